@@ -1,0 +1,30 @@
+"""One clock for everything that waits: real time, or virtual time for tests.
+
+Nothing in smachpy sleeps, starts a thread or waits for an event past the `Clock` protocol, so a
+mission with its action servers runs unchanged on `RealClock` (wall time) or `VirtualClock`
+(deterministic, as fast as the computer allows).
+"""
+
+from actionlib_core.clock._current import current_clock as current_clock
+from actionlib_core.clock._current import use_clock as use_clock
+from actionlib_core.clock._protocol import Clock as Clock
+from actionlib_core.clock._protocol import Event as Event
+from actionlib_core.clock._protocol import Task as Task
+from actionlib_core.clock._protocol import Timer as Timer
+from actionlib_core.clock._real import RealClock as RealClock
+from actionlib_core.clock._serial import SerialExecutor as SerialExecutor
+from actionlib_core.clock._virtual import Deadlock as Deadlock
+from actionlib_core.clock._virtual import VirtualClock as VirtualClock
+
+__all__ = [
+    "Clock",
+    "Deadlock",
+    "Event",
+    "RealClock",
+    "SerialExecutor",
+    "Task",
+    "Timer",
+    "VirtualClock",
+    "current_clock",
+    "use_clock",
+]

@@ -1,0 +1,266 @@
+"""Wall time: threads from a cache, one timer thread on demand, events safe in signal handlers."""
+
+from __future__ import annotations
+
+import _thread
+import asyncio
+import contextvars
+import heapq
+import itertools
+import threading
+import time
+from typing import TYPE_CHECKING, TypeVar
+
+from actionlib_core.clock._serial import report_thread_exception
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Coroutine
+
+T = TypeVar("T")
+
+IDLE_S = 5.0  # a cached thread without work ends after this
+
+
+class RealEvent:
+    """An event whose `set` takes no lock, so that a signal handler may call it at any moment.
+
+    `threading.Event.set` takes a lock that the interrupted `wait` of the same thread may hold.
+    Here every waiter brings a lock of its own; list operations are atomic.
+    """
+
+    __slots__ = ("_flag", "_waiters")
+
+    def __init__(self) -> None:
+        self._flag = False
+        self._waiters: list[_thread.LockType] = []
+
+    def is_set(self) -> bool:
+        return self._flag
+
+    def set(self) -> None:
+        self._flag = True
+        while self._waiters:
+            try:
+                waiter = self._waiters.pop()
+            except IndexError:  # another `set` took the last one
+                return
+            waiter.release()
+
+    def clear(self) -> None:
+        self._flag = False
+
+    def wait(self, timeout: float | None = None) -> bool:
+        if self._flag:
+            return True
+        if timeout is not None and timeout <= 0:
+            return False
+        waiter = _thread.allocate_lock()
+        waiter.acquire()
+        self._waiters.append(waiter)
+        try:
+            # Set between the first look and the append: nobody may wake us.
+            if self._flag:
+                return True
+            longest = -1 if timeout is None else min(timeout, _LONGEST_S)
+            return waiter.acquire(timeout=longest) or self._flag
+        finally:
+            self._forget(waiter)
+
+    def _forget(self, waiter: _thread.LockType) -> None:
+        try:
+            self._waiters.remove(waiter)
+        except ValueError:  # `set` has already taken it
+            return
+
+
+_LONGEST_S = threading.TIMEOUT_MAX
+
+
+class _Worker:
+    """One cached thread: runs tasks handed to it, ends after `IDLE_S` without any."""
+
+    def __init__(self, cache: _ThreadCache) -> None:
+        self._cache = cache
+        self._wake = _thread.allocate_lock()
+        self._wake.acquire()
+        self._task: RealTask | None = None
+        self._thread = threading.Thread(target=self._run, name="idle", daemon=True)
+        self._started = False
+
+    def give(self, task: RealTask) -> None:
+        self._task = task
+        if self._started:
+            self._wake.release()
+        else:
+            self._started = True
+            self._thread.start()
+
+    def _run(self) -> None:
+        while True:
+            task = self._task
+            self._task = None
+            assert task is not None
+            self._thread.name = task.name
+            task.run()
+            self._thread.name = "idle"
+            del task
+            self._cache.put_back(self)
+            if not self._wake.acquire(timeout=IDLE_S):
+                if self._cache.retire(self):
+                    return
+                self._wake.acquire()  # `give` chose this worker at the last moment
+
+
+class _ThreadCache:
+    """Idle threads, newest first; starting one from here costs a lock hand-over."""
+
+    def __init__(self) -> None:
+        self._idle: list[_Worker] = []
+        self._lock = threading.Lock()
+
+    def start(self, task: RealTask) -> None:
+        with self._lock:
+            worker = self._idle.pop() if self._idle else None
+        if worker is None:
+            worker = _Worker(self)
+        worker.give(task)
+
+    def put_back(self, worker: _Worker) -> None:
+        with self._lock:
+            self._idle.append(worker)
+
+    def retire(self, worker: _Worker) -> bool:
+        with self._lock:
+            try:
+                self._idle.remove(worker)
+            except ValueError:
+                return False
+            return True
+
+
+class RealTask:
+    """A target running in a cached thread."""
+
+    __slots__ = ("_context", "_done", "_ident", "_target", "error", "name")
+
+    def __init__(self, target: Callable[[], object], name: str) -> None:
+        self._target = target
+        self._context = contextvars.copy_context()
+        self._done = RealEvent()
+        self._ident: int | None = None
+        self.name = name
+        self.error: BaseException | None = None
+
+    @property
+    def ident(self) -> int | None:
+        return self._ident
+
+    def run(self) -> None:
+        self._ident = threading.get_ident()
+        try:
+            self._context.run(self._target)
+        except BaseException as error:  # noqa: BLE001  the thread's border: kept and reported
+            self.error = error
+            if not isinstance(error, SystemExit):
+                report_thread_exception()
+        finally:
+            self._ident = None
+            del self._target, self._context
+            self._done.set()
+
+    def is_alive(self) -> bool:
+        return not self._done.is_set()
+
+    def join(self, timeout: float | None = None) -> bool:
+        return self._done.wait(timeout)
+
+
+class RealTimer:
+    """One entry of the timer thread."""
+
+    __slots__ = ("callback",)
+
+    def __init__(self, callback: Callable[[], object]) -> None:
+        self.callback: Callable[[], object] | None = callback
+
+    def cancel(self) -> None:
+        self.callback = None
+
+
+class _TimerThread:
+    """All timers of a clock in one thread, which exists while there are timers."""
+
+    def __init__(self, clock: RealClock) -> None:
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._heap: list[tuple[float, int, RealTimer]] = []
+        self._count = itertools.count()
+        self._running = False
+        self._changed = RealEvent()
+
+    def add(self, delay: float, timer: RealTimer) -> None:
+        with self._lock:
+            due = self._clock.now() + max(delay, 0.0)
+            heapq.heappush(self._heap, (due, next(self._count), timer))
+            if not self._running:
+                self._running = True
+                # An empty context: timers belong to the clock, not to who came first.
+                contextvars.Context().run(self._start)
+            elif self._heap[0][2] is timer:
+                self._changed.set()
+
+    def _start(self) -> None:
+        self._clock.spawn(self._run, name="clock-timers")
+
+    def _run(self) -> None:
+        while True:
+            with self._lock:
+                self._changed.clear()
+                while self._heap and self._heap[0][2].callback is None:
+                    heapq.heappop(self._heap)
+                if not self._heap:
+                    self._running = False
+                    return
+                wait = self._heap[0][0] - self._clock.now()
+                timer = heapq.heappop(self._heap)[2] if wait <= 0 else None
+            if timer is None:
+                self._changed.wait(wait)
+                continue
+            callback, timer.callback = timer.callback, None
+            if callback is not None:
+                try:
+                    callback()
+                except Exception:  # noqa: BLE001  a border: reported, other timers go on
+                    report_thread_exception()
+
+
+class RealClock:
+    """Monotonic and wall time of the computer, real threads."""
+
+    def __init__(self) -> None:
+        self._cache = _ThreadCache()
+        self._timers = _TimerThread(self)
+
+    now = staticmethod(time.monotonic)
+    time_ns = staticmethod(time.time_ns)
+
+    def sleep(self, seconds: float) -> None:
+        if seconds > 0:
+            time.sleep(seconds)
+
+    def event(self) -> RealEvent:
+        return RealEvent()
+
+    def spawn(self, target: Callable[[], object], *, name: str) -> RealTask:
+        task = RealTask(target, name)
+        self._cache.start(task)
+        return task
+
+    def call_later(self, delay: float, callback: Callable[[], object]) -> RealTimer:
+        timer = RealTimer(callback)
+        self._timers.add(delay, timer)
+        return timer
+
+    def run_async(self, main: Coroutine[object, object, T]) -> T:
+        with asyncio.Runner() as runner:
+            return runner.run(main)

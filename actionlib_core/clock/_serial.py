@@ -1,0 +1,71 @@
+"""Run callables one after another, off the calling thread, without a thread while idle."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.clock._protocol import Clock, Task
+
+
+class SerialExecutor:
+    """Runs submitted callables in order, one at a time, in a task that ends when idle.
+
+    User callbacks go through one of these, so that they may block without holding up the
+    transport, and callbacks of one owner never overlap.
+
+    Threads: `submit` may be called from any thread and never waits for a callable.
+    """
+
+    def __init__(self, clock: Clock, name: str) -> None:
+        self._clock = clock
+        self._name = name
+        self._lock = threading.Lock()
+        self._queue: deque[Callable[[], object]] = deque()
+        self._task: Task | None = None
+
+    def submit(self, function: Callable[[], object]) -> None:
+        """Run `function` after everything submitted before it."""
+        with self._lock:
+            self._queue.append(function)
+            if self._task is None:
+                self._task = self._clock.spawn(self._drain, name=self._name)
+
+    def join(self, timeout: float | None = None) -> bool:
+        """Wait until nothing is queued or running.
+
+        Returns:
+            Whether the executor became idle.
+
+        Blocks: until idle or `timeout` [s] has passed. Not to be called from a submitted callable.
+        """
+        with self._lock:
+            task = self._task
+        return task is None or task.join(timeout)
+
+    def _drain(self) -> None:
+        while True:
+            with self._lock:
+                if not self._queue:
+                    self._task = None
+                    return
+                function = self._queue.popleft()
+            try:
+                function()
+            except Exception:  # noqa: BLE001  a border: reported, and the next callable still runs
+                report_thread_exception()
+
+
+def report_thread_exception() -> None:
+    """Give the exception being handled to `threading.excepthook`, as an ending thread would."""
+    import sys
+
+    kind, value, traceback = sys.exc_info()
+    if kind is not None:
+        threading.excepthook(
+            threading.ExceptHookArgs((kind, value, traceback, threading.current_thread()))
+        )

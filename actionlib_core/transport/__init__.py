@@ -1,0 +1,172 @@
+"""The network as one object that can be replaced: zenoh for robots, memory for tests.
+
+A transport moves bytes under keys. It knows nothing of actions or messages. Every implementation
+passes the suite in `tests/conformance`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+class Sample(NamedTuple):
+    """One message as it crossed the network.
+
+    Attributes:
+        key: The key it was put on, slashes between words, none in front.
+        payload: The bytes.
+        encoding: What the bytes are, in the sender's words; "" when it said nothing.
+        source: Session id of the sender; "" when unknown.
+    """
+
+    key: str
+    payload: bytes
+    encoding: str
+    source: str
+
+
+class Presence(NamedTuple):
+    """A liveliness token that appeared or vanished."""
+
+    key: str
+    alive: bool
+
+
+class Reply(NamedTuple):
+    """An answer to a query; `error` replies carry their text in `payload`."""
+
+    key: str
+    payload: bytes
+    encoding: str
+    error: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Quality:
+    """How a publisher's messages travel.
+
+    Attributes:
+        express: Send at once, never batched (goals, cancels, results).
+        block: Wait for room rather than drop when the network is slower than the sender.
+        latch: Keep the last message and give it to every subscriber that comes later.
+    """
+
+    express: bool = False
+    block: bool = True
+    latch: bool = False
+
+
+class Closable(Protocol):
+    """Something declared on the network."""
+
+    def close(self) -> None:
+        """Undeclare it; a second call does nothing. No callback starts after it returned."""
+        ...
+
+
+class PublisherPort(Closable, Protocol):
+    """The sending end of a key."""
+
+    def put(self, payload: bytes) -> None:
+        """Send `payload` to every subscriber of the key.
+
+        Raises:
+            TransportError: the transport is closed.
+        """
+        ...
+
+    def matching(self) -> bool:
+        """Tell whether any subscriber listens now."""
+        ...
+
+
+class Query(Protocol):
+    """A question that a queryable answers, now or later, from any thread."""
+
+    key: str
+    payload: bytes
+    encoding: str
+
+    def reply(self, payload: bytes, encoding: str = "") -> None:
+        """Send an answer."""
+        ...
+
+    def reply_error(self, text: str) -> None:
+        """Send an error; the asking side sees it as `Reply(error=True)`."""
+        ...
+
+    def finish(self) -> None:
+        """End the exchange; the asking side's `on_done` fires when all queryables have finished."""
+        ...
+
+
+class Transport(Protocol):
+    """One session on the network.
+
+    Threads: callbacks run on the transport's own thread, in order per key and sender; they must be
+    short and must not wait. They may call every method here, also for their own key.
+    """
+
+    @property
+    def session_id(self) -> str:
+        """This session's id: lower-case hexadecimal, unique on the network."""
+        ...
+
+    def publisher(self, key: str, encoding: str = "", quality: Quality = ...) -> PublisherPort:
+        """Declare that this session sends on `key`."""
+        ...
+
+    def subscribe(self, key: str, callback: Callable[[Sample], None]) -> Closable:
+        """Receive what is put on `key`, own puts included; a latched last message first."""
+        ...
+
+    def queryable(self, key: str, callback: Callable[[Query], None]) -> Closable:
+        """Answer the queries on `key`."""
+        ...
+
+    def query(
+        self,
+        key: str,
+        payload: bytes,
+        *,
+        encoding: str = "",
+        timeout: float,
+        on_reply: Callable[[Reply], None],
+        on_done: Callable[[], None],
+    ) -> Closable:
+        """Ask every queryable on `key`; `on_done` is called exactly once, after the last reply.
+
+        Args:
+            timeout: After this [s] the query is done, whoever has not answered.
+        """
+        ...
+
+    def declare_alive(self, key: str) -> Closable:
+        """Show a liveliness token on `key` until it is closed or this session dies."""
+        ...
+
+    def watch_alive(self, pattern: str, callback: Callable[[Presence], None]) -> Closable:
+        """Hear of tokens matching `pattern`: those that exist now first, then every change.
+
+        Args:
+            pattern: A key in which `*` stands for one word and `**` for any number of words.
+        """
+        ...
+
+    def list_alive(self, pattern: str, timeout: float) -> list[str]:
+        """Return the keys of the tokens that match `pattern` now.
+
+        Blocks: until the network has answered, `timeout` [s] at most.
+        """
+        ...
+
+    def close(self) -> None:
+        """Undeclare everything and leave the network; a second call does nothing.
+
+        Blocks: under a second. No callback runs after it returned.
+        """
+        ...
