@@ -59,10 +59,10 @@ class RealEvent:
         self._waiters.append(waiter)
         try:
             # Set between the first look and the append: nobody may wake us.
-            if self._flag:
+            if self.is_set():
                 return True
             longest = -1 if timeout is None else min(timeout, _LONGEST_S)
-            return waiter.acquire(timeout=longest) or self._flag
+            return waiter.acquire(timeout=longest) or self.is_set()
         finally:
             self._forget(waiter)
 

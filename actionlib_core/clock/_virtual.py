@@ -19,9 +19,12 @@ if TYPE_CHECKING:
     from types import TracebackType
     from typing import Self
 
+    from _typeshed import FileDescriptorLike as _File
+
 T = TypeVar("T")
 
 START_TIME_NS = 1_000_000_000 * 1_000_000_000  # 2001-09-09T01:46:40Z: stamps of tests never change
+INTERRUPT_S = 1.0  # real seconds that an interrupted thread waits for its turn
 JOIN_S = 5.0  # real seconds that `close` gives a thread to unwind
 
 
@@ -41,7 +44,7 @@ class Deadlock(Exception):  # noqa: N818  the field's word
         )
 
 
-class _Stopped(BaseException):  # noqa: N818  ends a participant's thread, never seen by users
+class _Stopped(BaseException):
     """The clock was closed while this participant waited."""
 
 
@@ -275,21 +278,24 @@ class VirtualClock:
         if me.error is not None:
             error, me.error = me.error, None
             raise error
-        if self._closed and me is not self._owner:
-            raise _Stopped
+        self._check_open(me)
         return me.woken
 
+    def _check_open(self, me: _Participant) -> None:
+        if self._closed and me is not self._owner:
+            raise _Stopped
+
     def _sit_out(self, me: _Participant) -> None:
-        """Wait for the turn; an exception of a signal handler waits for it too, then goes on."""
-        while True:
-            try:
-                me.gate.acquire()
-            except BaseException as error:  # noqa: BLE001  KeyboardInterrupt: raised by `_wait`
-                me.error = error
-                with self._lock:
-                    self._wake(me)
-            else:
-                return
+        """Wait for the turn; so does, for a moment, what a signal handler raised."""
+        try:
+            me.gate.acquire()
+        except BaseException as error:
+            with self._lock:
+                self._wake(me)
+            if not me.gate.acquire(timeout=INTERRUPT_S):
+                self._closed = True  # another participant never waits: this clock is broken
+                raise
+            me.error = error
 
     def _leave(self) -> None:
         """Hand the turn on for good: the participant's thread ends."""
@@ -300,7 +306,7 @@ class VirtualClock:
         self._pass_on(None)
 
     def _pass_on(self, me: _Participant | None) -> bool:
-        """Run callbacks and choose who goes on; False when that is `me`, which then just returns."""
+        """Run callbacks and choose who goes on; False when that is `me`."""
         while True:
             with self._lock:
                 chosen = self._choose()
@@ -386,20 +392,16 @@ class _VirtualSelector(selectors.BaseSelector):
         self.wakeup = clock.event("a coroutine")
         self._keys: dict[object, selectors.SelectorKey] = {}
 
-    def register(
-        self, fileobj: selectors._FileObject, events: int, data: object = None
-    ) -> selectors.SelectorKey:
+    def register(self, fileobj: _File, events: int, data: object = None) -> selectors.SelectorKey:
         fd = fileobj if isinstance(fileobj, int) else fileobj.fileno()
         key = selectors.SelectorKey(fileobj, fd, events, data)
         self._keys[fileobj] = key
         return key
 
-    def unregister(self, fileobj: selectors._FileObject) -> selectors.SelectorKey:
+    def unregister(self, fileobj: _File) -> selectors.SelectorKey:
         return self._keys.pop(fileobj)
 
-    def select(
-        self, timeout: float | None = None
-    ) -> list[tuple[selectors.SelectorKey, int]]:
+    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
         self.wakeup.wait(timeout)
         self.wakeup.clear()
         return []

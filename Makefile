@@ -1,0 +1,32 @@
+# smachpy: `make run` drives the patrol mission, `make test` checks everything.
+BIN := .venv/bin
+
+.PHONY: help run test lint types format bench clean
+
+help:  ## Show the targets
+	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | expand -t 12
+
+run:  ## Drive the simulated robot through the patrol mission
+	@.ci/venv dot,sim
+	@$(BIN)/smachpy run patrol --start-robot --out out
+
+test: lint types  ## Check everything: ruff, mypy, import-linter, pytest
+	$(BIN)/python -m pytest -q -n 2
+
+lint:
+	@.ci/venv dot,sim,test
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/lint-imports
+
+types:
+	@.ci/venv dot,sim,test
+	$(BIN)/mypy
+
+format:  ## Put the code into shape
+	@.ci/venv dot,sim,test
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+clean:  ## Remove everything that was made
+	rm -rf .venv out build dist *.egg-info .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,92 @@
+"""The `smachpy` command: every subcommand is found through an entry point.
+
+A package adds a subcommand with an entry point in the group `smachpy.commands` whose object is a
+function `register(subparsers)`. It adds one parser and sets `run=function(args) -> int`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import traceback
+from importlib.metadata import EntryPoint, entry_points, version
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from actionlib_core.exceptions import ActionlibError
+from smachpy.exceptions import SmachError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+GROUP = "smachpy.commands"
+EXIT_ERROR = 2
+EXIT_INTERRUPTED = 128 + signal.SIGINT
+
+
+class UsageError(SmachError):
+    """What the user asked for cannot be done; the text says why and what to try."""
+
+
+class _Parser(argparse.ArgumentParser):
+    """argparse with the house's exit code and a way out in every error."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(EXIT_ERROR, f"{self.prog}: {message}\nTry '{self.prog} --help'.\n")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code.
+
+    Exit codes: 0 success, 1 the mission or check did not succeed, 2 bad input, 130 Ctrl-C.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    try:
+        args = _parser(arguments).parse_args(arguments)
+        return int(args.run(args))
+    except KeyboardInterrupt:
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:  # `smachpy list | head`: the reader has seen enough
+        sys.stderr.close()
+        return 0
+    except (SmachError, ActionlibError) as error:
+        return _report(error, debug="--debug" in arguments)
+
+
+def _report(error: Exception, *, debug: bool) -> int:
+    if debug:
+        traceback.print_exception(error)
+    else:
+        print(f"smachpy: {error}", file=sys.stderr)
+    return EXIT_ERROR
+
+
+def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
+    parser = _Parser(prog="smachpy", description="Robot missions: run, draw and test them.")
+    parser.add_argument("--version", action="version", version=f"smachpy {version('smachpy')}")
+    subparsers = parser.add_subparsers(
+        metavar="COMMAND", required=True, parser_class=_Parser, dest="command"
+    )
+    for command in _wanted(arguments):
+        _load(command)(subparsers)
+    for subparser in subparsers.choices.values():
+        subparser.add_argument("--debug", action="store_true", help="show tracebacks of errors")
+    return parser
+
+
+def _wanted(arguments: Sequence[str]) -> list[EntryPoint]:
+    """The one command that is asked for, so that the others need not be imported, else all."""
+    commands = sorted(entry_points(group=GROUP), key=lambda command: command.name)
+    first = next((word for word in arguments if not word.startswith("-")), None)
+    return [command for command in commands if command.name == first] or commands
+
+
+def _load(command: EntryPoint) -> Callable[[Any], None]:
+    try:
+        register: Callable[[Any], None] = command.load()
+    except ModuleNotFoundError as error:
+        raise UsageError(
+            f"smachpy {command.name}: package {error.name!r} is missing. "
+            "Try: pip install 'smachpy[dot,sim]'"
+        ) from error
+    return register

@@ -1,0 +1,201 @@
+"""Find the machine that a user names on a command line: a mission, a module or a file."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import importlib.util
+import inspect
+import sys
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from smachpy.container import Container
+from smachpy.exceptions import SmachError
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+GROUP = "smachpy.missions"
+DEFAULT_NAMES = ("mission", "machine", "sm")
+
+
+class TargetError(SmachError):
+    """The named mission, module or file cannot be loaded.
+
+    Attributes:
+        target: What the user wrote.
+    """
+
+    def __init__(self, target: str, problem: str) -> None:
+        self.target = target
+        super().__init__(f"target {target!r}: {problem}")
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A machine, or the function that makes it.
+
+    Attributes:
+        name: What to call it in messages and file names.
+        source: Where it was found, `module:attribute`.
+        summary: First line of its docstring.
+    """
+
+    name: str
+    source: str
+    summary: str
+    thing: Any
+
+    def build(self, **arguments: object) -> Container:
+        """Return the machine; a factory is called with `arguments`.
+
+        Raises:
+            TargetError: it takes no such argument, or gives something that is no container.
+        """
+        if isinstance(self.thing, Container):
+            if arguments:
+                raise TargetError(
+                    self.name,
+                    f"got arguments {sorted(arguments)}; expected none, {self.source} is a "
+                    "finished machine. Try a function that returns one.",
+                )
+            return self.thing
+        self._check_arguments(arguments)
+        machine = self.thing(**arguments)
+        if not isinstance(machine, Container):
+            raise TargetError(
+                self.name, f"{self.source} returned {machine!r}; expected a state machine."
+            )
+        return machine
+
+    def _check_arguments(self, arguments: dict[str, object]) -> None:
+        try:
+            inspect.signature(self.thing).bind(**arguments)
+        except TypeError as error:
+            raise TargetError(
+                self.name,
+                f"{self.source}{inspect.signature(self.thing)} cannot be called with "
+                f"{sorted(arguments)}: {error}.",
+            ) from error
+
+
+def list_missions() -> list[Target]:
+    """Return the missions that installed packages offer (entry points `smachpy.missions`)."""
+    return [_load_mission(name) for name in _mission_names()]
+
+
+def load_target(text: str) -> Target:
+    """Load what a user named.
+
+    Args:
+        text: A mission's name (`patrol`), `module:factory`, or `path.py[:factory]`. Without
+            `:factory` a file's `mission`, `machine` or `sm` is taken, else its only machine.
+
+    Raises:
+        TargetError: there is no such thing; names the nearest ones.
+    """
+    place, _, attribute = text.partition(":")
+    if place.endswith(".py") or "/" in place:
+        return _from_module(text, _import_file(text, Path(place)), attribute, Path(place).stem)
+    if attribute:
+        return _from_module(text, _import_module(text, place), attribute, attribute)
+    if place in _mission_names():
+        return _load_mission(place)
+    raise TargetError(text, f"no such mission; {_suggest(place, _mission_names())}")
+
+
+def _mission_names() -> list[str]:
+    return sorted(point.name for point in entry_points(group=GROUP))
+
+
+def _load_mission(name: str) -> Target:
+    (point,) = (point for point in entry_points(group=GROUP) if point.name == name)
+    try:
+        thing = point.load()
+    except ModuleNotFoundError as error:
+        raise TargetError(
+            name, f"package {error.name!r} is missing. Try: pip install 'smachpy[sim]'"
+        ) from error
+    return _target(name, point.value, thing)
+
+
+def _import_file(text: str, path: Path) -> ModuleType:
+    if not path.is_file():
+        near = sorted(str(p) for p in path.parent.glob("*.py")) if path.parent.is_dir() else []
+        raise TargetError(text, f"no file {str(path)!r}; {_suggest(str(path), near)}")
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    if spec is None or spec.loader is None:
+        raise TargetError(
+            text, f"{str(path)!r} is not a Python file; expected a name ending in .py"
+        )
+    module = importlib.util.module_from_spec(spec)
+    sys.modules.setdefault(path.stem, module)  # dataclasses and pickles look their module up
+    sys.path.insert(0, str(path.parent.resolve()))  # as `python path.py` would
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise TargetError(text, f"running the file raised {_text_of(error)}") from error
+    finally:
+        sys.path.remove(str(path.parent.resolve()))
+    return module
+
+
+def _import_module(text: str, name: str) -> ModuleType:
+    here = str(Path.cwd())
+    sys.path.insert(0, here)
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        raise TargetError(
+            text, f"no module {error.name!r}; expected one on the Python path or in {here!r}."
+        ) from error
+    except Exception as error:
+        raise TargetError(text, f"importing {name!r} raised {_text_of(error)}") from error
+    finally:
+        sys.path.remove(here)
+
+
+def _from_module(text: str, module: ModuleType, attribute: str, name: str) -> Target:
+    names = [attribute] if attribute else [n for n in DEFAULT_NAMES if hasattr(module, n)]
+    if not names:
+        machines = [n for n, thing in vars(module).items() if isinstance(thing, Container)]
+        if len(machines) != 1:
+            raise TargetError(
+                text,
+                f"which machine is meant? got {machines}; expected one of "
+                f"{list(DEFAULT_NAMES)} or a single machine. Try {text}:NAME.",
+            )
+        names = machines
+    thing: Any = module
+    for word in names[0].split("."):
+        if not hasattr(thing, word):
+            public = [n for n, value in vars(module).items() if _usable(n, value)]
+            raise TargetError(text, f"nothing is called {names[0]!r}; {_suggest(word, public)}")
+        thing = getattr(thing, word)
+    if not (isinstance(thing, Container) or callable(thing)):
+        raise TargetError(
+            text, f"{names[0]} is {thing!r}; expected a machine or a function that returns one."
+        )
+    return _target(name, f"{module.__name__}:{names[0]}", thing)
+
+
+def _usable(name: str, value: object) -> bool:
+    return not name.startswith("_") and (isinstance(value, Container) or inspect.isfunction(value))
+
+
+def _target(name: str, source: str, thing: Any) -> Target:
+    doc = "" if isinstance(thing, Container) else (inspect.getdoc(thing) or "").strip()
+    return Target(name, source, doc.splitlines()[0] if doc else "", thing)
+
+
+def _suggest(word: str, names: list[str]) -> str:
+    near = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
+    hint = f" Did you mean {near[0]!r}?" if near else ""
+    return f"expected one of {sorted(names)}.{hint}"
+
+
+def _text_of(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"

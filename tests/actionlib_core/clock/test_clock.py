@@ -1,0 +1,182 @@
+"""What every clock promises, on real and on virtual time."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from contextvars import ContextVar
+
+import pytest
+
+from actionlib_core.clock import (
+    Clock,
+    RealClock,
+    SerialExecutor,
+    VirtualClock,
+    current_clock,
+    use_clock,
+)
+
+
+@pytest.fixture(params=["real", "virtual"])
+def any_clock(request):
+    if request.param == "real":
+        yield RealClock()
+    else:
+        with VirtualClock() as clock:
+            yield clock
+
+
+def test_clocks_satisfy_the_protocol(any_clock):
+    assert isinstance(any_clock, Clock)
+
+
+def test_event_set_before_the_wait_returns_at_once(any_clock):
+    event = any_clock.event()
+    event.set()
+    assert event.is_set()
+    assert event.wait()
+    assert event.wait(0)
+
+
+def test_event_wait_times_out(any_clock):
+    before = any_clock.now()
+    assert not any_clock.event().wait(0.01)
+    assert any_clock.now() >= before + 0.01
+    assert not any_clock.event().wait(0)
+    assert not any_clock.event().wait(-1)
+
+
+def test_event_set_wakes_every_waiter(any_clock):
+    event, woken = any_clock.event(), []
+    tasks = [any_clock.spawn(lambda: woken.append(event.wait(5)), name=f"w{i}") for i in range(5)]
+    any_clock.call_later(0.001, event.set)
+    assert all(task.join(5) for task in tasks)
+    assert woken == [True] * 5
+
+
+def test_event_clear_resets(any_clock):
+    event = any_clock.event()
+    event.set()
+    event.clear()
+    assert not event.is_set()
+    assert not event.wait(0.001)
+
+
+def test_spawn_runs_in_a_copy_of_the_context(any_clock):
+    variable = ContextVar("variable", default="outside")
+    seen = []
+
+    def target():
+        seen.append(variable.get())
+        variable.set("changed")
+
+    variable.set("inside")
+    any_clock.spawn(target, name="t").join(5)
+    assert seen == ["inside"]
+    assert variable.get() == "inside"
+
+
+def test_spawn_names_its_thread_and_knows_its_ident(any_clock):
+    seen = []
+    ready, go = any_clock.event(), any_clock.event()
+
+    def target():
+        seen.extend([threading.current_thread().name, threading.get_ident()])
+        ready.set()
+        go.wait(5)
+
+    task = any_clock.spawn(target, name="/PATROL/DRIVE")
+    assert ready.wait(5)
+    assert task.is_alive()
+    assert seen == ["/PATROL/DRIVE", task.ident]
+    go.set()
+    assert task.join(5)
+    assert not task.is_alive()
+    assert task.ident is None
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_spawn_keeps_and_reports_what_the_target_raised(any_clock, monkeypatch):
+    reported = []
+    monkeypatch.setattr(threading, "excepthook", lambda args: reported.append(args.exc_type))
+    task = any_clock.spawn(lambda: 1 / 0, name="t")
+    assert task.join(5)
+    assert isinstance(task.error, ZeroDivisionError)
+    assert reported == [ZeroDivisionError]
+
+
+def test_call_later_runs_in_order_of_the_deadlines(any_clock):
+    done, order = any_clock.event(), []
+    any_clock.call_later(0.02, lambda: (order.append("late"), done.set()))
+    any_clock.call_later(0.01, lambda: order.append("early"))
+    assert done.wait(5)
+    assert order == ["early", "late"]
+
+
+def test_call_later_cancelled_never_runs(any_clock):
+    order, done = [], any_clock.event()
+    any_clock.call_later(0.01, lambda: order.append("cancelled")).cancel()
+    any_clock.call_later(0.02, done.set)
+    assert done.wait(5)
+    assert order == []
+
+
+def test_call_later_reports_an_error_and_runs_the_next(any_clock, monkeypatch):
+    reported, done = [], any_clock.event()
+    monkeypatch.setattr(threading, "excepthook", lambda args: reported.append(args.exc_type))
+    any_clock.call_later(0.001, lambda: 1 / 0)
+    any_clock.call_later(0.002, done.set)
+    assert done.wait(5)
+    assert reported == [ZeroDivisionError]
+
+
+def test_run_async_returns_the_result_and_uses_the_clock(any_clock):
+    async def main():
+        before = any_clock.now()
+        await asyncio.sleep(0.01)
+        return any_clock.now() - before
+
+    assert any_clock.run_async(main()) >= 0.009
+
+
+def test_run_async_is_woken_from_another_thread(any_clock):
+    async def main():
+        loop, future = asyncio.get_running_loop(), asyncio.get_running_loop().create_future()
+        any_clock.spawn(lambda: loop.call_soon_threadsafe(future.set_result, "woken"), name="waker")
+        return await future
+
+    assert any_clock.run_async(main()) == "woken"
+
+
+def test_serial_executor_runs_in_order_one_at_a_time(any_clock):
+    executor, order = SerialExecutor(any_clock, "serial"), []
+    for i in range(20):
+        executor.submit(lambda i=i: order.append(i))
+    assert executor.join(5)
+    assert order == list(range(20))
+
+
+def test_serial_executor_goes_on_after_an_error(any_clock, monkeypatch):
+    reported, order = [], []
+    monkeypatch.setattr(threading, "excepthook", lambda args: reported.append(args.exc_type))
+    executor = SerialExecutor(any_clock, "serial")
+    executor.submit(lambda: 1 / 0)
+    executor.submit(lambda: order.append("next"))
+    assert executor.join(5)
+    assert (reported, order) == ([ZeroDivisionError], ["next"])
+
+
+def test_serial_executor_accepts_work_from_its_own_work(any_clock):
+    executor, done = SerialExecutor(any_clock, "serial"), any_clock.event()
+    executor.submit(lambda: executor.submit(done.set))
+    assert done.wait(5)
+
+
+def test_use_clock_reaches_spawned_tasks_and_ends_with_the_block():
+    outside = current_clock()
+    with VirtualClock() as clock, use_clock(clock):
+        seen = []
+        clock.spawn(lambda: seen.append(current_clock()), name="t").join()
+        assert seen == [clock]
+    assert current_clock() is outside

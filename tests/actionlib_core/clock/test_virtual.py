@@ -1,0 +1,182 @@
+"""Virtual time: determinism, jumps, seeds, deadlocks."""
+
+from __future__ import annotations
+
+import signal
+import threading
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from actionlib_core.clock import Deadlock, VirtualClock
+
+
+def test_time_jumps_to_the_next_deadline(clock):
+    clock.sleep(3600)
+    assert clock.now() == 3600
+    assert clock.time_ns() - VirtualClock().time_ns() == 3600 * 10**9
+
+
+def test_one_participant_runs_at_a_time(clock):
+    running, most = [], []
+
+    def work():
+        for _ in range(20):
+            running.append(1)
+            most.append(len(running))
+            running.pop()
+            clock.sleep(0.1)
+
+    tasks = [clock.spawn(work, name=f"t{i}") for i in range(4)]
+    assert all(task.join() for task in tasks)
+    assert set(most) == {1}
+    assert clock.now() == pytest.approx(2.0)
+
+
+def interleaving(seed: int | None) -> list[tuple[str, int]]:
+    with VirtualClock(seed) as clock:
+        order = []
+
+        def work(name):
+            for i in range(5):
+                order.append((name, i))
+                clock.sleep(1)
+
+        tasks = [clock.spawn(lambda n=n: work(n), name=n) for n in "abc"]
+        for task in tasks:
+            task.join()
+        return order
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**32))
+def test_the_same_seed_gives_the_same_run(seed):
+    assert interleaving(seed) == interleaving(seed)
+
+
+def test_seeds_differ_and_no_seed_takes_turns():
+    assert interleaving(None)[:6] == [("a", 0), ("b", 0), ("c", 0), ("a", 1), ("b", 1), ("c", 1)]
+    assert len({tuple(interleaving(seed)) for seed in range(10)}) > 3
+
+
+def test_a_wait_that_can_never_end_raises_with_everybody_s_reason(clock):
+    never = clock.event("the result of goal 7")
+    clock.spawn(never.wait, name="/PATROL/DRIVE")
+    with pytest.raises(Deadlock) as caught:
+        clock.event("the patrol").wait()
+    assert caught.value.waits == {
+        "MainThread": "the patrol",
+        "/PATROL/DRIVE": "the result of goal 7",
+    }
+    assert "/PATROL/DRIVE: waits for the result of goal 7" in str(caught.value)
+
+
+def test_the_run_can_go_on_after_a_deadlock(clock):
+    with pytest.raises(Deadlock):
+        clock.event().wait()
+    clock.sleep(1)
+    assert clock.now() == 1
+
+
+def test_close_ends_participants_that_still_wait():
+    with VirtualClock() as clock:
+        unwound = []
+
+        def work():
+            try:
+                clock.event().wait()
+            finally:
+                unwound.append(True)
+
+        task = clock.spawn(work, name="t")
+        clock.sleep(1)
+        assert task.is_alive()
+    assert unwound == [True]
+    assert not task.is_alive()
+
+
+def test_close_ends_a_participant_that_never_started():
+    with VirtualClock() as clock:
+        started = []
+        clock.spawn(lambda: started.append(1), name="t")
+    assert started == []
+
+
+def test_a_foreign_thread_may_set_but_not_wait(clock):
+    event, errors = clock.event(), []
+
+    def foreign():
+        event.set()
+        try:
+            clock.sleep(1)
+        except RuntimeError as error:
+            errors.append(str(error))
+
+    thread = threading.Thread(target=foreign, name="foreign")
+    thread.start()
+    thread.join()
+    assert event.wait()
+    assert "'foreign' may not wait" in errors[0]
+
+
+def test_a_callback_may_not_wait(clock, monkeypatch):
+    reported = []
+    monkeypatch.setattr(threading, "excepthook", lambda args: reported.append(str(args.exc_value)))
+    clock.call_later(1, lambda: clock.sleep(1))
+    clock.sleep(2)
+    assert "a callback may not wait" in reported[0]
+
+
+def test_a_raising_signal_handler_waits_for_the_turn_then_goes_on(clock):
+    class Interrupt(Exception):
+        pass
+
+    def handler(*_):
+        raise Interrupt
+
+    # The participant holds the turn while the signal reaches the waiting main thread.
+    def work():
+        signal.pthread_kill(threading.main_thread().ident, signal.SIGALRM)
+        while clock._owner in clock._waits:
+            pass
+        clock.sleep(1)
+
+    previous = signal.signal(signal.SIGALRM, handler)
+    try:
+        task = clock.spawn(work, name="t")
+        with pytest.raises(Interrupt):
+            clock.event().wait()
+    finally:
+        signal.signal(signal.SIGALRM, previous)
+    assert task.join()
+
+
+def test_an_interrupt_ends_the_wait_for_a_participant_that_never_waits(clock, monkeypatch):
+    class Interrupt(Exception):
+        pass
+
+    def handler(*_):
+        raise Interrupt
+
+    monkeypatch.setattr("actionlib_core.clock._virtual.INTERRUPT_S", 0.01)
+    stop = threading.Event()
+
+    def hog():
+        signal.pthread_kill(threading.main_thread().ident, signal.SIGALRM)
+        stop.wait(5)
+
+    previous = signal.signal(signal.SIGALRM, handler)
+    try:
+        clock.spawn(hog, name="hog")
+        with pytest.raises(Interrupt):
+            clock.event().wait()
+    finally:
+        signal.signal(signal.SIGALRM, previous)
+        stop.set()
+
+
+def test_ten_hours_of_sleeps_cost_little(clock):
+    for _ in range(36_000):
+        clock.sleep(1)
+    assert clock.now() == 36_000

@@ -1,0 +1,52 @@
+"""What every test gets: a watch for leaked threads and processes, a virtual clock, a network."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from actionlib_core.clock import VirtualClock, use_clock
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+# Threads that a clock keeps for a few seconds, without work.
+CACHED = {"idle", "clock-timers"}
+GRACE_S = 2.0
+
+
+def _threads() -> set[threading.Thread]:
+    return {t for t in threading.enumerate() if t.name not in CACHED}
+
+
+def _children() -> set[str]:
+    children: set[str] = set()
+    for task in Path("/proc/self/task").iterdir():
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # the thread has ended
+            children.update((task / "children").read_text().split())
+    return children
+
+
+@pytest.fixture(autouse=True)
+def no_leaks() -> Iterator[None]:
+    """Fail a test that leaves a thread or a process behind."""
+    threads, children = _threads(), _children()
+    yield
+    left = _threads() - threads
+    for thread in left:
+        if thread is not threading.current_thread():
+            thread.join(GRACE_S if thread.name not in CACHED else 0)
+    left = {t for t in left if t.is_alive() and t.name not in CACHED}
+    assert not left, f"threads left behind: {sorted(t.name for t in left)}"
+    assert not _children() - children, f"processes left behind: {_children() - children}"
+
+
+@pytest.fixture
+def clock() -> Iterator[VirtualClock]:
+    """A virtual clock, in force for the test."""
+    with VirtualClock() as clock, use_clock(clock):
+        yield clock
