@@ -1,0 +1,274 @@
+"""What a running machine reports: one closed union of small immutable records.
+
+Every event begins with the same three fields: `path` of the state it is about
+("/PATROL/DRIVE"), `t`, the clock's monotonic time [s], and `stamp_ns`, nanoseconds since the
+Unix epoch. Events are tuples, because a transition costs less than a microsecond and making a
+dataclass costs more than that.
+
+The events of one run, in order, rebuild it: `Started` and `Finished` enclose it; `Entered` and
+`Left` enclose every state below the root, containers included. A state that raised has `Failed`
+in place of `Left`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, TypeAlias
+
+
+class Started(NamedTuple):
+    """A root container began to run."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    initial: tuple[str, ...] = ()
+
+
+class Finished(NamedTuple):
+    """A root container's run ended; `outcome` is None when it raised."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    outcome: str | None
+
+
+class Entered(NamedTuple):
+    """A state became active."""
+
+    path: str
+    t: float
+    stamp_ns: int
+
+
+class Left(NamedTuple):
+    """A state ended with `outcome`."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    outcome: str
+
+
+class Failed(NamedTuple):
+    """A state raised; `error` is "Type: message"."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    error: str
+
+
+class PreemptRequested(NamedTuple):
+    """Somebody asked the state to stop."""
+
+    path: str
+    t: float
+    stamp_ns: int
+
+
+class Preempted(NamedTuple):
+    """A container ended because of a preempt; `label` is the child that was not started or not
+    followed."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    label: str
+
+
+class Abandoned(NamedTuple):
+    """A state ignored its preempt for `grace` [s]; `stack` shows where it was."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    grace: float
+    stack: str
+
+
+class TimedOut(NamedTuple):
+    """A state ran into its `timeout` [s] and was preempted."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    timeout: float
+
+
+class Retried(NamedTuple):
+    """A state runs again after attempt number `attempt` ended with `reason`."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    attempt: int
+    reason: str
+
+
+class Iterated(NamedTuple):
+    """An iterator took item number `index` (from 0)."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    index: int
+
+
+class CallbackFailed(NamedTuple):
+    """A callback, hook or listener raised; the machine goes on."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    callback: str
+    error: str
+
+
+class UserdataWritten(NamedTuple):
+    """The state at `path` wrote `value` to `key` (the container's name of the key)."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    key: str
+    value: Any
+
+
+class Paused(NamedTuple):
+    """The machine stands still before the state at `path`; `reason`: "pause", "step" or
+    "breakpoint"."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    reason: str
+
+
+class Resumed(NamedTuple):
+    """The machine goes on with the state at `path`."""
+
+    path: str
+    t: float
+    stamp_ns: int
+
+
+class Jumped(NamedTuple):
+    """An operator sent the container at `path` to its child `label`."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    label: str
+
+
+class OutcomeForced(NamedTuple):
+    """An operator ended the state at `path` with `outcome`."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    outcome: str
+
+
+class GoalSent(NamedTuple):
+    """An action state sent a goal."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    action: str
+    goal_id: str
+    goal: Any
+
+
+class GoalFeedback(NamedTuple):
+    """An action server reported progress."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    action: str
+    goal_id: str
+    feedback: Any
+
+
+class GoalDone(NamedTuple):
+    """A goal ended; `status` is the name of its goal status ("SUCCEEDED")."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    action: str
+    goal_id: str
+    status: str
+    text: str
+    result: Any = None
+
+
+Event: TypeAlias = (
+    Started
+    | Finished
+    | Entered
+    | Left
+    | Failed
+    | PreemptRequested
+    | Preempted
+    | Abandoned
+    | TimedOut
+    | Retried
+    | Iterated
+    | CallbackFailed
+    | UserdataWritten
+    | Paused
+    | Resumed
+    | Jumped
+    | OutcomeForced
+    | GoalSent
+    | GoalFeedback
+    | GoalDone
+)
+
+EVENT_TYPES: tuple[type[Event], ...] = Event.__args__
+_BY_NAME = {kind.__name__: kind for kind in EVENT_TYPES}
+
+
+def to_record(event: Event) -> dict[str, Any]:
+    """Return `event` as a dict of its fields and its `kind`, for JSON.
+
+    Values that JSON does not know (goals, userdata) are replaced by their `repr`.
+    """
+    record: dict[str, Any] = {"kind": type(event).__name__}
+    for key, value in event._asdict().items():
+        record[key] = _plain(value)
+    return record
+
+
+def from_record(record: dict[str, Any]) -> Event:
+    """Rebuild the event of a `to_record` dict.
+
+    Raises:
+        ValueError: `kind` names no event, or a field is missing or unknown.
+    """
+    fields = dict(record)
+    name = fields.pop("kind", None)
+    kind = _BY_NAME.get(name) if isinstance(name, str) else None
+    if kind is None:
+        raise ValueError(f"event record: kind: got {name!r}; expected one of {sorted(_BY_NAME)}.")
+    fields = {key: tuple(v) if isinstance(v, list) else v for key, v in fields.items()}
+    try:
+        return kind(**fields)
+    except TypeError as error:
+        raise ValueError(
+            f"event record: {name}: got fields {sorted(fields)}; expected {list(kind._fields)}."
+        ) from error
+
+
+def _plain(value: Any) -> Any:
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, dict) and all(isinstance(key, str) for key in value):
+        return {key: _plain(item) for key, item in value.items()}
+    return repr(value)

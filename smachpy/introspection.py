@@ -1,0 +1,240 @@
+"""The structure of a machine as data: the only thing that pictures and viewers read.
+
+`describe` walks a machine and returns one recursive, immutable record, which survives a round
+trip through JSON. The live side is the event stream (`smachpy.events`), whose paths are the paths
+of these records.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from smachpy.state import State
+
+Kind: TypeAlias = Literal[
+    "state",
+    "callback",
+    "action",
+    "service",
+    "monitor",
+    "condition",
+    "machine",
+    "sequence",
+    "concurrence",
+    "iterator",
+]
+KINDS: frozenset[str] = frozenset(get_args(Kind))
+
+
+@dataclass(frozen=True, slots=True)
+class TransitionRecord:
+    """One edge inside a container.
+
+    Attributes:
+        source: Label of the child that the edge leaves.
+        outcome: Outcome of that child.
+        target: Label of another child, or an outcome of the container.
+        target_is_outcome: Which of the two `target` is.
+        implicit: The user did not write the edge: an outcome that falls through to the container
+            outcome of the same name.
+    """
+
+    source: str
+    outcome: str
+    target: str
+    target_is_outcome: bool = False
+    implicit: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class RuleRecord:
+    """How a container derives an outcome from its children's outcomes.
+
+    Attributes:
+        outcome: Outcome of the container.
+        conditions: Pairs (child label, child outcome) that the rule names.
+        text: The rule in words, for a picture ("any of DRIVE:failed, WATCH:low").
+    """
+
+    outcome: str
+    conditions: tuple[tuple[str, str], ...] = ()
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class StateRecord:
+    """One state, with everything below it.
+
+    Attributes:
+        path: Absolute path ("/PATROL/DRIVE"); the root's is "/" and its name.
+        label: Last part of the path.
+        kind: What sort of state it is.
+        type_name: Class name.
+        outcomes: Registered outcomes, in the order of their declaration.
+        input_keys: Userdata keys it may read.
+        output_keys: Userdata keys it may write.
+        remapping: Pairs (key of the state, key of its container).
+        doc: First paragraph of the class's docstring, or "".
+        details: Pairs (name, text): action name, action type, timeout, retry, …
+        children: Records of the children, in the order in which they were added.
+        initial: Labels of the children that run first.
+        transitions: Edges between the children and to the outcomes.
+        rules: Outcome rules of a concurrence, loop rules of an iterator.
+        default_outcome: Outcome of a concurrence when no rule holds.
+    """
+
+    path: str
+    label: str
+    kind: Kind
+    type_name: str
+    outcomes: tuple[str, ...]
+    input_keys: tuple[str, ...] = ()
+    output_keys: tuple[str, ...] = ()
+    remapping: tuple[tuple[str, str], ...] = ()
+    doc: str = ""
+    details: tuple[tuple[str, str], ...] = ()
+    children: tuple[StateRecord, ...] = ()
+    initial: tuple[str, ...] = ()
+    transitions: tuple[TransitionRecord, ...] = ()
+    rules: tuple[RuleRecord, ...] = ()
+    default_outcome: str | None = None
+
+    @property
+    def is_container(self) -> bool:
+        """Whether it is of a kind that has children."""
+        return self.kind in {"machine", "sequence", "concurrence", "iterator"}
+
+    def walk(self) -> Iterator[StateRecord]:
+        """Yield this record and all below it, parents first."""
+        yield self
+        for child in self.children:
+            yield from child.walk()
+
+    def to_json(self, *, indent: int | None = None) -> str:
+        """Return the record as JSON text."""
+        return json.dumps(asdict(self), ensure_ascii=False, indent=indent)
+
+    @classmethod
+    def from_json(cls, text: str) -> StateRecord:
+        """Rebuild a record from `to_json` text.
+
+        Raises:
+            ValueError: The text is no JSON, or not of this shape; names the path of the bad field.
+        """
+        return _state_from(json.loads(text), "$")
+
+
+@dataclass(frozen=True, slots=True)
+class Structure:
+    """What a container adds to its record; returned by `Container.describe_structure`."""
+
+    children: tuple[tuple[str, State, tuple[tuple[str, str], ...]], ...] = ()
+    initial: tuple[str, ...] = ()
+    transitions: tuple[TransitionRecord, ...] = ()
+    rules: tuple[RuleRecord, ...] = ()
+    default_outcome: str | None = None
+    details: tuple[tuple[str, str], ...] = field(default=())
+
+
+def describe(machine: State, *, name: str | None = None) -> StateRecord:
+    """Return the structure of `machine`, without running it; inconsistent machines too.
+
+    Args:
+        machine: Any state; a container is described with all its descendants.
+        name: Label of the root; default: the container's `name`.
+    """
+    label = name or getattr(machine, "name", None) or "SM_ROOT"
+    return _describe(machine, f"/{label}", label, ())
+
+
+def _describe(
+    state: State, path: str, label: str, remapping: tuple[tuple[str, str], ...]
+) -> StateRecord:
+    kind, details = state.describe_details()
+    structure = state.describe_structure()
+    children = tuple(
+        _describe(child, f"{path}/{child_label}", child_label, child_remapping)
+        for child_label, child, child_remapping in structure.children
+    )
+    return StateRecord(
+        path=path,
+        label=label,
+        kind=kind,
+        type_name=type(state).__name__,
+        outcomes=tuple(state.get_registered_outcomes()),
+        input_keys=tuple(state.get_registered_input_keys()),
+        output_keys=tuple(state.get_registered_output_keys()),
+        remapping=remapping,
+        doc=_first_paragraph(state),
+        details=details + structure.details,
+        children=children,
+        initial=structure.initial,
+        transitions=structure.transitions,
+        rules=structure.rules,
+        default_outcome=structure.default_outcome,
+    )
+
+
+def _first_paragraph(state: State) -> str:
+    cls = type(state)
+    if cls.__module__.partition(".")[0] == "smachpy":  # the library's own texts say nothing new
+        return ""
+    doc = cls.__dict__.get("__doc__") or ""
+    return " ".join(doc.strip().split("\n\n")[0].split())
+
+
+def _state_from(data: Any, where: str) -> StateRecord:
+    fields = _fields(data, StateRecord, where)
+    if fields.get("kind") not in KINDS:
+        raise ValueError(
+            f"{where}.kind: got {fields.get('kind')!r}; expected one of {sorted(KINDS)}."
+        )
+    for name in ("outcomes", "input_keys", "output_keys", "initial"):
+        fields[name] = tuple(fields.get(name, ()))
+    for name in ("remapping", "details"):
+        fields[name] = _pairs(fields.get(name, ()))
+    fields["children"] = tuple(
+        _state_from(child, f"{where}.children[{i}]")
+        for i, child in enumerate(fields.get("children", ()))
+    )
+    fields["transitions"] = tuple(
+        TransitionRecord(**_fields(edge, TransitionRecord, f"{where}.transitions[{i}]"))
+        for i, edge in enumerate(fields.get("transitions", ()))
+    )
+    fields["rules"] = tuple(
+        _rule_from(rule, f"{where}.rules[{i}]") for i, rule in enumerate(fields.get("rules", ()))
+    )
+    return StateRecord(**fields)
+
+
+def _rule_from(data: Any, where: str) -> RuleRecord:
+    fields = _fields(data, RuleRecord, where)
+    fields["conditions"] = _pairs(fields.get("conditions", ()))
+    return RuleRecord(**fields)
+
+
+def _pairs(data: Any) -> tuple[tuple[str, str], ...]:
+    return tuple((str(a), str(b)) for a, b in data)
+
+
+def _fields(data: Any, cls: type, where: str) -> dict[str, Any]:
+    slots: dict[str, Any] = cls.__dataclass_fields__  # type: ignore[attr-defined]
+    if not isinstance(data, dict):
+        raise ValueError(f"{where}: got {type(data).__name__}; expected an object.")  # noqa: TRY004
+    unknown = sorted(set(data) - set(slots))
+    needed = {name for name, spec in slots.items() if _is_required(spec)}
+    missing = sorted(needed - set(data))
+    if unknown or missing:
+        raise ValueError(f"{where}: got unknown fields {unknown}, missing fields {missing}.")
+    return dict(data)
+
+
+def _is_required(spec: Any) -> bool:
+    from dataclasses import MISSING
+
+    return spec.default is MISSING and spec.default_factory is MISSING
