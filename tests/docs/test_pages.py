@@ -1,0 +1,125 @@
+"""What the README and the docs say is executed: a page is one program.
+
+Blocks marked `python` run in order in one namespace; `console` blocks run their `$ ` lines and
+their output must hold the lines shown (`...` stands for anything). An HTML comment before a block:
+
+- `<!-- file: NAME -->`  the block is written to that file in the page's working directory
+- `<!-- exit: N -->`     the last command of the block ends with this code
+- `<!-- shown: WHY -->`  the block is only shown (it needs something a test cannot have)
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+FENCE = re.compile(
+    r"(?:<!-- (?P<directive>file|exit|shown): (?P<value>.*?) -->\n+)?"
+    r"^```(?P<language>\w+)[^\n]*\n(?P<text>.*?)^```$",
+    re.MULTILINE | re.DOTALL,
+)
+COMMAND_S = 50
+
+
+@dataclass(frozen=True)
+class Block:
+    language: str
+    text: str
+    line: int
+    directive: str
+    value: str
+
+
+def blocks_of(page: Path) -> list[Block]:
+    text = page.read_text(encoding="utf-8")
+    return [
+        Block(
+            match["language"],
+            match["text"],
+            text.count("\n", 0, match.start("text")) + 1,
+            match["directive"] or "",
+            match["value"] or "",
+        )
+        for match in FENCE.finditer(text)
+    ]
+
+
+def run_python(page: Path, block: Block, namespace: dict) -> None:
+    code = compile("\n" * (block.line - 1) + block.text, str(page), "exec")
+    exec(code, namespace)
+
+
+def run_console(page: Path, block: Block, directory: Path) -> None:
+    parts = re.split(r"^\$ ", block.text, flags=re.MULTILINE)[1:]
+    environment = {
+        **os.environ,
+        "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+        "COLUMNS": "100",
+    }
+    for number, part in enumerate(parts, 1):
+        command, _, shown = part.partition("\n")
+        done = subprocess.run(
+            command,
+            shell=True,
+            cwd=directory,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=COMMAND_S,
+            stdin=subprocess.DEVNULL,
+        )
+        wanted = int(block.value) if block.directive == "exit" and number == len(parts) else 0
+        where = f"{page.name}:{block.line}: $ {command}"
+        output = done.stdout + done.stderr
+        assert done.returncode == wanted, f"{where}\nexit code {done.returncode}\n{output}"
+        check_output(where, shown, output)
+
+
+def check_output(where: str, shown: str, output: str) -> None:
+    """Every line shown must be in the output, in this order; blanks are folded."""
+    lines = iter([" ".join(line.split()) for line in output.splitlines()])
+    for line in shown.splitlines():
+        folded = " ".join(line.split())
+        if not folded or folded == "...":
+            continue
+        pattern = ".*".join(re.escape(piece) for piece in folded.split("..."))
+        assert any(re.fullmatch(pattern, real) for real in lines), (
+            f"{where}\nnot printed (in this order): {line}\n--- printed:\n{output}"
+        )
+
+
+@pytest.mark.zenoh
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_page(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    namespace = {"__name__": "page"}
+    for block in blocks_of(page):
+        if block.directive == "shown":
+            continue
+        if block.directive == "file":
+            target = tmp_path / block.value
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_text(block.text, encoding="utf-8")
+        elif block.language == "python":
+            run_python(page, block, namespace)
+        elif block.language == "console":
+            run_console(page, block, tmp_path)
+
+
+def test_every_link_between_pages_leads_somewhere():
+    broken = []
+    for page in PAGES:
+        for target in re.findall(r"\]\((?!https?:|#|mailto:)([^)#\s]+)", page.read_text("utf-8")):
+            if not (page.parent / target).exists():
+                broken.append(f"{page.relative_to(ROOT)} -> {target}")
+    assert not broken

@@ -1,0 +1,86 @@
+"""The command line's frame: finding commands, reporting errors, exit codes."""
+
+from __future__ import annotations
+
+from importlib.metadata import EntryPoint
+
+import pytest
+
+import smachpy.cli
+from smachpy.exceptions import SmachError
+
+
+def register_ok(subparsers):
+    parser = subparsers.add_parser("ok", help="return a code")
+    parser.add_argument("code", type=int)
+    parser.set_defaults(run=lambda args: args.code)
+
+
+def register_bad(subparsers):
+    def run(_args):
+        raise SmachError("/PATROL: broken: got 'x'; expected 'y'.")
+
+    subparsers.add_parser("bad").set_defaults(run=run)
+
+
+def register_interrupted(subparsers):
+    def run(_args):
+        raise KeyboardInterrupt
+
+    subparsers.add_parser("interrupted").set_defaults(run=run)
+
+
+@pytest.fixture(autouse=True)
+def commands(monkeypatch):
+    """Only the commands of this file, plus one whose package is not installed."""
+    names = ["ok", "bad", "interrupted"]
+    points = [EntryPoint(n, f"{__name__}:register_{n}", smachpy.cli.GROUP) for n in names]
+    points.append(EntryPoint("heavy", "a_package_nobody_has:register", smachpy.cli.GROUP))
+    loaders = {n: globals()[f"register_{n}"] for n in names}
+    monkeypatch.setattr(smachpy.cli, "entry_points", lambda **_: points)
+    load = smachpy.cli._load
+    monkeypatch.setattr(smachpy.cli, "_load", lambda p: loaders.get(p.name) or load(p))
+
+
+def test_main_returns_what_the_command_returns():
+    assert smachpy.cli.main(["ok", "7"]) == 7
+
+
+def test_an_error_is_one_screen_on_stderr_and_exit_code_2(capsys):
+    assert smachpy.cli.main(["bad"]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err == "smachpy: /PATROL: broken: got 'x'; expected 'y'.\n"
+
+
+def test_debug_shows_the_traceback(capsys):
+    assert smachpy.cli.main(["bad", "--debug"]) == 2
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_ctrl_c_is_exit_code_130():
+    assert smachpy.cli.main(["interrupted"]) == 130
+
+
+def test_a_missing_package_is_named_with_the_way_to_install_it(capsys):
+    assert smachpy.cli.main(["heavy"]) == 2
+    captured = capsys.readouterr().err
+    assert "'a_package_nobody_has' is missing" in captured
+    assert "pip install" in captured
+
+
+def test_an_unknown_command_is_exit_code_2_and_names_the_commands(capsys, monkeypatch):
+    points = [p for p in smachpy.cli.entry_points() if p.name != "heavy"]
+    monkeypatch.setattr(smachpy.cli, "entry_points", lambda **_: points)
+    with pytest.raises(SystemExit) as caught:
+        smachpy.cli.main(["okay"])
+    assert caught.value.code == 2
+    assert "'ok'" in capsys.readouterr().err
+
+
+def test_only_the_command_asked_for_is_loaded(monkeypatch):
+    loaded = []
+    load = smachpy.cli._load
+    monkeypatch.setattr(smachpy.cli, "_load", lambda p: loaded.append(p.name) or load(p))
+    smachpy.cli.main(["ok", "0"])
+    assert loaded == ["ok"]

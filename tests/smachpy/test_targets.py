@@ -1,0 +1,124 @@
+"""Naming a machine on a command line: missions, modules, files."""
+
+from __future__ import annotations
+
+from importlib.metadata import EntryPoint
+
+import pytest
+
+import smachpy
+import smachpy.targets
+from smachpy.targets import TargetError, list_missions, load_target
+
+FILE = '''
+import smachpy
+
+def mission(speed=1.0):
+    """Drive about.
+
+    More words.
+    """
+    machine = smachpy.StateMachine(outcomes=["done"])
+    machine.userdata.speed = speed
+    with machine:
+        smachpy.StateMachine.add("GO", smachpy.CBState(lambda ud: "done", outcomes=["done"]))
+    return machine
+
+def other():
+    return 3
+
+number = 5
+'''
+
+
+def make_mission():
+    """Say hello."""
+    machine = smachpy.StateMachine(outcomes=["done"])
+    with machine:
+        smachpy.StateMachine.add("GO", smachpy.CBState(lambda _: "done", outcomes=["done"]))
+    return machine
+
+
+@pytest.fixture
+def file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "drive_about.py"
+    path.write_text(FILE)
+    return path
+
+
+@pytest.fixture(autouse=True)
+def missions(monkeypatch):
+    points = [EntryPoint("hello", f"{__name__}:make_mission", smachpy.targets.GROUP)]
+    monkeypatch.setattr(EntryPoint, "load", lambda _: make_mission)
+    monkeypatch.setattr(smachpy.targets, "entry_points", lambda **_: points)
+
+
+def test_a_mission_s_name_gives_its_factory():
+    target = load_target("hello")
+    assert (target.name, target.summary) == ("hello", "Say hello.")
+    assert target.build().execute() == "done"
+    assert [t.name for t in list_missions()] == ["hello"]
+
+
+def test_an_unknown_mission_names_the_nearest():
+    with pytest.raises(TargetError, match="target 'helo': no such mission; .*Did you mean 'hello'"):
+        load_target("helo")
+
+
+@pytest.mark.parametrize("text", ["drive_about.py", "drive_about.py:mission", "./drive_about.py"])
+def test_a_file_gives_its_mission(file, text):
+    target = load_target(text)
+    assert target.summary == "Drive about."
+    machine = target.build(speed=2.0)
+    assert machine.userdata.speed == 2.0
+    assert machine.execute() == "done"
+
+
+def test_a_module_gives_the_named_factory(file):
+    assert load_target("drive_about:mission").build().execute() == "done"
+
+
+def test_a_finished_machine_is_a_target_too(file):
+    file.write_text(FILE + "\nmachine = mission()\n")
+    assert load_target("drive_about.py:machine").build().execute() == "done"
+    with pytest.raises(TargetError, match="is a finished machine"):
+        load_target("drive_about.py:machine").build(speed=1)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("drive_abuot.py", "no file 'drive_abuot.py'; .*Did you mean 'drive_about.py'"),
+        ("drive_about.py:misson", "nothing is called 'misson'; .*Did you mean 'mission'"),
+        ("drive_about.py:number", "number is 5; expected a machine or a function"),
+        ("no_such_module:x", "no module 'no_such_module'"),
+    ],
+)
+def test_a_wrong_name_says_what_is_wrong(file, text, words):
+    with pytest.raises(TargetError, match=words) as caught:
+        load_target(text)
+    assert caught.value.target == text
+
+
+def test_a_factory_that_gives_no_machine_is_an_error(file):
+    with pytest.raises(TargetError, match="returned 3; expected a state machine"):
+        load_target("drive_about.py:other").build()
+
+
+def test_an_argument_the_factory_does_not_take_is_an_error(file):
+    with pytest.raises(TargetError, match=r"mission\(speed=1.0\) cannot be called with \['sped'\]"):
+        load_target("drive_about.py:mission").build(sped=1)
+
+
+def test_a_file_that_raises_says_so_and_chains_the_cause(file):
+    file.write_text("1 / 0\n")
+    with pytest.raises(TargetError, match="raised ZeroDivisionError") as caught:
+        load_target("drive_about.py")
+    assert isinstance(caught.value.__cause__, ZeroDivisionError)
+
+
+def test_a_file_without_a_machine_says_what_it_looked_for(file):
+    file.write_text("x = 1\n")
+    with pytest.raises(TargetError, match="which machine is meant"):
+        load_target("drive_about.py")
