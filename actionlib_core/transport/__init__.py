@@ -64,7 +64,10 @@ class Closable(Protocol):
     """Something declared on the network."""
 
     def close(self) -> None:
-        """Undeclare it; a second call does nothing. No callback starts after it returned."""
+        """Undeclare it; a second call does nothing.
+
+        No callback starts after it returned; one that runs in another thread may still be ending.
+        """
         ...
 
 
@@ -85,7 +88,12 @@ class PublisherPort(Closable, Protocol):
 
 
 class Query(Protocol):
-    """A question that a queryable answers, now or later, from any thread."""
+    """A question that a queryable answers, now or later, from any thread.
+
+    It is open until `finish`; what is called on it after that does nothing. A session that ends
+    finishes what it has not answered, and so does a queryable's callback that raises (its error is
+    the answer then).
+    """
 
     key: str
     payload: bytes
@@ -107,8 +115,15 @@ class Query(Protocol):
 class Transport(Protocol):
     """One session on the network.
 
-    Threads: callbacks run on the transport's own thread, in order per key and sender; they must be
-    short and must not wait. They may call every method here, also for their own key.
+    Keys are exact here, without wildcards; only tokens are asked for by pattern.
+
+    Threads: callbacks run on the transport's own threads, never inside a call of yours, in order
+    per key and sender (those of different senders may overlap); they must be short and must not
+    wait. They may call every method here, also for their own key. An exception that one lets
+    through is given to `threading.excepthook`, and what it was about to get next still comes.
+
+    Raises:
+        TransportError: by every method but `close`: the session is closed, or a key is malformed.
     """
 
     @property
@@ -120,12 +135,21 @@ class Transport(Protocol):
         """Declare that this session sends on `key`."""
         ...
 
-    def subscribe(self, key: str, callback: Callable[[Sample], None]) -> Closable:
-        """Receive what is put on `key`, own puts included; a latched last message first."""
+    def subscribe(
+        self, key: str, callback: Callable[[Sample], None], *, history: bool = True
+    ) -> Closable:
+        """Receive what is put on `key`, own puts included.
+
+        Args:
+            key: An exact key.
+            callback: Gets each message.
+            history: Ask latched publishers for their last message: one that was put before now
+                comes first, once. False saves the asking where nobody latches.
+        """
         ...
 
     def queryable(self, key: str, callback: Callable[[Query], None]) -> Closable:
-        """Answer the queries on `key`."""
+        """Answer the queries on `key`; each ends with `Query.finish`."""
         ...
 
     def query(
@@ -140,8 +164,17 @@ class Transport(Protocol):
     ) -> Closable:
         """Ask every queryable on `key`; `on_done` is called exactly once, after the last reply.
 
+        It is called at once when there is no queryable, when all have finished, and when those that
+        have not are known to be dead. Closing the query ends the interest: neither callback starts
+        after that.
+
         Args:
+            key: An exact key.
+            payload: The question.
+            encoding: What the payload is.
             timeout: After this [s] the query is done, whoever has not answered.
+            on_reply: Gets each answer.
+            on_done: Hears that no more answers come.
         """
         ...
 
@@ -152,8 +185,12 @@ class Transport(Protocol):
     def watch_alive(self, pattern: str, callback: Callable[[Presence], None]) -> Closable:
         """Hear of tokens matching `pattern`: those that exist now first, then every change.
 
+        A token that several declare appears with the first of them and vanishes with the last.
+
         Args:
-            pattern: A key in which `*` stands for one word and `**` for any number of words.
+            pattern: A key in which `*` stands for one word and `**` for any number of words;
+                neither stands for a word that begins with `@`.
+            callback: Gets each token that appears or vanishes.
         """
         ...
 

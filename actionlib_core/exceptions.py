@@ -1,0 +1,189 @@
+"""Every exception of actionlib_core; the data of each error is on the object too.
+
+Exception
+ +-- ActionlibError
+      +-- NameSetupError        several problems in names or arguments, all at once
+      |    +-- InvalidNameError a name breaks the ROS name rules (caret text)
+      +-- NodeError             a node is closed, missing or made twice
+      +-- TransportError        the network session is closed or could not be opened
+      +-- TypeMismatchError     two ends of a name disagree on the type
+      +-- InterfaceError        a .msg/.srv/.action file or an interface name cannot be used
+      |    +-- FieldError       a value does not fit the field of a message
+      +-- DeserializationError  received bytes are not a message of the expected type
+"""
+
+from __future__ import annotations
+
+
+class ActionlibError(Exception):
+    """Root of all errors that actionlib_core raises on purpose."""
+
+
+class NameSetupError(ActionlibError, ValueError):
+    """Names or command-line arguments that cannot be used.
+
+    Attributes:
+        problems: One text per problem.
+    """
+
+    def __init__(self, *problems: str) -> None:
+        self.problems = problems
+        super().__init__("\n".join(problems))
+
+
+class InvalidNameError(NameSetupError):
+    """A name breaks the ROS name rules.
+
+    Attributes:
+        name: The name as given.
+        kind: What it names, for example "action name".
+        reason: Which rule it breaks.
+        index: Position of the first offending character.
+    """
+
+    def __init__(self, name: str, kind: str, reason: str, index: int) -> None:
+        self.name = name
+        self.kind = kind
+        self.reason = reason
+        self.index = index
+        caret = " " * (index + 3) + "^"
+        super().__init__(f"invalid {kind}: {reason}:\n  '{name}'\n{caret}")
+
+
+class NodeError(ActionlibError, RuntimeError):
+    """A node is closed, missing or was made twice."""
+
+
+class TransportError(ActionlibError, ConnectionError):
+    """The network session is closed, or could not be opened."""
+
+
+class TypeMismatchError(ActionlibError, TypeError):
+    """Two ends of a name disagree on what travels there.
+
+    Attributes:
+        name: The name.
+        expected_type: Our type, "pkg/Type".
+        expected_md5: Its checksum.
+        found_type: The other end's type.
+        found_md5: Its checksum.
+    """
+
+    def __init__(
+        self, name: str, expected: tuple[str, str], found: tuple[str, str], *, by: str = ""
+    ) -> None:
+        self.name = name
+        self.expected_type, self.expected_md5 = expected
+        self.found_type, self.found_md5 = found
+        whose = f" from {by}" if by else ""
+        super().__init__(
+            f"{name}: types differ: got {found[0]!r} (md5 {found[1]}){whose}; "
+            f"expected {expected[0]!r} (md5 {expected[1]}). Try using one type on both ends, or "
+            "another name."
+        )
+
+
+class InterfaceError(ActionlibError):
+    """A `.msg`, `.srv` or `.action` definition, or the name of one, cannot be used.
+
+    Attributes:
+        problems: One text per problem, each with file, line, caret and what was expected.
+    """
+
+    def __init__(self, *problems: str) -> None:
+        self.problems = problems
+        super().__init__("\n".join(problems))
+
+
+class FieldError(InterfaceError, TypeError):
+    """Values do not fit the fields of a message; found when it is written or filled.
+
+    Attributes:
+        problems: One text per bad field, "pkg/Type: $.path.of.field: expected X, got Y".
+    """
+
+
+class DeserializationError(ActionlibError, ValueError):
+    """Received bytes are not a message of the expected type.
+
+    Attributes:
+        type_name: The type that was expected, "pkg/Type".
+        size: Number of bytes received.
+        reason: What does not fit.
+    """
+
+    def __init__(self, type_name: str, size: int, reason: str) -> None:
+        self.type_name = type_name
+        self.size = size
+        self.reason = reason
+        super().__init__(
+            f"{type_name}: got {size} bytes that are no message of this type: {reason}; expected "
+            "the ROS 1 serialisation. Try comparing type and md5 at both ends."
+        )
+
+
+class ActionException(ActionlibError):  # noqa: N818  actionlib's name
+    """Root of the errors about actions."""
+
+
+class IllegalTransitionError(ActionException):
+    """A goal cannot do that in the state it is in.
+
+    Attributes:
+        goal: Names the goal and its action.
+        state: The state it is in.
+        target: The state it was to go to.
+        call: What was called.
+        allowed: The states from which the call is allowed.
+    """
+
+    def __init__(self, goal: str, state: str, target: str, call: str, allowed: list[str]) -> None:
+        self.goal = goal
+        self.state = state
+        self.target = target
+        self.call = call
+        self.allowed = allowed
+        super().__init__(
+            f"{goal}: cannot go {state} -> {target} on {call}; allowed from: {', '.join(allowed)}."
+        )
+
+
+class ServerConflictError(ActionException):
+    """Two action servers have one name; this one has stopped, so that no goal runs twice.
+
+    Attributes:
+        name: The action's name.
+        mine: (node, session) of the server that stopped.
+        other: (node, session) of the one that stays.
+    """
+
+    def __init__(self, name: str, mine: tuple[str, str], other: tuple[str, str]) -> None:
+        self.name = name
+        self.mine = mine
+        self.other = other
+        super().__init__(
+            f"action {name!r}: two servers: got one of node '{mine[0]}' (session {mine[1]}) beside "
+            f"one of node '{other[0]}' (session {other[1]}); expected one. Try another name or a "
+            "name space for this one, or end the other."
+        )
+
+
+class GoalFailedError(ActionException):
+    """A goal ended otherwise than SUCCEEDED.
+
+    Attributes:
+        name: The action's name.
+        status: The goal's final status, for example "ABORTED".
+        text: What the server said about it.
+        result: The result that came with it, or None.
+    """
+
+    def __init__(self, name: str, goal_id: str, status: str, text: str, result: object) -> None:
+        self.name = name
+        self.goal_id = goal_id
+        self.status = status
+        self.text = text
+        self.result = result
+        super().__init__(
+            f"goal {goal_id} on '{name}': got {status}: {text or 'no text'}; expected SUCCEEDED."
+        )

@@ -1,0 +1,280 @@
+"""ROS names: the rules, name spaces, private names, and remapping from the command line.
+
+A name in full has no slash in front here: `robot_1/move_base` is both the ROS name
+`/robot_1/move_base` and the key it has on the network.
+
+Source:
+    https://wiki.ros.org/Names (valid names, resolving, remapping arguments) and, for
+    `--ros-args`, https://design.ros2.org/articles/ros_command_line_arguments.html.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from actionlib_core.exceptions import InvalidNameError, NameSetupError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+_FORBIDDEN = re.compile(r"[^A-Za-z0-9_/~]")
+_EMPTY: Mapping[str, str] = MappingProxyType({})
+
+
+def check_name(name: str, kind: str = "name") -> str:
+    """Return `name` unchanged if the ROS rules allow it.
+
+    Args:
+        name: Relative (`move_base`), absolute (`/robot_1/move_base`) or private (`~goal`).
+        kind: What it names, for the error text: "action name", "topic name".
+
+    Raises:
+        InvalidNameError: a rule is broken; the text points at the first offending character.
+    """
+    problem = _find_problem(name)
+    if problem is not None:
+        reason, index = problem
+        raise InvalidNameError(name, kind, reason, index)
+    return name
+
+
+def _find_problem(name: str) -> tuple[str, int] | None:
+    if not name:
+        return "it is empty", 0
+    problems = [
+        (match.start(), f"{match.group()!r} is not allowed; expected letters, digits, '_' or '/'")
+        for match in [_FORBIDDEN.search(name)]
+        if match is not None
+    ]
+    first = name[0]
+    if first.isdigit():
+        problems.append((0, "it must not start with a digit; expected a letter, '_', '/' or '~'"))
+    for text, reason in (("//", "'//' is not allowed"), ("~", "'~' is allowed in front only")):
+        found = name.find(text, 1 if text == "~" else 0)
+        if found >= 0:
+            problems.append((found, reason))
+    if name == "/" or name.endswith("/"):
+        problems.append((len(name) - 1, "it must not end with '/'"))
+    if name == "~":
+        problems.append((0, "'~' alone names nothing"))
+    if not problems:
+        return None
+    index, reason = min(problems)
+    return reason, index
+
+
+def check_base_name(name: str, kind: str = "node name") -> str:
+    """Return `name` unchanged if it is one word: no slash, no tilde.
+
+    Raises:
+        InvalidNameError: it is not.
+    """
+    for char in "/~":
+        if char in name:
+            reason = f"{char!r} is not allowed; expected one word. Try a namespace"
+            raise InvalidNameError(name, kind, reason, name.index(char))
+    return check_name(name, kind)
+
+
+def clean_namespace(namespace: str) -> str:
+    """Return a name space without slashes around it; "" and "/" are the root.
+
+    Raises:
+        InvalidNameError: it is no valid name, or private.
+    """
+    if namespace in {"", "/"}:
+        return ""
+    trimmed = namespace.rstrip("/") or namespace
+    check_name(trimmed, "namespace")
+    if trimmed.startswith("~"):
+        raise InvalidNameError(namespace, "namespace", "'~' is not allowed", 0)
+    return trimmed.lstrip("/")
+
+
+def resolve_name(
+    name: str,
+    *,
+    namespace: str = "",
+    node: str = "",
+    remappings: Mapping[str, str] = _EMPTY,
+    kind: str = "name",
+) -> str:
+    """Return the full name, without a slash in front.
+
+    Args:
+        name: Relative, absolute or private name.
+        namespace: What relative names live under, no slashes around it.
+        node: Full name of the node, what private names live under.
+        remappings: Full name -> full name; looked up once, after resolving.
+        kind: What it names, for the error text.
+
+    Raises:
+        InvalidNameError: the name breaks the rules.
+    """
+    check_name(name, kind)
+    if name[0] == "/":
+        full = name[1:]
+    elif name[0] == "~":
+        private = name[1:].lstrip("/")
+        full = f"{node}/{private}" if node else private
+    else:
+        full = f"{namespace}/{name}" if namespace else name
+    return remappings.get(full, full)
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One `from:=to` of a command line.
+
+    Attributes:
+        old: Left side: a name, `__ns`, `__node` or `__name`.
+        new: Right side.
+        node: The only node it is meant for; "" when it is for all.
+    """
+
+    old: str
+    new: str
+    node: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class NameArguments:
+    """What a command line says about names.
+
+    Attributes:
+        rules: In the order of the command line.
+        rest: The arguments that are not about names, the program's own (`rospy.myargv`).
+    """
+
+    rules: tuple[Rule, ...] = ()
+    rest: tuple[str, ...] = ()
+
+    def node_name(self, name: str) -> str:
+        """Return what the node called `name` in the program is called here."""
+        return self._last(("__node", "__name"), name) or name
+
+    def namespace(self, name: str) -> str | None:
+        """Return the name space for the node called `name` in the program, None when not given."""
+        return self._last(("__ns",), name)
+
+    def _last(self, settings: tuple[str, ...], node: str) -> str | None:
+        found = [r.new for r in self.rules if r.old in settings and r.node in {"", node}]
+        return found[-1] if found else None
+
+    def remappings(self, name: str, *, namespace: str, node: str) -> dict[str, str]:
+        """Return the remappings of a node, full name -> full name; the first rule wins.
+
+        Args:
+            name: What the node is called in the program.
+            namespace: Its name space, no slashes around it.
+            node: Its full name.
+        """
+        result: dict[str, str] = {}
+        for rule in self.rules:
+            if rule.node in {"", name} and not rule.old.startswith("__"):
+                old = resolve_name(rule.old, namespace=namespace, node=node)
+                result.setdefault(old, resolve_name(rule.new, namespace=namespace, node=node))
+        return result
+
+
+@dataclass(slots=True)
+class _Collected:
+    """What has been read of the command line so far."""
+
+    rules: list[Rule] = field(default_factory=list)
+    rest: list[str] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
+
+    def take_rule(self, text: str, *, node: str = "") -> None:
+        """Read one `from:=to`; parameters and unknown `__settings` are left aside."""
+        old, _, new = text.partition(":=")
+        try:
+            if old == "__ns":
+                clean_namespace(new)
+            elif old in {"__node", "__name"}:
+                check_base_name(new)
+            elif old.startswith("_"):
+                return
+            else:
+                check_name(old, "remapped name")
+                check_name(new, "remapped name")
+        except NameSetupError as error:
+            self.problems.append(f"argument {text!r}: {error}")
+        else:
+            self.rules.append(Rule(old, new, node))
+
+    def take_ros_args(self, arguments: Sequence[str]) -> None:
+        """Read what stands between `--ros-args` and `--`."""
+        queue = list(arguments)
+        while queue:
+            flag = queue.pop(0)
+            if flag in {"-r", "--remap"}:
+                text = queue.pop(0) if queue else ""
+                if ":=" in text:
+                    node, rule = _split_node(text)
+                    self.take_rule(rule, node=node)
+                else:
+                    self.problems.append(
+                        f"argument {flag!r}: no rule follows: got {text!r}; expected from:=to"
+                    )
+            elif flag in _FLAGS_WITH_VALUE and queue:
+                queue.pop(0)
+            # All other flags are about logging and parameters, which are not ours.
+
+
+_FLAGS_WITH_VALUE = frozenset({
+    "-p", "--param", "--params-file", "--log-level", "--log-config-file", "-e", "--enclave",
+})  # fmt: skip
+
+
+def _split_node(text: str) -> tuple[str, str]:
+    """Split `talker:chatter:=news`, a rule for one node, into node and rule."""
+    old, _, new = text.partition(":=")
+    node, _, old = old.rpartition(":")
+    return node, f"{old}:={new}"
+
+
+def parse_arguments(argv: Sequence[str]) -> NameArguments:
+    """Read remapping from a command line, in the style of ROS 1 and of ROS 2.
+
+    ROS 1: `a:=b __ns:=/robot_1 __name:=patrol`; `_param:=value` and unknown `__log:=...` are
+    left aside. ROS 2: `--ros-args -r a:=b -r __ns:=/robot_1 -r __node:=patrol [--]`.
+
+    Args:
+        argv: The arguments; the program's name in front may be there or not.
+
+    Raises:
+        NameSetupError: some are malformed; the text names all of them.
+    """
+    collected = _Collected()
+    position = 0
+    while position < len(argv):
+        argument = argv[position]
+        position += 1
+        if argument == "--ros-args":
+            end = _find(argv, "--", position)
+            collected.take_ros_args(argv[position:end])
+            position = end + 1
+        elif _is_rule(argument):
+            collected.take_rule(argument)
+        else:
+            collected.rest.append(argument)
+    if collected.problems:
+        raise NameSetupError(*collected.problems)
+    return NameArguments(tuple(collected.rules), tuple(collected.rest))
+
+
+def _is_rule(argument: str) -> bool:
+    """Tell `a:=b` from an argument that merely contains `:=`, a YAML text for example."""
+    old, sign, _ = argument.partition(":=")
+    return bool(sign) and not re.search(r"[\s{}\[\]\"'=]|^-", old)
+
+
+def _find(argv: Sequence[str], what: str, start: int) -> int:
+    for position in range(start, len(argv)):
+        if argv[position] == what:
+            return position
+    return len(argv)

@@ -1,0 +1,252 @@
+"""A node: a name on the network and everything a client or server needs to be there.
+
+Programs need not make one: the first client, server, publisher or subscriber makes the default
+node, named after the program, and it is closed when the interpreter exits, on every path. `init`
+names it; tests use `use_node`.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import itertools
+import os
+import re
+import sys
+import threading
+from contextvars import ContextVar
+from pathlib import PurePath
+from typing import TYPE_CHECKING
+
+from actionlib_core.clock import RealClock, current_clock
+from actionlib_core.clock._serial import report_thread_exception
+from actionlib_core.exceptions import NodeError
+from actionlib_core.names import check_base_name, clean_namespace, parse_arguments, resolve_name
+from actionlib_core.presence import Endpoint, Kind, token_key
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from types import TracebackType
+    from typing import Self
+
+    from actionlib_core.clock import Clock
+    from actionlib_core.names import NameArguments
+    from actionlib_core.transport import Closable, Transport
+
+
+class Node:
+    """A named participant of the network.
+
+    Args:
+        name: One word, the node's base name.
+        transport: Its network session, which stays the caller's; None opens one on zenoh, which
+            the node closes.
+        clock: Time and threads; the current clock when None.
+        namespace: What the node's name and its relative names live under, "robot_1" for example.
+        arguments: Renaming from a command line (`actionlib_core.names.parse_arguments`).
+
+    Raises:
+        InvalidNameError: the name or the namespace breaks the ROS rules.
+        TransportError: no network session could be opened.
+
+    Threads: every method may be called from any thread.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        transport: Transport | None = None,
+        clock: Clock | None = None,
+        namespace: str = "",
+        arguments: NameArguments | None = None,
+    ) -> None:
+        self.clock = clock if clock is not None else current_clock()
+        self.arguments = arguments if arguments is not None else parse_arguments(())
+        self.name = check_base_name(self.arguments.node_name(name))
+        given = self.arguments.namespace(name)
+        self.namespace = clean_namespace(namespace if given is None else given)
+        self.full_name = f"{self.namespace}/{self.name}" if self.namespace else self.name
+        self._remappings = self.arguments.remappings(
+            name, namespace=self.namespace, node=self.full_name
+        )
+        self._owns_transport = transport is None
+        self.transport: Transport = transport if transport is not None else _open_zenoh()
+        self._lock = threading.Lock()
+        self._entities = itertools.count(1)
+        self._closers: dict[int, Callable[[], object]] = {}
+        self._closed = False
+
+    def __repr__(self) -> str:
+        state = " closed" if self._closed else ""
+        return f"<Node /{self.full_name}{state}>"
+
+    @property
+    def closed(self) -> bool:
+        """Whether `close` was called."""
+        return self._closed
+
+    def resolve(self, name: str, kind: str = "name") -> str:
+        """Return the full name, remapped, no slash in front; it is the key on the network.
+
+        Args:
+            name: Relative, absolute (`/...`) or private (`~...`) name.
+            kind: What it names, for the error text: "action name".
+
+        Raises:
+            InvalidNameError: the name breaks the ROS rules.
+        """
+        return resolve_name(
+            name,
+            namespace=self.namespace,
+            node=self.full_name,
+            remappings=self._remappings,
+            kind=kind,
+        )
+
+    def endpoint(self, kind: Kind, name: str, type_name: str, md5: str) -> Endpoint:
+        """Return a new end of the full name `name`, not yet shown to anybody."""
+        return Endpoint(
+            kind,
+            name,
+            type_name,
+            md5,
+            self.transport.session_id,
+            self.full_name,
+            next(self._entities),
+        )
+
+    def announce(self, kind: Kind, name: str, type_name: str, md5: str) -> Closable:
+        """Show the token of a new end of the full name `name`, until closed.
+
+        Raises:
+            TransportError: the session is closed.
+        """
+        return self.transport.declare_alive(token_key(self.endpoint(kind, name, type_name, md5)))
+
+    def on_close(self, closer: Callable[[], object]) -> Callable[[], None]:
+        """Call `closer` when the node closes, the newest first, before the network is left.
+
+        Returns:
+            Forgets `closer` again; for owners that were closed before.
+
+        Raises:
+            NodeError: the node is closed.
+        """
+        with self._lock:
+            if self._closed:
+                raise NodeError(
+                    f"node {self.full_name}: it is closed. Try making clients and servers before, "
+                    "or a new node."
+                )
+            number = next(self._entities)
+            self._closers[number] = closer
+
+        def forget() -> None:
+            with self._lock:
+                self._closers.pop(number, None)
+
+        return forget
+
+    def close(self) -> None:
+        """Close what was made on this node, then leave the network; a second call does nothing.
+
+        Blocks: under a second.
+        """
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+            closers = [self._closers[number] for number in sorted(self._closers, reverse=True)]
+            self._closers.clear()
+        for closer in closers:
+            try:
+                closer()
+            except Exception:  # noqa: BLE001  a border: reported, the others are closed too
+                report_thread_exception()
+        if self._owns_transport:
+            self.transport.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def _open_zenoh() -> Transport:
+    from actionlib_core.transport.zenoh import ZenohTransport
+
+    return ZenohTransport()
+
+
+_current: ContextVar[Node | None] = ContextVar("node", default=None)
+
+
+class _Default:
+    """The process's default node, made once."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.node: Node | None = None
+
+    def make(
+        self, name: str, namespace: str, arguments: NameArguments, transport: Transport | None
+    ) -> Node:
+        """Make the node. Needs the lock."""
+        node = Node(
+            name, namespace=namespace, arguments=arguments, clock=RealClock(), transport=transport
+        )
+        self.node = node
+        atexit.register(node.close)
+        return node
+
+
+_default = _Default()
+
+
+def get_node() -> Node:
+    """Return the node in force here: that of `use_node`, else the default one, made when needed.
+
+    Raises:
+        NodeError: a clock other than the real one is in use, but no node.
+        NameSetupError: the command line renames something in a way that is not allowed.
+        TransportError: no network session could be opened.
+    """
+    node = _current.get()
+    if node is not None:
+        return node
+    if not isinstance(current_clock(), RealClock):
+        raise NodeError(
+            "no node in use: the clock is not the real one, so the default node on zenoh does not "
+            "fit; expected a node on the same clock. Try use_node(Node(..., transport="
+            "MemoryNetwork(clock).session(), clock=clock))."
+        )
+    with _default.lock:
+        if _default.node is None or _default.node.closed:
+            name = f"{_program_name()}_{os.getpid()}"
+            _default.make(name, "", parse_arguments(sys.argv[1:]), None)
+        assert _default.node is not None
+        return _default.node
+
+
+@contextlib.contextmanager
+def use_node(node: Node) -> Iterator[Node]:
+    """Make `node` the current one inside the `with` block, also for tasks spawned in it."""
+    token = _current.set(node)
+    try:
+        yield node
+    finally:
+        _current.reset(token)
+
+
+def _program_name() -> str:
+    """Return a node name from the program's file name."""
+    stem = PurePath(sys.argv[0] if sys.argv else "").stem
+    name = re.sub(r"[^A-Za-z0-9_]", "_", stem).strip("_")
+    return name if name and not name[0].isdigit() else f"python_{name}".rstrip("_")
