@@ -4,6 +4,7 @@ Exception
  +-- ActionlibError
       +-- NameSetupError        several problems in names or arguments, all at once
       |    +-- InvalidNameError a name breaks the ROS name rules (caret text)
+      +-- ConfigError           a configuration has errors, all at once
       +-- NodeError             a node is closed, missing or made twice
       +-- TransportError        the network session is closed or could not be opened
       +-- TypeMismatchError     two ends of a name disagree on the type
@@ -48,6 +49,24 @@ class InvalidNameError(NameSetupError):
         self.index = index
         caret = " " * (index + 3) + "^"
         super().__init__(f"invalid {kind}: {reason}:\n  '{name}'\n{caret}")
+
+
+class ConfigError(ActionlibError, ValueError):
+    """A configuration that cannot be used.
+
+    Attributes:
+        where: The file, or "configuration".
+        problems: One text per problem.
+    """
+
+    def __init__(self, where: str, *problems: str) -> None:
+        self.where = where
+        self.problems = problems
+        if len(problems) == 1:
+            super().__init__(f"{where}: {problems[0]}")
+        else:
+            lines = "".join(f"\n  - {problem}" for problem in problems)
+            super().__init__(f"{where}: {len(problems)} problems:{lines}")
 
 
 class NodeError(ActionlibError, RuntimeError):
@@ -187,3 +206,7 @@ class GoalFailedError(ActionException):
         super().__init__(
             f"goal {goal_id} on '{name}': got {status}: {text or 'no text'}; expected SUCCEEDED."
         )
+
+
+class InterfaceWarning(UserWarning):
+    """A definition was read although it is not quite as ROS wants it."""

@@ -1,0 +1,110 @@
+"""ROS messages, services and actions as Python classes, from `.msg`, `.srv` and `.action` text.
+
+    from actionlib_core.interfaces.geometry_msgs.msg import PoseStamped
+    from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
+    from actionlib_core.interfaces.std_srvs.srv import Trigger, TriggerResponse
+
+Your own definitions lie in folders in ROS layout (`my_pkg/action/Turn.action`), named in the
+environment variable `SMACHPY_INTERFACE_PATH` or given to `add_path`; `define_action` and its like
+take text. Bytes and checksums are those of ROS 1.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, cast
+
+from actionlib_core.interfaces._message import Message
+from actionlib_core.interfaces._modules import install as _install
+from actionlib_core.interfaces._modules import install_ros_names
+from actionlib_core.interfaces._registry import ServiceType, registry
+
+if TYPE_CHECKING:
+    import os
+
+__all__ = [
+    "Message",
+    "ServiceType",
+    "add_path",
+    "define_action",
+    "define_message",
+    "define_service",
+    "get_action",
+    "get_message",
+    "get_service",
+    "install_ros_names",
+]
+
+_install()
+
+
+def get_message(name: str) -> type[Message]:
+    """Return a message class by its ROS name.
+
+    Args:
+        name: "move_base_msgs/MoveBaseGoal" or "move_base_msgs/msg/MoveBaseGoal".
+
+    Raises:
+        InterfaceError: Unknown, malformed, or it contains itself.
+    """
+    return registry.message(name)
+
+
+def get_service(name: str) -> type[ServiceType]:
+    """Return a service class by its ROS name, "std_srvs/Trigger" or "std_srvs/srv/Trigger".
+
+    Raises:
+        InterfaceError: As `get_message`.
+    """
+    return registry.service(name)
+
+
+def get_action(name: str) -> type[Message]:
+    """Return an action's class `XAction` by its ROS name.
+
+    Args:
+        name: "move_base_msgs/MoveBase", "move_base_msgs/action/MoveBase" or
+            "move_base_msgs/MoveBaseAction".
+
+    Raises:
+        InterfaceError: As `get_message`.
+    """
+    return registry.action(name)
+
+
+def define_message(name: str, text: str) -> type[Message]:
+    """Define a message by its `.msg` text; `get_message` and imports find it from then on.
+
+    Args:
+        name: "my_pkg/Name".
+        text: What a `.msg` file would hold.
+
+    Raises:
+        InterfaceError: Malformed text, or the name has another definition already.
+    """
+    return cast("type[Message]", registry.define("msg", name, text))
+
+
+def define_service(name: str, text: str) -> type[ServiceType]:
+    """Define a service by its `.srv` text; arguments and errors as `define_message`."""
+    return cast("type[ServiceType]", registry.define("srv", name, text))
+
+
+def define_action(name: str, text: str) -> type[Message]:
+    """Define an action "my_pkg/Turn" by its `.action` text and return its class `TurnAction`.
+
+    `TurnGoal` and the others are in `actionlib_core.interfaces.my_pkg.msg`. Arguments and errors as
+    `define_message`.
+    """
+    return cast("type[Message]", registry.define("action", name, text))
+
+
+def add_path(folder: str | os.PathLike[str]) -> None:
+    """Search a folder in ROS layout before those known so far.
+
+    Args:
+        folder: Holds `my_pkg/{msg,srv,action}/Name.*`; it may also be the folder `my_pkg` itself.
+
+    Raises:
+        InterfaceError: No such folder, or nothing of that kind in it.
+    """
+    registry.add_path(folder)

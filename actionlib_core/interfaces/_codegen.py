@@ -1,0 +1,402 @@
+"""Source text of a class's serialiser and deserialiser, one flat function each.
+
+The whole tree of nested messages is unrolled: runs of fixed-size fields become one `struct` call,
+nested objects are made without their `__init__`. That makes them faster than a call per field or
+per nested message by a factor of three to ten; the codecs are the hot path of every goal.
+
+Source: the ROS 1 wire format, http://wiki.ros.org/ROS/Technical%20Overview: little-endian,
+unpadded, strings and dynamic arrays behind a uint32 length.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import TYPE_CHECKING, Any, Final
+
+from actionlib_core.exceptions import DeserializationError
+from actionlib_core.interfaces import _arrays
+from actionlib_core.time import Duration, Time
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.interfaces._definition import Definition, Field, FieldType
+    from actionlib_core.interfaces._message import Message
+
+    Resolve = Callable[[str], type[Message]]
+
+_TIMES: Final[dict[str, tuple[type[Time | Duration], str]]] = {
+    "time": (Time, "II"),
+    "duration": (Duration, "ii"),
+}
+_TEXT = "'utf-8', 'surrogateescape'"  # so that bytes which are not UTF-8 pass through unchanged
+_ZERO_SIZE_LIMIT = 1_000_000  # elements without content, whose number no payload size bounds
+
+WRITE_ERRORS = (
+    _arrays.MismatchError,
+    struct.error,
+    AttributeError,
+    TypeError,
+    ValueError,
+    OverflowError,
+    KeyError,
+)
+"""What the fast path raises on a value it does not take."""
+
+
+class _Source:
+    """Lines of a function and the names they use; `scope` becomes the function's globals."""
+
+    def __init__(self, scope: dict[str, Any]) -> None:
+        self.scope = scope
+        self.lines: list[str] = []
+        self.indent = 1
+        self._count = 0
+
+    def add(self, line: str) -> None:
+        self.lines.append("    " * self.indent + line)
+
+    def local(self, prefix: str = "v") -> str:
+        self._count += 1
+        return f"{prefix}{self._count}"
+
+    def bind(self, prefix: str, value: object) -> str:
+        """Make `value` a global of the function and return its name."""
+        for name, bound in self.scope.items():
+            if bound is value and name.startswith(prefix):
+                return name
+        name = f"{prefix}{len(self.scope)}"
+        self.scope[name] = value
+        return name
+
+    def codec(self, kind: str, codes: str) -> str:
+        """Return the name of the `pack` or `unpack_from` of a struct."""
+        name = f"{kind}_{codes.replace('?', 'o')}"
+        if name not in self.scope:
+            self.scope[name] = getattr(struct.Struct(f"<{codes}"), kind)
+        return name
+
+    def function(self, signature: str) -> str:
+        return "\n".join([f"def {signature}:", *self.lines, ""])
+
+
+def make_codecs(
+    cls: type[Message], definition: Definition, resolve: Resolve
+) -> tuple[Callable[[Any], bytes], Callable[[bytes], Any]]:
+    """Return the functions `write(message) -> bytes` and `read(bytes) -> message` of a class.
+
+    `write` raises one of `WRITE_ERRORS` on values that need converting or are wrong; `read` raises
+    DeserializationError.
+    """
+    scope: dict[str, Any] = {
+        "Mismatch": _arrays.MismatchError,
+        "Bad": DeserializationError,
+        "READ_ERRORS": (struct.error, _arrays.MismatchError, OverflowError, TypeError),
+        "new": object.__new__,
+        "BOOLS": _arrays.BOOLS,
+        "numbers": _arrays.numbers,
+        "octets": _arrays.octets,
+        "bools": _arrays.bools,
+        "fixed": _arrays.fixed,
+        "objects": _arrays.objects,
+    }
+    text = _write_source(definition, resolve, scope) + _read_source(cls, definition, resolve, scope)
+    # The text holds only names checked by the parser and numbers made here.
+    exec(compile(text, f"<codecs of {definition.name}>", "exec"), scope)  # noqa: S102
+    return scope["write"], scope["read"]
+
+
+# --- writing -----------------------------------------------------------------------------------
+
+
+class _Items:
+    """The parts of the payload in order: runs of packed scalars, and ready bytes."""
+
+    def __init__(self, source: _Source) -> None:
+        self._source = source
+        self._parts: list[str] = []
+        self._codes = ""
+        self._values: list[str] = []
+
+    def scalar(self, codes: str, *values: str) -> None:
+        self._codes += codes
+        self._values += values
+
+    def ready(self, expression: str) -> None:
+        self._flush()
+        self._parts.append(expression)
+
+    def _flush(self) -> None:
+        if self._codes:
+            pack = self._source.codec("pack", self._codes)
+            self._parts.append(f"{pack}({', '.join(self._values)})")
+        self._codes, self._values = "", []
+
+    def parts(self) -> list[str]:
+        self._flush()
+        return self._parts
+
+
+def _write_source(definition: Definition, resolve: Resolve, scope: dict[str, Any]) -> str:
+    source = _Source(scope)
+    items = _Items(source)
+    _write_fields(source, items, definition.fields, "m", resolve)
+    parts = items.parts()
+    if len(parts) <= 1:
+        source.add(f"return {parts[0] if parts else repr(b'')}")
+    else:
+        source.add(f"return b''.join(({', '.join(parts)}))")
+    return source.function("write(m)")
+
+
+def _write_fields(
+    source: _Source, items: _Items, fields: tuple[Field, ...], owner: str, resolve: Resolve
+) -> None:
+    for field in fields:
+        value = f"{owner}.{field.attribute}"
+        if field.type.is_array:
+            _write_array(source, items, field.type, value, resolve)
+        else:
+            _write_one(source, items, field.type, value, resolve)
+
+
+def _write_one(
+    source: _Source, items: _Items, kind: FieldType, value: str, resolve: Resolve
+) -> None:
+    if kind.base == "bool":
+        items.scalar("B", f"BOOLS[{value}]")
+    elif kind.base in _arrays.STRUCT_CODES:
+        items.scalar(_arrays.STRUCT_CODES[kind.base], value)
+    elif kind.base == "string":
+        name = source.local("s")
+        source.add(f"{name} = {value}.encode({_TEXT})")
+        items.scalar("I", f"len({name})")
+        items.ready(name)
+    elif kind.base in _TIMES:
+        time_class, codes = _TIMES[kind.base]
+        name = _checked(source, value, time_class)
+        items.scalar(codes, f"{name}.secs", f"{name}.nsecs")
+    else:
+        nested = resolve(kind.base)
+        name = _checked(source, value, nested)
+        _write_fields(source, items, nested._definition.fields, name, resolve)  # noqa: SLF001 # ours
+
+
+def _checked(source: _Source, value: str, cls: type) -> str:
+    """Put `value` into a local, checked to be exactly of a class."""
+    name = source.local()
+    source.add(f"{name} = {value}")
+    source.add(f"if {name}.__class__ is not {source.bind('C', cls)}: raise Mismatch")
+    return name
+
+
+def _write_array(
+    source: _Source, items: _Items, kind: FieldType, value: str, resolve: Resolve
+) -> None:
+    name = source.local("a")
+    code = _arrays.STRUCT_CODES.get(kind.base)
+    if kind.base == "bool":
+        source.add(f"{name} = bools({value})")
+    elif code == "B":
+        source.add(f"{name} = octets({value})")
+    elif code:
+        source.add(f"{name} = {value}")
+    else:
+        source.add(f"{name} = objects({value})")
+    if kind.length is None:
+        items.scalar("I", f"len({name})")
+    else:
+        source.add(f"fixed({name}, {kind.length})")
+    if code in {"B", "?"}:
+        items.ready(name)
+    elif code:
+        items.ready(f"numbers({code!r}, {name})")
+    else:
+        items.ready(_write_loop(source, kind, name, resolve))
+
+
+def _write_loop(source: _Source, kind: FieldType, values: str, resolve: Resolve) -> str:
+    """Write the elements one by one; return the expression of their bytes."""
+    element, parts = source.local("x"), source.local("p")
+    source.add(f"{parts} = []")
+    source.add(f"for {element} in {values}:")
+    source.indent += 1
+    items = _Items(source)
+    if kind.is_builtin:
+        _write_one(source, items, type(kind)(kind.base), element, resolve)
+    else:
+        nested = resolve(kind.base)
+        source.add(f"if {element}.__class__ is not {source.bind('C', nested)}: raise Mismatch")
+        _write_fields(source, items, nested._definition.fields, element, resolve)  # noqa: SLF001
+    for part in items.parts():
+        source.add(f"{parts}.append({part})")
+    source.indent -= 1
+    return f"b''.join({parts})"
+
+
+# --- reading -----------------------------------------------------------------------------------
+
+
+class _Cursor:
+    """Emits reads in wire order and gathers runs of scalars into one `unpack_from`."""
+
+    def __init__(self, source: _Source, offset: str) -> None:
+        self.source = source
+        self._offset = offset  # "0" or a variable; then plus `_skip` bytes
+        self._skip = 0
+        self._codes = ""
+        self._names: list[str] = []
+        self.builds: list[str] = []
+        self.minimum = 0
+
+    def scalar(self, code: str) -> str:
+        name = self.source.local("f")
+        self._codes += code
+        self._names.append(name)
+        return name
+
+    def flush(self) -> None:
+        if self._codes:
+            unpack = self.source.codec("unpack_from", self._codes)
+            targets = ", ".join(self._names)
+            self.source.add(f"{targets}, = {unpack}(d, {self.position()})")
+            size = struct.calcsize(f"<{self._codes}")
+            self._skip += size
+            self.minimum += size
+        self._codes, self._names = "", []
+
+    def position(self) -> str:
+        """The expression of the next byte to read; call only when flushed."""
+        if self._offset == "0":
+            return str(self._skip)
+        return f"{self._offset} + {self._skip}" if self._skip else self._offset
+
+    def settle(self) -> None:
+        """Bring the variable `p` to the next byte to read."""
+        self.flush()
+        if self._offset != "p" or self._skip:
+            self.source.add(f"p = {self.position()}")
+        self.moved()
+
+    def moved(self) -> None:
+        """Go on from the variable `p`."""
+        self._offset, self._skip = "p", 0
+
+    def take(self, length: str) -> str:
+        """Move past `length` bytes; return the slice of them."""
+        self.flush()
+        start = self.position()
+        name = start
+        if not start.isidentifier() and not start.isdigit():
+            name = self.source.local("q")
+            self.source.add(f"{name} = {start}")
+        elif start == "p":
+            name = self.source.local("q")
+            self.source.add(f"{name} = p")
+        self.source.add(f"p = {name} + {length}")
+        self.moved()
+        return f"d[{name}:p]"
+
+
+def _read_source(
+    cls: type[Message], definition: Definition, resolve: Resolve, scope: dict[str, Any]
+) -> str:
+    source = _Source(scope)
+    source.add("if d.__class__ is not bytes: d = bytes(d)")
+    source.add("try:")
+    source.indent += 1
+    cursor = _Cursor(source, "0")
+    result = _read_message(cursor, cls, definition.fields, resolve)
+    cursor.flush()
+    end = cursor.position()
+    source.add(f"if len(d) != {end}: raise Mismatch(f'it should end at byte {{{end}}}')")
+    for line in cursor.builds:
+        source.add(line)
+    source.add(f"return {result}")
+    source.indent -= 1
+    source.add("except READ_ERRORS as e:")
+    source.add(f"    raise Bad({definition.name!r}, len(d), str(e)) from e")
+    return source.function("read(d)")
+
+
+def _read_message(
+    cursor: _Cursor, cls: type[Message], fields: tuple[Field, ...], resolve: Resolve
+) -> str:
+    """Read the fields; the object is put together in `cursor.builds`, when all is read."""
+    name = cursor.source.local("o")
+    cursor.builds.append(f"{name} = new({cursor.source.bind('C', cls)})")
+    for field in fields:
+        if field.type.is_array:
+            value = _read_array(cursor, field.type, resolve)
+        else:
+            value = _read_one(cursor, field.type, resolve)
+        cursor.builds.append(f"{name}.{field.attribute} = {value}")
+    return name
+
+
+def _read_one(cursor: _Cursor, kind: FieldType, resolve: Resolve) -> str:
+    if kind.base in _arrays.STRUCT_CODES:
+        return cursor.scalar(_arrays.STRUCT_CODES[kind.base])
+    if kind.base == "string":
+        length = cursor.scalar("I")
+        name = cursor.source.local("s")
+        cursor.source.add(f"{name} = str({cursor.take(length)}, {_TEXT})")
+        return name
+    if kind.base in _TIMES:
+        time_class, codes = _TIMES[kind.base]
+        secs, nsecs = cursor.scalar(codes[0]), cursor.scalar(codes[1])
+        name = cursor.source.local("t")
+        bound = cursor.source.bind("C", time_class)
+        # A sender may leave more than a second in nsecs; `set` carries it over.
+        cursor.builds += [
+            f"{name} = new({bound}); {name}.secs = {secs}; {name}.nsecs = {nsecs}",
+            f"if not 0 <= {nsecs} < 1000000000: {name}.set({secs}, {nsecs})",
+        ]
+        return name
+    nested = resolve(kind.base)
+    return _read_message(cursor, nested, nested._definition.fields, resolve)  # noqa: SLF001
+
+
+def _read_array(cursor: _Cursor, kind: FieldType, resolve: Resolve) -> str:
+    count = cursor.scalar("I") if kind.length is None else str(kind.length)
+    name = cursor.source.local("a")
+    code = _arrays.STRUCT_CODES.get(kind.base)
+    if code == "B":
+        cursor.source.add(f"{name} = {cursor.take(count)}")
+    elif code and kind.length is not None:
+        cursor.flush()
+        unpack = cursor.source.codec("unpack_from", f"{kind.length}{code}")
+        cursor.source.add(f"{name} = list({unpack}(d, {cursor.position()}))")
+        cursor._skip += kind.length * struct.calcsize(code)  # noqa: SLF001 # one machine, two parts
+    elif code:
+        cursor.flush()
+        size = struct.calcsize(f"<{code}")
+        start = cursor.position()
+        unpack = cursor.source.bind("unpack_from", struct.unpack_from)
+        cursor.source.add(f"{name} = list({unpack}(f'<{{{count}}}{code}', d, {start}))")
+        cursor.source.add(f"p = {start} + {count} * {size}")
+        cursor.moved()
+    else:
+        _read_loop(cursor, kind, name, count, resolve)
+    return name
+
+
+def _read_loop(cursor: _Cursor, kind: FieldType, name: str, count: str, resolve: Resolve) -> None:
+    """Read the elements one by one into the list `name`."""
+    source = cursor.source
+    cursor.settle()
+    source.add(f"{name} = []")
+    guard = len(source.lines)
+    source.add(f"for _ in range({count}):")
+    source.indent += 1
+    inner = _Cursor(source, "p")
+    element = _read_one(inner, type(kind)(kind.base), resolve)
+    inner.settle()
+    for line in inner.builds:
+        source.add(line)
+    source.add(f"{name}.append({element})")
+    source.indent -= 1
+    # A wrong count must not keep us busy, or fill the memory, before the bytes run out.
+    bound = f"(len(d) - p) // {inner.minimum}" if inner.minimum else str(_ZERO_SIZE_LIMIT)
+    text = f"if {count} > {bound}: raise Mismatch(f'an array says it has {{{count}}} elements')"
+    source.lines.insert(guard, "    " * source.indent + text)

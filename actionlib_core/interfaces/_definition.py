@@ -1,0 +1,314 @@
+"""Reading `.msg` text: fields, constants and comments, or an error with file, line and caret.
+
+Source: the ROS 1 message description format, http://wiki.ros.org/msg. The text is read here and
+not by `rosbags`, because a user needs positions, comments and the spelling of constants (which
+the ROS 1 checksum covers); the tests hold the result against `rosbags`.
+"""
+
+from __future__ import annotations
+
+import difflib
+import keyword
+import re
+from dataclasses import dataclass, field
+
+from actionlib_core.exceptions import InterfaceError
+
+INTEGERS = {
+    "int8": (-(2**7), 2**7 - 1),
+    "uint8": (0, 2**8 - 1),
+    "int16": (-(2**15), 2**15 - 1),
+    "uint16": (0, 2**16 - 1),
+    "int32": (-(2**31), 2**31 - 1),
+    "uint32": (0, 2**32 - 1),
+    "int64": (-(2**63), 2**63 - 1),
+    "uint64": (0, 2**64 - 1),
+    # Old names: in ROS 1 a byte is signed and a char is not.
+    "byte": (-(2**7), 2**7 - 1),
+    "char": (0, 2**8 - 1),
+}
+"""Lowest and highest value of each integer type."""
+
+FLOATS = ("float32", "float64")
+TIMES = ("time", "duration")
+BUILTINS = (*INTEGERS, *FLOATS, "bool", "string", *TIMES)
+
+# Names a message class has for itself; a field of that name gets a trailing underscore.
+RESERVED = frozenset(
+    {
+        *("serialize", "deserialize", "to_bytes", "from_bytes"),
+        *("to_yaml", "from_yaml", "to_dict", "from_dict", "self"),
+    }
+)
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
+_TYPE = re.compile(r"([A-Za-z0-9_/]+?)(\[(\d*)\])?\Z")
+_TYPE_PATH = re.compile(r"([a-zA-Z][A-Za-z0-9_]*/)?[A-Za-z][A-Za-z0-9_]*\Z")
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """Where in a definition something stands, for error messages."""
+
+    source: str
+    line: int
+    column: int
+    text: str
+
+    def problem(self, what: str) -> str:
+        """Return `what` under its file and line, with a caret below the offending column."""
+        shown = self.text.expandtabs(1).rstrip()
+        return f"{self.source}:{self.line}: {what}\n    {shown}\n    {' ' * self.column}^"
+
+
+@dataclass(frozen=True, slots=True)
+class FieldType:
+    """The type of a field.
+
+    Attributes:
+        base: A built-in such as "float64", or a message type "pkg/Name".
+        is_array: Whether it is an array.
+        length: The length of a fixed array, None for a dynamic one.
+    """
+
+    base: str
+    is_array: bool = False
+    length: int | None = None
+
+    @property
+    def is_builtin(self) -> bool:
+        """Whether the base is no message type."""
+        return self.base in BUILTINS
+
+    @property
+    def suffix(self) -> str:
+        """The array part of the ROS spelling: "", "[]" or "[9]"."""
+        if not self.is_array:
+            return ""
+        return f"[{'' if self.length is None else self.length}]"
+
+    def __str__(self) -> str:
+        return f"{self.base}{self.suffix}"
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One field: its ROS name, the Python attribute (they differ for keywords), its type."""
+
+    name: str
+    type: FieldType
+    position: Position = field(compare=False, repr=False)
+    comment: str = ""
+
+    @property
+    def attribute(self) -> str:
+        """The attribute of the message class."""
+        return attribute_of(self.name)
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """One constant: `text` is the value as spelt, which the checksum covers."""
+
+    name: str
+    type: str
+    value: bool | int | float | str
+    text: str
+    comment: str = ""
+
+    @property
+    def attribute(self) -> str:
+        """The attribute of the message class."""
+        return attribute_of(self.name)
+
+
+@dataclass(frozen=True, slots=True)
+class Definition:
+    """A message type: name "pkg/Name", fields, constants and the text they were read from."""
+
+    name: str
+    fields: tuple[Field, ...]
+    constants: tuple[Constant, ...]
+    text: str
+    source: str
+    comment: str = ""
+
+    @property
+    def package(self) -> str:
+        """The package part of the name."""
+        return self.name.split("/")[0]
+
+    @property
+    def short_name(self) -> str:
+        """The name without its package."""
+        return self.name.split("/")[1]
+
+
+def attribute_of(name: str) -> str:
+    """Return the Python attribute for a field name: with "_" behind keywords and own methods."""
+    return f"{name}_" if keyword.iskeyword(name) or name in RESERVED else name
+
+
+def did_you_mean(word: str, known: object) -> str:
+    """Return " Did you mean 'x' or 'y'?" for the nearest of `known`, "" when nothing is near."""
+    names = [str(name) for name in known] if isinstance(known, (list, tuple, set, dict)) else []
+    lowered = {name.lower(): name for name in names}
+    close = [lowered[word.lower()]] if word.lower() in lowered else []
+    close += [n for n in difflib.get_close_matches(word, names, n=3, cutoff=0.6) if n not in close]
+    return f" Did you mean {' or '.join(map(repr, close[:3]))}?" if close else ""
+
+
+def parse(name: str, text: str, *, source: str = "", first_line: int = 1) -> Definition:
+    """Read the text of one message.
+
+    Args:
+        name: Its type, "pkg/Name"; bare types in the text belong to the same package.
+        text: The definition, lines of `type name` and `type NAME=value`.
+        source: File name for error messages; the name when "".
+        first_line: Number of the text's first line in that file.
+
+    Raises:
+        InterfaceError: Lines that cannot be read; all of them at once.
+    """
+    return _Reader(name, source or name, first_line).read(text)
+
+
+class _Reader:
+    """Collects fields, constants and problems of one message text, line by line."""
+
+    def __init__(self, name: str, source: str, first_line: int) -> None:
+        self.name = name
+        self.package = name.split("/")[0]
+        self.source = source
+        self.first_line = first_line
+        self.fields: list[Field] = []
+        self.constants: list[Constant] = []
+        self.problems: list[str] = []
+        self.seen: dict[str, int] = {}
+
+    def read(self, text: str) -> Definition:
+        head: list[str] = []
+        block: list[str] = []
+        for number, line in enumerate(text.splitlines(), self.first_line):
+            code, _, comment = line.partition("#")
+            if not code.strip():
+                block = [*block, comment.strip()] if "#" in line else []
+                head = block if not self.seen else head
+                continue
+            at = Position(self.source, number, len(code) - len(code.lstrip()), line)
+            self._line(at, code, " ".join(filter(None, [*block, comment.strip()])))
+            block = []
+        if self.problems:
+            raise InterfaceError(*self.problems)
+        fields, constants = tuple(self.fields), tuple(self.constants)
+        return Definition(self.name, fields, constants, text, self.source, " ".join(head))
+
+    def _line(self, at: Position, code: str, comment: str) -> None:
+        words = code.split(None, 1)
+        kind = self._type(at, words[0])
+        if kind is None:
+            return
+        if len(words) == 1:
+            self._problem(at, at.column + len(words[0]), "no field name; expected `type name`")
+            return
+        column = code.index(words[1], at.column + len(words[0]))
+        if "=" in words[1]:
+            self._constant(at, column, kind, words[1], comment)
+        else:
+            self._field(at, column, kind, words[1].strip(), comment)
+
+    def _type(self, at: Position, text: str) -> FieldType | None:
+        match = _TYPE.match(text)
+        if match is None or not _TYPE_PATH.match(match[1]):
+            return self._bad_type(at, text)
+        base, is_array, length = match[1], match[2] is not None, match[3]
+        if base == "Header":
+            base = "std_msgs/Header"
+        elif base not in BUILTINS and "/" not in base:
+            base = f"{self.package}/{base}"
+        return FieldType(base, is_array, int(length) if length else None)
+
+    def _bad_type(self, at: Position, text: str) -> None:
+        if "<=" in text:
+            what = (
+                f"bounded type {text!r} is ROS 2's; expected ROS 1's `string`, `type[]`, `type[N]`"
+            )
+        elif "[" in text or "]" in text:
+            what = f"malformed array {text!r}; expected `type[]` or `type[N]`"
+        else:
+            hint = did_you_mean(text.strip("-:;,"), BUILTINS)
+            what = f"malformed type {text!r}; expected a built-in type or `package/Name`.{hint}"
+        self._problem(at, at.column, what)
+
+    def _field(self, at: Position, column: int, kind: FieldType, name: str, comment: str) -> None:
+        words = name.split()
+        if len(words) > 1 and _NAME.match(words[0]):
+            what = f"unexpected {words[1]!r} behind the field name; expected `type name`"
+            hint = ". Default values are ROS 2's; a constant is `type NAME=value`"
+            self._problem(at, column + name.index(words[1], len(words[0])), what + hint)
+            return
+        if self._check_name(at, column, name, "field"):
+            where = Position(at.source, at.line, at.column, at.text)
+            self.fields.append(Field(name, kind, where, comment))
+
+    def _constant(
+        self, at: Position, column: int, kind: FieldType, code: str, comment: str
+    ) -> None:
+        name = code.split("=", 1)[0].strip()
+        if kind.is_array or not kind.is_builtin or kind.base in TIMES:
+            what = f"a constant cannot be a {kind}; expected a number, bool or string type"
+            self._problem(at, at.column, what)
+            return
+        if not self._check_name(at, column, name, "constant"):
+            return
+        # A string constant is the rest of the line, comment sign included.
+        if kind.base == "string":
+            raw, comment = at.text.split("=", 1)[1], ""
+        else:
+            raw = code.split("=", 1)[1]
+        try:
+            value = _constant_value(kind.base, raw.strip())
+        except ValueError as error:
+            self._problem(at, at.text.index("=") + 1, f"constant {name}: {error}")
+            return
+        self.constants.append(Constant(name, kind.base, value, raw.strip(), comment))
+
+    def _check_name(self, at: Position, column: int, name: str, what: str) -> bool:
+        if not _NAME.match(name):
+            rule = "a letter, then letters, digits and underscores"
+            self._problem(at, column, f"invalid {what} name: got {name!r}; expected {rule}")
+            return False
+        if name in self.seen:
+            first = self.seen[name]
+            self._problem(at, column, f"duplicate name {name!r}; line {first} has it already")
+            return False
+        self.seen[name] = at.line
+        return True
+
+    def _problem(self, at: Position, column: int, what: str) -> None:
+        where = Position(at.source, at.line, column, at.text)
+        self.problems.append(where.problem(what))
+
+
+def _constant_value(kind: str, text: str) -> bool | int | float | str:
+    """Convert the text of a constant; ValueError says what is wrong with it."""
+    if kind == "string":
+        return text
+    if kind == "bool":
+        values = {"true": True, "1": True, "false": False, "0": False}
+        if text.lower() not in values:
+            raise ValueError(f"got {text!r}; expected True or False")
+        return values[text.lower()]
+    if kind in FLOATS:
+        try:
+            return float(text)
+        except ValueError:
+            raise ValueError(f"got {text!r}; expected a number") from None
+    lowest, highest = INTEGERS[kind]
+    try:
+        number = int(text, 10 if text.lstrip("+-").isdigit() else 0)
+    except ValueError:
+        raise ValueError(f"got {text!r}; expected a whole number") from None
+    if not lowest <= number <= highest:
+        raise ValueError(f"got {number}; expected {lowest} to {highest} ({kind})")
+    return number

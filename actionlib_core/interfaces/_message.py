@@ -1,0 +1,249 @@
+"""The base class of all messages, and the making of a message class from its definition."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
+
+from actionlib_core.exceptions import FieldError, InterfaceError
+from actionlib_core.interfaces import _arrays
+from actionlib_core.interfaces._codegen import WRITE_ERRORS, make_codecs
+from actionlib_core.interfaces._definition import attribute_of, did_you_mean
+from actionlib_core.interfaces._values import (
+    coerced,
+    default_source,
+    filled,
+    plain,
+    short,
+    to_time,
+)
+from actionlib_core.interfaces._yaml import dump, load
+from actionlib_core.time import Duration, Time
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from actionlib_core.interfaces._definition import Definition
+
+
+class Buffer(Protocol):
+    """Where `Message.serialize` writes, for example an `io.BytesIO`."""
+
+    def write(self, data: bytes, /) -> object:
+        """Take the bytes."""
+        ...
+
+
+class Message:
+    """Base of all message classes; it has what ROS 1's generated classes have, and more.
+
+    A message takes its fields by position or keyword; fields not given have ROS's default values
+    (0, False, "", empty arrays, default messages). Fields may be set to anything: types are checked
+    when the message is written (`to_bytes`, `serialize`, `to_yaml`), where every bad field is named
+    with its path. `time` and `duration` fields take float seconds: the constructor converts them at
+    once, a later assignment is converted in the bytes only.
+
+    `uint8[]` and `char[]` are `bytes`; other arrays are lists. Lists, tuples, bytearrays and 1-D
+    numpy arrays are taken wherever an array is written.
+    """
+
+    __slots__: ClassVar[Any] = ()
+    __hash__ = None  # type: ignore[assignment] # mutable
+
+    _type: ClassVar[str]
+    """ROS name, "pkg/Name"."""
+    _md5sum: ClassVar[str]
+    """ROS 1 checksum of the definition, 32 hexadecimal digits."""
+    _slot_types: ClassVar[list[str]]
+    """ROS types in the order of `__slots__`."""
+    _full_text: ClassVar[str]
+    """The definition with all those it uses, as ROS 1 publishes it."""
+    _has_header: ClassVar[bool]
+    """Whether the first field is a `std_msgs/Header header`."""
+    _definition: ClassVar[Definition]
+    _nested: ClassVar[dict[str, type[Message]]]
+    _write: ClassVar[Callable[[Any], bytes]]
+    _read: ClassVar[Callable[[bytes], Any]]
+
+    def to_bytes(self) -> bytes:
+        """Return the ROS 1 serialisation.
+
+        Raises:
+            FieldError: Values do not fit their fields; all of them are named.
+        """
+        write = type(self)._write
+        try:
+            return write(self)
+        except WRITE_ERRORS:
+            # Values of other types than the fields' own: convert them, or say what is wrong.
+            return write(coerced(self))
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Self:
+        """Make a message from its ROS 1 serialisation.
+
+        Raises:
+            DeserializationError: The bytes are no message of this type.
+        """
+        return cls._read(data)  # type: ignore[no-any-return] # generated code
+
+    def serialize(self, buff: Buffer) -> None:
+        """Write the ROS 1 serialisation to a file-like object; raises as `to_bytes`."""
+        buff.write(Message.to_bytes(self))
+
+    def deserialize(self, data: bytes) -> Self:
+        """Fill this message from its ROS 1 serialisation and return it; raises as `from_bytes`."""
+        other = type(self)._read(data)
+        for name in self.__slots__:
+            setattr(self, name, getattr(other, name))
+        return self
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values: nested dicts, lists, numbers; times as {"secs", "nsecs"}.
+
+        Raises:
+            FieldError: As `to_bytes`.
+        """
+        return plain(coerced(self))
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """Make a message from plain values; fields not given have their defaults.
+
+        A time is a number of seconds, a dict {"secs", "nsecs"} or "now"; a `Header` may be "auto"
+        (stamped now).
+
+        Raises:
+            FieldError: Unknown fields or values that do not fit; all of them are named.
+        """
+        return filled(cls, values)
+
+    def to_yaml(self) -> str:
+        """Return YAML as `rostopic echo` prints it, which `from_yaml` reads back.
+
+        Raises:
+            FieldError: As `to_bytes`.
+        """
+        return dump(coerced(self))
+
+    @classmethod
+    def from_yaml(cls, text: str) -> Self:
+        """Make a message from YAML text, block or flow style; values as in `from_dict`.
+
+        Raises:
+            FieldError: The text is no YAML mapping, or as `from_dict`.
+        """
+        return filled(cls, load(text, cls._type))
+
+    def __repr__(self) -> str:
+        return short(self)
+
+    def __str__(self) -> str:
+        return dump(self)
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        for field in self._definition.fields:
+            mine, theirs = getattr(self, field.attribute), getattr(other, field.attribute)
+            if field.type.is_array:
+                if not _arrays.same(mine, theirs):
+                    return False
+            elif mine != theirs:
+                return False
+        return True
+
+    def __getstate__(self) -> list[Any]:
+        return [getattr(self, name) for name in self.__slots__]
+
+    def __setstate__(self, state: list[Any]) -> None:
+        for name, value in zip(self.__slots__, state, strict=True):
+            setattr(self, name, value)
+
+
+def make_class(
+    definition: Definition,
+    resolve: Callable[[str], type[Message]],
+    *,
+    module: str,
+    md5: str,
+    full_text: str,
+) -> type[Message]:
+    """Make the class of a message.
+
+    Args:
+        definition: What to make it of.
+        resolve: Returns the class of a nested type.
+        module: Value of `__module__`, under which the class can be imported (pickle needs it).
+        md5: Its ROS 1 checksum.
+        full_text: Value of `_full_text`.
+    """
+    slots = [field.attribute for field in definition.fields]
+    if clash := set(slots) & {constant.attribute for constant in definition.constants}:
+        raise InterfaceError(f"{definition.source}: names used twice: {sorted(clash)}")
+    namespace: dict[str, Any] = {
+        "__slots__": slots,
+        "__module__": module,
+        "__doc__": _documentation(definition),
+        "_type": definition.name,
+        "_md5sum": md5,
+        "_slot_types": [str(field.type) for field in definition.fields],
+        "_full_text": full_text,
+        "_has_header": bool(slots) and str(definition.fields[0].type) == "std_msgs/Header",
+        "_definition": definition,
+        "_nested": {
+            f.type.base: resolve(f.type.base) for f in definition.fields if not f.type.is_builtin
+        },
+    }
+    namespace |= {constant.attribute: constant.value for constant in definition.constants}
+    namespace["__init__"] = _make_init(definition, resolve)
+    cls = type(definition.short_name, (Message,), namespace)
+    write, read = make_codecs(cls, definition, resolve)
+    cls._write = staticmethod(write)  # type: ignore[assignment] # called through the class
+    cls._read = staticmethod(read)  # type: ignore[assignment] # as above
+    return cls
+
+
+def _documentation(definition: Definition) -> str:
+    lines = [definition.comment or f"The ROS message {definition.name}.", ""]
+    for field in definition.fields:
+        lines.append(f"{field.attribute} ({field.type}): {field.comment}".rstrip(": "))
+    return "\n".join(lines).strip()
+
+
+def _make_init(definition: Definition, resolve: Callable[[str], type[Message]]) -> Any:
+    """Make `__init__`: one argument per field, None (or nothing) for the default."""
+    scope: dict[str, Any] = {
+        "Time": Time,
+        "Duration": Duration,
+        "to_time": to_time,
+        "unknown": _raise_unknown,
+    }
+    names = [field.attribute for field in definition.fields]
+    lines = [f"def __init__({', '.join(['self', *(f'{n}=None' for n in names), '**extra'])}):"]
+    lines.append("    if extra: unknown(self, extra)")
+    for field in definition.fields:
+        name = field.attribute
+        default = default_source(field.type, resolve, scope)
+        given = name
+        if not field.type.is_array and field.type.base in {"time", "duration"}:
+            cls = "Time" if field.type.base == "time" else "Duration"
+            given = f"{name} if {name}.__class__ is {cls} else to_time({cls}, {name})"
+            given = f"({given})"
+        lines.append(f"    self.{name} = {default} if {name} is None else {given}")
+    # The text holds only names checked by the parser.
+    exec(compile("\n".join(lines), f"<__init__ of {definition.name}>", "exec"), scope)  # noqa: S102
+    return scope["__init__"]
+
+
+def _raise_unknown(message: Message, extra: dict[str, Any]) -> None:
+    known = list(message.__slots__)
+    raise FieldError(
+        *(
+            f"{message._type}: got unknown field {name!r}; expected {', '.join(known) or 'none'}."
+            + did_you_mean(name, known)
+            for name in extra
+        )
+    )
+
+
+__all__ = ["Buffer", "Message", "attribute_of", "make_class"]

@@ -1,0 +1,132 @@
+"""`from actionlib_core.interfaces.geometry_msgs.msg import PoseStamped`: modules made on demand."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import types
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.exceptions import InterfaceError
+from actionlib_core.interfaces._definition import did_you_mean
+from actionlib_core.interfaces._registry import ROOT, Registry, registry
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from actionlib_core.interfaces._sources import Kind
+
+_SECTIONS: dict[str, Kind] = {"msg": "msg", "srv": "srv"}
+
+
+class _Section(types.ModuleType):
+    """The module `pkg.msg` or `pkg.srv`; its classes are made when first named."""
+
+    def __init__(self, name: str, package: str, kind: Kind, source: Registry) -> None:
+        super().__init__(name, f"The {kind} classes of the ROS package {package}.")
+        self._package = package
+        self._kind = kind
+        self._registry = source
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "__all__":
+            return self._registry.names(self._kind, self._package)
+        if name.startswith("_"):
+            raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
+        known = self._registry.names(self._kind, self._package)
+        if name not in known:
+            raise AttributeError(
+                f"{self.__name__}: got {name!r}; expected an interface of that package."
+                + (did_you_mean(name, known) or f" It has {', '.join(known) or 'none'}.")
+            )
+        value = self._registry.attribute(self._package, self._kind, name)
+        setattr(self, name, value)
+        return value
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *self._registry.names(self._kind, self._package)})
+
+
+class _Package(types.ModuleType):
+    """The module `pkg`; it has `msg` and `srv`."""
+
+    def __init__(self, name: str, package: str) -> None:
+        super().__init__(name, f"The ROS package {package}.")
+        self.__path__: list[str] = []
+
+    def __getattr__(self, name: str) -> Any:
+        if name in _SECTIONS:
+            return importlib.import_module(f"{self.__name__}.{name}")
+        if self.__name__ == "actionlib" and not name.startswith("_"):
+            # Old programs say `import actionlib` for the clients and servers.
+            return getattr(importlib.import_module("actionlib_core"), name)
+        raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
+
+
+class _Finder(MetaPathFinder, Loader):
+    """Finds interface packages below a prefix.
+
+    Args:
+        prefix: "actionlib_core.interfaces." or "" for plain ROS names.
+        source: Where the classes come from.
+    """
+
+    def __init__(self, prefix: str, source: Registry) -> None:
+        self.prefix = prefix
+        self._registry = source
+
+    def find_spec(
+        self,
+        fullname: str,
+        path: Sequence[str] | None,  # noqa: ARG002 # the protocol's
+        target: types.ModuleType | None = None,  # noqa: ARG002 # the protocol's
+    ) -> ModuleSpec | None:
+        if not fullname.startswith(self.prefix):
+            return None
+        package, _, section = fullname.removeprefix(self.prefix).partition(".")
+        if package.startswith("_") or section not in {"", *_SECTIONS}:
+            return None
+        if not self._registry.sources.has_package(package):
+            return None
+        return ModuleSpec(fullname, self, is_package=not section)
+
+    def create_module(self, spec: ModuleSpec) -> types.ModuleType:
+        package, _, section = spec.name.removeprefix(self.prefix).partition(".")
+        if not section:
+            return _Package(spec.name, package)
+        return _Section(spec.name, package, _SECTIONS[section], self._registry)
+
+    def exec_module(self, module: types.ModuleType) -> None:
+        """Nothing to run: the module looks its classes up."""
+
+
+def install() -> None:
+    """Make `actionlib_core.interfaces.<pkg>` importable; called by the package itself, once."""
+    # First, so that the folder of a package's stubs is not taken for a namespace package.
+    _install(f"{ROOT}.", first=True)
+
+
+def install_ros_names() -> None:
+    """Make the plain ROS names importable: `from geometry_msgs.msg import PoseStamped`.
+
+    Old programs then run unchanged. The classes are those of `actionlib_core.interfaces`. Modules
+    that exist otherwise (a ROS installation) win. Calling it again has no effect.
+
+    Raises:
+        InterfaceError: Called after a module of another origin took a package's name.
+    """
+    taken = sys.modules.get("geometry_msgs")
+    if taken is not None and not isinstance(taken, _Package):
+        raise InterfaceError(
+            f"install_ros_names: got geometry_msgs from {getattr(taken, '__file__', '?')} imported "
+            "already; expected none. Try calling it first, or use the other installation"
+        )
+    _install("", first=False)
+
+
+def _install(prefix: str, *, first: bool) -> None:
+    present = [f for f in sys.meta_path if isinstance(f, _Finder) and f.prefix == prefix]
+    if not present:
+        sys.meta_path.insert(0 if first else len(sys.meta_path), _Finder(prefix, registry))

@@ -1,0 +1,166 @@
+"""Where definitions come from: inline text, user folders in ROS layout, the bundled folder."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, get_args
+
+from actionlib_core.exceptions import InterfaceError
+from actionlib_core.interfaces._sections import (
+    ACTION_PARTS,
+    SERVICE_PARTS,
+    Section,
+    action_messages,
+    split,
+)
+
+Kind = Literal["msg", "srv", "action"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+
+PATH_VARIABLE = "SMACHPY_INTERFACE_PATH"
+_BUNDLED = Path(__file__).parent / "share"
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """The text of a definition and the file (or other origin) it was read from."""
+
+    text: str
+    origin: str
+
+
+class Sources:
+    """Finds definitions by kind, package and name; the first place that has one wins.
+
+    The order: inline definitions, `add_path` folders (newest first), the folders in
+    `SMACHPY_INTERFACE_PATH`, the bundled ones.
+    """
+
+    def __init__(self) -> None:
+        self._inline: dict[tuple[Kind, str, str], Source] = {}
+        self._added: list[Path] = []
+
+    def add_path(self, folder: str | os.PathLike[str]) -> None:
+        path = Path(folder).expanduser().resolve()
+        if not path.is_dir():
+            raise InterfaceError(f"add_path: got {str(folder)!r}; expected an existing folder")
+        if not any(_packages_in(path)):
+            raise InterfaceError(
+                f"add_path: got {str(folder)!r}, which holds no interfaces; expected a folder in "
+                "ROS layout: my_pkg/msg/Name.msg, my_pkg/srv/Name.srv, my_pkg/action/Name.action"
+            )
+        if path not in self._added:
+            self._added.insert(0, path)
+
+    def define(self, kind: Kind, package: str, name: str, text: str) -> None:
+        self._inline[kind, package, name] = Source(text, f"{package}/{kind}/{name} (inline)")
+
+    def forget(self, kind: Kind, package: str, name: str) -> None:
+        self._inline.pop((kind, package, name), None)
+
+    def search_path(self) -> list[Path]:
+        """Return the folders searched, in order, missing ones included."""
+        listed = os.environ.get(PATH_VARIABLE, "").split(os.pathsep)
+        return [*self._added, *(Path(p).expanduser() for p in listed if p.strip()), _BUNDLED]
+
+    def find(self, kind: Kind, package: str, name: str) -> Source | None:
+        """Return a definition, None when there is none."""
+        inline = self._inline.get((kind, package, name))
+        if inline is not None:
+            return inline
+        for root in self.search_path():
+            for folder in _folders_of(root, package):
+                path = folder / kind / f"{name}.{kind}"
+                if path.is_file():
+                    return Source(_text_of(path), str(path))
+        return None
+
+    def sections(self, kind: Kind, package: str, name: str) -> dict[str, Section]:
+        """Return the sections of a service or action by part name; empty when there is none."""
+        source = self.find(kind, package, name)
+        if source is None:
+            return {}
+        parts = SERVICE_PARTS if kind == "srv" else ACTION_PARTS
+        return dict(zip(parts, split(source.text, parts, source.origin), strict=True))
+
+    def message_source(self, package: str, name: str) -> tuple[Source, int] | None:
+        """Return the text of a message and its first line: a file's, or a part of an action's."""
+        source = self.find("msg", package, name)
+        if source is not None:
+            return source, 1
+        for suffix in ("Goal", "Result", "Feedback"):
+            part = self._part("action", package, name, suffix)
+            if part is not None:
+                return part
+        for suffix in ("ActionGoal", "ActionResult", "ActionFeedback", "Action"):
+            base = name.removesuffix(suffix)
+            action = self.find("action", package, base) if base not in {name, ""} else None
+            if action is not None:
+                return Source(action_messages(base)[name], action.origin), 1
+        return None
+
+    def service_part(self, package: str, name: str) -> tuple[Source, int] | None:
+        """Return the text of a service's request or response and its first line."""
+        for suffix in ("Request", "Response"):
+            part = self._part("srv", package, name, suffix)
+            if part is not None:
+                return part
+        return None
+
+    def _part(self, kind: Kind, package: str, name: str, suffix: str) -> tuple[Source, int] | None:
+        base = name.removesuffix(suffix)
+        source = self.find(kind, package, base) if base not in {name, ""} else None
+        if source is None:
+            return None
+        section = self.sections(kind, package, base)[suffix.lower()]
+        return Source(section.text, source.origin), section.first_line
+
+    def packages(self) -> list[str]:
+        """Return the names of all packages that define something."""
+        found = {package for _, package, _ in self._inline}
+        for root in self.search_path():
+            found |= {folder.name for folder in _packages_in(root)}
+        return sorted(found)
+
+    def has_package(self, package: str) -> bool:
+        """Tell whether a package defines something."""
+        return any(key[1] == package for key in self._inline) or any(
+            _folders_of(root, package) for root in self.search_path()
+        )
+
+    def names(self, kind: Kind, package: str) -> list[str]:
+        """Return the names of a package's definitions of a kind."""
+        found = {name for k, p, name in self._inline if (k, p) == (kind, package)}
+        for root in self.search_path():
+            for folder in _folders_of(root, package):
+                found |= {path.stem for path in (folder / kind).glob(f"*.{kind}")}
+        return sorted(found)
+
+
+def _text_of(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InterfaceError(f"{path}: got a byte that is no UTF-8: {error}") from error
+
+
+def _is_package(folder: Path) -> bool:
+    return any((folder / kind).is_dir() for kind in KINDS)
+
+
+def _folders_of(root: Path, package: str) -> list[Path]:
+    """Return the folders of a package below a root; the root may itself be the package."""
+    candidates = [root / package]
+    if root.name == package:
+        candidates.append(root)
+    return [folder for folder in candidates if _is_package(folder)]
+
+
+def _packages_in(root: Path) -> list[Path]:
+    if not root.is_dir():
+        return []
+    if _is_package(root):
+        return [root]
+    return [folder for folder in root.iterdir() if _is_package(folder)]
