@@ -6,7 +6,7 @@ seconds: ``Time.now() + 0.5``, ``Duration(2) < 2.5``, ``float(Duration(1, 500_00
 
 from __future__ import annotations
 
-from typing import ClassVar, Self, SupportsFloat, SupportsInt, TypeAlias, overload
+from typing import Any, ClassVar, Self, SupportsFloat, SupportsInt, TypeAlias, overload
 
 from actionlib_core.clock import current_clock
 
@@ -260,14 +260,13 @@ def to_seconds(duration: _Seconds | None) -> float | None:
         return None
     if isinstance(duration, (float, int)):
         return float(duration)
-    to_sec = getattr(duration, "to_sec", None)
-    if to_sec is not None and not isinstance(duration, Time):
-        return float(to_sec())
     return _number(duration, "duration")
 
 
-def _number(value: object, where: str) -> float:
-    if isinstance(value, str) or isinstance(value, Time) or not hasattr(value, "__float__"):
+def _number(value: Any, where: str) -> float:
+    if hasattr(value, "to_sec") and not isinstance(value, Time):
+        return float(value.to_sec())
+    if isinstance(value, (str, Time)) or not hasattr(value, "__float__"):
         raise TypeError(f"{where}: got {value!r}; expected seconds as a number or a Duration")
     return float(value)
 

@@ -179,7 +179,7 @@ def _write_one(
     else:
         nested = resolve(kind.base)
         name = _checked(source, value, nested)
-        _write_fields(source, items, nested._definition.fields, name, resolve)  # noqa: SLF001 # ours
+        _write_fields(source, items, nested._definition.fields, name, resolve)
 
 
 def _checked(source: _Source, value: str, cls: type) -> str:
@@ -227,7 +227,7 @@ def _write_loop(source: _Source, kind: FieldType, values: str, resolve: Resolve)
     else:
         nested = resolve(kind.base)
         source.add(f"if {element}.__class__ is not {source.bind('C', nested)}: raise Mismatch")
-        _write_fields(source, items, nested._definition.fields, element, resolve)  # noqa: SLF001
+        _write_fields(source, items, nested._definition.fields, element, resolve)
     for part in items.parts():
         source.add(f"{parts}.append({part})")
     source.indent -= 1
@@ -354,7 +354,7 @@ def _read_one(cursor: _Cursor, kind: FieldType, resolve: Resolve) -> str:
         ]
         return name
     nested = resolve(kind.base)
-    return _read_message(cursor, nested, nested._definition.fields, resolve)  # noqa: SLF001
+    return _read_message(cursor, nested, nested._definition.fields, resolve)
 
 
 def _read_array(cursor: _Cursor, kind: FieldType, resolve: Resolve) -> str:

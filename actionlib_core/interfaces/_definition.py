@@ -136,12 +136,12 @@ class Definition:
     @property
     def package(self) -> str:
         """The package part of the name."""
-        return self.name.split("/")[0]
+        return self.name.partition("/")[0]
 
     @property
     def short_name(self) -> str:
         """The name without its package."""
-        return self.name.split("/")[1]
+        return self.name.partition("/")[2]
 
 
 def attribute_of(name: str) -> str:
@@ -178,7 +178,7 @@ class _Reader:
 
     def __init__(self, name: str, source: str, first_line: int) -> None:
         self.name = name
-        self.package = name.split("/")[0]
+        self.package = name.partition("/")[0]
         self.source = source
         self.first_line = first_line
         self.fields: list[Field] = []
@@ -192,14 +192,20 @@ class _Reader:
         for number, line in enumerate(text.splitlines(), self.first_line):
             code, _, comment = line.partition("#")
             if not code.strip():
-                block = [*block, comment.strip()] if "#" in line else []
-                head = block if not self.seen else head
+                if "#" in line:
+                    block.append(comment.strip())
+                    continue
+                # A block of comments with a blank line behind it tells of the message itself.
+                head = head or ([] if self.seen else block)
+                block = []
                 continue
             at = Position(self.source, number, len(code) - len(code.lstrip()), line)
             self._line(at, code, " ".join(filter(None, [*block, comment.strip()])))
             block = []
         if self.problems:
             raise InterfaceError(*self.problems)
+        if not self.seen:
+            head = head or block
         fields, constants = tuple(self.fields), tuple(self.constants)
         return Definition(self.name, fields, constants, text, self.source, " ".join(head))
 
@@ -220,7 +226,8 @@ class _Reader:
     def _type(self, at: Position, text: str) -> FieldType | None:
         match = _TYPE.match(text)
         if match is None or not _TYPE_PATH.match(match[1]):
-            return self._bad_type(at, text)
+            self._bad_type(at, text)
+            return None
         base, is_array, length = match[1], match[2] is not None, match[3]
         if base == "Header":
             base = "std_msgs/Header"

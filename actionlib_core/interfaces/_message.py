@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, cast
 
 from actionlib_core.exceptions import FieldError, InterfaceError
 from actionlib_core.interfaces import _arrays
@@ -70,7 +70,7 @@ class Message:
         Raises:
             FieldError: Values do not fit their fields; all of them are named.
         """
-        write = type(self)._write
+        write = type(self)._write  # noqa: SLF001 # a field of that name hides nothing here
         try:
             return write(self)
         except WRITE_ERRORS:
@@ -92,7 +92,7 @@ class Message:
 
     def deserialize(self, data: bytes) -> Self:
         """Fill this message from its ROS 1 serialisation and return it; raises as `from_bytes`."""
-        other = type(self)._read(data)
+        other = type(self)._read(data)  # noqa: SLF001 # as above
         for name in self.__slots__:
             setattr(self, name, getattr(other, name))
         return self
@@ -103,7 +103,7 @@ class Message:
         Raises:
             FieldError: As `to_bytes`.
         """
-        return plain(coerced(self))
+        return dict(plain(coerced(self)))
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
@@ -196,17 +196,16 @@ def make_class(
     }
     namespace |= {constant.attribute: constant.value for constant in definition.constants}
     namespace["__init__"] = _make_init(definition, resolve)
-    cls = type(definition.short_name, (Message,), namespace)
+    cls: Any = type(definition.short_name, (Message,), namespace)
     write, read = make_codecs(cls, definition, resolve)
-    cls._write = staticmethod(write)  # type: ignore[assignment] # called through the class
-    cls._read = staticmethod(read)  # type: ignore[assignment] # as above
-    return cls
+    cls._write = staticmethod(write)
+    cls._read = staticmethod(read)
+    return cast("type[Message]", cls)
 
 
 def _documentation(definition: Definition) -> str:
     lines = [definition.comment or f"The ROS message {definition.name}.", ""]
-    for field in definition.fields:
-        lines.append(f"{field.attribute} ({field.type}): {field.comment}".rstrip(": "))
+    lines += [f"{f.attribute} ({f.type}): {f.comment}".rstrip(": ") for f in definition.fields]
     return "\n".join(lines).strip()
 
 

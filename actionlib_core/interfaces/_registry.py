@@ -88,7 +88,7 @@ class Registry:
                 return self.message(f"{package}/{base}Action")
         raise InterfaceError(self._unknown("action", f"{package}/{short}"))
 
-    def define(self, kind: Kind, name: str, text: str) -> type[Message] | type[ServiceType]:
+    def define(self, kind: Kind, name: str, text: str) -> type[Message | ServiceType]:
         """Define an interface by its text and return its class.
 
         The same name and text again returns the class made first.
@@ -142,7 +142,7 @@ class Registry:
             return self.service(f"{package}/{name}")
         return self.message(f"{package}/{name}")
 
-    def _built(self, kind: Kind, package: str, short: str) -> type[Message] | type[ServiceType]:
+    def _built(self, kind: Kind, package: str, short: str) -> type[Message | ServiceType]:
         if kind == "srv":
             return self.service(f"{package}/{short}")
         return self.message(f"{package}/{short}{'Action' if kind == 'action' else ''}")
@@ -197,7 +197,7 @@ class Registry:
         return (found or self.sources.service_part(package, short)) is not None
 
     def _unknown(self, what: str, full: str) -> str:
-        package, short = full.split("/")
+        short = full.partition("/")[2]
         known = [f"{p}/{n}" for p in self.sources.packages() for n in self._names_of(what, p)]
         near = [n for n in BUILTINS if n == short.lower()] if what == "type" else []
         if near:

@@ -20,7 +20,8 @@ Kind = Literal["msg", "srv", "action"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 PATH_VARIABLE = "SMACHPY_INTERFACE_PATH"
-_BUNDLED = Path(__file__).parent / "share"
+BUNDLED = Path(__file__).parent / "share"
+"""The folder of the definitions that come with this package."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,9 +37,13 @@ class Sources:
 
     The order: inline definitions, `add_path` folders (newest first), the folders in
     `SMACHPY_INTERFACE_PATH`, the bundled ones.
+
+    Args:
+        folders: Search these and nothing else, neither the environment's nor the bundled ones.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, folders: list[Path] | None = None) -> None:
+        self._only = folders
         self._inline: dict[tuple[Kind, str, str], Source] = {}
         self._added: list[Path] = []
 
@@ -62,8 +67,10 @@ class Sources:
 
     def search_path(self) -> list[Path]:
         """Return the folders searched, in order, missing ones included."""
+        if self._only is not None:
+            return [*self._added, *self._only]
         listed = os.environ.get(PATH_VARIABLE, "").split(os.pathsep)
-        return [*self._added, *(Path(p).expanduser() for p in listed if p.strip()), _BUNDLED]
+        return [*self._added, *(Path(p).expanduser() for p in listed if p.strip()), BUNDLED]
 
     def find(self, kind: Kind, package: str, name: str) -> Source | None:
         """Return a definition, None when there is none."""

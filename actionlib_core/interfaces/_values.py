@@ -24,6 +24,14 @@ if TYPE_CHECKING:
 
 _LONGEST_SHOWN = 8  # array elements in a repr
 _LARGEST_FLOAT32 = 3.4028235677973366e38  # rounds to infinity from here on
+_DEFAULTS = {
+    **dict.fromkeys(INTEGERS, "0"),
+    **dict.fromkeys(FLOATS, "0.0"),
+    "bool": "False",
+    "string": '""',
+    "time": "Time()",
+    "duration": "Duration()",
+}
 _OCTETS = ("uint8", "char")
 
 
@@ -40,14 +48,8 @@ def default_source(
         if kind.is_builtin and kind.base not in {"time", "duration"}:
             return f"[{element}] * {kind.length}"
         return f"[{element} for _ in range({kind.length})]"
-    if kind.base in INTEGERS:
-        return "0"
-    if kind.base in FLOATS:
-        return "0.0"
     if kind.is_builtin:
-        return {"bool": "False", "string": '""', "time": "Time()", "duration": "Duration()"}[
-            kind.base
-        ]
+        return _DEFAULTS[kind.base]
     name = "M_" + kind.base.replace("/", "_")
     scope[name] = resolve(kind.base)
     return f"{name}()"
