@@ -1,0 +1,11 @@
+"""Floors in the form of ROS `map_server`, with robots and waypoint lists for them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+FOLDER: Final = Path(__file__).parent
+OFFICE_MAP: Final = FOLDER / "office.yaml"
+OFFICE_ROBOT: Final = FOLDER / "office_robot.yaml"
+OFFICE_WAYPOINTS: Final = FOLDER / "office_waypoints.yaml"

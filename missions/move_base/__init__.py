@@ -1,0 +1,1 @@
+"""A simulated robot on an occupancy map, behind a `move_base` action server."""

@@ -1,0 +1,196 @@
+"""Follow a way: turn towards it, drive along it, stop on the goal, turn to the goal's heading."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from enum import Enum, auto
+from typing import TYPE_CHECKING, Final
+
+from missions.move_base.geometry import wrap_angle
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from missions.move_base.body import Body
+    from missions.move_base.config import ControlConfig, RobotConfig
+    from missions.move_base.geometry import Pose2D
+
+_CREEP: Final = 0.06  # [m/s] slowest approach, so that the goal is reached in finite time
+_CREEP_TURN: Final = 0.08  # [rad/s] the same for the last turn
+_FACING: Final = 0.15  # [rad] a turn on the spot ends this near to the way's heading
+_SHARE: Final = 0.8  # of the braking and turning power that the plan counts on
+_STRAIGHT: Final = 1e-4  # [1/m] less curvature than this needs no slowing down
+_BEND_REACH: Final = 4  # points on each side over which a bend is measured
+
+
+class Stage(Enum):
+    """What the follower is doing."""
+
+    TURN = auto()  # on the spot, towards the way
+    DRIVE = auto()
+    BRAKE = auto()  # on the goal
+    FACE = auto()  # on the spot, to the goal's heading
+    DONE = auto()
+
+
+class Follower:
+    """Turns the place of a body on one way into commands.
+
+    Source of the steering law: R. C. Coulter, "Implementation of the Pure Pursuit Path Tracking
+    Algorithm", CMU-RI-TR-92-01.
+
+    Attributes:
+        stage: What it is doing.
+        points: The way, (x, y) [m].
+    """
+
+    def __init__(
+        self,
+        points: Sequence[tuple[float, float]],
+        goal: Pose2D,
+        robot: RobotConfig,
+        control: ControlConfig,
+    ) -> None:
+        self.points = points
+        self.stage = Stage.DRIVE
+        self._goal = goal
+        self._robot = robot
+        self._control = control
+        self._at = 0  # index of the nearest point
+        self._ahead = 0  # index of the point steered to
+        self._lengths = _lengths(points)
+        self._limits = _speed_limits(points, self._lengths, robot)
+        self._first = True
+
+    @property
+    def remaining(self) -> float:
+        """Distance left [m] along the way."""
+        return self._lengths[-1] - self._lengths[self._at]
+
+    def rest(self, distance: float = math.inf) -> Sequence[tuple[float, float]]:
+        """Return the points still ahead, of the next `distance` metres."""
+        end, limit = self._at, self._lengths[self._at] + distance
+        while end < len(self.points) and self._lengths[end] <= limit:
+            end += 1
+        return self.points[self._at : end]
+
+    def command(self, body: Body) -> tuple[float, float]:
+        """Return the speed [m/s] and turn rate [rad/s] to steer with now; moves the stage on."""
+        if self.stage in {Stage.TURN, Stage.DRIVE}:
+            return self._go(body)
+        if self.stage is Stage.BRAKE:
+            if not body.standing:
+                return 0.0, 0.0
+            self.stage = Stage.FACE
+        if self.stage is Stage.FACE:
+            error = wrap_angle(self._goal.yaw - body.yaw)
+            if abs(error) > self._control.yaw_tolerance / 2.0:
+                return 0.0, self._turn(error)
+            if body.standing:
+                self.stage = Stage.DONE
+        return 0.0, 0.0
+
+    def _go(self, body: Body) -> tuple[float, float]:
+        x, y = body.x, body.y
+        self._progress(x, y)
+        left = math.hypot(self._goal.x - x, self._goal.y - y)
+        if left < self._control.xy_tolerance / 2.0 or self._overshot(x, y, left):
+            self.stage = Stage.BRAKE
+            return 0.0, 0.0
+        target_x, target_y = self.points[self._look(body.speed)]
+        distance = math.hypot(target_x - x, target_y - y)
+        error = wrap_angle(math.atan2(target_y - y, target_x - x) - body.yaw)
+        if self._must_turn(error):
+            return 0.0, self._turn(error)
+        speed = max(_CREEP, self._limits[self._at])
+        speed = max(_CREEP, min(speed, math.sqrt(2.0 * _SHARE * self._robot.braking * left)))
+        curvature = 2.0 * math.sin(error) / max(distance, 1e-3)
+        turn_rate = speed * curvature
+        most = _SHARE * self._robot.max_turn_rate
+        if abs(turn_rate) > most:
+            speed *= most / abs(turn_rate)
+            turn_rate = math.copysign(most, turn_rate)
+        return speed, turn_rate
+
+    def _must_turn(self, error: float) -> bool:
+        """Tell whether the heading is so far off that it has to turn on the spot."""
+        if self.stage is Stage.TURN:
+            if abs(error) < _FACING:
+                self.stage = Stage.DRIVE
+        elif abs(error) > self._control.turn_on_spot:
+            self.stage = Stage.TURN
+        return self.stage is Stage.TURN
+
+    def _turn(self, error: float) -> float:
+        """Return the turn rate for a turn by `error` [rad] that ends at rest."""
+        rate = math.sqrt(2.0 * _SHARE * self._robot.turn_acceleration * abs(error)) * _SHARE
+        return math.copysign(max(_CREEP_TURN, min(rate, self._robot.max_turn_rate)), error)
+
+    def _progress(self, x: float, y: float) -> None:
+        """Move the nearest point forward, never back: ways may cross themselves."""
+        points, at = self.points, self._at
+        px, py = points[at]
+        best = (px - x) ** 2 + (py - y) ** 2
+        last = len(points) - 1
+        while at < last:
+            px, py = points[at + 1]
+            distance = (px - x) ** 2 + (py - y) ** 2
+            if distance > best:
+                break
+            at, best = at + 1, distance
+        self._at = at
+
+    def _look(self, speed: float) -> int:
+        """Return the index of the point to steer to."""
+        control = self._control
+        reach = self._lengths[self._at] + max(
+            control.lookahead_min, abs(speed) * control.lookahead_time
+        )
+        ahead, last = max(self._ahead, self._at), len(self.points) - 1
+        while ahead < last and self._lengths[ahead] < reach:
+            ahead += 1
+        self._ahead = ahead
+        return ahead
+
+    def _overshot(self, x: float, y: float, left: float) -> bool:
+        """Tell whether it is at the end of the way and the goal is no longer in front."""
+        last = len(self.points) - 1
+        if self._at < last or left > self._control.xy_tolerance or last == 0:
+            return False
+        (px, py), (qx, qy) = self.points[max(0, last - _BEND_REACH)], self.points[last]
+        return (qx - x) * (qx - px) + (qy - y) * (qy - py) <= 0.0
+
+
+def _lengths(points: Sequence[tuple[float, float]]) -> list[float]:
+    """Return the distance [m] along the way from its start to each point."""
+    result, total = [0.0], 0.0
+    for (x0, y0), (x1, y1) in itertools.pairwise(points):
+        total += math.hypot(x1 - x0, y1 - y0)
+        result.append(total)
+    return result
+
+
+def _speed_limits(
+    points: Sequence[tuple[float, float]], lengths: Sequence[float], robot: RobotConfig
+) -> list[float]:
+    """Return the fastest speed [m/s] at each point: slow in bends, braking before them."""
+    count = len(points)
+    limits = [robot.max_speed] * count
+    turn, braking = _SHARE * robot.max_turn_rate, 2.0 * _SHARE * robot.braking
+    for i in range(_BEND_REACH, count - _BEND_REACH):
+        bend = _bend(points[i - _BEND_REACH], points[i], points[i + _BEND_REACH])
+        if bend > _STRAIGHT:
+            limits[i] = min(robot.max_speed, turn / bend)
+    limits[-1] = 0.0
+    for i in range(count - 2, -1, -1):
+        reachable = math.sqrt(limits[i + 1] ** 2 + braking * (lengths[i + 1] - lengths[i]))
+        limits[i] = min(limits[i], reachable)
+    return limits
+
+
+def _bend(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
+    """Return the curvature [1/m] of the circle through three points."""
+    ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - b[0], c[1] - b[1]
+    product = math.hypot(ux, uy) * math.hypot(vx, vy) * math.hypot(ux + vx, uy + vy)
+    return 2.0 * abs(ux * vy - uy * vx) / product if product > 0.0 else 0.0

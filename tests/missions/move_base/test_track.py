@@ -1,0 +1,36 @@
+from __future__ import annotations
+
+import numpy as np
+from PIL import Image
+
+from missions.move_base.geometry import Pose2D
+from missions.move_base.occupancy import OccupancyMap
+from missions.move_base.track import GoalMark, draw_track
+
+
+def test_the_picture_shows_track_goals_and_dock(tmp_path):
+    grid = OccupancyMap(np.zeros((80, 120), dtype=np.int8), 0.05, Pose2D(0, 0, 0))
+    track = [(1 + i / 50, 2.0) for i in range(150)]
+    goals = [
+        GoalMark(Pose2D(4.0, 2.0, 0.0), "east", reached=True),
+        GoalMark(Pose2D(2.0, 3.3, 1.0), "north", reached=False),
+    ]
+    path = tmp_path / "track.png"
+    draw_track(path, grid, track, goals, dock=Pose2D(1, 1, 0), title="done")
+    picture = np.asarray(Image.open(path).convert("RGB")).astype(int)
+    assert picture.shape[1] == 1600
+
+    def count(colour):
+        return int((np.abs(picture - np.array(colour)).sum(axis=2) < 20).sum())
+
+    assert count((46, 125, 50)) > 500
+    assert count((176, 60, 60)) > 500
+    assert count((255, 236, 179)) > 500
+    at_start = picture[round((4.0 - 2.0) / 4.0 * 1067), round(1.1 / 6.0 * 1600)]
+    assert np.abs(at_start - np.array((38, 103, 191))).sum() < 40
+
+
+def test_an_empty_drive_is_drawn_too(tmp_path):
+    grid = OccupancyMap(np.full((8, 12), -1, dtype=np.int8), 0.5, Pose2D(1, 1, 0.5))
+    draw_track(tmp_path / "track.png", grid, [], [])
+    assert (tmp_path / "track.png").stat().st_size > 1000
