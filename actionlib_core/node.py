@@ -20,16 +20,19 @@ from typing import TYPE_CHECKING
 
 from actionlib_core.clock import RealClock, current_clock
 from actionlib_core.clock._serial import report_thread_exception
+from actionlib_core.config import load_config
 from actionlib_core.exceptions import NodeError
 from actionlib_core.names import check_base_name, clean_namespace, parse_arguments, resolve_name
 from actionlib_core.presence import Endpoint, Kind, token_key
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
+    from pathlib import Path
     from types import TracebackType
     from typing import Self
 
     from actionlib_core.clock import Clock
+    from actionlib_core.config import Config
     from actionlib_core.names import NameArguments
     from actionlib_core.transport import Closable, Transport
 
@@ -44,6 +47,8 @@ class Node:
         clock: Time and threads; the current clock when None.
         namespace: What the node's name and its relative names live under, "robot_1" for example.
         arguments: Renaming from a command line (`actionlib_core.names.parse_arguments`).
+        config: How that session joins the network; None takes `SMACHPY_CONFIG`. Its `namespace`
+            is for the default node only.
 
     Raises:
         InvalidNameError: the name or the namespace breaks the ROS rules.
@@ -60,6 +65,7 @@ class Node:
         clock: Clock | None = None,
         namespace: str = "",
         arguments: NameArguments | None = None,
+        config: Config | None = None,
     ) -> None:
         self.clock = clock if clock is not None else current_clock()
         self.arguments = arguments if arguments is not None else parse_arguments(())
@@ -71,7 +77,7 @@ class Node:
             name, namespace=self.namespace, node=self.full_name
         )
         self._owns_transport = transport is None
-        self.transport: Transport = transport if transport is not None else _open_zenoh()
+        self.transport: Transport = transport if transport is not None else _open_zenoh(config)
         self._lock = threading.Lock()
         self._entities = itertools.count(1)
         self._closers: dict[int, Callable[[], object]] = {}
@@ -179,35 +185,86 @@ class Node:
         self.close()
 
 
-def _open_zenoh() -> Transport:
+def _open_zenoh(config: Config | None = None) -> Transport:
     from actionlib_core.transport.zenoh import ZenohTransport
 
-    return ZenohTransport()
+    return ZenohTransport(config)
 
 
 _current: ContextVar[Node | None] = ContextVar("node", default=None)
 
 
 class _Default:
-    """The process's default node, made once."""
+    """The process's default node, made once.
+
+    The lock is held while the node is made, so that two threads that need it get the same one.
+    """
 
     def __init__(self) -> None:
-        self.lock = threading.Lock()
-        self.node: Node | None = None
+        self._lock = threading.Lock()
+        self._node: Node | None = None
 
-    def make(
-        self, name: str, namespace: str, arguments: NameArguments, transport: Transport | None
-    ) -> Node:
-        """Make the node. Needs the lock."""
+    def get(self) -> Node:
+        with self._lock:
+            if self._node is None or self._node.closed:
+                self._make(f"{_program_name()}_{os.getpid()}", load_config(), sys.argv[1:], None)
+            assert self._node is not None
+            return self._node
+
+    def init(self, name: str, config: Config, argv: Sequence[str], namespace: str | None) -> Node:
+        with self._lock:
+            if self._node is not None and not self._node.closed:
+                raise NodeError(
+                    f"init: the default node exists already: got {name!r}; expected the first call. "
+                    f"Its name is {self._node.full_name!r}. Try calling init before the first "
+                    "client, server, publisher or subscriber is made."
+                )
+            return self._make(name, config, argv, namespace)
+
+    def _make(self, name: str, config: Config, argv: Sequence[str], namespace: str | None) -> Node:
         node = Node(
-            name, namespace=namespace, arguments=arguments, clock=RealClock(), transport=transport
+            name,
+            config=config,
+            namespace=config.namespace if namespace is None else namespace,
+            arguments=parse_arguments(argv),
+            clock=RealClock(),
         )
-        self.node = node
+        self._node = node
         atexit.register(node.close)
         return node
 
 
 _default = _Default()
+
+
+def init(
+    name: str | None = None,
+    argv: Sequence[str] | None = None,
+    config: Config | str | Path | None = None,
+    *,
+    namespace: str | None = None,
+) -> Node:
+    """Make the default node with a name and a configuration of your own; optional.
+
+    Args:
+        name: One word; None takes the program's name and process id.
+        argv: Arguments with renaming; None takes `sys.argv[1:]`. What is the program's own is in
+            `node.arguments.rest` afterwards.
+        config: How to join the network, or the file that says it; None takes `SMACHPY_CONFIG`.
+        namespace: What relative names live under; None takes the configuration's.
+
+    Raises:
+        NodeError: the default node exists already.
+        ConfigError: the configuration has errors.
+        NameSetupError: a name or an argument is not allowed.
+        TransportError: the network cannot be joined.
+    """
+    return _default.init(
+        name or f"{_program_name()}_{os.getpid()}",
+        load_config(config),
+        sys.argv[1:] if argv is None else argv,
+        namespace,
+    )
 
 
 def get_node() -> Node:
@@ -227,12 +284,7 @@ def get_node() -> Node:
             "fit; expected a node on the same clock. Try use_node(Node(..., transport="
             "MemoryNetwork(clock).session(), clock=clock))."
         )
-    with _default.lock:
-        if _default.node is None or _default.node.closed:
-            name = f"{_program_name()}_{os.getpid()}"
-            _default.make(name, "", parse_arguments(sys.argv[1:]), None)
-        assert _default.node is not None
-        return _default.node
+    return _default.get()
 
 
 @contextlib.contextmanager

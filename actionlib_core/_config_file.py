@@ -1,0 +1,148 @@
+"""Read a configuration file: YAML into the dataclasses of `config`, every problem with its line."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
+
+from actionlib_core.config import Config
+from actionlib_core.exceptions import ConfigError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+# Files named in a configuration file are looked for beside it.
+_FILE_FIELDS = frozenset({"ca", "certificate", "key", "password_file", "users_file"})
+
+
+def read_config_file(path: Path) -> Config:
+    """Return the configuration that a file holds.
+
+    Raises:
+        ConfigError: it cannot be read or has errors; the text names all with line and field.
+    """
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    try:
+        data = YAML(typ="rt").load(path)
+    except OSError as error:
+        raise ConfigError(str(path), f"cannot be read: {error.strerror}.") from error
+    except YAMLError as error:
+        raise ConfigError(str(path), f"not YAML: {error}") from error
+    reader = _Reader(path.parent)
+    config = Config() if data is None else reader.read_record(Config, data, "")
+    if reader.problems:
+        raise ConfigError(str(path), *reader.problems)
+    assert isinstance(config, Config)
+    return config
+
+
+class _Reader:
+    """Turns plain YAML data into dataclasses, collecting what is wrong."""
+
+    def __init__(self, folder: Path) -> None:
+        self.problems: list[str] = []
+        self._folder = folder
+        self._line = 1
+
+    def read_record(self, kind: type, data: object, where: str) -> object:
+        """Return a `kind` made from `data`, None when a problem was found."""
+        if not isinstance(data, Mapping):
+            return self._report(where, "not a mapping", data, "lines of 'field: value'")
+        before = len(self.problems)
+        hints = get_type_hints(kind)
+        values: dict[str, Any] = {}
+        for key, value in data.items():
+            self._go_to(data, key)
+            path = f"{where}.{key}" if where else str(key)
+            if key in hints:
+                values[key] = self._read(hints[key], value, path)
+            else:
+                self._report_unknown(path, str(key), sorted(hints))
+        for name in _required(kind) - set(data):
+            self._report(f"{where}.{name}", "missing", None, "a value")
+        if len(self.problems) > before:
+            return None
+        try:
+            return kind(**values)
+        except ConfigError as error:
+            self.problems += [self._place(data, text) for text in error.problems]
+            return None
+
+    def _read(self, hint: Any, value: object, path: str) -> object:
+        if dataclasses.is_dataclass(hint) and isinstance(hint, type):
+            return self.read_record(hint, value, path)
+        if get_origin(hint) is tuple:
+            return self._read_sequence(get_args(hint)[0], value, path)
+        if get_origin(hint) is Literal:
+            choices = sorted(get_args(hint))
+            return value if value in choices else self._report(path, "unknown", value, choices)
+        return self._read_scalar(hint, value, path)
+
+    def _read_sequence(self, hint: Any, value: object, path: str) -> object:
+        if isinstance(value, str) or not isinstance(value, Sequence):
+            return self._report(path, "not a list", value, "a list")
+        result = []
+        for index, item in enumerate(value):
+            self._go_to(value, index)
+            result.append(self._read(hint, item, f"{path}[{index}]"))
+        return tuple(result)
+
+    def _read_scalar(self, hint: Any, value: object, path: str) -> object:
+        if hint is float and isinstance(value, (int, float)) and not isinstance(value, bool):
+            return float(value)
+        if hint is bool and isinstance(value, bool):
+            return value
+        if hint is str and isinstance(value, str):
+            if path.rpartition(".")[2] in _FILE_FIELDS:
+                return str(self._folder / value)
+            return str(value)
+        return self._report(path, "wrong type", value, {float: "a number", bool: "true or false"}
+                            .get(hint, "a text"))  # fmt: skip
+
+    def _report(self, path: str, what: str, value: object, expected: object) -> object:
+        self.problems.append(
+            f"line {self._line}: {path or 'file'}: {what}: got {_plain(value)!r}; "
+            f"expected {expected}."
+        )
+        return None
+
+    def _report_unknown(self, path: str, key: str, known: list[str]) -> None:
+        close = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
+        hint = f" Did you mean {close[0]!r}?" if close else ""
+        self.problems.append(
+            f"line {self._line}: {path}: unknown field: got {key!r}; expected one of {known}.{hint}"
+        )
+
+    def _go_to(self, data: object, key: object) -> None:
+        position = getattr(data, "lc", None)
+        if position is not None:
+            self._line = position.data[key][0] + 1
+
+    def _place(self, data: Mapping[str, Any], problem: str) -> str:
+        """Put the line in front of a problem that the dataclass itself found."""
+        key = problem.partition(":")[0].partition(".")[0].partition("[")[0]
+        if key not in data:
+            return problem
+        self._go_to(data, key)
+        return f"line {self._line}: {problem}"
+
+
+def _required(kind: type) -> set[str]:
+    return {
+        field.name
+        for field in dataclasses.fields(kind)
+        if field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
+    }
+
+
+def _plain(value: object) -> object:
+    """Return YAML's own containers and scalars as Python's, for the error text."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_plain(item) for item in value]
+    return value

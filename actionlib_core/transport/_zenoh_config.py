@@ -1,0 +1,129 @@
+"""Our configuration as zenoh's settings: path in zenoh's configuration -> plain JSON value.
+
+Source:
+    https://github.com/eclipse-zenoh/zenoh/blob/main/DEFAULT_CONFIG.json5 names and explains them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from actionlib_core.config import ROUTER_ENDPOINT
+from actionlib_core.presence import ROOT
+
+if TYPE_CHECKING:
+    from actionlib_core.config import AccessRule, Config
+
+LOOPBACK = "tcp/127.0.0.1:0"
+_MESSAGES = [
+    "put",
+    "delete",
+    "declare_subscriber",
+    "query",
+    "reply",
+    "declare_queryable",
+    "liveliness_token",
+    "liveliness_query",
+    "declare_liveliness_subscriber",
+]
+
+
+def zenoh_settings(config: Config) -> dict[str, object]:
+    """Return what has to be set in a zenoh configuration."""
+    settings: dict[str, object] = {
+        "mode": config.mode,
+        "connect/endpoints": list(config.connect),
+        "connect/timeout_ms": round(config.connect_timeout * 1e3),
+        "connect/exit_on_failure": bool(config.connect),
+        "listen/endpoints": _listen(config),
+        "scouting/multicast/enabled": config.discovery != "off",
+        "scouting/delay": round(config.settle * 1e3),
+        "open/return_conditions/connect_scouted": config.settle > 0,
+        "open/return_conditions/declares": config.settle > 0,
+        "transport/link/tx/lease": round(config.lease * 1e3),
+        # Shared memory saves nothing at our sizes, and a killed process leaves its segments behind.
+        "transport/shared_memory/enabled": False,
+    }
+    if config.discovery != "off":
+        settings["scouting/multicast/interface"] = config.discovery
+    settings.update(_tls(config))
+    settings.update(_login(config))
+    settings.update(_access(config))
+    return settings
+
+
+def _listen(config: Config) -> list[str]:
+    if config.mode == "client":
+        return []
+    if config.listen:
+        return list(config.listen)
+    return [ROUTER_ENDPOINT if config.mode == "router" else LOOPBACK]
+
+
+def _tls(config: Config) -> dict[str, object]:
+    tls = config.tls
+    if not tls.ca:
+        return {}
+    prefix = "transport/link/tls"
+    settings: dict[str, object] = {
+        f"{prefix}/root_ca_certificate": tls.ca,
+        f"{prefix}/enable_mtls": tls.require_client_certificate,
+        f"{prefix}/verify_name_on_connect": tls.verify_name,
+    }
+    if tls.certificate:
+        for side in ("listen", "connect"):
+            settings[f"{prefix}/{side}_certificate"] = tls.certificate
+            settings[f"{prefix}/{side}_private_key"] = tls.key
+    return settings
+
+
+def _login(config: Config) -> dict[str, object]:
+    settings: dict[str, object] = {}
+    if config.user:
+        settings["transport/auth/usrpwd/user"] = config.user
+        settings["transport/auth/usrpwd/password"] = config.secret()
+    if config.users_file:
+        settings["transport/auth/usrpwd/dictionary_file"] = config.users_file
+    return settings
+
+
+def _access(config: Config) -> dict[str, object]:
+    if not config.access:
+        return {}
+    rules = []
+    subjects = []
+    policies = []
+    for index, rule in enumerate(config.access):
+        rules.append(
+            {
+                "id": f"rule{index}",
+                "messages": _MESSAGES,
+                "flows": ["ingress", "egress"],
+                "permission": rule.permission,
+                "key_exprs": _keys(rule),
+            }
+        )
+        subject: dict[str, object] = {"id": f"subject{index}"}
+        if rule.users:
+            subject["usernames"] = list(rule.users)
+        if rule.certificates:
+            subject["cert_common_names"] = list(rule.certificates)
+        subjects.append(subject)
+        policies.append({"rules": [f"rule{index}"], "subjects": [f"subject{index}"]})
+    return {
+        "access_control": {
+            "enabled": True,
+            "default_permission": "deny",
+            "rules": rules,
+            "subjects": subjects,
+            "policies": policies,
+        }
+    }
+
+
+def _keys(rule: AccessRule) -> list[str]:
+    """Return a rule's names with the keys that belong to them: tokens and latched messages."""
+    keys = []
+    for name in rule.names:
+        keys += [name, f"{name}/@latch/**", f"{ROOT}/*/*/*/*/*/*/{name}"]
+    return keys

@@ -1,0 +1,249 @@
+# ruff: noqa: D102  the methods of a session are documented in the protocol
+"""Zenoh as transport: the only place that imports zenoh.
+
+Threads: zenoh calls back on its own threads, and for what a session sends to itself inside the
+sending call. `Inlet` evens that out: an item that arrives inside a call of ours is handed to a
+thread of the transport, so that no callback ever runs on the caller's stack, under its locks.
+
+Locks: each guards a few fields for a moment; none is held while zenoh or foreign code is called.
+
+Nothing is left to finalizers: a session is kept alive here until it is closed, at the latest when
+the interpreter exits.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import itertools
+import json
+import threading
+from functools import partial
+from typing import TYPE_CHECKING, TypeVar
+
+import zenoh
+from zenoh import handlers
+
+from actionlib_core.clock import RealClock, SerialExecutor
+from actionlib_core.config import Config, load_config
+from actionlib_core.exceptions import TransportError
+from actionlib_core.transport import Presence, Quality, Reply, Sample
+from actionlib_core.transport._inlet import Gate, inside
+from actionlib_core.transport._keys import check_key, compile_pattern
+from actionlib_core.transport._zenoh_config import zenoh_settings
+from actionlib_core.transport.zenoh._declared import (
+    Asking,
+    Declared,
+    LatchedPublisher,
+    Publisher,
+    Queryable,
+    Subscriber,
+    Token,
+    Watcher,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.transport import Query
+
+__all__ = ["ZenohTransport"]
+
+D = TypeVar("D", bound=Declared)
+
+CLOSE_S = 0.5  # zenoh may take so long to leave the network; it is left behind after that
+IDLE_S = 0.3  # `close` waits so long for callbacks that are running
+ASK_S = 5.0  # longest wait for a latched publisher's answer
+DEFAULT = Quality()
+
+
+class ZenohTransport:
+    """A session on a zenoh network.
+
+    Args:
+        config: How to join; None takes `SMACHPY_CONFIG`, else the machine's loopback only.
+
+    Raises:
+        ConfigError: the configuration has errors.
+        TransportError: the network cannot be joined.
+
+    Blocks: making one opens the session: `connect_timeout` plus `settle` of `config` at most.
+    """
+
+    def __init__(self, config: Config | None = None) -> None:
+        self.config = load_config(config)
+        self.clock = RealClock()
+        self.gate = Gate()
+        self.numbers = itertools.count(1)
+        self._lock = threading.Lock()
+        self._closed = False
+        self._declared: dict[Declared, None] = {}
+        self.session = _open(self.config)
+        self._session_id = str(self.session.zid())
+        self.loopback = SerialExecutor(self.clock, f"transport-{self._session_id[:8]}")
+        _open_transports[self] = None
+
+    @property
+    def session_id(self) -> str:
+        """This session's id."""
+        return self._session_id
+
+    def publisher(self, key: str, encoding: str = "", quality: Quality = DEFAULT) -> Publisher:
+        kind = LatchedPublisher if quality.latch else Publisher
+        return self._declare(lambda: kind(self, check_key(key), encoding, quality), key)
+
+    def subscribe(
+        self, key: str, callback: Callable[[Sample], None], *, history: bool = True
+    ) -> Subscriber:
+        make = partial(Subscriber, self, check_key(key), callback, history=history)
+        return self._declare(make, key)
+
+    def queryable(self, key: str, callback: Callable[[Query], None]) -> Queryable:
+        return self._declare(lambda: Queryable(self, check_key(key), callback), key)
+
+    def query(
+        self,
+        key: str,
+        payload: bytes,
+        *,
+        encoding: str = "",
+        timeout: float,
+        on_reply: Callable[[Reply], None],
+        on_done: Callable[[], None],
+    ) -> Asking:
+        asking = self._declare(lambda: Asking(self, on_reply, on_done), check_key(key))
+        callback = handlers.Callback(asking.take_reply, asking.take_done, indirect=False)
+        self._get(key, callback, payload, encoding, timeout, asking.token)
+        return asking
+
+    def ask(
+        self, key: str, on_reply: Callable[[zenoh.Reply], None], on_done: Callable[[], None]
+    ) -> None:
+        """Ask without giving the question to anybody to hold; for the declarations here."""
+        self._get(key, handlers.Callback(on_reply, on_done, indirect=False), b"", "", ASK_S, None)
+
+    def _get(
+        self,
+        key: str,
+        callback: handlers.Callback[zenoh.Reply],
+        payload: bytes,
+        encoding: str,
+        timeout: float,
+        token: zenoh.CancellationToken | None,
+    ) -> None:
+        try:
+            with inside:
+                self.session.get(
+                    key,
+                    callback,
+                    target=zenoh.QueryTarget.ALL,
+                    consolidation=zenoh.ConsolidationMode.NONE,
+                    timeout=timeout,
+                    congestion_control=zenoh.CongestionControl.BLOCK,
+                    express=True,
+                    payload=payload,
+                    encoding=encoding or None,
+                    cancellation_token=token,
+                )
+        except zenoh.ZError as error:
+            raise TransportError(f"{key}: cannot ask: {error}") from error
+
+    def declare_alive(self, key: str) -> Token:
+        return self._declare(lambda: Token(self, check_key(key)), key)
+
+    def watch_alive(self, pattern: str, callback: Callable[[Presence], None]) -> Watcher:
+        compile_pattern(pattern)
+        return self._declare(lambda: Watcher(self, pattern, callback), pattern)
+
+    def list_alive(self, pattern: str, timeout: float) -> list[str]:
+        compile_pattern(pattern)
+        self._check_open(pattern)
+        found: set[str] = set()
+        done = self.clock.event()
+
+        def on_reply(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                found.add(str(reply.ok.key_expr))
+
+        callback = handlers.Callback(on_reply, done.set, indirect=False)
+        try:
+            with inside:
+                self.session.liveliness().get(pattern, callback, timeout=timeout)
+        except zenoh.ZError as error:
+            raise TransportError(f"{pattern}: cannot ask: {error}") from error
+        done.wait(timeout)
+        return sorted(found)
+
+    def close(self) -> None:
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+            self._declared.clear()
+        self.gate.shut()
+        _leave(self.clock, self.session)
+        self.gate.wait_idle(IDLE_S)
+        _open_transports.pop(self, None)
+
+    def forget(self, entry: Declared) -> bool:
+        """Drop an entry that is being closed; False when it was gone already."""
+        with self._lock:
+            return self._declared.pop(entry, False) is None
+
+    def _declare(self, make: Callable[[], D], key: str) -> D:
+        self._check_open(key)
+        try:
+            with inside:
+                entry = make()
+        except zenoh.ZError as error:
+            raise TransportError(f"{key}: cannot be declared: {error}") from error
+        with self._lock:
+            self._declared[entry] = None
+        return entry
+
+    def _check_open(self, key: str) -> None:
+        if self._closed:
+            raise TransportError(
+                f"{key}: the session is closed. Try using a node that is still open."
+            )
+
+
+def _open(config: Config) -> zenoh.Session:
+    raw = zenoh.Config()
+    for path, value in zenoh_settings(config).items():
+        raw.insert_json5(path, json.dumps(value))
+    try:
+        return zenoh.open(raw)
+    except zenoh.ZError as error:
+        where = f" {', '.join(config.connect)}" if config.connect else ""
+        raise TransportError(f"cannot join the network{where} as {config.mode}: {error}") from error
+
+
+def _leave(clock: RealClock, session: zenoh.Session) -> None:
+    """Close a session.
+
+    Blocks: `CLOSE_S` at most. Zenoh waits 10 s when another side has stopped reading; a thread is
+    left behind with it then, which does not keep the interpreter alive.
+    """
+
+    def close() -> None:
+        # A time-out says that the network could not be told; the session is unusable all the same.
+        with contextlib.suppress(zenoh.ZError):
+            session.close()  # type: ignore[no-untyped-call]  # zenoh's stub
+
+    try:
+        clock.spawn(close, name="transport-close").join(CLOSE_S)
+    except RuntimeError:  # the interpreter exits and starts no more threads
+        close()
+
+
+# Sessions stay alive until they are closed, so that no finalizer ever does it.
+_open_transports: dict[ZenohTransport, None] = {}
+
+
+def _close_all() -> None:
+    for transport in list(_open_transports):
+        transport.close()
+
+
+atexit.register(_close_all)

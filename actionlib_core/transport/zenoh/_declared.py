@@ -1,0 +1,356 @@
+"""What a zenoh session declares: publishers, subscribers, queryables, queries, tokens.
+
+Each keeps its zenoh objects until it is closed, so that no finalizer undeclares anything.
+"""
+
+from __future__ import annotations
+
+import threading
+from functools import partial
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+import zenoh
+from zenoh import handlers
+
+from actionlib_core.exceptions import TransportError
+from actionlib_core.transport import Presence, Quality, Reply, Sample
+from actionlib_core.transport._inlet import Inlet, inside
+from actionlib_core.transport._latch import LatchFilter, pack_numbers
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.transport import Query
+    from actionlib_core.transport.zenoh import ZenohTransport
+
+T = TypeVar("T")
+
+LATCH_RETRIES = 5  # how often a latched publisher that cannot be reached yet is asked
+LATCH_RETRY_S = 0.1
+_PLAIN = "zenoh/bytes"  # what zenoh says of a payload without encoding
+_ERROR = "smachpy/error"  # marks the error replies that a queryable sent on purpose
+
+
+class _Undeclarable(Protocol):
+    def undeclare(self) -> Any: ...
+
+
+class Declared:
+    """Something declared by a session, kept by it until closed."""
+
+    def __init__(self, transport: ZenohTransport) -> None:
+        self._transport = transport
+        self._inlet = Inlet(transport.gate, transport.loopback)
+        self._handles: list[_Undeclarable] = []
+
+    def _keep(self, *handles: _Undeclarable) -> None:
+        self._handles.extend(handles)
+
+    def close(self) -> None:
+        self._inlet.closed = True
+        if self._transport.forget(self):
+            for handle in reversed(self._handles):
+                with inside:
+                    handle.undeclare()
+
+
+class Publisher(Declared):
+    """The sending end of a key."""
+
+    def __init__(
+        self, transport: ZenohTransport, key: str, encoding: str, quality: Quality
+    ) -> None:
+        super().__init__(transport)
+        self._key = key
+        blocking = zenoh.CongestionControl.BLOCK
+        dropping = zenoh.CongestionControl.DROP
+        self._port = transport.session.declare_publisher(
+            key,
+            encoding=encoding or None,
+            express=quality.express,
+            congestion_control=blocking if quality.block else dropping,
+        )
+        self._source = zenoh.SourceInfo(self._port.id, 0)
+        self._keep(self._port)
+
+    def put(self, payload: bytes) -> None:
+        self._put(payload, None)
+
+    def _put(self, payload: bytes, attachment: bytes | None) -> None:
+        if self._inlet.closed:
+            raise TransportError(
+                f"{self._key}: the publisher is closed. Try sending before the node is closed."
+            )
+        try:
+            with inside:
+                self._port.put(payload, source_info=self._source, attachment=attachment)
+        except zenoh.ZError as error:
+            raise TransportError(f"{self._key}: cannot send: {error}") from error
+
+    def matching(self) -> bool:
+        return not self._inlet.closed and self._port.matching_status
+
+
+class LatchedPublisher(Publisher):
+    """Keeps its last message and gives it to whoever asks on its own key.
+
+    The key is `<key>/@latch/<session>/<n>`; a token on it tells subscribers that it can be asked.
+    Every message carries `n` and its own number as attachment, so that a subscriber that gets it
+    live and asks for it too can tell that it is the same.
+    """
+
+    def __init__(
+        self, transport: ZenohTransport, key: str, encoding: str, quality: Quality
+    ) -> None:
+        super().__init__(transport, key, encoding, quality)
+        self._number = next(transport.numbers)
+        self._encoding = encoding
+        self._lock = threading.Lock()
+        self._count = 0
+        self._last: tuple[bytes, bytes] = b"", pack_numbers(self._number, 0)
+        self._own_key = f"{key}/@latch/{transport.session_id}/{self._number}"
+        session = transport.session
+        self._keep(session.declare_queryable(self._own_key, _direct(self._on_query)))
+        self._keep(session.liveliness().declare_token(self._own_key))
+
+    def put(self, payload: bytes) -> None:
+        with self._lock:
+            self._count += 1
+            attachment = pack_numbers(self._number, self._count)
+            self._last = payload, attachment
+        self._put(payload, attachment)
+
+    def _on_query(self, query: zenoh.Query) -> None:
+        # Inline is right here: it calls nothing foreign and takes no lock.
+        with query:
+            payload, attachment = self._last
+            query.reply(
+                self._own_key, payload, encoding=self._encoding or None, attachment=attachment
+            )
+
+
+class Subscriber(Declared):
+    """Receives a key, and the last message of its latched publishers."""
+
+    def __init__(
+        self,
+        transport: ZenohTransport,
+        key: str,
+        callback: Callable[[Sample], None],
+        *,
+        history: bool,
+    ) -> None:
+        super().__init__(transport)
+        self._key = key
+        self._callback = callback
+        self._filter = LatchFilter()
+        self._latched: set[str] = set()
+        session = transport.session
+        self._keep(session.declare_subscriber(key, _direct(self._on_sample)))
+        if history:
+            tokens = session.liveliness().declare_subscriber(
+                f"{key}/@latch/*/*", _direct(self._on_token), history=True
+            )
+            self._keep(tokens)
+
+    def _on_sample(self, raw: zenoh.Sample) -> None:
+        self._inlet.take(self._deliver, raw)
+
+    def _deliver(self, raw: zenoh.Sample) -> None:
+        if raw.kind != zenoh.SampleKind.PUT:
+            return
+        sample = _convert_sample(raw)
+        numbers = raw.attachment
+        if numbers is None or self._filter.take_live(sample.source, numbers.to_bytes()):
+            self._callback(sample)
+
+    def _on_token(self, token: zenoh.Sample) -> None:
+        self._inlet.take(self._note_token, token)
+
+    def _note_token(self, token: zenoh.Sample) -> None:
+        key = str(token.key_expr)
+        if token.kind == zenoh.SampleKind.PUT:
+            self._latched.add(key)
+            self._ask(key, LATCH_RETRIES)
+        else:
+            self._latched.discard(key)
+
+    def _ask(self, key: str, retries: int) -> None:
+        if self._inlet.closed or key not in self._latched:
+            return
+        answered: list[bool] = []
+
+        def on_reply(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                answered.append(True)
+                self._inlet.take(self._deliver_last, reply.ok)
+
+        def on_done() -> None:
+            if not answered and retries:
+                again = partial(self._ask, key, retries - 1)
+                self._transport.clock.call_later(LATCH_RETRY_S, again)
+
+        self._transport.ask(key, on_reply, on_done)
+
+    def _deliver_last(self, raw: zenoh.Sample) -> None:
+        source = str(raw.key_expr).rsplit("/", 2)[1]
+        numbers = b"" if raw.attachment is None else raw.attachment.to_bytes()
+        if self._filter.take_asked(source, numbers):
+            encoding = _convert_encoding(raw.encoding)
+            self._callback(Sample(self._key, raw.payload.to_bytes(), encoding, source))
+
+
+class ZenohQuery:
+    """A query to a queryable of ours."""
+
+    __slots__ = ("_lock", "_raw", "encoding", "key", "payload")
+
+    def __init__(self, raw: zenoh.Query) -> None:
+        self._raw: zenoh.Query | None = raw
+        self._lock = threading.Lock()
+        self.key = str(raw.key_expr)
+        self.payload = b"" if raw.payload is None else raw.payload.to_bytes()
+        self.encoding = "" if raw.encoding is None else _convert_encoding(raw.encoding)
+
+    def reply(self, payload: bytes, encoding: str = "") -> None:
+        raw = self._raw
+        if raw is not None:
+            with inside:
+                raw.reply(self.key, payload, encoding=encoding or None, express=True)
+
+    def reply_error(self, text: str) -> None:
+        raw = self._raw
+        if raw is not None:
+            with inside:
+                raw.reply_err(text.encode(), encoding=_ERROR)
+
+    def finish(self) -> None:
+        with self._lock:
+            raw, self._raw = self._raw, None
+        if raw is not None:
+            with inside:
+                raw.drop()  # type: ignore[no-untyped-call]  # zenoh's stub
+
+
+class Queryable(Declared):
+    """Answers queries."""
+
+    def __init__(
+        self, transport: ZenohTransport, key: str, callback: Callable[[Query], None]
+    ) -> None:
+        super().__init__(transport)
+        self._callback = callback
+        self._keep(transport.session.declare_queryable(key, _direct(self._on_query)))
+
+    def _on_query(self, raw: zenoh.Query) -> None:
+        self._inlet.take(self._answer, raw, zenoh.Query.drop)
+
+    def _answer(self, raw: zenoh.Query) -> None:
+        query = ZenohQuery(raw)
+        try:
+            self._callback(query)
+        except Exception as error:
+            query.reply_error(f"{type(error).__name__}: {error}")
+            query.finish()
+            raise
+
+
+class Asking(Declared):
+    """A query of ours on its way."""
+
+    def __init__(
+        self,
+        transport: ZenohTransport,
+        on_reply: Callable[[Reply], None],
+        on_done: Callable[[], None],
+    ) -> None:
+        super().__init__(transport)
+        self._on_reply = on_reply
+        self._on_done = on_done
+        self.token = zenoh.CancellationToken()
+
+    def take_reply(self, raw: zenoh.Reply) -> None:
+        self._inlet.take(self._deliver, raw)
+
+    def take_done(self) -> None:
+        self._inlet.take(self._finish, None)
+
+    def _deliver(self, raw: zenoh.Reply) -> None:
+        reply = _convert_reply(raw)
+        if reply is not None:
+            self._on_reply(reply)
+
+    def _finish(self, _: None) -> None:
+        if self._transport.forget(self):
+            self._on_done()
+
+    def close(self) -> None:
+        self._inlet.closed = True
+        if self._transport.forget(self):
+            with inside:
+                self.token.cancel()  # type: ignore[no-untyped-call]  # zenoh's stub
+
+
+class Watcher(Declared):
+    """Hears of tokens."""
+
+    def __init__(
+        self, transport: ZenohTransport, pattern: str, callback: Callable[[Presence], None]
+    ) -> None:
+        super().__init__(transport)
+        self._callback = callback
+        self._alive: set[str] = set()
+        tokens = transport.session.liveliness().declare_subscriber(
+            pattern, _direct(self._on_token), history=True
+        )
+        self._keep(tokens)
+
+    def _on_token(self, raw: zenoh.Sample) -> None:
+        self._inlet.take(self._deliver, raw)
+
+    def _deliver(self, raw: zenoh.Sample) -> None:
+        key = str(raw.key_expr)
+        alive = raw.kind == zenoh.SampleKind.PUT
+        if alive != (key in self._alive):
+            (self._alive.add if alive else self._alive.discard)(key)
+            self._callback(Presence(key, alive))
+
+
+class Token(Declared):
+    """A liveliness token."""
+
+    def __init__(self, transport: ZenohTransport, key: str) -> None:
+        super().__init__(transport)
+        self._keep(transport.session.liveliness().declare_token(key))
+
+
+def _direct(callback: Callable[[T], None]) -> handlers.Callback[T]:
+    """Run a callback on zenoh's thread; zenoh's default starts a Python thread for each."""
+    return handlers.Callback(callback, indirect=False)
+
+
+def _convert_encoding(raw: zenoh.Encoding) -> str:
+    text = str(raw)
+    return "" if text == _PLAIN else text
+
+
+def _convert_sample(raw: zenoh.Sample) -> Sample:
+    source = raw.source_info
+    return Sample(
+        str(raw.key_expr),
+        raw.payload.to_bytes(),
+        _convert_encoding(raw.encoding),
+        "" if source is None else str(source.source_id.zid),
+    )
+
+
+def _convert_reply(raw: zenoh.Reply) -> Reply | None:
+    """Return an answer; None for zenoh's own note that the time is over."""
+    good = raw.ok
+    if good is not None:
+        encoding = _convert_encoding(good.encoding)
+        return Reply(str(good.key_expr), good.payload.to_bytes(), encoding, error=False)
+    bad = raw.err
+    if bad is None or str(bad.encoding) != _ERROR:
+        return None
+    return Reply("", bad.payload.to_bytes(), "", error=True)
