@@ -1,0 +1,62 @@
+"""Pictures of state machines: files, notebooks, the terminal.
+
+Reads nothing but introspection records (`smachpy.introspection`) and events (`smachpy.events`).
+
+    import viz
+
+    viz.render(machine, "machine.svg")          # the structure
+    history = viz.History()
+    machine.subscribe(history.on_event)
+    machine.execute()
+    viz.render(machine, "run.svg", run=history)  # with what the run visited and took
+
+`render` and `picture` draw one picture, `atlas` one page per container, `svg` the text a notebook
+shows. `TerminalView` shows a run while it happens.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from viz.drawing import PictureError as PictureError
+    from viz.drawing import atlas as atlas
+    from viz.drawing import picture as picture
+    from viz.drawing import render as render
+    from viz.drawing import svg as svg
+    from viz.engine import EngineError as EngineError
+    from viz.extract import UnknownPathError as UnknownPathError
+    from viz.history import History as History
+    from viz.terminal import TerminalView as TerminalView
+
+__all__ = [
+    "EngineError",
+    "History",
+    "PictureError",
+    "TerminalView",
+    "UnknownPathError",
+    "atlas",
+    "picture",
+    "render",
+    "svg",
+]
+
+_HOMES = {
+    "EngineError": "viz.engine",
+    "History": "viz.history",
+    "PictureError": "viz.drawing",
+    "TerminalView": "viz.terminal",
+    "UnknownPathError": "viz.extract",
+    "atlas": "viz.drawing",
+    "picture": "viz.drawing",
+    "render": "viz.drawing",
+    "svg": "viz.drawing",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'viz' has no attribute {name!r}")
+    import importlib
+
+    return getattr(importlib.import_module(_HOMES[name]), name)

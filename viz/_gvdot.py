@@ -1,0 +1,70 @@
+"""A `dot` program made of the Graphviz library inside the pygraphviz wheel.
+
+Run as a process of its own (`python -m viz._gvdot -Tsvg file.gv`), never imported: a fault in the
+C library must not reach a robot. Understands what `viz.engine` and the `graphviz` package pass:
+`-K`, `-T`, `-o`, `-G/-N/-E name=value`, `-V`, and any number of input files.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+import pygraphviz
+
+
+def main(arguments: list[str]) -> int:
+    """Draw every input one after another; returns the exit code."""
+    options = _parser().parse_args(arguments)
+    if options.version:
+        sys.stderr.write(f"dot - graphviz version {pygraphviz.__graphviz_version__}\n")
+        return 0
+    out = options.output.open("wb") if options.output else sys.stdout.buffer
+    for source in options.files or [None]:
+        try:
+            out.write(_draw(_read(source), options))
+        except (ValueError, OSError, pygraphviz.DotError) as error:
+            sys.stderr.write(f"Error: {source or '<stdin>'}: {error}\n")
+            return 1
+    out.flush()
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="dot", allow_abbrev=False)
+    parser.add_argument("-K", dest="engine", default="dot")
+    parser.add_argument("-T", dest="format", default="dot")
+    parser.add_argument("-o", dest="output", type=Path)
+    parser.add_argument("-V", dest="version", action="store_true")
+    parser.add_argument("-q", dest="quiet", action="store_true")
+    for kind in "GNE":
+        parser.add_argument(f"-{kind}", dest=kind, action="append", default=[])
+    parser.add_argument("files", nargs="*", type=Path)
+    return parser
+
+
+def _read(source: Path | None) -> str:
+    data = sys.stdin.buffer.read() if source is None else source.read_bytes()
+    return data.decode("utf-8")
+
+
+def _draw(text: str, options: argparse.Namespace) -> bytes:
+    picture = pygraphviz.AGraph(string=text)
+    for kind, attributes in (
+        ("G", picture.graph_attr),
+        ("N", picture.node_attr),
+        ("E", picture.edge_attr),
+    ):
+        for assignment in getattr(options, kind):
+            name, _, value = assignment.partition("=")
+            attributes[name] = value or "true"
+    data: bytes = picture.draw(format=options.format, prog=options.engine)
+    return data
+
+
+if __name__ == "__main__":
+    code = main(sys.argv[1:])
+    sys.stdout.flush()
+    os._exit(code)  # the library's clean-up at exit costs time and can fault

@@ -1,0 +1,242 @@
+"""Pictures of machines, from the record to the file."""
+
+from __future__ import annotations
+
+import secrets
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from smachpy.exceptions import SmachError
+from smachpy.introspection import StateRecord, describe
+from viz import dot, engine, extract, graph, layout
+from viz.history import History
+from viz.mermaid import mermaid_text
+from viz.model import Diagram, Marks, Node
+from viz.outline import outline_text
+from viz.theme import THEMES, Theme
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Callable, Iterable
+
+    from smachpy.events import Event
+    from smachpy.state import State
+
+
+class PictureError(SmachError):
+    """The picture cannot be made as asked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How to draw.
+
+    Attributes:
+        theme: `light` or `dark`.
+        depth: Container levels to open; None opens as many as stay readable.
+        show_implicit: Draw the transitions nobody wrote down as well.
+    """
+
+    theme: str = "light"
+    depth: int | None = None
+    show_implicit: bool = False
+
+
+def render(
+    machine: State | StateRecord,
+    file: str | os.PathLike[str],
+    *,
+    theme: str = "light",
+    depth: int | None = None,
+    path: str | None = None,
+    active: Iterable[str] = (),
+    run: History | Iterable[Event] | None = None,
+    show_implicit: bool = False,
+) -> Path:
+    """Draw a machine into a file.
+
+    Args:
+        machine: A state machine, any container, or its record.
+        file: Where to; the ending names the format: svg, png, pdf, dot, json, mmd or txt.
+        theme: `light` or `dark`.
+        depth: Container levels to open; None opens as many as stay readable (60 states).
+        path: Draw only the container at this path.
+        active: Paths of states to mark as running.
+        run: The history or the events of a run, whose states and transitions are marked.
+        show_implicit: Draw the transitions nobody wrote down as well.
+
+    Returns:
+        The file.
+
+    Raises:
+        PictureError: unknown format or theme, or the file cannot be written.
+        UnknownPathError: `path` or one of `active` names no state.
+        EngineError: there is no `dot` program, or it failed.
+
+    Blocks: while `dot` runs, usually well under a second; never past its time limit.
+    """
+    target = Path(file)
+    content = picture(
+        machine,
+        target.suffix.lstrip(".").lower(),
+        theme=theme,
+        depth=depth,
+        path=path,
+        active=active,
+        run=run,
+        show_implicit=show_implicit,
+    )
+    _write(target, content)
+    return target
+
+
+def picture(
+    machine: State | StateRecord,
+    form: str,
+    *,
+    theme: str = "light",
+    depth: int | None = None,
+    path: str | None = None,
+    active: Iterable[str] = (),
+    run: History | Iterable[Event] | None = None,
+    show_implicit: bool = False,
+) -> bytes:
+    """Return what `render` would write into a file of the format `form`.
+
+    Raises, Blocks: as `render`.
+    """
+    whole = machine if isinstance(machine, StateRecord) else describe(machine)
+    record = whole if path is None else extract.find(whole, path)
+    look = Look(theme, depth, show_implicit)
+    make = _FORMS.get(form)
+    if make is None:
+        raise PictureError(
+            f"picture: format: got {form!r}; expected one of {', '.join(sorted(_FORMS))}."
+        )
+    return make(record, look, _marks(whole, active, run))
+
+
+def svg(machine: State | StateRecord) -> str:
+    """Return a machine as SVG text, as a notebook shows it."""
+    return picture(machine, "svg").decode("utf-8")
+
+
+def atlas(
+    machine: State | StateRecord,
+    folder: str | os.PathLike[str],
+    *,
+    theme: str = "light",
+    run: History | Iterable[Event] | None = None,
+    show_implicit: bool = False,
+) -> Path:
+    """Draw one SVG page per container into `folder`, each state linked to its own page.
+
+    Returns:
+        The page of the outermost container, `index.svg`.
+
+    Raises, Blocks: as `render`.
+    """
+    record = machine if isinstance(machine, StateRecord) else describe(machine)
+    colours = _theme(theme)
+    marks = _marks(record, (), run)
+    parents = [state for state in record.walk() if state.children] or [record]
+    names = {state.path: f"page{i}.svg" for i, state in enumerate(parents)}
+    names[record.path] = "index.svg"
+    above = {child.path: state.path for state in parents for child in state.children}
+    pages = []
+    for state in parents:
+        node = extract.extract(state, depth=1, show_implicit=show_implicit)
+        links = {path: names[path] for path in (c.path for c in state.children) if path in names}
+        if state.path in above:
+            links[state.path] = names[above[state.path]]
+        pages.append(graph.draw(Diagram(node, marks, links), colours))
+    geometries = layout.compose_all(pages, colours, engine.lay_out)
+    texts = [dot.dot_text(p, colours, g) for p, g in zip(pages, geometries, strict=True)]
+    place = Path(folder)
+    for state, content in zip(parents, engine.draw_pages(texts), strict=True):
+        _write(place / names[state.path], content)
+    return place / "index.svg"
+
+
+def _marks(
+    record: StateRecord, active: Iterable[str], run: History | Iterable[Event] | None
+) -> Marks:
+    history = run if isinstance(run, History) else History()
+    if run is not None and not isinstance(run, History):
+        for event in run:
+            history.on_event(event)
+    marks = history.marks()
+    named = {extract.find(record, path).path for path in active}
+    paths = {
+        state.path
+        for state in record.walk()
+        if any(path == state.path or path.startswith(state.path + "/") for path in named)
+    }
+    return Marks(marks.active | paths, marks.visits, marks.last, marks.taken)
+
+
+def _theme(name: str) -> Theme:
+    if name not in THEMES:
+        raise PictureError(f"picture: theme: got {name!r}; expected one of {sorted(THEMES)}.")
+    return THEMES[name]
+
+
+def _node(record: StateRecord, look: Look) -> Node:
+    return extract.extract(record, depth=look.depth, show_implicit=look.show_implicit)
+
+
+def _drawn(form: engine.Format) -> Callable[[StateRecord, Look, Marks], bytes]:
+    def make(record: StateRecord, look: Look, marks: Marks) -> bytes:
+        colours = _theme(look.theme)
+        pieces = graph.draw(Diagram(_node(record, look), marks), colours)
+        places = layout.compose(pieces, colours, engine.lay_out)
+        return engine.draw(dot.dot_text(pieces, colours, places), form)
+
+    return make
+
+
+def _dot(record: StateRecord, look: Look, marks: Marks) -> bytes:
+    colours = _theme(look.theme)
+    pieces = graph.draw(Diagram(_node(record, look), marks), colours)
+    return dot.dot_text(pieces, colours).encode("utf-8", "replace")
+
+
+def _json(record: StateRecord, look: Look, marks: Marks) -> bytes:
+    del look, marks  # the record is the structure, whole and without a look
+    return (record.to_json(indent=2) + "\n").encode("utf-8", "replace")
+
+
+def _mermaid(record: StateRecord, look: Look, marks: Marks) -> bytes:
+    diagram = Diagram(_node(record, look), marks)
+    return mermaid_text(diagram, _theme(look.theme)).encode("utf-8", "replace")
+
+
+def _outline(record: StateRecord, look: Look, marks: Marks) -> bytes:
+    return outline_text(Diagram(_node(record, look), marks)).encode("utf-8", "replace")
+
+
+_FORMS: dict[str, Callable[[StateRecord, Look, Marks], bytes]] = {
+    "svg": _drawn("svg"),
+    "png": _drawn("png"),
+    "pdf": _drawn("pdf"),
+    "dot": _dot,
+    "gv": _dot,
+    "json": _json,
+    "mmd": _mermaid,
+    "txt": _outline,
+}
+
+
+def _write(file: Path, content: bytes) -> None:
+    """Write whole or not at all: a viewer never sees half a picture."""
+    draft = file.with_name(f".{file.name}.{secrets.token_hex(4)}")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            draft.write_bytes(content)
+            draft.replace(file)
+        finally:
+            draft.unlink(missing_ok=True)
+    except OSError as error:
+        raise PictureError(f"picture: {str(file)!r} cannot be written: {error.strerror}") from error

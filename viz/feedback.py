@@ -1,0 +1,117 @@
+"""What a goal's feedback says about progress, for any action that has the usual fields.
+
+Goals and feedback are the user's messages, so nothing is required of them: what is not there or
+cannot be read is left out.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from viz.words import shorten
+
+if TYPE_CHECKING:
+    from viz.history import Goal
+
+DISTANCES = ("distance_remaining", "distance_left", "distance_to_goal", "distance")
+FRACTIONS = ("progress", "fraction", "completion")
+PERCENTS = ("percent", "percent_complete", "percentage")
+COUNTS = ("remaining", "left", "seconds_left", "time_left", "time_remaining")
+TEXTS = ("text", "message", "status", "state", "phase")
+TEXT_LENGTH = 60
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """What can be shown of a running goal.
+
+    Attributes:
+        fraction: 0 to 1, None when it cannot be told.
+        distance: Way left [m], None when it cannot be told.
+        text: The feedback in words; may be empty.
+    """
+
+    fraction: float | None = None
+    distance: float | None = None
+    text: str = ""
+
+
+def progress_of(goal: Goal) -> Progress:
+    """Read a running goal's progress from its newest feedback."""
+    feedback = goal.feedback
+    if feedback is None:
+        return Progress()
+    distance = _distance(goal.goal, feedback)
+    return Progress(_fraction(goal, distance), distance, _text(feedback))
+
+
+def _distance(goal: Any, feedback: Any) -> float | None:
+    said = _first(feedback, DISTANCES)
+    if said is not None:
+        return said
+    here = _position(_read(feedback, "base_position"))
+    there = _position(_read(goal, "target_pose"))
+    if here is None or there is None:
+        return None
+    return math.hypot(there[0] - here[0], there[1] - here[1])
+
+
+def _position(stamped: Any) -> tuple[float, float] | None:
+    position = _read(_read(stamped, "pose"), "position")
+    x, y = _number(_read(position, "x")), _number(_read(position, "y"))
+    return None if x is None or y is None else (x, y)
+
+
+def _fraction(goal: Goal, distance: float | None) -> float | None:
+    percent = _first(goal.feedback, PERCENTS)
+    said = _first(goal.feedback, FRACTIONS) if percent is None else percent / 100
+    if said is not None:
+        return min(max(said, 0.0), 1.0)
+    first, now = _distance(goal.goal, goal.first_feedback), distance
+    if first is None or now is None:
+        first, now = _first(goal.first_feedback, COUNTS), _first(goal.feedback, COUNTS)
+    if first is None or now is None or first <= 0:
+        return None
+    return min(max(1 - now / first, 0.0), 1.0)
+
+
+def _text(feedback: Any) -> str:
+    for name in TEXTS:
+        value = _read(feedback, name)
+        if isinstance(value, str) and value:
+            return shorten(value, TEXT_LENGTH)
+    words = [
+        f"{name} {value:g}" if isinstance(value, float) else f"{name} {value}"
+        for name in _names(feedback)
+        if isinstance(value := _read(feedback, name), (int, float, str))
+    ]
+    return shorten(", ".join(words), TEXT_LENGTH)
+
+
+def _names(message: Any) -> tuple[str, ...]:
+    slots = getattr(type(message), "__slots__", ())
+    names = (slots,) if isinstance(slots, str) else tuple(slots)
+    return tuple(n for n in names or tuple(getattr(message, "__dict__", ())) if n[:1] != "_")
+
+
+def _first(message: Any, names: tuple[str, ...]) -> float | None:
+    return next((v for n in names if (v := _number(_read(message, n))) is not None), None)
+
+
+def _read(message: Any, name: str) -> Any:
+    try:
+        return getattr(message, name, None)
+    except Exception:  # noqa: BLE001  a user's property may raise anything; then it is not there
+        return None
+
+
+def _number(value: Any) -> float | None:
+    """Seconds of a duration, or the number itself, if it is a finite one."""
+    seconds = _read(value, "to_sec")
+    if callable(seconds):
+        value = seconds()
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return None
+    return float(value) if math.isfinite(value) else None

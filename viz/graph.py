@@ -1,0 +1,247 @@
+"""From the model of a picture to boxes, dots and arrows with their looks.
+
+Graphviz names here are numbers (`n0`, `n0_in`, `n0_o1`), never the user's: whatever a state is
+called, the DOT text stays valid.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from itertools import count
+from typing import TYPE_CHECKING
+
+from viz import style
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from viz.model import Diagram, Edge, Node
+    from viz.theme import Theme
+
+
+@dataclass(frozen=True, slots=True)
+class Vertex:
+    """Something small inside a container: its entry, an outcome, a join."""
+
+    name: str
+    attributes: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Anchor:
+    """Where an arrow begins or ends.
+
+    Attributes:
+        box: Name of the box it belongs to.
+        part: Name of the vertex on that box's border or inside; empty for the box itself.
+        is_open: Whether the box is an open container.
+    """
+
+    box: str
+    part: str = ""
+    is_open: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Arrow:
+    """One arrow between pieces of one container.
+
+    Attributes:
+        back: Points against the reading direction, so that layouts take it the other way round.
+    """
+
+    name: str
+    tail: Anchor
+    head: Anchor
+    attributes: Mapping[str, str]
+    back: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A state; one that has an entry is an open container with everything inside."""
+
+    name: str
+    attributes: Mapping[str, str]
+    entry: Vertex | None = None
+    pills: tuple[Vertex, ...] = ()
+    joins: tuple[Vertex, ...] = ()
+    boxes: tuple[Box, ...] = ()
+    arrows: tuple[Arrow, ...] = ()
+
+    def containers(self) -> Iterator[Box]:
+        """Yield the open containers, parents first."""
+        if self.entry is not None:
+            yield self
+        for box in self.boxes:
+            yield from box.containers()
+
+    def height(self) -> int:
+        """Levels of open containers inside, this one included."""
+        if self.entry is None:
+            return 0
+        return 1 + max((box.height() for box in self.boxes), default=0)
+
+
+def draw(diagram: Diagram, theme: Theme) -> Box:
+    """Return the picture's pieces."""
+    return _Drawing(diagram, theme).box(diagram.root, 0)
+
+
+class _Drawing:
+    def __init__(self, diagram: Diagram, theme: Theme) -> None:
+        self._diagram = diagram
+        self._theme = theme
+        self._marks = diagram.marks
+        self._numbers = count()
+
+    def box(self, node: Node, depth: int) -> Box:
+        name = f"n{next(self._numbers)}"
+        if not node.is_open:
+            return Box(name, style.state(node, self._diagram, self._theme))
+        boxes = {child.label: self.box(child, depth + 1) for child in node.children}
+        return _Interior(self._diagram, self._theme, node, depth, name, boxes).box()
+
+
+class _Interior:
+    """Draws what is inside one open container."""
+
+    def __init__(
+        self,
+        diagram: Diagram,
+        theme: Theme,
+        node: Node,
+        depth: int,
+        name: str,
+        boxes: Mapping[str, Box],
+    ) -> None:
+        self._diagram, self._marks, self._theme = diagram, diagram.marks, theme
+        self._node, self._depth, self._name, self._boxes = node, depth, name, boxes
+        self._nodes = {child.label: child for child in node.children}
+        self._pills = {pill.outcome: f"{name}_o{i}" for i, pill in enumerate(node.pills)}
+        self._joins: list[Vertex] = []
+        self._arrows: list[Arrow] = []
+
+    def box(self) -> Box:
+        self._starts()
+        for edge in self._node.edges:
+            self._transition(edge)
+        self._decisions()
+        node, theme = self._node, self._theme
+        visited = node.path in self._marks.visits
+        return Box(
+            self._name,
+            style.container(node, self._depth, self._diagram, theme),
+            Vertex(
+                f"{self._name}_in", style.entry(theme, touched=visited or not self._marks.has_run)
+            ),
+            tuple(self._pill(outcome) for outcome in self._pills),
+            tuple(self._joins),
+            tuple(self._boxes.values()),
+            tuple(self._arrows),
+        )
+
+    def _pill(self, outcome: str) -> Vertex:
+        (pill,) = (pill for pill in self._node.pills if pill.outcome == outcome)
+        taken = self._marks.taken.get((self._node.path, outcome), 0)
+        return Vertex(
+            self._pills[outcome],
+            style.pill(
+                outcome,
+                self._theme,
+                by_default=pill.by_default,
+                stands_back=self._marks.has_run and not taken,
+            ),
+        )
+
+    def _starts(self) -> None:
+        fork = len(self._node.initial) > 1 or self._node.kind == "concurrence"
+        for label in self._node.initial:
+            self._arrow(
+                Anchor(self._name, "in", is_open=True),
+                self._entrance(label, back=False),
+                style.start(self._theme, fork=fork),
+            )
+
+    def _transition(self, edge: Edge) -> None:
+        source = self._boxes[edge.source]
+        groups = [(outcome,) for outcome in edge.outcomes] if source.entry else [edge.outcomes]
+        for outcomes in groups:
+            path = self._nodes[edge.source].path
+            same_name = edge.to_outcome and outcomes == (edge.target,)
+            attributes = style.transition(
+                outcomes,
+                self._theme,
+                self._marks,
+                counts={o: self._marks.taken.get((path, o), 0) for o in outcomes},
+                labelled=source.entry is None and not same_name,
+                implicit=edge.implicit,
+            )
+            head = (
+                self._outcome(edge.target)
+                if edge.to_outcome
+                else self._entrance(edge.target, back=edge.back)
+            )
+            self._arrow(self._exit(edge.source, outcomes[0]), head, attributes, back=edge.back)
+
+    def _decisions(self) -> None:
+        """Rules over several states meet in a bar; a rule over one state is a plain arrow."""
+        drawn = Counter(
+            (edge.source, outcome) for edge in self._node.edges for outcome in edge.outcomes
+        )
+        for rule in self._node.rules:
+            conditions = [c for c in rule.conditions if c[0] in self._boxes]
+            if rule.outcome not in self._pills or not conditions:
+                continue
+            if len(conditions) == 1 and not drawn[conditions[0]]:
+                self._decide(*conditions[0], self._outcome(rule.outcome), rule.outcome)
+            elif len(conditions) > 1:
+                self._join(rule.outcome, conditions, rule.text)
+
+    def _join(self, outcome: str, conditions: list[tuple[str, str]], text: str) -> None:
+        bar = f"{self._name}_j{len(self._joins)}"
+        self._joins.append(Vertex(bar, style.join(text, self._theme)))
+        anchor = Anchor(self._name, bar.removeprefix(f"{self._name}_"), is_open=True)
+        for label, child_outcome in conditions:
+            self._decide(label, child_outcome, anchor, outcome)
+        self._arrow(
+            anchor,
+            self._outcome(outcome),
+            style.decision(outcome, self._theme, self._marks, label=""),
+        )
+
+    def _decide(self, label: str, child_outcome: str, head: Anchor, outcome: str) -> None:
+        named = self._boxes[label].entry is None and child_outcome != outcome
+        attributes = style.decision(
+            child_outcome,
+            self._theme,
+            self._marks,
+            label=child_outcome if named else "",
+        )
+        self._arrow(self._exit(label, child_outcome), head, attributes)
+
+    def _exit(self, label: str, outcome: str) -> Anchor:
+        box = self._boxes[label]
+        if box.entry is None:
+            return Anchor(box.name)
+        pills = [pill.outcome for pill in self._nodes[label].pills]
+        if outcome not in pills:
+            return Anchor(box.name, "", is_open=True)
+        return Anchor(box.name, f"o{pills.index(outcome)}", is_open=True)
+
+    def _entrance(self, label: str, *, back: bool) -> Anchor:
+        box = self._boxes[label]
+        if box.entry is None:
+            return Anchor(box.name)
+        return Anchor(box.name, "" if back else "in", is_open=True)
+
+    def _outcome(self, outcome: str) -> Anchor:
+        part = self._pills[outcome].removeprefix(f"{self._name}_")
+        return Anchor(self._name, part, is_open=True)
+
+    def _arrow(
+        self, tail: Anchor, head: Anchor, attributes: Mapping[str, str], *, back: bool = False
+    ) -> None:
+        name = f"{self._name}_e{len(self._arrows)}"
+        self._arrows.append(Arrow(name, tail, head, attributes, back))

@@ -1,0 +1,252 @@
+"""Where every piece of a picture goes: each container is laid out on its own, innermost first.
+
+A container becomes a page for `dot`, in which the containers inside are boxes of known size with
+a port for their entry on the upper border and one per outcome on the lower one. So no arrow ever
+crosses a border except at an entry or an outcome, and the time grows with the number of states,
+while one layout of everything takes minutes for 500 states. All containers of one height share
+one run of `dot`. Lengths are points (1/72 inch), y points up.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from math import ceil
+from typing import TYPE_CHECKING, Any
+
+import graphviz
+
+from viz import style
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from viz.graph import Anchor, Arrow, Box
+    from viz.theme import Theme
+
+    Engine = Callable[[Sequence[str]], list[dict[str, Any]]]
+    Geometry = dict[str, dict[str, str]]
+
+MARGIN = 12
+DOT_RADIUS = 4
+PORT = 8
+INCH = 72.0
+_POINT = re.compile(r"(-?[\d.]+(?:e[+-]?\d+)?),(-?[\d.]+(?:e[+-]?\d+)?)")
+
+
+@dataclass(frozen=True, slots=True)
+class _Page:
+    """One container, laid out.
+
+    Attributes:
+        width, height: Outer size with the dot and the pills that stand over the border.
+        dx, dy: From coordinates of the page to coordinates of the outer box.
+        floor: Height of the lower border in the outer box.
+        ports: Centre and width along x in the outer box, by part.
+    """
+
+    width: int
+    height: int
+    dx: float
+    dy: float
+    floor: float
+    title: tuple[float, float]
+    ports: dict[str, tuple[float, float]]
+    spots: dict[str, tuple[float, float]]
+    curves: dict[str, dict[str, str]]
+
+
+def compose(root: Box, theme: Theme, run: Engine) -> Geometry:
+    """Return the positions of everything in `root`, as Graphviz attributes by name.
+
+    Args:
+        root: The picture; must be an open container.
+        theme: Fonts and sizes.
+        run: Lays DOT texts out and returns Graphviz' JSON for each.
+
+    Blocks: while `run` does, once per nesting level.
+    """
+    return compose_all([root], theme, run)[0]
+
+
+def compose_all(roots: Sequence[Box], theme: Theme, run: Engine) -> list[Geometry]:
+    """`compose` for several pictures with as few runs as for the deepest one."""
+    containers = [box for root in roots for box in root.containers()]
+    pages: dict[int, _Page] = {}
+    for height in range(1, max(root.height() for root in roots) + 1):
+        level = [box for box in containers if box.height() == height]
+        texts = [_page_text(box, theme, pages) for box in level]
+        for box, result in zip(level, run(texts), strict=True):
+            pages[id(box)] = _page(box, result)
+    geometries = []
+    for root in roots:
+        geometry: Geometry = {}
+        _place(root, pages, (0.0, 0.0), geometry)
+        geometries.append(geometry)
+    return geometries
+
+
+def _page_text(box: Box, theme: Theme, pages: Mapping[int, _Page]) -> str:
+    dot = graphviz.Digraph(graph_attr={**style.graph(theme), "label": box.attributes["label"]})
+    dot.attr("graph", labelloc="t", pad="0")
+    dot.attr("node", **style.node_defaults(theme))
+    dot.attr("edge", **style.edge_defaults(theme))
+    assert box.entry is not None
+    dot.node(box.entry.name, label="", shape="point", width="0.03", height="0.03")
+    for child in box.boxes:
+        dot.node(child.name, **_block(child, pages.get(id(child))))
+    for vertex in box.joins:
+        dot.node(vertex.name, **vertex.attributes)
+    if box.pills:
+        with dot.subgraph() as bottom:
+            bottom.attr(rank="sink")
+            for vertex in box.pills:
+                bottom.node(vertex.name, **vertex.attributes)
+    for arrow in box.arrows:
+        _write_arrow(dot, box, arrow)
+    return str(dot.source)
+
+
+def _block(child: Box, page: _Page | None) -> Mapping[str, str]:
+    """The node that stands for a child: itself, or a table of the size of its page."""
+    if page is None:
+        return child.attributes
+    inner = page.height - 4
+    rows = (
+        _strip(page.width, {part: span for part, span in page.ports.items() if part == "in"}),
+        f'<td fixedsize="true" width="{page.width}" height="{inner}"></td>',
+        _strip(page.width, {part: span for part, span in page.ports.items() if part != "in"}),
+    )
+    table = '<table border="0" cellborder="0" cellspacing="0" cellpadding="0">'
+    body = "".join(f"<tr>{row}</tr>" for row in rows)
+    return {"label": f"<{table}{body}</table>>", "margin": "0", "shape": "plain", "style": ""}
+
+
+def _strip(width: int, ports: Mapping[str, tuple[float, float]]) -> str:
+    """A row two points high with a named cell per port."""
+    cells = []
+    at = 0
+    for part, (centre, span) in sorted(ports.items(), key=lambda item: item[1][0]):
+        left = max(at, round(centre - span / 2))
+        if left > at:
+            cells.append(_cell(left - at))
+        at = min(width, max(left + 1, round(centre + span / 2)))
+        cells.append(_cell(at - left, f' port="{part}"'))
+    if at < width:
+        cells.append(_cell(width - at))
+    return (
+        '<td><table border="0" cellborder="0" cellspacing="0" cellpadding="0"><tr>'
+        f"{''.join(cells)}</tr></table></td>"
+    )
+
+
+def _cell(width: int, port: str = "") -> str:
+    return f'<td fixedsize="true" width="{width}" height="2"{port}></td>'
+
+
+def _write_arrow(dot: graphviz.Digraph, box: Box, arrow: Arrow) -> None:
+    tail, head = _end(arrow.tail, box), _end(arrow.head, box)
+    attributes = {**arrow.attributes, "id": arrow.name}
+    if arrow.back:
+        dot.edge(head, tail, dir="back", **attributes)
+    else:
+        dot.edge(tail, head, **attributes)
+
+
+def _end(anchor: Anchor, box: Box) -> str:
+    if anchor.box == box.name:
+        return f"{anchor.box}_{anchor.part}"
+    if anchor.is_open and anchor.part:
+        return f"{anchor.box}:{anchor.part}:{'n' if anchor.part == 'in' else 's'}"
+    return f"{anchor.box}:e" if anchor.is_open else anchor.box
+
+
+def _page(box: Box, result: Mapping[str, Any]) -> _Page:
+    found = {item["name"]: item for item in result.get("objects", ()) if "pos" in item}
+    curves = {
+        edge["id"]: {key: edge[key] for key in ("pos", "lp") if key in edge}
+        for edge in result.get("edges", ())
+    }
+    _, _, right, top = map(float, result["bb"].split(","))
+    spots = {name: _xy(item["pos"]) for name, item in found.items()}
+    assert box.entry is not None
+    entry_x, _ = spots[box.entry.name]
+    for arrow in box.arrows:
+        if arrow.tail.box == box.name and arrow.tail.part == "in":
+            curves[arrow.name]["pos"] = _with_stem(curves[arrow.name]["pos"], entry_x, top)
+    spots[box.entry.name] = (entry_x, top)
+    title_x, right = _title(result, entry_x, right)
+    dy, floor = float(MARGIN), 0.0
+    ports = {"in": (entry_x + MARGIN, float(PORT))}
+    if box.pills:
+        dy = -min(spots[p.name][1] - _size(found[p.name], "height") / 2 for p in box.pills)
+        floor = spots[box.pills[0].name][1] + dy
+        for i, vertex in enumerate(box.pills):
+            ports[f"o{i}"] = (spots[vertex.name][0] + MARGIN, _size(found[vertex.name], "width"))
+    return _Page(
+        width=ceil(right + 2 * MARGIN),
+        height=ceil(top + dy + DOT_RADIUS),
+        dx=MARGIN,
+        dy=dy,
+        floor=floor,
+        title=(title_x, _xy(result["lp"])[1]),
+        ports=ports,
+        spots=spots,
+        curves=curves,
+    )
+
+
+def _title(result: Mapping[str, Any], entry_x: float, right: float) -> tuple[float, float]:
+    """Centre of the title, left of the line from the entry if it fits, else beside it."""
+    width = float(result["lwidth"]) * INCH
+    if width + DOT_RADIUS <= entry_x:
+        return width / 2 - 2, right
+    left = entry_x + DOT_RADIUS + 2
+    return left + width / 2, max(right, left + width - DOT_RADIUS)
+
+
+def _with_stem(curve: str, x: float, top: float) -> str:
+    """Let a curve begin on the upper border."""
+    head, _, rest = curve.rpartition("e,")
+    arrow, _, points = rest.partition(" ")
+    first_x, first_y = _xy(points.split(" ", 1)[0])
+    stem = [(x + (first_x - x) * part, top + (first_y - top) * part) for part in (0, 1 / 3, 2 / 3)]
+    text = " ".join(f"{px:.2f},{py:.2f}" for px, py in stem)
+    return f"{head}e,{arrow} {text} {points}"
+
+
+def _place(
+    box: Box, pages: Mapping[int, _Page], origin: tuple[float, float], geometry: Geometry
+) -> None:
+    """Write absolute positions; `origin` is the lower left corner of the outer box."""
+    page = pages[id(box)]
+    ox, oy = origin
+    sx, sy = ox + page.dx, oy + page.dy
+    geometry[box.name] = {
+        "bb": f"{ox:.2f},{oy + page.floor:.2f},{ox + page.width:.2f},"
+        f"{oy + page.height - DOT_RADIUS:.2f}",
+        "lp": f"{sx + page.title[0]:.2f},{sy + page.title[1]:.2f}",
+    }
+    for name, (x, y) in page.spots.items():
+        geometry.setdefault(name, {})["pos"] = f"{sx + x:.2f},{sy + y:.2f}"
+    for name, attributes in page.curves.items():
+        geometry[name] = {key: _shift(value, sx, sy) for key, value in attributes.items()}
+    for child in box.boxes:
+        inner = pages.get(id(child))
+        if inner is not None:
+            x, y = page.spots[child.name]
+            corner = (sx + x - inner.width / 2, sy + y - inner.height / 2)
+            _place(child, pages, corner, geometry)
+
+
+def _shift(value: str, dx: float, dy: float) -> str:
+    return _POINT.sub(lambda m: f"{float(m[1]) + dx:.2f},{float(m[2]) + dy:.2f}", value)
+
+
+def _xy(text: str) -> tuple[float, float]:
+    x, y = text.split(",")
+    return float(x), float(y)
+
+
+def _size(item: Mapping[str, Any], side: str) -> float:
+    return float(item[side]) * INCH

@@ -1,0 +1,164 @@
+"""What a picture shows: the states of a machine as far as they are opened, and marks on them.
+
+Everything here is frozen and knows nothing of colours, engines or files.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+OutcomeClass = Literal["success", "failure", "preempted", "other"]
+
+_SUCCESS = frozenset(
+    {"succeeded", "success", "done", "ok", "yes", "true", "valid", "complete", "completed"}
+    | {"finished", "reached", "arrived"}
+)
+_FAILURE = frozenset(
+    {"aborted", "failed", "failure", "fail", "error", "invalid", "no", "false", "timeout"}
+    | {"timed_out", "lost", "rejected", "unreachable", "exception"}
+)
+_PREEMPTED = ("preempt", "cancel", "recall", "interrupt")
+
+
+def outcome_class(outcome: str) -> OutcomeClass:
+    """Tell what kind of end an outcome's name speaks of.
+
+    >>> outcome_class("preempted"), outcome_class("low_battery")
+    ('preempted', 'other')
+    """
+    word = outcome.lower()
+    if word in _SUCCESS:
+        return "success"
+    if word in _FAILURE:
+        return "failure"
+    return "preempted" if word.startswith(_PREEMPTED) else "other"
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """The transitions of one container from one state to one target.
+
+    Attributes:
+        source: Label of a child.
+        target: Label of a child, or an outcome of the container.
+        to_outcome: Whether `target` is an outcome.
+        outcomes: The outcomes of `source` that lead there.
+        implicit: Nobody wrote these transitions down: an outcome of the same name took them.
+        back: Points against the reading direction.
+    """
+
+    source: str
+    target: str
+    to_outcome: bool
+    outcomes: tuple[str, ...]
+    implicit: bool = False
+    back: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """How a container comes to an outcome when several children decide together.
+
+    Attributes:
+        outcome: The container's outcome.
+        conditions: Pairs (child label, child outcome).
+        text: The rule in words.
+    """
+
+    outcome: str
+    conditions: tuple[tuple[str, str], ...]
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Pill:
+    """An outcome on the border of an open container.
+
+    Attributes:
+        by_default: Only transitions that nobody wrote down lead to it.
+    """
+
+    outcome: str
+    by_default: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A state in a picture.
+
+    Attributes:
+        path: `/ROOT/CHILD`.
+        kind: As in `smachpy.introspection.StateRecord`.
+        details: Pairs (name, value) for the tooltip.
+        hidden: Number of states inside that the picture does not show.
+        children: Empty for a plain state and for a closed container.
+        initial: Labels of the children that start first.
+        pills: Outcomes drawn on the border of an open container.
+    """
+
+    path: str
+    label: str
+    kind: str
+    type_name: str = ""
+    doc: str = ""
+    details: tuple[tuple[str, str], ...] = ()
+    outcomes: tuple[str, ...] = ()
+    hidden: int = 0
+    children: tuple[Node, ...] = ()
+    initial: tuple[str, ...] = ()
+    edges: tuple[Edge, ...] = ()
+    rules: tuple[Rule, ...] = ()
+    default_outcome: str | None = None
+    pills: tuple[Pill, ...] = ()
+
+    @property
+    def is_open(self) -> bool:
+        """Whether its children are drawn."""
+        return bool(self.children)
+
+    def walk(self) -> Iterator[Node]:
+        """Yield this node and everything below, parents first."""
+        yield self
+        for child in self.children:
+            yield from child.walk()
+
+
+@dataclass(frozen=True, slots=True)
+class Marks:
+    """What a run left on a machine.
+
+    Attributes:
+        active: Paths of the states that are running, containers included.
+        visits: Times each state was entered, by path.
+        last: Outcome with which each state was last left, by path.
+        taken: Times each transition was taken, by (path of the state left, outcome).
+    """
+
+    active: frozenset[str] = frozenset()
+    visits: Mapping[str, int] = field(default_factory=dict)
+    last: Mapping[str, str] = field(default_factory=dict)
+    taken: Mapping[tuple[str, str], int] = field(default_factory=dict)
+
+    @property
+    def has_run(self) -> bool:
+        """Whether there is a history, so that untouched parts can stand back."""
+        return bool(self.visits)
+
+
+@dataclass(frozen=True, slots=True)
+class Diagram:
+    """A picture without its look.
+
+    Attributes:
+        root: The outermost state.
+        marks: What to highlight.
+        links: Address of the page of a container, by path, for linked pages.
+    """
+
+    root: Node
+    marks: Marks = field(default_factory=Marks)
+    links: Mapping[str, str] = field(default_factory=dict)

@@ -1,0 +1,303 @@
+"""How each piece of a picture looks, as Graphviz attributes.
+
+Every text that comes from a machine passes through `shorten`, `markup` or `plain` here, so that no
+name can break a picture, whatever it contains.
+"""
+
+from __future__ import annotations
+
+import html
+from typing import TYPE_CHECKING
+
+import graphviz
+
+from viz.model import outcome_class
+from viz.theme import FONT
+from viz.words import ENDINGS, GLYPHS, KIND_WORDS, shorten
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from viz.model import Diagram, Marks, Node, OutcomeClass
+    from viz.theme import Swatch, Theme
+
+    Attributes = dict[str, str]
+
+TOOLTIP_LENGTH = 600
+
+
+def markup(text: str) -> str:
+    """Return `text` safe inside an HTML-like label."""
+    return html.escape(shorten(text), quote=True) or " "
+
+
+def plain(text: str, length: int = TOOLTIP_LENGTH) -> str:
+    """Return `text` safe as the value of an ordinary attribute."""
+    lines = [shorten(line, length) for line in text[: 4 * length].splitlines()[:12]]
+    value = "\n".join(lines).replace("&", "&amp;")
+    safe: str = graphviz.escape(value)
+    return safe
+
+
+def graph(theme: Theme) -> Attributes:
+    """Attributes of a whole picture."""
+    return {
+        "bgcolor": theme.background,
+        "compound": "true",
+        "fontcolor": theme.ink,
+        "fontname": FONT,
+        "fontsize": "11",
+        "labeljust": "l",
+        "nodesep": "0.26",
+        "pad": "0.25",
+        "ranksep": "0.34",
+        "splines": "true",
+        "outputorder": "edgesfirst",
+        "tooltip": " ",
+    }
+
+
+def node_defaults(theme: Theme) -> Attributes:
+    """Attributes of every vertex that says nothing else."""
+    return {
+        "color": theme.inactive.stroke,
+        "fillcolor": theme.inactive.fill,
+        "fontcolor": theme.inactive.text,
+        "fontname": FONT,
+        "fontsize": "11",
+        "height": "0.34",
+        "margin": "0.14,0.05",
+        "penwidth": "1.1",
+        "shape": "box",
+        "style": "rounded,filled",
+        "width": "0.5",
+    }
+
+
+def edge_defaults(theme: Theme) -> Attributes:
+    """Attributes of every edge that says nothing else."""
+    return {
+        "arrowsize": "0.62",
+        "color": theme.edge,
+        "fontcolor": theme.muted,
+        "fontname": FONT,
+        "fontsize": "9",
+        "penwidth": "1.2",
+        "tooltip": " ",
+    }
+
+
+def state(node: Node, diagram: Diagram, theme: Theme) -> Attributes:
+    """A plain state, or a container that is closed."""
+    marks = diagram.marks
+    attributes = {**_identity(node, diagram), "label": _state_label(node, marks, theme)}
+    if node.hidden:
+        attributes["peripheries"] = "2"
+    swatch, extra = _status(node, marks, theme)
+    return attributes | _swatch(swatch) | extra
+
+
+def container(node: Node, depth: int, diagram: Diagram, theme: Theme) -> Attributes:
+    """An open container."""
+    marks = diagram.marks
+    active = node.path in marks.active
+    word = KIND_WORDS.get(node.kind, "")
+    title = f"<b>{markup(node.label)}</b>"
+    if word:
+        title += f'<font point-size="9" color="{theme.muted}">&#160;&#160;{word}</font>'
+    title += _count(marks.visits.get(node.path, 0), theme.muted)
+    return {
+        **_identity(node, diagram),
+        "color": theme.active.stroke if active else theme.border,
+        "fillcolor": theme.container(depth),
+        "fontcolor": theme.active.text if active else theme.ink,
+        "label": f"<{title}>",
+        "margin": "11",
+        "penwidth": "2.2" if active else "1",
+        "style": "rounded,filled,dashed" if node.kind == "concurrence" else "rounded,filled",
+    }
+
+
+def entry(theme: Theme, *, touched: bool) -> Attributes:
+    """The dot where a container is entered."""
+    colour = theme.ink if touched else theme.muted
+    return {
+        "color": colour,
+        "fillcolor": colour,
+        "fixedsize": "true",
+        "height": "0.11",
+        "label": "",
+        "shape": "circle",
+        "style": "filled",
+        "tooltip": "start",
+        "width": "0.11",
+    }
+
+
+def pill(outcome: str, theme: Theme, *, by_default: bool, stands_back: bool) -> Attributes:
+    """An outcome on the border of a container."""
+    swatch = theme.outcome(outcome_class(outcome))
+    attributes = {
+        "fontsize": "9",
+        "height": "0.21",
+        "label": f"<{markup(outcome)}>",
+        "margin": "0.1,0.02",
+        "penwidth": "1.2",
+        "style": "rounded,filled,dashed" if by_default else "rounded,filled",
+        "tooltip": plain(f"outcome {outcome}"),
+        "width": "0.3",
+    } | _swatch(swatch)
+    if stands_back:
+        attributes["color"] = _see_through(swatch.stroke)
+    return attributes
+
+
+def join(text: str, theme: Theme) -> Attributes:
+    """The bar at which several states decide together."""
+    return {
+        "color": theme.muted,
+        "fillcolor": theme.muted,
+        "fixedsize": "true",
+        "height": "0.045",
+        "label": "",
+        "shape": "box",
+        "style": "filled",
+        "tooltip": plain(text),
+        "width": "0.5",
+    }
+
+
+def start(theme: Theme, *, fork: bool) -> Attributes:
+    """The arrow from the entry of a container to what runs first."""
+    return {
+        "arrowsize": "0.5",
+        "color": theme.muted,
+        "penwidth": "1",
+        "style": "dashed" if fork else "solid",
+        "weight": "3",
+    }
+
+
+def transition(
+    outcomes: Sequence[str],
+    theme: Theme,
+    marks: Marks,
+    *,
+    counts: Mapping[str, int],
+    labelled: bool,
+    implicit: bool,
+) -> Attributes:
+    """An arrow that one or several outcomes of a state take.
+
+    Args:
+        outcomes: Their names.
+        theme: The colours.
+        marks: The run to show.
+        counts: Times each outcome was taken here.
+        labelled: Whether to write the names.
+        implicit: Whether nobody wrote the transition down.
+    """
+    kinds = {outcome_class(outcome) for outcome in outcomes}
+    kind: OutcomeClass = kinds.pop() if len(kinds) == 1 else "other"
+    swatch = theme.outcome(kind)
+    taken = sum(counts.get(outcome, 0) for outcome in outcomes)
+    stands_back = marks.has_run and not taken
+    stroke = theme.edge if kind == "other" else swatch.stroke
+    attributes = {
+        "color": _see_through(stroke) if stands_back else stroke,
+        "tooltip": plain(", ".join(outcomes)),
+    }
+    if implicit:
+        attributes |= {"style": "dotted", "arrowsize": "0.5"}
+    if taken:
+        attributes |= {"penwidth": "2.6"}
+    if labelled or taken > 1:
+        ink = theme.muted if stands_back or kind == "other" else swatch.text
+        names = outcomes if labelled else [""]
+        rows = "".join(
+            f'<tr><td align="left"><font color="{ink}">{markup(name)}'
+            f"{_times(counts.get(name or outcomes[0], 0))}</font></td></tr>"
+            for name in names
+        )
+        attributes["label"] = (
+            f'<<table border="0" cellborder="0" cellspacing="0" cellpadding="2">{rows}</table>>'
+        )
+    return attributes
+
+
+def decision(outcome: str, theme: Theme, marks: Marks, *, label: str) -> Attributes:
+    """An arrow of a rule: from a state's outcome towards the container's."""
+    return dict(transition([outcome], theme, marks, counts={}, labelled=False, implicit=False)) | (
+        {"label": _small(label, theme.muted)} if label else {}
+    )
+
+
+def _small(text: str, ink: str) -> str:
+    return (
+        f'<<table border="0" cellborder="0" cellspacing="0" cellpadding="2">'
+        f'<tr><td><font color="{ink}">{markup(text)}</font></td></tr></table>>'
+    )
+
+
+def _identity(node: Node, diagram: Diagram) -> dict[str, str]:
+    """Id, tooltip and link: the same picture can be restyled and navigated by path."""
+    lines = [node.path, f"{node.kind} ({node.type_name})" if node.type_name else node.kind]
+    lines += [f"{name}: {value}" for name, value in node.details]
+    if node.doc:
+        lines.append(node.doc)
+    identity = {"id": plain(node.path), "tooltip": plain("\n".join(lines))}
+    if node.path in diagram.links:
+        identity["URL"] = graphviz.escape(diagram.links[node.path])
+        identity["target"] = "_self"
+    return identity
+
+
+def _state_label(node: Node, marks: Marks, theme: Theme) -> str:
+    glyph = GLYPHS.get(node.kind, "")
+    name = markup(node.label)
+    text = f'<font color="{theme.muted}" point-size="10">{glyph}&#160;</font>' if glyph else ""
+    text += f"<b>{name}</b>" if node.path in marks.active or node.hidden else name
+    if node.hidden:
+        word = KIND_WORDS.get(node.kind, "")
+        note = f"{word}, {node.hidden} states" if word else f"{node.hidden} states"
+        text += f'<br/><font point-size="8.5" color="{theme.muted}">{note}</font>'
+        return f"<{text}>"
+    text += _count(marks.visits.get(node.path, 0), theme.muted)
+    last = marks.last.get(node.path)
+    if last is not None and node.path not in marks.active and ENDINGS[outcome_class(last)]:
+        text += f"&#160;{ENDINGS[outcome_class(last)]}"
+    return f"<{text}>"
+
+
+def _times(count: int) -> str:
+    return f"&#160;\u00d7{count}" if count > 1 else ""
+
+
+def _count(count: int, ink: str) -> str:
+    return f'<font point-size="9" color="{ink}">&#160;{_times(count)}</font>' if count > 1 else ""
+
+
+def _status(node: Node, marks: Marks, theme: Theme) -> tuple[Swatch, Attributes]:
+    """Colours, line and fill of a state by what the run did with it."""
+    if node.path in marks.active:
+        return theme.active, {"penwidth": "2.4"}
+    if not marks.has_run:
+        return theme.inactive, {}
+    last = marks.last.get(node.path)
+    if last is None:
+        return theme.inactive, {"color": theme.faint, "fontcolor": theme.muted, "penwidth": "1"}
+    kind = outcome_class(last)
+    swatch = theme.outcome(kind)
+    if kind == "failure":
+        return swatch, {"penwidth": "2.2"}
+    if kind == "preempted":
+        return swatch, {"penwidth": "2", "style": "rounded,filled,dashed"}
+    return swatch, {"penwidth": "1.8"}
+
+
+def _swatch(swatch: Swatch) -> Attributes:
+    return {"fillcolor": swatch.fill, "color": swatch.stroke, "fontcolor": swatch.text}
+
+
+def _see_through(colour: str) -> str:
+    return colour + "59"

@@ -1,0 +1,27 @@
+"""Names, glyphs and texts that the pictures and the terminal share."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from viz.model import OutcomeClass
+
+LABEL_LENGTH = 40
+# Glyphs that Liberation Sans and Arial have: no picture shows empty boxes for them.
+GLYPHS = {"action": "\u25ba", "service": "\u2194", "monitor": "\u25cf", "condition": "?"}
+KIND_WORDS = {"concurrence": "concurrent", "iterator": "repeats", "sequence": "sequence"}
+ENDINGS: dict[OutcomeClass, str] = {
+    "success": "\u221a",
+    "failure": "\u00d7",
+    "preempted": "\u25a0",
+    "other": "",
+}
+
+
+def shorten(text: str, length: int = LABEL_LENGTH) -> str:
+    """Return one line of at most `length` printable characters, whatever `text` holds."""
+    line = " ".join(text[: 4 * length].split())
+    if not line.isprintable():
+        line = "".join(c if c.isprintable() else "\ufffd" for c in line)
+    return line if len(line) <= length else line[: length - 1] + "\u2026"
