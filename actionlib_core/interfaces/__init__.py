@@ -11,7 +11,7 @@ take text. Bytes and checksums are those of ROS 1.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, TypeVar, cast
 
 from actionlib_core.interfaces._message import Message
 from actionlib_core.interfaces._modules import install as _install
@@ -28,11 +28,16 @@ __all__ = [
     "define_action",
     "define_message",
     "define_service",
+    "from_cdr",
     "get_action",
     "get_message",
     "get_service",
     "install_ros_names",
+    "rihs01",
+    "to_cdr",
 ]
+
+AnyMessage = TypeVar("AnyMessage", bound=Message)
 
 _install()
 
@@ -108,3 +113,38 @@ def add_path(folder: str | os.PathLike[str]) -> None:
         InterfaceError: No such folder, or nothing of that kind in it.
     """
     registry.add_path(folder)
+
+
+def rihs01(message: type[Message] | str) -> str:
+    """Return the ROS 2 type hash ("RIHS01_...") of a message class or of the ROS name of one.
+
+    Raises:
+        InterfaceError: Unknown, or ROS 2 cannot have such a type.
+    """
+    from actionlib_core.interfaces import _typesys
+
+    return _typesys.rihs01(get_message(message) if isinstance(message, str) else message)
+
+
+def to_cdr(message: Message) -> bytes:
+    """Return a message's CDR serialisation, which ROS 2 uses; a `Header` loses its `seq`.
+
+    Raises:
+        FieldError: As `Message.to_bytes`.
+        InterfaceError: ROS 2 defines the type, or one it uses, with other fields.
+    """
+    from actionlib_core.interfaces import _typesys
+
+    return _typesys.to_cdr(message)
+
+
+def from_cdr(cls: type[AnyMessage], data: bytes) -> AnyMessage:
+    """Make a message from its little-endian CDR serialisation; a `Header` gets `seq` 0.
+
+    Raises:
+        DeserializationError: The bytes are no message of this type.
+        InterfaceError: As `to_cdr`.
+    """
+    from actionlib_core.interfaces import _typesys
+
+    return cast("AnyMessage", _typesys.from_cdr(cls, data))

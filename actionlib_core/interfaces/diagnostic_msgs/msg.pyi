@@ -5,6 +5,8 @@ import actionlib_core.interfaces.std_msgs.msg as _std_msgs_msg
 from actionlib_core.interfaces import Message as _Message
 
 class DiagnosticArray(_Message):
+    """States of the parts of a robot."""
+
     header: _std_msgs_msg.Header
     status: list[DiagnosticStatus]
     def __init__(
@@ -14,15 +16,17 @@ class DiagnosticArray(_Message):
     ) -> None: ...
 
 class DiagnosticStatus(_Message):
+    """State of one part of a robot."""
+
     OK: _Final = 0
     WARN: _Final = 1
     ERROR: _Final = 2
     STALE: _Final = 3
-    level: int
-    name: str
-    message: str
-    hardware_id: str
-    values: list[KeyValue]
+    level: int  # OK, WARN, ERROR or STALE
+    name: str  # of the part
+    message: str  # for people to read
+    hardware_id: str  # which piece of hardware
+    values: list[KeyValue]  # further figures
     def __init__(
         self,
         level: int | None = None,

@@ -4,8 +4,10 @@ import actionlib_core.interfaces.std_msgs.msg as _std_msgs_msg
 from actionlib_core.interfaces import Message as _Message
 
 class Accel(_Message):
-    linear: Vector3
-    angular: Vector3
+    """An acceleration."""
+
+    linear: Vector3  # [m/s^2]
+    angular: Vector3  # [rad/s^2]
     def __init__(
         self,
         linear: Vector3 | None = None,
@@ -13,6 +15,8 @@ class Accel(_Message):
     ) -> None: ...
 
 class AccelStamped(_Message):
+    """An acceleration in the frame of the header."""
+
     header: _std_msgs_msg.Header
     accel: Accel
     def __init__(
@@ -22,8 +26,10 @@ class AccelStamped(_Message):
     ) -> None: ...
 
 class AccelWithCovariance(_Message):
+    """An acceleration and how sure it is."""
+
     accel: Accel
-    covariance: list[float]
+    covariance: list[float]  # 6x6 by rows: linear x, y, z [m/s^2], angular x, y, z [rad/s^2]
     def __init__(
         self,
         accel: Accel | None = None,
@@ -31,6 +37,8 @@ class AccelWithCovariance(_Message):
     ) -> None: ...
 
 class AccelWithCovarianceStamped(_Message):
+    """An acceleration with its covariance in the frame of the header."""
+
     header: _std_msgs_msg.Header
     accel: AccelWithCovariance
     def __init__(
@@ -40,9 +48,11 @@ class AccelWithCovarianceStamped(_Message):
     ) -> None: ...
 
 class Inertia(_Message):
-    m: float
-    com: Vector3
-    ixx: float
+    """Mass properties of a body."""
+
+    m: float  # mass [kg]
+    com: Vector3  # centre of mass [m]
+    ixx: float  # inertia tensor [kg m^2]
     ixy: float
     ixz: float
     iyy: float
@@ -61,6 +71,8 @@ class Inertia(_Message):
     ) -> None: ...
 
 class InertiaStamped(_Message):
+    """Mass properties in the frame of the header."""
+
     header: _std_msgs_msg.Header
     inertia: Inertia
     def __init__(
@@ -70,6 +82,8 @@ class InertiaStamped(_Message):
     ) -> None: ...
 
 class Point(_Message):
+    """A position [m]."""
+
     x: float
     y: float
     z: float
@@ -81,6 +95,8 @@ class Point(_Message):
     ) -> None: ...
 
 class Point32(_Message):
+    """A position [m] in single precision, for large clouds."""
+
     x: float
     y: float
     z: float
@@ -92,6 +108,8 @@ class Point32(_Message):
     ) -> None: ...
 
 class PointStamped(_Message):
+    """A position in the frame of the header."""
+
     header: _std_msgs_msg.Header
     point: Point
     def __init__(
@@ -101,6 +119,8 @@ class PointStamped(_Message):
     ) -> None: ...
 
 class Polygon(_Message):
+    """A closed outline: the last point joins the first."""
+
     points: list[Point32]
     def __init__(
         self,
@@ -108,6 +128,8 @@ class Polygon(_Message):
     ) -> None: ...
 
 class PolygonStamped(_Message):
+    """An outline in the frame of the header."""
+
     header: _std_msgs_msg.Header
     polygon: Polygon
     def __init__(
@@ -117,8 +139,10 @@ class PolygonStamped(_Message):
     ) -> None: ...
 
 class Pose(_Message):
-    position: Point
-    orientation: Quaternion
+    """Where something is and how it is turned."""
+
+    position: Point  # [m]
+    orientation: Quaternion  # unit quaternion
     def __init__(
         self,
         position: Point | None = None,
@@ -126,9 +150,11 @@ class Pose(_Message):
     ) -> None: ...
 
 class Pose2D(_Message):
-    x: float
-    y: float
-    theta: float
+    """A pose in the plane."""
+
+    x: float  # [m]
+    y: float  # [m]
+    theta: float  # [rad], counter-clockwise from the x axis
     def __init__(
         self,
         x: float | None = None,
@@ -137,6 +163,8 @@ class Pose2D(_Message):
     ) -> None: ...
 
 class PoseArray(_Message):
+    """Poses in the frame of the header."""
+
     header: _std_msgs_msg.Header
     poses: list[Pose]
     def __init__(
@@ -146,6 +174,8 @@ class PoseArray(_Message):
     ) -> None: ...
 
 class PoseStamped(_Message):
+    """A pose in the frame, and at the time, of the header."""
+
     header: _std_msgs_msg.Header
     pose: Pose
     def __init__(
@@ -155,8 +185,10 @@ class PoseStamped(_Message):
     ) -> None: ...
 
 class PoseWithCovariance(_Message):
+    """A pose and how sure it is."""
+
     pose: Pose
-    covariance: list[float]
+    covariance: list[float]  # 6x6 by rows: x, y, z [m], rotation about x, y, z [rad]
     def __init__(
         self,
         pose: Pose | None = None,
@@ -164,6 +196,8 @@ class PoseWithCovariance(_Message):
     ) -> None: ...
 
 class PoseWithCovarianceStamped(_Message):
+    """A pose with its covariance in the frame of the header."""
+
     header: _std_msgs_msg.Header
     pose: PoseWithCovariance
     def __init__(
@@ -173,6 +207,8 @@ class PoseWithCovarianceStamped(_Message):
     ) -> None: ...
 
 class Quaternion(_Message):
+    """An orientation. All zeros is none: w = 1 is no rotation; a yaw angle a in the plane is z = sin(a/2), w = cos(a/2)."""
+
     x: float
     y: float
     z: float
@@ -186,6 +222,8 @@ class Quaternion(_Message):
     ) -> None: ...
 
 class QuaternionStamped(_Message):
+    """An orientation in the frame of the header."""
+
     header: _std_msgs_msg.Header
     quaternion: Quaternion
     def __init__(
@@ -195,8 +233,10 @@ class QuaternionStamped(_Message):
     ) -> None: ...
 
 class Transform(_Message):
-    translation: Vector3
-    rotation: Quaternion
+    """From one frame to another."""
+
+    translation: Vector3  # [m]
+    rotation: Quaternion  # unit quaternion
     def __init__(
         self,
         translation: Vector3 | None = None,
@@ -204,6 +244,8 @@ class Transform(_Message):
     ) -> None: ...
 
 class TransformStamped(_Message):
+    """The pose of the frame child_frame_id in the frame of the header."""
+
     header: _std_msgs_msg.Header
     child_frame_id: str
     transform: Transform
@@ -215,8 +257,10 @@ class TransformStamped(_Message):
     ) -> None: ...
 
 class Twist(_Message):
-    linear: Vector3
-    angular: Vector3
+    """A velocity."""
+
+    linear: Vector3  # [m/s]; x is forward in a robot's frame
+    angular: Vector3  # [rad/s]; z is counter-clockwise in the plane
     def __init__(
         self,
         linear: Vector3 | None = None,
@@ -224,6 +268,8 @@ class Twist(_Message):
     ) -> None: ...
 
 class TwistStamped(_Message):
+    """A velocity in the frame of the header."""
+
     header: _std_msgs_msg.Header
     twist: Twist
     def __init__(
@@ -233,8 +279,10 @@ class TwistStamped(_Message):
     ) -> None: ...
 
 class TwistWithCovariance(_Message):
+    """A velocity and how sure it is."""
+
     twist: Twist
-    covariance: list[float]
+    covariance: list[float]  # 6x6 by rows: vx, vy, vz [m/s], rotation rates about x, y, z [rad/s]
     def __init__(
         self,
         twist: Twist | None = None,
@@ -242,6 +290,8 @@ class TwistWithCovariance(_Message):
     ) -> None: ...
 
 class TwistWithCovarianceStamped(_Message):
+    """A velocity with its covariance in the frame of the header."""
+
     header: _std_msgs_msg.Header
     twist: TwistWithCovariance
     def __init__(
@@ -251,6 +301,8 @@ class TwistWithCovarianceStamped(_Message):
     ) -> None: ...
 
 class Vector3(_Message):
+    """A direction in space; its unit is that of the message that uses it."""
+
     x: float
     y: float
     z: float
@@ -262,6 +314,8 @@ class Vector3(_Message):
     ) -> None: ...
 
 class Vector3Stamped(_Message):
+    """A direction in the frame of the header."""
+
     header: _std_msgs_msg.Header
     vector: Vector3
     def __init__(
@@ -271,8 +325,10 @@ class Vector3Stamped(_Message):
     ) -> None: ...
 
 class Wrench(_Message):
-    force: Vector3
-    torque: Vector3
+    """Force and torque."""
+
+    force: Vector3  # [N]
+    torque: Vector3  # [Nm]
     def __init__(
         self,
         force: Vector3 | None = None,
@@ -280,6 +336,8 @@ class Wrench(_Message):
     ) -> None: ...
 
 class WrenchStamped(_Message):
+    """Force and torque in the frame of the header."""
+
     header: _std_msgs_msg.Header
     wrench: Wrench
     def __init__(

@@ -7,10 +7,12 @@ from actionlib_core.interfaces import Message as _Message
 from actionlib_core.time import Time as _Time
 
 class GridCells(_Message):
+    """Some cells of a grid."""
+
     header: _std_msgs_msg.Header
-    cell_width: float
-    cell_height: float
-    cells: list[_geometry_msgs_msg.Point]
+    cell_width: float  # [m]
+    cell_height: float  # [m]
+    cells: list[_geometry_msgs_msg.Point]  # their centres
     def __init__(
         self,
         header: _std_msgs_msg.Header | None = None,
@@ -20,11 +22,13 @@ class GridCells(_Message):
     ) -> None: ...
 
 class MapMetaData(_Message):
-    map_load_time: _Time
-    resolution: float
-    width: int
-    height: int
-    origin: _geometry_msgs_msg.Pose
+    """Size and place of a grid map."""
+
+    map_load_time: _Time  # when it was loaded
+    resolution: float  # side of a cell [m]
+    width: int  # number of columns
+    height: int  # number of rows
+    origin: _geometry_msgs_msg.Pose  # of the corner of cell (0, 0) in the map's frame
     def __init__(
         self,
         map_load_time: _Time | float | None = None,
@@ -35,9 +39,11 @@ class MapMetaData(_Message):
     ) -> None: ...
 
 class OccupancyGrid(_Message):
+    """A map of cells."""
+
     header: _std_msgs_msg.Header
     info: MapMetaData
-    data: list[int]
+    data: list[int]  # row by row from cell (0, 0): 0 free to 100 occupied, -1 unknown
     def __init__(
         self,
         header: _std_msgs_msg.Header | None = None,
@@ -46,8 +52,10 @@ class OccupancyGrid(_Message):
     ) -> None: ...
 
 class Odometry(_Message):
+    """Estimated motion: the pose in the frame of the header, the twist in the frame child_frame_id."""
+
     header: _std_msgs_msg.Header
-    child_frame_id: str
+    child_frame_id: str  # the moving frame, for example base_link
     pose: _geometry_msgs_msg.PoseWithCovariance
     twist: _geometry_msgs_msg.TwistWithCovariance
     def __init__(
@@ -59,6 +67,8 @@ class Odometry(_Message):
     ) -> None: ...
 
 class Path(_Message):
+    """A sequence of poses to follow."""
+
     header: _std_msgs_msg.Header
     poses: list[_geometry_msgs_msg.PoseStamped]
     def __init__(

@@ -7,6 +7,8 @@ from actionlib_core.time import Duration as _Duration
 from actionlib_core.time import Time as _Time
 
 class Clock(_Message):
+    """Simulated time."""
+
     clock: _Time
     def __init__(
         self,
@@ -14,19 +16,21 @@ class Clock(_Message):
     ) -> None: ...
 
 class Log(_Message):
+    """One log record."""
+
     DEBUG: _Final = 1
     INFO: _Final = 2
     WARN: _Final = 4
     ERROR: _Final = 8
     FATAL: _Final = 16
     header: _std_msgs_msg.Header
-    level: int
-    name: str
-    msg: str
-    file: str
-    function: str
-    line: int
-    topics: list[str]
+    level: int  # one of the constants
+    name: str  # of the node
+    msg: str  # the text
+    file: str  # source file
+    function: str  # in the source
+    line: int  # in the file
+    topics: list[str]  # that the node publishes
     def __init__(
         self,
         header: _std_msgs_msg.Header | None = None,

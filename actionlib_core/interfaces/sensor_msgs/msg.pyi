@@ -7,6 +7,8 @@ from actionlib_core.interfaces import Message as _Message
 from actionlib_core.time import Time as _Time
 
 class BatteryState(_Message):
+    """State of a battery. A value that is not measured is NaN."""
+
     POWER_SUPPLY_STATUS_UNKNOWN: _Final = 0
     POWER_SUPPLY_STATUS_CHARGING: _Final = 1
     POWER_SUPPLY_STATUS_DISCHARGING: _Final = 2
@@ -29,20 +31,20 @@ class BatteryState(_Message):
     POWER_SUPPLY_TECHNOLOGY_NICD: _Final = 5
     POWER_SUPPLY_TECHNOLOGY_LIMN: _Final = 6
     header: _std_msgs_msg.Header
-    voltage: float
-    temperature: float
-    current: float
-    charge: float
-    capacity: float
-    design_capacity: float
-    percentage: float
-    power_supply_status: int
-    power_supply_health: int
-    power_supply_technology: int
-    present: bool
-    cell_voltage: list[float]
-    cell_temperature: list[float]
-    location: str
+    voltage: float  # [V]
+    temperature: float  # [degrees Celsius]
+    current: float  # [A], negative while discharging
+    charge: float  # [Ah]
+    capacity: float  # [Ah], as of now
+    design_capacity: float  # [Ah], when new
+    percentage: float  # 0 to 1
+    power_supply_status: int  # one of POWER_SUPPLY_STATUS_*
+    power_supply_health: int  # one of POWER_SUPPLY_HEALTH_*
+    power_supply_technology: int  # one of POWER_SUPPLY_TECHNOLOGY_*
+    present: bool  # whether there is a battery
+    cell_voltage: list[float]  # [V] each
+    cell_temperature: list[float]  # [degrees Celsius] each
+    location: str  # where it is plugged in
     serial_number: str
     def __init__(
         self,
@@ -65,17 +67,19 @@ class BatteryState(_Message):
     ) -> None: ...
 
 class CameraInfo(_Message):
+    """Calibration of a camera."""
+
     header: _std_msgs_msg.Header
-    height: int
-    width: int
-    distortion_model: str
-    D: list[float]
-    K: list[float]
-    R: list[float]
-    P: list[float]
-    binning_x: int
-    binning_y: int
-    roi: RegionOfInterest
+    height: int  # rows
+    width: int  # columns
+    distortion_model: str  # for example plumb_bob
+    D: list[float]  # distortion
+    K: list[float]  # 3x3 intrinsic matrix by rows [pixel]
+    R: list[float]  # 3x3 rectification by rows
+    P: list[float]  # 3x4 projection by rows [pixel]
+    binning_x: int  # 0 as 1
+    binning_y: int  # 0 as 1
+    roi: RegionOfInterest  # all zeros: the full picture
     def __init__(
         self,
         header: _std_msgs_msg.Header | None = None,
@@ -92,7 +96,9 @@ class CameraInfo(_Message):
     ) -> None: ...
 
 class ChannelFloat32(_Message):
-    name: str
+    """One value for each point of a PointCloud."""
+
+    name: str  # for example intensity
     values: list[float]
     def __init__(
         self,
@@ -101,8 +107,10 @@ class ChannelFloat32(_Message):
     ) -> None: ...
 
 class CompressedImage(_Message):
+    """A compressed picture."""
+
     header: _std_msgs_msg.Header
-    format: str
+    format: str  # for example jpeg or png
     data: bytes
     def __init__(
         self,
@@ -113,8 +121,8 @@ class CompressedImage(_Message):
 
 class FluidPressure(_Message):
     header: _std_msgs_msg.Header
-    fluid_pressure: float
-    variance: float
+    fluid_pressure: float  # [Pa], absolute
+    variance: float  # 0: not known
     def __init__(
         self,
         header: _std_msgs_msg.Header | None = None,
@@ -124,8 +132,8 @@ class FluidPressure(_Message):
 
 class Illuminance(_Message):
     header: _std_msgs_msg.Header
-    illuminance: float
-    variance: float
+    illuminance: float  # [lux]
+    variance: float  # 0: not known
     def __init__(
         self,
         header: _std_msgs_msg.Header | None = None,
@@ -134,13 +142,15 @@ class Illuminance(_Message):
     ) -> None: ...
 
 class Image(_Message):
+    """A picture, row by row."""
+
     header: _std_msgs_msg.Header
-    height: int
-    width: int
-    encoding: str
-    is_bigendian: int
-    step: int
-    data: bytes
+    height: int  # rows
+    width: int  # columns
+    encoding: str  # for example rgb8, bgr8, mono8, 32FC1
+    is_bigendian: int  # 0 or 1
+    step: int  # bytes per row
+    data: bytes  # step * height bytes
     def __init__(
         self,
         header: _std_msgs_msg.Header | None = None,
@@ -153,13 +163,15 @@ class Image(_Message):
     ) -> None: ...
 
 class Imu(_Message):
+    """Inertial measurement. A covariance whose first element is -1 says that the value is not measured."""
+
     header: _std_msgs_msg.Header
     orientation: _geometry_msgs_msg.Quaternion
-    orientation_covariance: list[float]
-    angular_velocity: _geometry_msgs_msg.Vector3
-    angular_velocity_covariance: list[float]
-    linear_acceleration: _geometry_msgs_msg.Vector3
-    linear_acceleration_covariance: list[float]
+    orientation_covariance: list[float]  # 3x3 by rows about x, y, z
+    angular_velocity: _geometry_msgs_msg.Vector3  # [rad/s]
+    angular_velocity_covariance: list[float]  # 3x3 by rows about x, y, z
+    linear_acceleration: _geometry_msgs_msg.Vector3  # [m/s^2]
+    linear_acceleration_covariance: list[float]  # 3x3 by rows x, y, z
     def __init__(
         self,
         header: _std_msgs_msg.Header | None = None,
@@ -172,11 +184,13 @@ class Imu(_Message):
     ) -> None: ...
 
 class JointState(_Message):
+    """State of joints; each array is empty or has one element per name."""
+
     header: _std_msgs_msg.Header
     name: list[str]
-    position: list[float]
-    velocity: list[float]
-    effort: list[float]
+    position: list[float]  # [rad] or [m]
+    velocity: list[float]  # [rad/s] or [m/s]
+    effort: list[float]  # [Nm] or [N]
     def __init__(
         self,
         header: _std_msgs_msg.Header | None = None,
@@ -187,9 +201,11 @@ class JointState(_Message):
     ) -> None: ...
 
 class Joy(_Message):
+    """State of a joystick."""
+
     header: _std_msgs_msg.Header
-    axes: list[float]
-    buttons: list[int]
+    axes: list[float]  # -1 to 1
+    buttons: list[int]  # 1 while pressed
     def __init__(
         self,
         header: _std_msgs_msg.Header | None = None,
@@ -201,9 +217,9 @@ class JoyFeedback(_Message):
     TYPE_LED: _Final = 0
     TYPE_RUMBLE: _Final = 1
     TYPE_BUZZER: _Final = 2
-    type: int
+    type: int  # one of TYPE_*
     id: int
-    intensity: float
+    intensity: float  # 0 to 1
     def __init__(
         self,
         type: int | None = None,
@@ -219,23 +235,27 @@ class JoyFeedbackArray(_Message):
     ) -> None: ...
 
 class LaserEcho(_Message):
-    echoes: list[float]
+    """Several echoes of one ray."""
+
+    echoes: list[float]  # [m] or intensities
     def __init__(
         self,
         echoes: _Collection[float] | None = None,
     ) -> None: ...
 
 class LaserScan(_Message):
+    """One sweep of a planar laser scanner."""
+
     header: _std_msgs_msg.Header
-    angle_min: float
-    angle_max: float
-    angle_increment: float
-    time_increment: float
-    scan_time: float
-    range_min: float
-    range_max: float
-    ranges: list[float]
-    intensities: list[float]
+    angle_min: float  # of the first ray [rad]
+    angle_max: float  # of the last ray [rad]
+    angle_increment: float  # between rays [rad]
+    time_increment: float  # between rays [s]
+    scan_time: float  # between scans [s]
+    range_min: float  # shorter ranges are not valid [m]
+    range_max: float  # longer ranges are not valid [m]
+    ranges: list[float]  # [m], one per ray
+    intensities: list[float]  # device's own unit, or empty
     def __init__(
         self,
         header: _std_msgs_msg.Header | None = None,
@@ -252,8 +272,8 @@ class LaserScan(_Message):
 
 class MagneticField(_Message):
     header: _std_msgs_msg.Header
-    magnetic_field: _geometry_msgs_msg.Vector3
-    magnetic_field_covariance: list[float]
+    magnetic_field: _geometry_msgs_msg.Vector3  # [T]
+    magnetic_field_covariance: list[float]  # 3x3 by rows; 0: not known
     def __init__(
         self,
         header: _std_msgs_msg.Header | None = None,
@@ -262,6 +282,8 @@ class MagneticField(_Message):
     ) -> None: ...
 
 class MultiDOFJointState(_Message):
+    """State of joints with several degrees of freedom; arrays as in JointState."""
+
     header: _std_msgs_msg.Header
     joint_names: list[str]
     transforms: list[_geometry_msgs_msg.Transform]
@@ -277,14 +299,16 @@ class MultiDOFJointState(_Message):
     ) -> None: ...
 
 class MultiEchoLaserScan(_Message):
+    """One sweep of a scanner that sees several echoes per ray; fields as in LaserScan."""
+
     header: _std_msgs_msg.Header
-    angle_min: float
-    angle_max: float
-    angle_increment: float
-    time_increment: float
-    scan_time: float
-    range_min: float
-    range_max: float
+    angle_min: float  # [rad]
+    angle_max: float  # [rad]
+    angle_increment: float  # [rad]
+    time_increment: float  # [s]
+    scan_time: float  # [s]
+    range_min: float  # [m]
+    range_max: float  # [m]
     ranges: list[LaserEcho]
     intensities: list[LaserEcho]
     def __init__(
@@ -302,17 +326,19 @@ class MultiEchoLaserScan(_Message):
     ) -> None: ...
 
 class NavSatFix(_Message):
+    """A position by satellite (WGS 84)."""
+
     COVARIANCE_TYPE_UNKNOWN: _Final = 0
     COVARIANCE_TYPE_APPROXIMATED: _Final = 1
     COVARIANCE_TYPE_DIAGONAL_KNOWN: _Final = 2
     COVARIANCE_TYPE_KNOWN: _Final = 3
     header: _std_msgs_msg.Header
     status: NavSatStatus
-    latitude: float
-    longitude: float
-    altitude: float
-    position_covariance: list[float]
-    position_covariance_type: int
+    latitude: float  # [degrees], north positive
+    longitude: float  # [degrees], east positive
+    altitude: float  # above the ellipsoid [m]; NaN: not known
+    position_covariance: list[float]  # 3x3 by rows, east, north, up [m^2]
+    position_covariance_type: int  # one of COVARIANCE_TYPE_*
     def __init__(
         self,
         header: _std_msgs_msg.Header | None = None,
@@ -325,6 +351,8 @@ class NavSatFix(_Message):
     ) -> None: ...
 
 class NavSatStatus(_Message):
+    """Kind of a satellite fix."""
+
     STATUS_NO_FIX: _Final = -1
     STATUS_FIX: _Final = 0
     STATUS_SBAS_FIX: _Final = 1
@@ -333,8 +361,8 @@ class NavSatStatus(_Message):
     SERVICE_GLONASS: _Final = 2
     SERVICE_COMPASS: _Final = 4
     SERVICE_GALILEO: _Final = 8
-    status: int
-    service: int
+    status: int  # one of STATUS_*
+    service: int  # sum of SERVICE_*
     def __init__(
         self,
         status: int | None = None,
@@ -342,9 +370,11 @@ class NavSatStatus(_Message):
     ) -> None: ...
 
 class PointCloud(_Message):
+    """Points with further values per point."""
+
     header: _std_msgs_msg.Header
     points: list[_geometry_msgs_msg.Point32]
-    channels: list[ChannelFloat32]
+    channels: list[ChannelFloat32]  # each has one value per point
     def __init__(
         self,
         header: _std_msgs_msg.Header | None = None,
@@ -353,15 +383,17 @@ class PointCloud(_Message):
     ) -> None: ...
 
 class PointCloud2(_Message):
+    """Points in a packed binary layout."""
+
     header: _std_msgs_msg.Header
-    height: int
-    width: int
-    fields: list[PointField]
+    height: int  # 1 for a cloud without order
+    width: int  # points per row
+    fields: list[PointField]  # what one point holds
     is_bigendian: bool
-    point_step: int
-    row_step: int
-    data: bytes
-    is_dense: bool
+    point_step: int  # bytes per point
+    row_step: int  # bytes per row
+    data: bytes  # row_step * height bytes
+    is_dense: bool  # whether no point is invalid
     def __init__(
         self,
         header: _std_msgs_msg.Header | None = None,
@@ -376,6 +408,8 @@ class PointCloud2(_Message):
     ) -> None: ...
 
 class PointField(_Message):
+    """One value of each point of a PointCloud2."""
+
     INT8: _Final = 1
     UINT8: _Final = 2
     INT16: _Final = 3
@@ -384,10 +418,10 @@ class PointField(_Message):
     UINT32: _Final = 6
     FLOAT32: _Final = 7
     FLOAT64: _Final = 8
-    name: str
-    offset: int
-    datatype: int
-    count: int
+    name: str  # for example x
+    offset: int  # bytes from the start of the point
+    datatype: int  # one of the constants
+    count: int  # number of elements
     def __init__(
         self,
         name: str | None = None,
@@ -397,14 +431,16 @@ class PointField(_Message):
     ) -> None: ...
 
 class Range(_Message):
+    """One reading of a distance sensor."""
+
     ULTRASOUND: _Final = 0
     INFRARED: _Final = 1
     header: _std_msgs_msg.Header
-    radiation_type: int
-    field_of_view: float
-    min_range: float
-    max_range: float
-    range: float
+    radiation_type: int  # ULTRASOUND or INFRARED
+    field_of_view: float  # angle [rad]
+    min_range: float  # [m]
+    max_range: float  # [m]
+    range: float  # [m]; below min_range or above max_range: not valid, see REP 117
     def __init__(
         self,
         header: _std_msgs_msg.Header | None = None,
@@ -416,11 +452,13 @@ class Range(_Message):
     ) -> None: ...
 
 class RegionOfInterest(_Message):
+    """Part of a picture [pixel]."""
+
     x_offset: int
     y_offset: int
     height: int
     width: int
-    do_rectify: bool
+    do_rectify: bool  # whether it was cut from the rectified picture
     def __init__(
         self,
         x_offset: int | None = None,
@@ -432,8 +470,8 @@ class RegionOfInterest(_Message):
 
 class RelativeHumidity(_Message):
     header: _std_msgs_msg.Header
-    relative_humidity: float
-    variance: float
+    relative_humidity: float  # 0 to 1
+    variance: float  # 0: not known
     def __init__(
         self,
         header: _std_msgs_msg.Header | None = None,
@@ -443,8 +481,8 @@ class RelativeHumidity(_Message):
 
 class Temperature(_Message):
     header: _std_msgs_msg.Header
-    temperature: float
-    variance: float
+    temperature: float  # [degrees Celsius]
+    variance: float  # 0: not known
     def __init__(
         self,
         header: _std_msgs_msg.Header | None = None,
@@ -453,9 +491,11 @@ class Temperature(_Message):
     ) -> None: ...
 
 class TimeReference(_Message):
+    """Another clock's time at the header's stamp."""
+
     header: _std_msgs_msg.Header
-    time_ref: _Time
-    source: str
+    time_ref: _Time  # that clock's time
+    source: str  # its name
     def __init__(
         self,
         header: _std_msgs_msg.Header | None = None,

@@ -35,10 +35,12 @@ class Char(_Message):
     ) -> None: ...
 
 class ColorRGBA(_Message):
+    """A colour; each part from 0 to 1."""
+
     r: float
     g: float
     b: float
-    a: float
+    a: float  # opacity: 0 is invisible
     def __init__(
         self,
         r: float | None = None,
@@ -55,6 +57,8 @@ class Duration(_Message):
     ) -> None: ...
 
 class Empty(_Message):
+    """Carries nothing but its own arrival."""
+
     def __init__(self) -> None: ...
 
 class Float32(_Message):
@@ -90,9 +94,11 @@ class Float64MultiArray(_Message):
     ) -> None: ...
 
 class Header(_Message):
-    seq: int
-    stamp: _Time
-    frame_id: str
+    """When and where the data that follow are valid."""
+
+    seq: int  # counts the messages; set by the publisher, 0 will do
+    stamp: _Time  # time of the data, 0: not said
+    frame_id: str  # coordinate frame of the data, for example map or base_link
     def __init__(
         self,
         seq: int | None = None,
@@ -165,9 +171,9 @@ class Int8MultiArray(_Message):
     ) -> None: ...
 
 class MultiArrayDimension(_Message):
-    label: str
-    size: int
-    stride: int
+    label: str  # name of the dimension
+    size: int  # number of elements
+    stride: int  # elements from one index to the next of the dimension before
     def __init__(
         self,
         label: str | None = None,
@@ -176,8 +182,10 @@ class MultiArrayDimension(_Message):
     ) -> None: ...
 
 class MultiArrayLayout(_Message):
+    """How a flat array holds several dimensions, the outermost first."""
+
     dim: list[MultiArrayDimension]
-    data_offset: int
+    data_offset: int  # elements before the first one
     def __init__(
         self,
         dim: _Collection[MultiArrayDimension] | None = None,

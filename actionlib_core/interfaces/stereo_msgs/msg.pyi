@@ -4,14 +4,16 @@ import actionlib_core.interfaces.std_msgs.msg as _std_msgs_msg
 from actionlib_core.interfaces import Message as _Message
 
 class DisparityImage(_Message):
+    """Disparities of a stereo pair."""
+
     header: _std_msgs_msg.Header
-    image: _sensor_msgs_msg.Image
-    f: float
-    T: float
+    image: _sensor_msgs_msg.Image  # 32FC1 [pixel]
+    f: float  # focal length [pixel]
+    T: float  # baseline [m]
     valid_window: _sensor_msgs_msg.RegionOfInterest
-    min_disparity: float
-    max_disparity: float
-    delta_d: float
+    min_disparity: float  # [pixel]
+    max_disparity: float  # [pixel]
+    delta_d: float  # smallest step [pixel]
     def __init__(
         self,
         header: _std_msgs_msg.Header | None = None,

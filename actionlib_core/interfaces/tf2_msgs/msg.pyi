@@ -25,6 +25,8 @@ class TF2Error(_Message):
     ) -> None: ...
 
 class TFMessage(_Message):
+    """Poses of frames in each other."""
+
     transforms: list[_geometry_msgs_msg.TransformStamped]
     def __init__(
         self,

@@ -6,6 +6,8 @@ from actionlib_core.interfaces import Message as _Message
 from actionlib_core.time import Duration as _Duration
 
 class JointTrajectory(_Message):
+    """Where joints shall be when; stamp 0 begins at once."""
+
     header: _std_msgs_msg.Header
     joint_names: list[str]
     points: list[JointTrajectoryPoint]
@@ -17,11 +19,13 @@ class JointTrajectory(_Message):
     ) -> None: ...
 
 class JointTrajectoryPoint(_Message):
-    positions: list[float]
-    velocities: list[float]
-    accelerations: list[float]
-    effort: list[float]
-    time_from_start: _Duration
+    """One point of a trajectory; each array is empty or has one element per joint."""
+
+    positions: list[float]  # [rad] or [m]
+    velocities: list[float]  # [rad/s] or [m/s]
+    accelerations: list[float]  # [rad/s^2] or [m/s^2]
+    effort: list[float]  # [Nm] or [N]
+    time_from_start: _Duration  # since the trajectory's stamp
     def __init__(
         self,
         positions: _Collection[float] | None = None,
@@ -32,6 +36,8 @@ class JointTrajectoryPoint(_Message):
     ) -> None: ...
 
 class MultiDOFJointTrajectory(_Message):
+    """As JointTrajectory, for joints with several degrees of freedom."""
+
     header: _std_msgs_msg.Header
     joint_names: list[str]
     points: list[MultiDOFJointTrajectoryPoint]

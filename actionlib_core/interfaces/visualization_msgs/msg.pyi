@@ -168,6 +168,8 @@ class InteractiveMarkerUpdate(_Message):
     ) -> None: ...
 
 class Marker(_Message):
+    """Something drawn in the frame of the header; ns and id together name it."""
+
     ARROW: _Final = 0
     CUBE: _Final = 1
     SPHERE: _Final = 2
@@ -187,17 +189,17 @@ class Marker(_Message):
     header: _std_msgs_msg.Header
     ns: str
     id: int
-    type: int
-    action: int
+    type: int  # one of ARROW to TRIANGLE_LIST
+    action: int  # ADD (or MODIFY), DELETE, DELETEALL
     pose: _geometry_msgs_msg.Pose
-    scale: _geometry_msgs_msg.Vector3
+    scale: _geometry_msgs_msg.Vector3  # [m]
     color: _std_msgs_msg.ColorRGBA
-    lifetime: _Duration
-    frame_locked: bool
-    points: list[_geometry_msgs_msg.Point]
-    colors: list[_std_msgs_msg.ColorRGBA]
-    text: str
-    mesh_resource: str
+    lifetime: _Duration  # 0: for ever
+    frame_locked: bool  # move with its frame
+    points: list[_geometry_msgs_msg.Point]  # for lists and strips [m]
+    colors: list[_std_msgs_msg.ColorRGBA]  # one per point, or empty
+    text: str  # for TEXT_VIEW_FACING
+    mesh_resource: str  # for MESH_RESOURCE, for example package://my_pkg/meshes/a.stl
     mesh_use_embedded_materials: bool
     def __init__(
         self,

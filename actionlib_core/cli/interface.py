@@ -1,0 +1,94 @@
+"""`actionlib interface show|list|stubs`: what messages, services and actions there are."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import argparse
+
+    from actionlib_core.interfaces._sources import Kind
+
+_TITLES: dict[Kind, str] = {"msg": "Messages", "srv": "Services", "action": "Actions"}
+
+
+def register(subparsers: Any) -> None:
+    """Add the command to an argparse subparsers object."""
+    parser = subparsers.add_parser(
+        "interface",
+        help="show message, service and action definitions",
+        description="Definitions come with the package, from folders in SMACHPY_INTERFACE_PATH "
+        "(my_pkg/msg/Name.msg, my_pkg/srv/Name.srv, my_pkg/action/Name.action), and from programs.",
+    )
+    verbs = parser.add_subparsers(metavar="VERB", required=True)
+    _register_show(verbs)
+    _register_list(verbs)
+    _register_stubs(verbs)
+
+
+def _register_show(verbs: Any) -> None:
+    parser = verbs.add_parser("show", help="print a definition, nested types written out")
+    parser.add_argument("name", metavar="NAME", help="pkg/Name or pkg/action/Name")
+    parser.add_argument(
+        "-a", "--all-comments", action="store_true", help="also the comments of nested types"
+    )
+    parser.add_argument("--json", action="store_true", help="fields, constants and md5 as JSON")
+    parser.set_defaults(run=_show)
+
+
+def _register_list(verbs: Any) -> None:
+    parser = verbs.add_parser("list", help="list all definitions found")
+    parser.add_argument("-m", "--only-msgs", action="store_true", help="messages only")
+    parser.add_argument("-s", "--only-srvs", action="store_true", help="services only")
+    parser.add_argument("-a", "--only-actions", action="store_true", help="actions only")
+    parser.add_argument("--json", action="store_true", help="as JSON")
+    parser.set_defaults(run=_list)
+
+
+def _register_stubs(verbs: Any) -> None:
+    parser = verbs.add_parser("stubs", help="write typed .pyi files for editors and mypy")
+    parser.add_argument("folder", metavar="DIR", help="where to; DIR/my_pkg/msg.pyi is written")
+    parser.add_argument(
+        "packages", metavar="PACKAGE", nargs="*", help="which (default: all not bundled)"
+    )
+    parser.add_argument("--json", action="store_true", help="the paths written as JSON")
+    parser.set_defaults(run=_stubs)
+
+
+def _show(args: argparse.Namespace) -> int:
+    from actionlib_core.interfaces import _cli
+
+    if args.json:
+        print(json.dumps(_cli.describe(args.name), indent=2))
+    else:
+        print(_cli.show(args.name, all_comments=args.all_comments))
+    return 0
+
+
+def _list(args: argparse.Namespace) -> int:
+    from actionlib_core.interfaces import _cli
+
+    asked: dict[Kind, bool] = {
+        "msg": args.only_msgs,
+        "srv": args.only_srvs,
+        "action": args.only_actions,
+    }
+    kinds = [kind for kind, wanted in asked.items() if wanted or not any(asked.values())]
+    found = _cli.list_interfaces(kinds)
+    if args.json:
+        print(json.dumps(found, indent=2))
+        return 0
+    for kind in kinds:
+        print(f"{_TITLES[kind]}:")
+        for name in found[kind]:
+            print(f"    {name}")
+    return 0
+
+
+def _stubs(args: argparse.Namespace) -> int:
+    from actionlib_core.interfaces import _cli
+
+    written = [str(path) for path in _cli.write_stubs(args.folder, args.packages)]
+    print(json.dumps(written) if args.json else "\n".join(written))
+    return 0

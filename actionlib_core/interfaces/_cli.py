@@ -1,0 +1,150 @@
+"""What `actionlib interface show|list|stubs` prints and writes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.exceptions import InterfaceError
+from actionlib_core.interfaces import _stubs
+from actionlib_core.interfaces._registry import parse_name, registry
+from actionlib_core.interfaces._sections import ACTION_PARTS, SERVICE_PARTS
+from actionlib_core.interfaces._sources import BUNDLED, KINDS
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterator, Sequence
+
+    from actionlib_core.interfaces._definition import Definition
+    from actionlib_core.interfaces._sources import Kind
+
+_PARTS: dict[Kind, tuple[str, ...]] = {"msg": (), "srv": SERVICE_PARTS, "action": ACTION_PARTS}
+
+
+def show(name: str, *, all_comments: bool = False) -> str:
+    """Return a definition with its nested types written out below their fields, tab by tab.
+
+    Args:
+        name: "pkg/Name" or "pkg/kind/Name"; the short form shows every kind that has the name.
+        all_comments: Show the comments of nested types too.
+
+    Raises:
+        InterfaceError: Unknown or malformed.
+    """
+    found = _kinds_of(name)
+    package, _, short = parse_name(name)
+    blocks = []
+    for kind in found:
+        title = [f"# {package}/{kind}/{short}"] if len(found) > 1 else []
+        lines: list[str] = []
+        for number, definition in enumerate(_definitions(kind, package, short)):
+            lines += ["---"] if number else []
+            lines += _lines(definition, "", comments=True, nested_comments=all_comments)
+        blocks.append("\n".join([*title, *lines]).rstrip())
+    return "\n\n".join(blocks)
+
+
+def describe(name: str) -> dict[str, Any]:
+    """Return a definition as plain data: kinds, and for each part its type, md5 and fields.
+
+    Raises:
+        InterfaceError: Unknown or malformed.
+    """
+    package, _, short = parse_name(name)
+    return {
+        f"{package}/{kind}/{short}": [
+            {
+                "type": definition.name,
+                "md5": registry.message(definition.name)._md5sum,
+                "constants": [
+                    {"name": c.name, "type": c.type, "value": c.value, "comment": c.comment}
+                    for c in definition.constants
+                ],
+                "fields": [
+                    {"name": f.name, "type": str(f.type), "comment": f.comment}
+                    for f in definition.fields
+                ],
+            }
+            for definition in _definitions(kind, package, short)
+        ]
+        for kind in _kinds_of(name)
+    }
+
+
+def list_interfaces(kinds: Sequence[Kind] = KINDS) -> dict[str, list[str]]:
+    """Return the names of all definitions found, "pkg/kind/Name", by kind."""
+    sources = registry.sources
+    packages = sources.packages()
+    return {
+        kind: [f"{p}/{kind}/{name}" for p in packages for name in sources.names(kind, p)]
+        for kind in kinds
+    }
+
+
+def write_stubs(folder: str | os.PathLike[str], packages: Sequence[str] = ()) -> list[Path]:
+    """Write typed `.pyi` files, `<folder>/<package>/msg.pyi` and `srv.pyi`, and return their paths.
+
+    Args:
+        folder: Made if need be; put it on mypy's `mypy_path`.
+        packages: Which ones; none means all that are not bundled (those have their stubs).
+
+    Raises:
+        InterfaceError: Unknown packages, none at all, or malformed definitions.
+    """
+    known = registry.sources.packages()
+    wanted = list(packages) or [p for p in known if not (BUNDLED / p).is_dir()]
+    if unknown := [p for p in wanted if p not in known]:
+        raise InterfaceError(
+            *(f"stubs: got package {p!r}; expected one of {', '.join(known)}" for p in unknown)
+        )
+    if not wanted:
+        raise InterfaceError(
+            "stubs: got no package of your own; the bundled ones have their stubs. Try naming a "
+            "package, or SMACHPY_INTERFACE_PATH=folder with my_pkg/{msg,srv,action} in it"
+        )
+    files: dict[str, str] = {}
+    for package in wanted:
+        files |= _stubs.package_stubs(registry, package)
+    return _stubs.write(files, Path(folder))
+
+
+def _kinds_of(name: str) -> list[Kind]:
+    """Return the kinds that define a name; parts of services and actions count as messages."""
+    package, given, short = parse_name(name)
+    kinds = [kind for kind in KINDS if given in {None, kind}]
+    found = [kind for kind in kinds if registry.sources.find(kind, package, short) is not None]
+    if not found:
+        registry.message(name)  # raises where it is unknown
+        return ["msg"]
+    return found
+
+
+def _definitions(kind: Kind, package: str, short: str) -> list[Definition]:
+    names = [f"{package}/{short}{part.title()}" for part in _PARTS[kind]]
+    return [registry.message(name)._definition for name in names or [f"{package}/{short}"]]
+
+
+def _lines(
+    definition: Definition, indent: str, *, comments: bool, nested_comments: bool
+) -> Iterator[str]:
+    waiting = list(definition.fields)
+    for line in definition.text.splitlines():
+        shown = line.rstrip() if comments else _without_comment(line)
+        if shown or comments:
+            yield f"{indent}{shown}".rstrip()
+        if waiting and line == waiting[0].position.text:
+            field = waiting.pop(0)
+            if not field.type.is_builtin:
+                nested = registry.message(field.type.base)._definition
+                yield from _lines(
+                    nested,
+                    f"{indent}\t",
+                    comments=nested_comments,
+                    nested_comments=nested_comments,
+                )
+
+
+def _without_comment(line: str) -> str:
+    if line.lstrip().startswith("string ") and "=" in line.partition("#")[0]:
+        return line.rstrip()  # the value of a string constant may hold the comment sign
+    return line.partition("#")[0].rstrip()
