@@ -94,13 +94,13 @@ class _Reader:
     def _read_scalar(self, hint: Any, value: object, path: str) -> object:
         if hint is float and isinstance(value, (int, float)) and not isinstance(value, bool):
             return float(value)
-        if hint is bool and isinstance(value, bool):
+        if hint in {bool, int} and type(value) is hint:
             return value
         if hint is str and isinstance(value, str):
             if path.rpartition(".")[2] in _FILE_FIELDS:
                 return str(self._folder / value)
             return str(value)
-        return self._report(path, "wrong type", value, {float: "a number", bool: "true or false"}
+        return self._report(path, "wrong type", value, {float: "a number", int: "a whole number", bool: "true or false"}
                             .get(hint, "a text"))  # fmt: skip
 
     def _report(self, path: str, what: str, value: object, expected: object) -> object:

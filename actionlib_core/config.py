@@ -5,6 +5,7 @@ lets nobody else in. Everything beyond that is said here: a router to connect to
 password, who may use which names, and the name space of a robot.
 
 The file is YAML with the fields of `Config`; `SMACHPY_CONFIG` names it, or an argument does.
+`SMACHPY_DOMAIN` alone sets the domain where no file does.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 ENVIRONMENT_VARIABLE = "SMACHPY_CONFIG"
+DOMAIN_VARIABLE = "SMACHPY_DOMAIN"
+LAST_DOMAIN = 9999
 ROUTER_ENDPOINT = "tcp/127.0.0.1:7447"
 
 Mode = Literal["peer", "client", "router"]
@@ -72,6 +75,7 @@ class Config:
         listen: Endpoints to be reached at; empty is the loopback address (a client has none).
         discovery: Network interface on which peers find each other: "lo" stays on this machine,
             "auto" picks one, "off" finds nobody.
+        domain: Programs of different domains, 0 to 9999, do not find each other.
         namespace: What relative names live under, one per robot.
         lease: A link that is silent for this long [s] is dead, and so is what was behind it.
         connect_timeout: How long opening may try to reach `connect` [s].
@@ -88,6 +92,7 @@ class Config:
     connect: tuple[str, ...] = ()
     listen: tuple[str, ...] = ()
     discovery: str = "lo"
+    domain: int = 0
     namespace: str = ""
     lease: float = 10.0
     connect_timeout: float = 5.0
@@ -153,6 +158,8 @@ def _check_endpoints(config: Config) -> str:
 
 
 def _check_numbers(config: Config) -> str:
+    if not 0 <= config.domain <= LAST_DOMAIN:
+        return f"domain: out of range: got {config.domain!r}; expected 0 to {LAST_DOMAIN}."
     for name, low in (("lease", 0.1), ("connect_timeout", 0.0), ("settle", 0.0)):
         value = getattr(config, name)
         if value < low:
@@ -241,7 +248,18 @@ def load_config(source: Config | str | Path | None = None) -> Config:
     if source is None:
         source = os.environ.get(ENVIRONMENT_VARIABLE) or None
     if source is None:
-        return Config()
+        return Config(domain=_domain_of_environment())
     from actionlib_core._config_file import read_config_file
 
     return read_config_file(Path(source))
+
+
+def _domain_of_environment() -> int:
+    text = os.environ.get(DOMAIN_VARIABLE) or "0"
+    try:
+        return int(text)
+    except ValueError:
+        raise ConfigError(
+            "environment",
+            f"{DOMAIN_VARIABLE}: not a number: got {text!r}; expected 0 to {LAST_DOMAIN}.",
+        ) from None

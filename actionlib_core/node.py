@@ -215,9 +215,9 @@ class _Default:
         with self._lock:
             if self._node is not None and not self._node.closed:
                 raise NodeError(
-                    f"init: the default node exists already: got {name!r}; expected the first call. "
-                    f"Its name is {self._node.full_name!r}. Try calling init before the first "
-                    "client, server, publisher or subscriber is made."
+                    f"init: the default node exists already: got {name!r}; expected the first "
+                    f"call, as the node is called {self._node.full_name!r}. Try calling init "
+                    "before the first client, server, publisher or subscriber is made."
                 )
             return self._make(name, config, argv, namespace)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +14,9 @@ from actionlib_core.clock import VirtualClock, use_clock
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+# Test runs on one machine do not find each other, and neither do their processes.
+os.environ.setdefault("SMACHPY_DOMAIN", str(1 + os.getpid() % 9999))
 
 # Threads that a clock keeps for a few seconds, without work.
 CACHED = {"idle", "clock-timers"}

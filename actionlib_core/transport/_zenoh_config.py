@@ -14,6 +14,7 @@ from actionlib_core.presence import ROOT
 if TYPE_CHECKING:
     from actionlib_core.config import AccessRule, Config
 
+FIRST_PORT = 7446  # zenoh's own for discovery, domain 0
 LOOPBACK = "tcp/127.0.0.1:0"
 _MESSAGES = [
     "put",
@@ -46,6 +47,7 @@ def zenoh_settings(config: Config) -> dict[str, object]:
     }
     if config.discovery != "off":
         settings["scouting/multicast/interface"] = config.discovery
+        settings["scouting/multicast/address"] = f"224.0.0.224:{FIRST_PORT + config.domain}"
     settings.update(_tls(config))
     settings.update(_login(config))
     settings.update(_access(config))

@@ -1,0 +1,224 @@
+"""The end of the program as one event: requested by a signal, by the program, or by a test.
+
+    with shutdown.handle_signals():
+        shutdown.on_shutdown(machine.request_preempt)
+        machine.execute()
+
+The first SIGINT or SIGTERM requests the shutdown; the second SIGINT raises KeyboardInterrupt as
+Python does by default, a third ends the process at once.
+
+Tests use a `Shutdown` of their own (`use_shutdown`) and request it by hand.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import threading
+import weakref
+from contextvars import ContextVar
+from typing import TYPE_CHECKING
+
+from actionlib_core.clock import RealClock, SerialExecutor, current_clock
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from types import FrameType
+
+    from actionlib_core.clock import Clock, Event
+
+
+class Shutdown:
+    """One shutdown, requested at most once until `clear`.
+
+    Threads: every method may be called from any thread; `note` from a signal handler too.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._reason: str | None = None
+        self._delivered = False
+        self._events: weakref.WeakKeyDictionary[Clock, Event] = weakref.WeakKeyDictionary()
+        self._callbacks: dict[int, tuple[SerialExecutor, Callable[[], object]]] = {}
+        self._count = 0
+
+    @property
+    def reason(self) -> str | None:
+        """Why it was requested; None when it was not."""
+        return self._reason
+
+    def requested(self) -> bool:
+        """Tell whether the program is to end."""
+        return self._reason is not None
+
+    def event(self, clock: Clock | None = None) -> Event:
+        """Return the event that is set by the request, to wait for on `clock`.
+
+        It is one event per clock; nobody but this object may set or clear it.
+        """
+        clock = current_clock() if clock is None else clock
+        with self._lock:
+            event = self._events.get(clock)
+            if event is None:
+                event = self._events[clock] = clock.event()
+                if self._reason is not None:
+                    event.set()
+            return event
+
+    def on_shutdown(self, callback: Callable[[], object]) -> Callable[[], None]:
+        """Call `callback` once when shutdown is requested; soon, when it was already.
+
+        Returns:
+            Forgets the callback.
+
+        Threads: the callback runs in a thread of the current clock, never in a signal handler; it
+            may block. An exception is given to `threading.excepthook`.
+        """
+        executor = SerialExecutor(current_clock(), "shutdown")
+        with self._lock:
+            late = self._delivered
+            self._count += 1
+            number = self._count
+            if not late:
+                self._callbacks[number] = executor, callback
+        if late:
+            executor.submit(callback)
+
+        def forget() -> None:
+            with self._lock:
+                self._callbacks.pop(number, None)
+
+        return forget
+
+    def request(self, reason: str = "requested") -> bool:
+        """Ask the program to end.
+
+        Returns:
+            Whether this was the first request.
+        """
+        with self._lock:
+            first = not self._delivered
+            self.note(reason)
+            self._delivered = True
+            events = list(self._events.values()) if first else []
+            callbacks = list(self._callbacks.values()) if first else []
+            self._callbacks.clear()
+        for event in events:
+            event.set()
+        for executor, callback in callbacks:
+            executor.submit(callback)
+        return first
+
+    def note(self, reason: str) -> None:
+        """Make `requested` true, without waking anybody yet; takes no lock."""
+        if self._reason is None:
+            self._reason = reason
+
+    def clear(self) -> None:
+        """Forget the request, for a program that goes on after it."""
+        with self._lock:
+            self._reason = None
+            self._delivered = False
+            for event in self._events.values():
+                event.clear()
+
+
+class _SignalHandler:
+    """Turns signals into a request.
+
+    The handler itself takes no lock, as the code that it interrupts may hold any; a thread that
+    waits for it does the rest.
+    """
+
+    def __init__(self, shutdown: Shutdown) -> None:
+        self._shutdown = shutdown
+        self._clock = RealClock()
+        self._wake = self._clock.event()
+        self._over = False
+        self.task = self._clock.spawn(self._relay, name="shutdown-signals")
+
+    def __call__(self, number: int, _frame: FrameType | None) -> None:
+        if not self._wake.is_set():
+            self._shutdown.note(signal.Signals(number).name)
+            self._wake.set()
+        elif number == signal.SIGINT:
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
+            raise KeyboardInterrupt
+
+    def _relay(self) -> None:
+        self._wake.wait()
+        if not self._over:
+            self._shutdown.request(self._shutdown.reason or "signal")
+
+    def end(self) -> None:
+        """End the thread; a request that is under way is still delivered."""
+        if not self._wake.is_set():
+            self._over = True
+            self._wake.set()
+
+
+_process = Shutdown()
+_current: ContextVar[Shutdown] = ContextVar("shutdown", default=_process)
+
+
+def current_shutdown() -> Shutdown:
+    """Return the shutdown in force here: that of `use_shutdown`, else the process's."""
+    return _current.get()
+
+
+@contextlib.contextmanager
+def use_shutdown(shutdown: Shutdown) -> Iterator[Shutdown]:
+    """Make `shutdown` the current one inside the `with` block, also for tasks spawned in it."""
+    token = _current.set(shutdown)
+    try:
+        yield shutdown
+    finally:
+        _current.reset(token)
+
+
+def requested() -> bool:
+    """Tell whether the program is to end."""
+    return current_shutdown().requested()
+
+
+def event(clock: Clock | None = None) -> Event:
+    """Return the event that is set by the request; see `Shutdown.event`."""
+    return current_shutdown().event(clock)
+
+
+def request(reason: str = "requested") -> bool:
+    """Ask the program to end; see `Shutdown.request`."""
+    return current_shutdown().request(reason)
+
+
+def on_shutdown(callback: Callable[[], object]) -> Callable[[], None]:
+    """Call `callback` when shutdown is requested; see `Shutdown.on_shutdown`."""
+    return current_shutdown().on_shutdown(callback)
+
+
+@contextlib.contextmanager
+def handle_signals(
+    signals: tuple[signal.Signals, ...] = (signal.SIGINT, signal.SIGTERM),
+) -> Iterator[Shutdown]:
+    """Turn signals into a request inside the `with` block; the old handlers return after it.
+
+    Raises:
+        RuntimeError: this is not the main thread, the only one that may handle signals.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        raise RuntimeError(
+            f"shutdown: signals cannot be handled here: got thread "
+            f"{threading.current_thread().name!r}; expected the main thread. Try calling "
+            "handle_signals before starting threads."
+        )
+    shutdown = current_shutdown()
+    handler = _SignalHandler(shutdown)
+    before = {number: signal.getsignal(number) for number in signals}
+    try:
+        for number in signals:
+            signal.signal(number, handler)
+        yield shutdown
+    finally:
+        for number, old in before.items():
+            signal.signal(number, signal.SIG_DFL if old is None else old)
+        handler.end()
