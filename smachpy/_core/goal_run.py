@@ -1,6 +1,6 @@
 """One execution of an action state as decisions: when to cancel, when to give up, which outcome.
 
-    RUNNING --preempt, exec_timeout--> CANCELLING --the goal ends, preempt_timeout--> ENDED
+    RUNNING --preempt, failure, exec_timeout--> CANCELLING --the goal ends, preempt_timeout--> ENDED
        |                                                                               ^
        +----------------------------------- the goal ends -----------------------------+
 
@@ -49,6 +49,7 @@ class GoalRun:
 
     __slots__ = (
         "_deadline",
+        "_failed",
         "_preempt_timeout",
         "abandoned",
         "cancelling",
@@ -65,6 +66,7 @@ class GoalRun:
         self.exec_timeout = exec_timeout
         self._preempt_timeout = preempt_timeout
         self._deadline = None if exec_timeout is None else now + exec_timeout
+        self._failed = False
         self.preempted = False
         self.timed_out = False
         self.cancelling = False
@@ -82,6 +84,11 @@ class GoalRun:
         if not self.status:
             self.preempted = True
 
+    def on_failure(self) -> None:
+        """Note that a callback raised: the goal is to be cancelled, without a preempt."""
+        if not self.status:
+            self._failed = True
+
     def on_end(self, status: str, text: str) -> None:
         """Note that the goal ended, with the name of a final goal status."""
         if not self.status:
@@ -92,8 +99,9 @@ class GoalRun:
         if self.status:
             return Step.FINISH
         late = self._deadline is not None and now >= self._deadline
-        if not self.cancelling and (self.preempted or late):
-            self.timed_out = late and not self.preempted
+        asked = self.preempted or self._failed
+        if not self.cancelling and (asked or late):
+            self.timed_out = late and not asked
             self.cancelling = True
             grace = self._preempt_timeout
             self._deadline = None if grace is None else now + grace

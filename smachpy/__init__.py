@@ -1,0 +1,113 @@
+"""Robot missions as state machines: SMACH's names, without ROS and without its hangs.
+
+    import smachpy
+
+    class Drive(smachpy.State):
+        def __init__(self):
+            super().__init__(outcomes=["arrived", "blocked"])
+
+        def execute(self, userdata):
+            return "arrived"
+
+    sm = smachpy.StateMachine(outcomes=["done", "failed"])
+    with sm:
+        smachpy.StateMachine.add("DRIVE", Drive(), {"arrived": "done", "blocked": "failed"})
+    sm.execute()
+
+`import smachpy as smach` and `import smachpy as smach_ros` run existing programs. The states that
+talk to action servers, services and topics are imported when they are first used.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from smachpy._core.retry import Retry as Retry
+from smachpy.concurrence import Concurrence as Concurrence
+from smachpy.concurrence import Rule as Rule
+from smachpy.concurrence import all_of as all_of
+from smachpy.concurrence import any_of as any_of
+from smachpy.concurrence import n_of as n_of
+from smachpy.container import Container as Container
+from smachpy.exceptions import InconsistentMachineError as InconsistentMachineError
+from smachpy.exceptions import InvalidConstructionError as InvalidConstructionError
+from smachpy.exceptions import InvalidStateError as InvalidStateError
+from smachpy.exceptions import InvalidTransitionError as InvalidTransitionError
+from smachpy.exceptions import InvalidUserCodeError as InvalidUserCodeError
+from smachpy.exceptions import ReadOnlyError as ReadOnlyError
+from smachpy.exceptions import SmachError as SmachError
+from smachpy.exceptions import UserDataKeyError as UserDataKeyError
+from smachpy.introspection import StateRecord as StateRecord
+from smachpy.introspection import describe as describe
+from smachpy.iterator import Iterator as Iterator
+from smachpy.log import logdebug as logdebug
+from smachpy.log import logerr as logerr
+from smachpy.log import loginfo as loginfo
+from smachpy.log import logwarn as logwarn
+from smachpy.log import set_loggers as set_loggers
+from smachpy.sequence import Sequence as Sequence
+from smachpy.state import CBState as CBState
+from smachpy.state import State as State
+from smachpy.state_machine import StateMachine as StateMachine
+from smachpy.user_data import Remapper as Remapper
+from smachpy.user_data import UserData as UserData
+from smachpy.util import CBInterface as CBInterface
+from smachpy.util import cb_interface as cb_interface
+from smachpy.util import has_smach_interface as has_smach_interface
+from smachpy.util import is_shutdown as is_shutdown
+from smachpy.util import set_shutdown_check as set_shutdown_check
+
+if TYPE_CHECKING:
+    from smachpy.introspection import Kind as Kind
+
+__all__ = [
+    "CBInterface",
+    "CBState",
+    "Concurrence",
+    "Container",
+    "InconsistentMachineError",
+    "InvalidConstructionError",
+    "InvalidStateError",
+    "InvalidTransitionError",
+    "InvalidUserCodeError",
+    "Iterator",
+    "ReadOnlyError",
+    "Remapper",
+    "Retry",
+    "Rule",
+    "Sequence",
+    "SmachError",
+    "State",
+    "StateMachine",
+    "StateRecord",
+    "UserData",
+    "UserDataKeyError",
+    "all_of",
+    "any_of",
+    "cb_interface",
+    "describe",
+    "has_smach_interface",
+    "is_shutdown",
+    "logdebug",
+    "logerr",
+    "loginfo",
+    "logwarn",
+    "n_of",
+    "set_loggers",
+    "set_shutdown_check",
+]
+
+# Names of states that need actionlib_core -> module that defines them; imported on first use.
+_LAZY: dict[str, str] = {}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _LAZY:
+        from importlib import import_module
+
+        return getattr(import_module(_LAZY[name]), name)
+    raise AttributeError(f"module 'smachpy' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_LAZY})

@@ -1,0 +1,1 @@
+"""Decisions of state machines without threads, time or input and output."""

@@ -1,0 +1,27 @@
+"""Lists of names (outcomes, keys) as users give them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from smachpy.exceptions import InvalidStateError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+def unique_names(names: Iterable[str], what: str = "names") -> tuple[str, ...]:
+    """Return `names` without repeats, in their order.
+
+    Raises:
+        InvalidStateError: `names` is one string, or holds something that is no string.
+    """
+    if isinstance(names, str):
+        raise InvalidStateError(
+            f"{what}: got the string {names!r}; expected a list of strings. Try [{names!r}]."
+        )
+    found = tuple(dict.fromkeys(names))
+    bad = [name for name in found if not isinstance(name, str)]
+    if bad:
+        raise InvalidStateError(f"{what}: got {bad}; expected strings.")
+    return found

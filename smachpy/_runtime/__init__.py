@@ -1,0 +1,1 @@
+"""What carries a running machine: frames, events, callbacks, preemption, child tasks."""

@@ -1,0 +1,170 @@
+"""The children of a concurrence while they run, each in a task of its own."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING, Any
+
+from smachpy._runtime.frame import FRAME, Frame
+from smachpy.events import Entered, Failed, Left
+from smachpy.exceptions import InvalidTransitionError, InvalidUserCodeError, did_you_mean
+
+if TYPE_CHECKING:
+    from actionlib_core.clock import Event as ClockEvent
+    from actionlib_core.clock import Task
+    from smachpy._runtime.step import Step
+    from smachpy.container import Container
+
+
+class Branch(Frame):
+    """One child of a concurrence, in its task.
+
+    Attributes:
+        outcome: What it ended with; None while it runs, or when it raised.
+        error: What it raised.
+        ended: It has ended, or was abandoned.
+        task: The task that runs it.
+    """
+
+    __slots__ = ("ended", "error", "group", "outcome", "task")
+
+    def __init__(self, group: Group, step: Step) -> None:
+        frame = group.frame
+        super().__init__(frame.container, frame.path, frame.run, frame.parent, step)
+        self.boundary = self
+        self.group = group
+        self.outcome: str | None = None
+        self.error: BaseException | None = None
+        self.ended = False
+        self.task: Task | None = None
+
+    def run_child(self) -> None:
+        """Run the child; the task's whole work."""
+        FRAME.set(self)
+        try:
+            outcome = self._execute()
+        except BaseException as error:  # noqa: BLE001  handed to the container's thread
+            self.group.end(self, None, error)
+        else:
+            self.group.end(self, outcome, None)
+
+    def _execute(self) -> str:
+        step = self.step
+        if self.told is not None:  # asked to stop before it began
+            return "preempted"
+        if not self.run.watched:
+            outcome = step.execute(step.userdata)
+            if outcome in step.next:
+                return outcome
+        else:
+            outcome = self._execute_watched(step)
+        if outcome in step.next or (outcome == "preempted" and self.told is not None):
+            return outcome
+        outcomes = step.state.get_registered_outcomes()
+        raise InvalidTransitionError(
+            f"{self.here()}: unknown outcome: got {outcome!r}; expected one of "
+            f"{sorted(outcomes)}.{did_you_mean(outcome, outcomes)}"
+        )
+
+    def _execute_watched(self, step: Step) -> Any:
+        self.emit(Entered)
+        try:
+            outcome = step.execute(step.watched_userdata(self))
+        except Exception as error:
+            self.emit(Failed, f"{type(error).__name__}: {error}")
+            raise
+        self.emit(Left, outcome)
+        return outcome
+
+
+class Group:
+    """All branches of one run, and the queue on which they report to the container's thread.
+
+    Attributes:
+        reports: Ended branches that the container has not looked at yet.
+        each: The container wants to be woken for every end, not only for the last.
+    """
+
+    __slots__ = ("_left", "_wake", "branches", "container", "each", "frame", "reports")
+
+    def __init__(self, container: Container, frame: Frame, steps: list[Step], *, each: bool) -> None:
+        self.container = container
+        self.frame = frame
+        self.each = each
+        self.reports: deque[Branch] = deque()
+        self._wake: ClockEvent = frame.run.clock.event()
+        self.branches = [Branch(self, step) for step in steps]
+        self._left = len(steps)
+
+    def start(self) -> None:
+        """Start every branch in its task, named after its path."""
+        spawn = self.frame.run.clock.spawn
+        for branch in self.branches:
+            branch.task = spawn(branch.run_child, name=branch.here())
+
+    def tell(self, branches: list[Branch]) -> None:
+        """Ask the children of `branches` to stop; with the container's lock held."""
+        for branch in branches:
+            if not branch.ended:
+                branch.told = branch.step
+                branch.step.state.request_preempt()
+
+    def end(self, branch: Branch, outcome: str | None, error: BaseException | None) -> None:
+        """Note how a branch ended; the first report of a branch counts."""
+        with self.container._lock:  # noqa: SLF001  whoever passes a preempt on is done after this
+            if branch.ended:
+                return
+            branch.ended = True
+            branch.outcome, branch.error = outcome, error
+            if branch.step.state.preempt_requested():
+                branch.step.state.recall_preempt()
+            self._left -= 1
+            last = self._left == 0
+        self.reports.append(branch)
+        if last or self.each or error is not None:
+            self._wake.set()
+
+    def wait(self) -> bool:
+        """Wait for reports.
+
+        Returns:
+            Whether branches are still running.
+
+        Blocks: until a branch has something to report; an ignored preempt ends in a report too.
+        """
+        if not self.reports or not (self.each or self._left == 0):
+            self._wake.wait()
+        self._wake.clear()
+        return self._left > 0
+
+    def running(self) -> list[Branch]:
+        """Return the branches that have not ended."""
+        return [branch for branch in self.branches if not branch.ended]
+
+    def outcomes(self) -> dict[str, str | None]:
+        """Return label -> outcome, None for those that run."""
+        return {branch.step.label: branch.outcome for branch in self.branches}
+
+    def raise_errors(self) -> None:
+        """Raise what the branches raised, all of it.
+
+        Raises:
+            InvalidUserCodeError: from an `ExceptionGroup` of the branches' exceptions.
+        """
+        failed = [branch for branch in self.branches if branch.error is not None]
+        if not failed:
+            return
+        errors: list[Exception] = []
+        for branch in failed:
+            if not isinstance(branch.error, Exception):  # SystemExit and its like go through
+                assert branch.error is not None
+                raise branch.error
+            errors.append(branch.error)
+        first = failed[0]
+        raised = ", ".join(
+            f"{branch.here()}: {type(branch.error).__name__}: {branch.error}" for branch in failed
+        )
+        raise InvalidUserCodeError(
+            f"{self.frame.path}: {len(failed)} of {len(self.branches)} children raised: {raised}",
+            path=getattr(first.error, "path", "") or first.here(),
+        ) from ExceptionGroup(f"children of {self.frame.path}", errors)

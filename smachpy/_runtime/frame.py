@@ -1,0 +1,154 @@
+"""Where we are: the chain of running containers, in a context variable.
+
+A `Run` belongs to one execution of a root; every container below it has a `Frame`. The frames
+know the path and the listeners, so that states need to know neither.
+"""
+
+from __future__ import annotations
+
+import threading
+from contextvars import ContextVar
+from typing import TYPE_CHECKING, Any
+
+from smachpy import log
+from smachpy.events import CallbackFailed
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.clock import Clock
+    from smachpy.container import Container
+    from smachpy.events import Event
+    from smachpy.state import State
+
+
+class Run:
+    """One execution of a root container, shared by all frames below it.
+
+    Attributes:
+        clock: The clock of the run.
+        watched: Somebody wants to see or to control each transition. The inner loops look at this
+            and nothing else.
+        control: The operator's control, once somebody asked for it.
+    """
+
+    __slots__ = ("clock", "control", "watched")
+
+    def __init__(self, clock: Clock) -> None:
+        self.clock = clock
+        self.watched = False
+        self.control: Any = None
+
+
+class Frame:
+    """One running container, or one branch of a concurrence.
+
+    Attributes:
+        path: Path of the container.
+        step: What runs now: anything with `label` and `state`; None between runs.
+        told: The step whose state was asked to stop.
+        boundary: The task that can be left behind when a state below ignores its preempt.
+    """
+
+    __slots__ = ("boundary", "container", "parent", "path", "run", "step", "thread", "told")
+
+    def __init__(
+        self, container: Container, path: str, run: Run, parent: Frame | None, step: Any = None
+    ) -> None:
+        self.container = container
+        self.path = path
+        self.run = run
+        self.parent = parent
+        self.step = step
+        self.told: Any = None
+        self.boundary: Any = None if parent is None else parent.boundary
+        self.thread = threading.get_ident()
+
+    def here(self) -> str:
+        """Return the path of the state that runs now."""
+        step = self.step
+        return self.path if step is None else f"{self.path}/{step.label}"
+
+    def publish(self, event: Event) -> None:
+        """Give `event` to the listeners of this container and of all above it.
+
+        A listener that raises is reported to the others and to the log; it hurts nobody.
+        """
+        frame: Frame | None = self
+        while frame is not None:
+            for listener in frame.container._listeners:  # noqa: SLF001  one machinery
+                try:
+                    listener(event)
+                except Exception as error:  # noqa: BLE001  a border: reported below
+                    self._listener_failed(listener, error, event)
+            frame = frame.parent
+
+    def emit(self, kind: Callable[..., Event], *fields: Any) -> None:
+        """Publish an event about the state that runs now."""
+        if self.run.watched:
+            clock = self.run.clock
+            self.publish(kind(self.here(), clock.now(), clock.time_ns(), *fields))
+
+    def emit_own(self, kind: Callable[..., Event], *fields: Any) -> None:
+        """Publish an event about the container itself."""
+        if self.run.watched:
+            clock = self.run.clock
+            self.publish(kind(self.path, clock.now(), clock.time_ns(), *fields))
+
+    def callback_failed(self, callback: object, error: BaseException) -> None:
+        """Report a raising callback: to the log and to the listeners."""
+        name = getattr(callback, "__qualname__", None) or repr(callback)
+        text = f"{type(error).__name__}: {error}"
+        log.log_exception(f"{self.path}: callback {name} raised {text}", error)
+        self.emit_own(CallbackFailed, name, text)
+
+    def _listener_failed(self, listener: object, error: BaseException, event: Event) -> None:
+        name = getattr(listener, "__qualname__", None) or repr(listener)
+        log.log_exception(f"{self.path}: listener {name} raised {error!r} on {event!r}", error)
+
+
+class Scope:
+    """A running state's handle on its run: to publish from any thread, also after callbacks.
+
+    Attributes:
+        path: Path of the state.
+        clock: Clock of the run.
+    """
+
+    __slots__ = ("_frame", "clock", "path")
+
+    def __init__(self, frame: Frame) -> None:
+        self._frame = frame
+        self.path = frame.here()
+        self.clock = frame.run.clock
+
+    def emit(self, kind: Callable[..., Event], *fields: Any) -> None:
+        """Publish the event `kind(path, t, stamp_ns, *fields)`, if anybody listens.
+
+        Threads: any.
+        """
+        frame = self._frame
+        if frame.run.watched:
+            clock = self.clock
+            frame.publish(kind(self.path, clock.now(), clock.time_ns(), *fields))
+
+
+FRAME: ContextVar[Frame | None] = ContextVar("smachpy_frame", default=None)
+
+
+def current_scope() -> Scope | None:
+    """Return the scope of the state that runs in this context; None outside any machine."""
+    frame = FRAME.get()
+    return None if frame is None else Scope(frame)
+
+
+def current_path() -> str:
+    """Return the path of the state that runs in this context, or ""."""
+    frame = FRAME.get()
+    return "" if frame is None else frame.here()
+
+
+def current_state() -> State | None:
+    """Return the state that runs in this context."""
+    frame = FRAME.get()
+    return None if frame is None or frame.step is None else frame.step.state

@@ -1,0 +1,90 @@
+"""A container, compiled: one record per child with all that running it needs, looked up once."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+
+from smachpy._runtime.guarded import runner_of
+from smachpy.events import UserdataWritten
+from smachpy.user_data import Remapper
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from smachpy._runtime.frame import Frame
+    from smachpy.state import State
+    from smachpy.user_data import UserData
+
+
+class End:
+    """The container ends with this outcome."""
+
+    __slots__ = ("outcome",)
+    final: ClassVar[bool] = True
+
+    def __init__(self, outcome: str) -> None:
+        self.outcome = outcome
+
+
+class Step:
+    """One child, ready to run.
+
+    Attributes:
+        label: Its label.
+        state: The child.
+        execute: Runs it: its own `execute`, or that with its options around it.
+        userdata: Its window into the container's userdata.
+        next: Outcome -> what comes then.
+        interface: The child's interface version that this was compiled from.
+    """
+
+    __slots__ = ("execute", "interface", "label", "names", "next", "state", "userdata")
+    final: ClassVar[bool] = False
+
+    def __init__(
+        self, label: str, state: State, userdata: UserData, remapping: Mapping[str, str]
+    ) -> None:
+        self.label = label
+        self.state = state
+        self.interface = state._interface  # noqa: SLF001  one machinery
+        self.names = dict(remapping)
+        self.userdata = Remapper(
+            userdata,
+            state.get_registered_input_keys(),
+            state.get_registered_output_keys(),
+            remapping,
+        )
+        self.execute: Callable[[Any], Any] = runner_of(state)
+        self.next: dict[str, Following] = {}
+
+    def watched_userdata(self, frame: Frame) -> Remapper:
+        """Return a window that reports each write."""
+        return _WatchedRemapper(self.userdata, frame)
+
+
+Following: TypeAlias = Step | End
+
+
+class _WatchedRemapper(Remapper):
+    """A window that says who wrote what, when."""
+
+    __slots__ = ("_scope_of",)
+    _scope_of: tuple[Frame, str]
+
+    def __init__(self, original: Remapper, frame: Frame) -> None:
+        set_slot = object.__setattr__
+        set_slot(self, "_data", original._data)
+        set_slot(self, "_input", original._input)
+        set_slot(self, "_output", original._output)
+        set_slot(self, "_scope_of", (frame, frame.here()))
+
+    def __setitem__(self, key: str, item: Any) -> None:
+        super().__setitem__(key, item)
+        frame, path = self._scope_of
+        if frame.run.watched:
+            clock = frame.run.clock
+            name = self._output[key]
+            frame.publish(UserdataWritten(path, clock.now(), clock.time_ns(), name, item))
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        self[name] = value

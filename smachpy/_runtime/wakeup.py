@@ -1,0 +1,56 @@
+"""What a state waits on while it runs: one flag that a preempt and any other news may set."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from types import TracebackType
+    from typing import Self
+
+    from smachpy.state import State
+
+
+class Wakeup:
+    """Wakes the thread that runs `state` for a preempt, for `set` and at a deadline.
+
+    The loop around it loses nothing when it clears first, then looks at everything that may have
+    happened, then waits. Used as a context manager; on leaving it the state is left alone.
+
+    Threads: `set` from any thread, callback or signal handler; the rest by the state's thread.
+    """
+
+    __slots__ = ("_event", "_forget", "_state", "clock")
+
+    def __init__(self, state: State) -> None:
+        self._state = state
+        self.clock = state._clock()  # noqa: SLF001  the states' machinery
+        self._event = self.clock.event()
+
+    def __enter__(self) -> Self:
+        self._forget = self._state._on_preempt(self._event.set)  # noqa: SLF001  as above
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._forget()
+
+    def set(self) -> None:
+        """Wake the state; remembered until `clear`."""
+        self._event.set()
+
+    def clear(self) -> None:
+        """Forget what was said; look at everything after this, not before."""
+        self._event.clear()
+
+    def wait_until(self, *deadlines: float | None) -> None:
+        """Wait for news or the first of the deadlines [s, clock]; None is no deadline.
+
+        Blocks: see above.
+        """
+        due = [deadline for deadline in deadlines if deadline is not None]
+        self._event.wait(max(0.0, min(due) - self.clock.now()) if due else None)

@@ -1,0 +1,351 @@
+"""The concurrence: all children at once, their outcomes make its own."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from smachpy import log
+from smachpy._construction import construction_method
+from smachpy._core.names import unique_names
+from smachpy._core.rules import Rule, all_of, any_of, as_rules, decide, n_of
+from smachpy._core.spec import ChildSpec, ConcurrenceSpec
+from smachpy._core.validate import concurrence_problems
+from smachpy._runtime.branches import Group
+from smachpy.container import Container
+from smachpy.events import Preempted
+from smachpy.exceptions import (
+    InconsistentMachineError,
+    InvalidConstructionError,
+    InvalidStateError,
+    InvalidTransitionError,
+    InvalidUserCodeError,
+    did_you_mean,
+)
+from smachpy.introspection import RuleRecord, Structure
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Sequence as SequenceOf
+    from typing import Unpack
+
+    from smachpy._runtime.branches import Branch
+    from smachpy._runtime.frame import Frame
+    from smachpy._runtime.step import Step
+    from smachpy.introspection import Kind
+    from smachpy.state import State, StateOptions
+    from smachpy.user_data import UserData
+
+__all__ = ["Concurrence", "Rule", "all_of", "any_of", "n_of"]
+
+
+class _Plan:
+    """A concurrence, compiled."""
+
+    __slots__ = ("steps", "userdata")
+
+    def __init__(self, concurrence: Concurrence) -> None:
+        self.userdata = concurrence.userdata
+        self.steps = [concurrence._make_step(label) for label in concurrence._states]  # noqa: SLF001
+        for step in self.steps:
+            step.next = dict.fromkeys(step.state.get_registered_outcomes())  # type: ignore[arg-type]
+
+    def is_stale(self, concurrence: Concurrence) -> bool:
+        return self.userdata is not concurrence.userdata or any(
+            step.interface != step.state._interface  # noqa: SLF001
+            for step in self.steps
+        )
+
+
+class Concurrence(Container):
+    """A container that runs all its children at once and ends when all have ended.
+
+    Args:
+        outcomes: Outcomes.
+        default_outcome: Outcome when no rule of `outcome_map` holds.
+        input_keys: Keys copied from the parent's userdata when it starts.
+        output_keys: Keys copied to the parent's userdata when it ends.
+        outcome_map: Outcome -> rule: `{label: outcome}` (all must hold; an outcome may be a
+            list of outcomes), or `all_of`, `any_of`, `n_of`. The rule that asks for most wins.
+        outcome_cb: Called with label -> outcome when all have ended; returns the outcome, or
+            None to leave it to the rules.
+        child_termination_cb: Called with label -> outcome (None: still runs) each time a child
+            has ended; returns True to preempt all others, a list of labels to preempt those,
+            False to let them run. Called in the container's thread, never two at once.
+        name: Name of the machine when it is the root.
+        **options: See `StateOptions`.
+
+    Raises:
+        InvalidStateError: there is no way to an outcome, or a callback cannot be called.
+
+    Threads: each child runs in a thread named after its path; all have ended when `execute`
+        returns, except those left behind after a preempt they ignored (docs/preemption.md).
+    """
+
+    kind: ClassVar[Kind] = "concurrence"
+
+    def __init__(
+        self,
+        outcomes: Iterable[str],
+        default_outcome: str,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        outcome_map: Mapping[str, Any] | None = None,
+        outcome_cb: Callable[[dict[str, str | None]], str | None] | None = None,
+        child_termination_cb: Callable[[dict[str, str | None]], Any] | None = None,
+        *,
+        name: str | None = None,
+        **options: Unpack[StateOptions],
+    ) -> None:
+        super().__init__(outcomes, input_keys, output_keys, name=name, **options)
+        problems = []
+        if not (default_outcome or outcome_map or outcome_cb):
+            problems.append("outcome policy: got none; expected default_outcome at least")
+        if default_outcome and default_outcome not in self._outcomes:
+            near = did_you_mean(default_outcome, self._outcomes)
+            problems.append(
+                f"default outcome: got {default_outcome!r}; expected one of "
+                f"{sorted(self._outcomes)}.{near}"
+            )
+        for outcome in outcome_map or ():
+            if outcome not in self._outcomes:
+                near = did_you_mean(outcome, self._outcomes)
+                problems.append(
+                    f"outcome map: got {outcome!r}; expected one of {sorted(self._outcomes)}.{near}"
+                )
+        for what, cb in (("outcome_cb", outcome_cb), ("child_termination_cb", child_termination_cb)):
+            if cb is not None and not callable(cb):
+                problems.append(f"{what}: got {cb!r}; expected a function")
+        if problems:
+            raise InvalidStateError("Concurrence: " + "\n  - ".join(problems))
+        self._default_outcome = default_outcome
+        self._outcome_map = dict(outcome_map or {})
+        self._rules = as_rules(self._outcome_map)
+        self._outcome_cb = outcome_cb
+        self._child_termination_cb = child_termination_cb
+        self._group: Group | None = None
+
+    @construction_method
+    def add(
+        self: Concurrence,
+        label: str,
+        state: State,
+        remapping: Mapping[str, str] | None = None,
+    ) -> State:
+        """Add a state.
+
+        Args:
+            label: Its name here; unique.
+            state: The state.
+            remapping: Key of the state -> key of this container's userdata.
+
+        Returns:
+            The state.
+
+        Raises:
+            InvalidStateError: the label is taken, or `state` is no state.
+            InvalidConstructionError: called on the class while no concurrence is open.
+        """
+        if self._frame is not None:
+            raise InvalidConstructionError(f"{label}: add: got a new state while it runs.")
+        self._store_child(label, state, remapping)
+        return state
+
+    # -- structure -----------------------------------------------------------------------------
+
+    def get_initial_states(self) -> list[str]:
+        """Return all labels."""
+        return list(self._states)
+
+    def set_initial_state(
+        self, initial_states: SequenceOf[str], userdata: UserData | None = None
+    ) -> None:
+        """Add to the userdata; the children always start all together.
+
+        Raises:
+            InvalidStateError: a label that is not there.
+        """
+        unknown = sorted(set(initial_states) - set(self._states))
+        if unknown:
+            raise InvalidStateError(
+                f"initial states: got {unknown}; expected labels of {sorted(self._states)}."
+                f"{did_you_mean(unknown[0], self._states)}"
+            )
+        if initial_states and set(initial_states) != set(self._states):
+            log.logwarn("Concurrence.set_initial_state: all children start together; ignored.")
+        if userdata is not None:
+            self.userdata.update(userdata)
+
+    def get_active_states(self) -> list[str]:
+        """Return the labels of the children that run now."""
+        group = self._group
+        return [] if group is None else [branch.step.label for branch in group.running()]
+
+    def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
+        """Return what the outcome map names as (child outcome, child label, outcome)."""
+        return [
+            (child_outcome, label, outcome)
+            for outcome, rule in self._rules
+            for label, wanted in rule.conditions
+            for child_outcome in wanted
+        ]
+
+    def find_problems(self, where: str) -> tuple[str, ...]:
+        """Return what is wrong with this concurrence itself."""
+        children = tuple(
+            ChildSpec(label, tuple(state.get_registered_outcomes()))
+            for label, state in self._states.items()
+        )
+        spec = ConcurrenceSpec(where, self._outcomes, children, self._default_outcome, self._rules)
+        return concurrence_problems(spec)
+
+    def describe_structure(self) -> Structure:
+        """Return the children and the rules."""
+        children = tuple(
+            (label, state, tuple(self._remappings[label].items()))
+            for label, state in self._states.items()
+        )
+        rules = [
+            RuleRecord(
+                outcome,
+                tuple((label, one) for label, wanted in rule.conditions for one in wanted),
+                str(rule),
+            )
+            for outcome, rule in self._rules
+        ]
+        return Structure(
+            children,
+            tuple(self._states),
+            (),
+            tuple(rules),
+            self._default_outcome or None,
+            (("outcome callback", _name_of(self._outcome_cb)),) if self._outcome_cb else (),
+        )
+
+    # -- running -------------------------------------------------------------------------------
+
+    def _compile(self, frame: Frame) -> _Plan:
+        problems = self.find_problems(frame.path)
+        if problems:
+            raise InconsistentMachineError(f"{type(self).__name__} {frame.path!r}", problems)
+        return _Plan(self)
+
+    def _run_children(self, frame: Frame, plan: _Plan) -> str:
+        each = bool(self._child_termination_cb or self._transition_cbs)
+        group = Group(self, frame, plan.steps, each=each)
+        with self._lock:
+            self._group = group
+        try:
+            if self._start_cbs:
+                self.call_start_cbs()
+            if self._preempt_requested:
+                frame.emit_own(Preempted, "")
+                outcome = "preempted"
+            else:
+                self._run_group(group)
+                outcome = self._outcome(frame, group)
+        finally:
+            with self._lock:
+                self._group = None
+        if self._termination_cbs:
+            self.call_termination_cbs(list(self._states), outcome)
+        return outcome
+
+    def _run_group(self, group: Group) -> None:
+        """Start the branches and see them end."""
+        group.start()
+        if self._transition_cbs:
+            for _ in group.branches:
+                self.call_transition_cbs()
+        failure: BaseException | None = None
+        running = True
+        while running or group.reports:
+            running = group.wait() if running else False
+            while group.reports:
+                branch = group.reports.popleft()
+                try:
+                    self._branch_ended(group, branch)
+                except InvalidUserCodeError as error:
+                    failure = failure or error
+                    self._preempt_branches(group, group.running())
+        if failure is not None:
+            raise failure
+        group.raise_errors()
+
+    def _branch_ended(self, group: Group, branch: Branch) -> None:
+        if branch.error is not None:
+            self._preempt_branches(group, group.running())
+            return
+        if self._transition_cbs:
+            self.call_transition_cbs()
+        if self._child_termination_cb is None:
+            return
+        try:
+            answer = self._child_termination_cb(group.outcomes())
+        except Exception as error:
+            raise InvalidUserCodeError(
+                f"{group.frame.path}: child_termination_cb raised {type(error).__name__}: {error}",
+                path=group.frame.path,
+            ) from error
+        self._preempt_branches(group, self._chosen(group, answer))
+
+    def _chosen(self, group: Group, answer: Any) -> list[Branch]:
+        """Return the branches that the answer of child_termination_cb names."""
+        if answer is True or answer is False or answer is None:
+            return group.running() if answer else []
+        labels = [answer] if isinstance(answer, str) else answer
+        if not isinstance(labels, (list, tuple, set, frozenset)):
+            return group.running() if answer else []
+        unknown = sorted(set(labels) - set(self._states))
+        if unknown:
+            raise InvalidUserCodeError(
+                f"{group.frame.path}: child_termination_cb: got labels {unknown}; expected labels "
+                f"of {sorted(self._states)}.{did_you_mean(unknown[0], self._states)}",
+                path=group.frame.path,
+            )
+        return [branch for branch in group.running() if branch.step.label in labels]
+
+    def _preempt_branches(self, group: Group, branches: list[Branch]) -> None:
+        with self._lock:
+            group.tell(branches)
+
+    def _tell_children(self, frame: Frame) -> None:
+        group = self._group
+        if group is not None and group.frame is frame:
+            group.tell(group.branches)
+
+    def _outcome(self, frame: Frame, group: Group) -> str:
+        """Return the outcome that the callback, the rules or the default give."""
+        outcomes = group.outcomes()
+        if self._outcome_cb is not None:
+            try:
+                answer = self._outcome_cb(dict(outcomes))
+            except Exception as error:
+                raise InvalidUserCodeError(
+                    f"{frame.path}: outcome_cb raised {type(error).__name__}: {error}",
+                    path=frame.path,
+                ) from error
+            if answer:
+                return self._registered(frame, answer)
+        ruled = decide(self._rules, outcomes)
+        if ruled is not None:
+            return ruled
+        cut = any(branch.told is not None for branch in group.branches)
+        if self._preempt_requested and cut and self._may_end_preempted():
+            frame.emit_own(Preempted, "")
+            return "preempted"
+        return self._default_outcome
+
+    def _may_end_preempted(self) -> bool:
+        return "preempted" in self._outcomes or not self._default_outcome
+
+    def _registered(self, frame: Frame, answer: object) -> str:
+        if answer in self._outcomes:
+            return str(answer)
+        raise InvalidTransitionError(
+            f"{frame.path}: outcome_cb: got {answer!r}; expected one of {sorted(self._outcomes)}."
+            f"{did_you_mean(answer, self._outcomes)}"
+        )
+
+
+def _name_of(function: object) -> str:
+    return getattr(function, "__qualname__", None) or repr(function)

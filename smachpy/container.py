@@ -1,0 +1,418 @@
+"""What all containers share: children, userdata, callbacks, construction, the frame of a run."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from smachpy import log
+from smachpy._construction import OPEN, innermost
+from smachpy._runtime.frame import FRAME, Frame
+from smachpy._runtime.root import execute_root
+from smachpy._runtime.step import Step
+from smachpy.exceptions import (
+    InconsistentMachineError,
+    InvalidConstructionError,
+    InvalidStateError,
+    did_you_mean,
+)
+from smachpy.state import State
+from smachpy.user_data import UserData
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from types import TracebackType
+    from typing import Self, Unpack
+
+    from smachpy.events import Event
+    from smachpy.state import StateOptions
+    from smachpy.user_data import Remapper
+
+__all__ = ["Container"]
+
+Callback = tuple["Callable[..., object]", "tuple[Any, ...]"]
+
+
+class Container(State):
+    """A state made of states.
+
+    Args:
+        outcomes: Outcomes.
+        input_keys: Keys copied from the parent's userdata when it starts.
+        output_keys: Keys copied to the parent's userdata when it ends.
+        name: Name of the machine when it is the root, first part of every path below it.
+        **options: See `StateOptions`.
+
+    Attributes:
+        userdata: The container's own userdata, kept between runs (see `reset_userdata`).
+        name: See above.
+    """
+
+    name: str | None = None
+
+    def __init__(
+        self,
+        outcomes: Iterable[str] = (),
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        *,
+        name: str | None = None,
+        **options: Unpack[StateOptions],
+    ) -> None:
+        super().__init__(outcomes, input_keys, output_keys, **options)
+        self.userdata = UserData()
+        if name is not None:
+            self.name = name
+        self._states: dict[str, State] = {}
+        self._remappings: dict[str, dict[str, str]] = {}
+        self._start_cbs: list[Callback] = []
+        self._transition_cbs: list[Callback] = []
+        self._termination_cbs: list[Callback] = []
+        self._listeners: tuple[Callable[[Event], object], ...] = ()
+        self._frame: Frame | None = None
+        self._open_tokens: list[Any] = []
+        self._context_kwargs: dict[str, Any] = {}
+        self._plan: Any = None
+        # Held while a preempt is passed on, and by the runner when it ends a child: re-entrant,
+        # because a signal handler may come in between.
+        self._lock = threading.RLock()
+
+    # -- structure -----------------------------------------------------------------------------
+
+    def __getitem__(self, key: str) -> State:
+        """Return the child with this label."""
+        try:
+            return self._states[key]
+        except KeyError:
+            self._no_child(key)
+
+    def get_children(self) -> dict[str, State]:
+        """Return label -> child, in the order in which they were added."""
+        return self._states
+
+    def get_initial_states(self) -> list[str]:
+        """Return the labels of the children that run first."""
+        raise NotImplementedError
+
+    def set_initial_state(
+        self, initial_states: Sequence[str], userdata: UserData | None = None
+    ) -> None:
+        """Choose where the next run begins, and add to the userdata."""
+        raise NotImplementedError
+
+    def get_active_states(self) -> list[str]:
+        """Return the labels of the children that run now."""
+        raise NotImplementedError
+
+    def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
+        """Return the edges inside as (outcome, from label, to label or container outcome)."""
+        raise NotImplementedError
+
+    def find_problems(self, where: str) -> tuple[str, ...]:
+        """Return what is wrong with this container itself, its children left out."""
+        raise NotImplementedError
+
+    def check_consistency(self) -> None:
+        """Check this container and all below it.
+
+        Raises:
+            InconsistentMachineError: with all problems found.
+        """
+        where = f"/{self.name or 'SM_ROOT'}"
+        problems = [*_all_problems(self, where)]
+        if problems:
+            raise InconsistentMachineError(f"{type(self).__name__} {where!r}", problems)
+
+    def is_running(self) -> bool:
+        """Tell whether it runs."""
+        return self._frame is not None
+
+    def reset_userdata(self) -> None:
+        """Forget all userdata of this container and of all containers below it."""
+        self.userdata._data.clear()  # noqa: SLF001  ours
+        for child in self.get_children().values():
+            if isinstance(child, Container):
+                child.reset_userdata()
+
+    def _store_child(
+        self, label: str, state: State, remapping: Mapping[str, str] | None
+    ) -> None:
+        if not isinstance(label, str) or not label:
+            raise InvalidStateError(f"label: got {label!r}; expected a string, not empty.")
+        if label in self._states:
+            raise InvalidStateError(
+                f"{label}: label is taken: got a second state with it; expected a label not in "
+                f"{sorted(self._states)}."
+            )
+        if not callable(getattr(state, "execute", None)):
+            raise InvalidStateError(
+                f"{label}: state: got {state!r}; expected an instance of State"
+                f"{'. Try adding (): it is a class' if isinstance(state, type) else ''}."
+            )
+        if isinstance(state, type):
+            raise InvalidStateError(
+                f"{label}: state: got the class {state.__name__}; expected an instance. "
+                f"Try {state.__name__}()."
+            )
+        self._states[label] = state
+        self._remappings[label] = dict(remapping or {})
+        self._plan = None
+
+    def _no_child(self, key: str) -> NoReturn:
+        labels = sorted(self.get_children())
+        raise KeyError(
+            f"{type(self).__name__}: no such state: got {key!r}; expected one of {labels}."
+            f"{did_you_mean(key, labels)}"
+        ) from None
+
+    # -- running -------------------------------------------------------------------------------
+
+    def execute(self, parent_ud: UserData | Remapper | None = None) -> str:
+        """Run to the end and return the outcome.
+
+        Args:
+            parent_ud: Where input keys are copied from and output keys to.
+
+        Raises:
+            InconsistentMachineError: the machine does not hold together.
+            InvalidUserCodeError: a state or callback raised; the cause is chained.
+            InvalidTransitionError: a state returned something that is none of its outcomes.
+
+        Blocks: until the machine has ended; after a preempt, see docs/preemption.md.
+        Threads: one run at a time; from several threads one after another.
+        """
+        parent = FRAME.get()
+        if parent is None:
+            return execute_root(self, parent_ud)
+        return self._run(Frame(self, parent.here(), parent.run, parent), parent_ud)
+
+    def _run(self, frame: Frame, parent_ud: UserData | Remapper | None) -> str:
+        """Run in `frame`: copy the keys, call the callbacks, run the children."""
+        plan = self._plan
+        if plan is None or plan.is_stale(self):
+            plan = self._plan = self._compile(frame)
+        with self._lock:
+            if self._frame is not None:
+                raise InvalidStateError(
+                    f"{frame.path}: execute: got a second call while it runs; expected one run "
+                    "at a time."
+                )
+            self._frame = frame
+        token = FRAME.set(frame)
+        try:
+            if self._listeners:
+                frame.run.watched = True
+            if parent_ud is not None:
+                self._copy_input_keys(parent_ud, self.userdata)
+            outcome = self._run_children(frame, plan)
+            if parent_ud is not None:
+                self._copy_output_keys(self.userdata, parent_ud)
+            return outcome
+        finally:
+            FRAME.reset(token)
+            self._leave(frame)
+
+    def _compile(self, frame: Frame) -> Any:
+        """Return this container's plan.
+
+        Raises:
+            InconsistentMachineError: it does not hold together.
+        """
+        raise NotImplementedError
+
+    def _run_children(self, frame: Frame, plan: Any) -> str:
+        """Run the children and return the outcome."""
+        raise NotImplementedError
+
+    def _make_step(self, label: str) -> Step:
+        return Step(label, self._states[label], self.userdata, self._remappings[label])
+
+    def _leave(self, frame: Frame) -> None:
+        """Forget the run; with it ends the preempt that belonged to it."""
+        with self._lock:
+            if self._frame is frame:
+                self._frame = None
+                self._preempt_requested = False
+            told, frame.told = frame.told, None
+            frame.step = None
+            if told is not None:
+                told.state.recall_preempt()
+
+    def request_preempt(self) -> None:
+        """Ask the container and all active states below it to stop.
+
+        Before a run it ends the next one at once. When it returns, every active descendant has
+        been told.
+
+        Threads: any thread, callback or signal handler; never waits for a state.
+        """
+        with self._lock:
+            super().request_preempt()
+            frame = self._frame
+            if frame is not None:
+                self._tell_children(frame)
+
+    def _tell_children(self, frame: Frame) -> None:
+        """Pass the preempt on to what runs; called with the lock held."""
+        step = frame.step
+        if step is not None:
+            frame.told = step
+            step.state.request_preempt()
+
+    def _copy_input_keys(self, parent_ud: UserData | Remapper, ud: UserData) -> None:
+        for key in self._input_keys:
+            try:
+                ud[key] = parent_ud[key]
+            except KeyError:
+                log.logwarn(f"{type(self).__name__}: input key {key!r} has no value to copy.")
+
+    def _copy_output_keys(self, ud: UserData, parent_ud: UserData | Remapper) -> None:
+        for key in self._output_keys:
+            try:
+                parent_ud[key] = ud[key]
+            except KeyError:
+                log.logwarn(f"{type(self).__name__}: output key {key!r} has no value to copy.")
+
+    # -- callbacks and listeners ---------------------------------------------------------------
+
+    def register_start_cb(
+        self, start_cb: Callable[..., object], cb_args: Iterable[Any] = ()
+    ) -> None:
+        """Call `start_cb(userdata, initial_states, *cb_args)` at the start of each run."""
+        self._start_cbs.append((start_cb, tuple(cb_args)))
+
+    def register_transition_cb(
+        self, transition_cb: Callable[..., object], cb_args: Iterable[Any] = ()
+    ) -> None:
+        """Call `transition_cb(userdata, active_states, *cb_args)` after each transition."""
+        self._transition_cbs.append((transition_cb, tuple(cb_args)))
+
+    def register_termination_cb(
+        self, termination_cb: Callable[..., object], cb_args: Iterable[Any] = ()
+    ) -> None:
+        """Call `termination_cb(userdata, terminal_states, outcome, *cb_args)` at the end."""
+        self._termination_cbs.append((termination_cb, tuple(cb_args)))
+
+    def call_start_cbs(self) -> None:
+        """Call the start callbacks; one that raises is reported, the others still run."""
+        self._call(self._start_cbs, self.get_initial_states())
+
+    def call_transition_cbs(self) -> None:
+        """Call the transition callbacks; one that raises is reported, the others still run."""
+        self._call(self._transition_cbs, self.get_active_states())
+
+    def call_termination_cbs(self, terminal_states: Sequence[str], outcome: str) -> None:
+        """Call the termination callbacks; one that raises is reported, the others still run."""
+        self._call(self._termination_cbs, terminal_states, outcome)
+
+    def _call(self, callbacks: list[Callback], *arguments: object) -> None:
+        for callback, extra in tuple(callbacks):
+            try:
+                callback(self.userdata, *arguments, *extra)
+            except Exception as error:  # noqa: BLE001  a border: reported, the machine goes on
+                frame = self._frame
+                if frame is not None:
+                    frame.callback_failed(callback, error)
+                else:
+                    log.log_exception(f"callback {callback!r} raised {error!r}", error)
+
+    def subscribe(self, listener: Callable[[Event], object]) -> Callable[[], None]:
+        """Give every event of this container and of all below it to `listener`.
+
+        Returns:
+            A function that ends it.
+
+        Threads: `listener` is called in the thread where the event happens and holds the machine
+            up while it runs. What it raises is logged and otherwise without effect.
+        """
+        self._listeners = (*self._listeners, listener)
+        frame = self._frame
+        if frame is not None:
+            frame.run.watched = True
+
+        def unsubscribe() -> None:
+            self._listeners = tuple(item for item in self._listeners if item is not listener)
+
+        return unsubscribe
+
+    # -- construction --------------------------------------------------------------------------
+
+    def __enter__(self) -> Self:
+        """Open the container for `add`."""
+        self._open_tokens.append(OPEN.set((*OPEN.get(), self)))
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Close it; at the outermost container everything is checked."""
+        OPEN.reset(self._open_tokens.pop())
+        if error is None and not OPEN.get() and self._context_kwargs.get("check", True):
+            self.check_consistency()
+
+    @contextlib.contextmanager
+    def opened(self, **kwargs: Any) -> Iterator[Self]:
+        """Open the container in a `with` block.
+
+        Args:
+            **kwargs: `check=False` leaves the check to the next `with` or to `execute`, so that
+                a machine can be built in several steps.
+        """
+        before, self._context_kwargs = self._context_kwargs, kwargs
+        try:
+            with self:
+                yield self
+        finally:
+            self._context_kwargs = before
+
+    def open(self) -> None:
+        """Open the container for `add`, until `close`."""
+        self.__enter__()
+
+    def close(self) -> None:
+        """Close what `open` opened.
+
+        Raises:
+            InvalidConstructionError: it is not the container that was opened last.
+        """
+        if not OPEN.get() or OPEN.get()[-1] is not self:
+            raise InvalidConstructionError(
+                f"{type(self).__name__}.close: it is not the container opened last: got "
+                f"{[type(c).__name__ for c in OPEN.get()]} open; expected it last."
+            )
+        self.__exit__(None, None, None)
+
+    def is_opened(self) -> bool:
+        """Tell whether `add` goes to this container."""
+        return bool(OPEN.get()) and OPEN.get()[-1] is self
+
+    def assert_opened(self, msg: str = "") -> None:
+        """Raise unless it is open."""
+        if not self.is_opened():
+            raise InvalidConstructionError(
+                f"{type(self).__name__}: not open: expected `with sm:`. {msg}".rstrip()
+            )
+
+    @classmethod
+    def _any_containers_opened(cls) -> bool:
+        return bool(OPEN.get())
+
+    @classmethod
+    def _currently_opened_container(cls) -> Any:
+        found = innermost(cls)
+        if found is None:
+            raise InvalidConstructionError(
+                f"{cls.__name__}: none is open; expected one. Try `with sm:`."
+            )
+        return found
+
+
+def _all_problems(container: Container, where: str) -> Iterator[str]:
+    yield from container.find_problems(where)
+    for label, child in container.get_children().items():
+        if isinstance(child, Container):
+            yield from _all_problems(child, f"{where}/{label}")

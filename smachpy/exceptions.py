@@ -1,0 +1,108 @@
+"""Every exception of smachpy; the data of each error is on the object too.
+
+    Exception
+     +-- SmachError
+          +-- InvalidConstructionError   a container is built in a way that cannot work
+          +-- InvalidStateError          a state, its label or its options are wrong
+          |    +-- InconsistentMachineError  a finished machine does not hold together
+          +-- InvalidTransitionError     an outcome or a target that does not exist
+          |    +-- InconsistentMachineError
+          +-- InvalidUserCodeError       a state or a callback raised; see `path` and `__cause__`
+               +-- UserDataKeyError      a key was not declared or is not there (KeyError too)
+               +-- ReadOnlyError         an input-only value was changed (TypeError too)
+
+Exceptions never write to a log; who handles one decides.
+"""
+
+from __future__ import annotations
+
+import difflib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+
+class SmachError(Exception):
+    """Root of all errors that smachpy raises on purpose.
+
+    Attributes:
+        message: The text.
+    """
+
+    def __init__(self, message: str = "") -> None:
+        self.message = message
+        super().__init__(message)
+
+
+class InvalidConstructionError(SmachError):
+    """A container is built in a way that cannot work."""
+
+
+class InvalidStateError(SmachError):
+    """A state, its label or its options are wrong."""
+
+
+class InvalidTransitionError(SmachError):
+    """An outcome or the target of a transition does not exist."""
+
+
+class InconsistentMachineError(InvalidTransitionError, InvalidStateError):
+    """A machine does not hold together; all its problems at once.
+
+    Attributes:
+        problems: One text per problem, "path: what: got …; expected …".
+    """
+
+    def __init__(self, where: str, problems: Sequence[str]) -> None:
+        self.problems = tuple(problems)
+        if len(self.problems) == 1:
+            super().__init__(self.problems[0])
+        else:
+            lines = "".join(f"\n  - {problem}" for problem in self.problems)
+            super().__init__(f"{where} has {len(self.problems)} problems:{lines}")
+
+
+class InvalidUserCodeError(SmachError):
+    """A state or a callback raised, or used the library wrongly; the cause is chained.
+
+    Attributes:
+        path: Path of the state that raised ("/PATROL/DRIVE"), or "".
+    """
+
+    def __init__(self, message: str = "", *, path: str = "") -> None:
+        self.path = path
+        super().__init__(message)
+
+
+class UserDataKeyError(InvalidUserCodeError, KeyError, AttributeError):
+    """A userdata key was not declared, or has no value.
+
+    It is a `KeyError` and an `AttributeError`, so that `in`, `hasattr` and `getattr` with a
+    default work.
+
+    Attributes:
+        key: The key.
+        declared: The keys that the state declared (undeclared key), or those that have a value.
+    """
+
+    def __init__(
+        self, key: str, problem: str, declared: Iterable[object] = (), *, path: str = ""
+    ) -> None:
+        self.key = key
+        self.declared = tuple(sorted(map(str, declared)))
+        text = f"{path or 'userdata'}: {problem}{did_you_mean(key, self.declared)}"
+        InvalidUserCodeError.__init__(self, text, path=path)
+
+    def __str__(self) -> str:
+        return self.message
+
+
+class ReadOnlyError(InvalidUserCodeError, TypeError):
+    """A state tried to change a value that it declared as input only."""
+
+
+def did_you_mean(word: object, known: Iterable[object]) -> str:
+    """Return " Did you mean …?" when `word` looks like one of `known`, else ""."""
+    near = difflib.get_close_matches(str(word), [str(k) for k in known], n=1, cutoff=0.5)
+    return f" Did you mean {near[0]!r}?" if near else ""

@@ -1,0 +1,406 @@
+"""The state machine: one child at a time, outcomes lead from one to the next."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
+
+from smachpy import log
+from smachpy._construction import construction_method
+from smachpy._core.names import unique_names
+from smachpy._core.spec import ChildSpec, MachineSpec
+from smachpy._core.validate import machine_problems
+from smachpy._runtime.step import End, Step
+from smachpy.container import Container
+from smachpy.events import Entered, Failed, Left, Preempted
+from smachpy.exceptions import (
+    InconsistentMachineError,
+    InvalidConstructionError,
+    InvalidStateError,
+    InvalidTransitionError,
+    InvalidUserCodeError,
+    SmachError,
+    did_you_mean,
+)
+from smachpy.introspection import Structure, TransitionRecord
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+    from typing import Unpack
+
+    from smachpy._runtime.frame import Frame
+    from smachpy._runtime.step import Following
+    from smachpy.introspection import Kind
+    from smachpy.state import State, StateOptions
+    from smachpy.user_data import UserData
+
+__all__ = ["StateMachine"]
+
+
+class _Plan:
+    """A state machine, compiled."""
+
+    __slots__ = ("steps", "userdata")
+
+    def __init__(self, machine: StateMachine) -> None:
+        self.userdata = machine.userdata
+        make = machine._make_step  # noqa: SLF001  one module
+        self.steps = {label: make(label) for label in machine._states}  # noqa: SLF001
+        ends = {outcome: End(outcome) for outcome in machine.get_registered_outcomes()}
+        for child in machine._child_specs():  # noqa: SLF001
+            following: dict[str, Following] = {}
+            for outcome, target in child.targets().items():
+                where = target or outcome
+                if where in self.steps and target:
+                    following[outcome] = self.steps[where]
+                elif where in ends:
+                    following[outcome] = ends[where]
+            self.steps[child.label].next = following
+
+    def is_stale(self, machine: StateMachine) -> bool:
+        if self.userdata is not machine.userdata:
+            return True
+        return any(
+            step.interface != step.state._interface  # noqa: SLF001
+            for step in self.steps.values()
+        )
+
+
+class StateMachine(Container):
+    """A container that runs one child after the other, as their outcomes say.
+
+    The first state added is the initial one. An outcome without a transition ends the machine
+    with the outcome of the same name.
+
+    Args:
+        outcomes: Outcomes.
+        input_keys: Keys copied from the parent's userdata when it starts.
+        output_keys: Keys copied to the parent's userdata when it ends.
+        name: Name of the machine when it is the root.
+        **options: See `StateOptions`.
+    """
+
+    kind: ClassVar[Kind] = "machine"
+
+    def __init__(
+        self,
+        outcomes: Iterable[str],
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        *,
+        name: str | None = None,
+        **options: Unpack[StateOptions],
+    ) -> None:
+        super().__init__(outcomes, input_keys, output_keys, name=name, **options)
+        self._transitions: dict[str, dict[str, str | None]] = {}
+        self._initial_state_label: str | None = None
+        self._next_initial: str | None = None
+        self._follow_connectors: tuple[str, tuple[str, ...]] | None = None
+
+    # -- construction --------------------------------------------------------------------------
+
+    @construction_method
+    def add(
+        self: StateMachine,
+        label: str,
+        state: State,
+        transitions: Mapping[str, str | None] | None = None,
+        remapping: Mapping[str, str] | None = None,
+        constants: Mapping[str, Any] | None = None,
+    ) -> State:
+        """Add a state.
+
+        Args:
+            label: Its name here; unique.
+            state: The state.
+            transitions: Outcome of the state -> label of the next state, or outcome of this
+                machine. Outcomes left out, or mapped to None, end the machine with the outcome of
+                the same name.
+            remapping: Key of the state -> key of this machine's userdata.
+            constants: Key of the state -> fixed value; the key is made its own in the userdata.
+
+        Returns:
+            The state.
+
+        Raises:
+            InvalidStateError: the label is taken, or `state` is no state.
+            InvalidConstructionError: called on the class while no machine is open.
+        """
+        return self._add(label, state, transitions, remapping, constants)
+
+    @construction_method
+    def add_auto(
+        self: StateMachine,
+        label: str,
+        state: State,
+        connector_outcomes: Iterable[str],
+        transitions: Mapping[str, str | None] | None = None,
+        remapping: Mapping[str, str] | None = None,
+        constants: Mapping[str, Any] | None = None,
+    ) -> State:
+        """Add a state whose `connector_outcomes` lead to the state that is added next.
+
+        Transitions given explicitly take precedence. Other arguments as in `add`.
+        """
+        connectors = unique_names(connector_outcomes, "connector_outcomes")
+        self._add(label, state, transitions, remapping, constants)
+        open_ends = tuple(o for o in connectors if self._transitions[label].get(o) is None)
+        self._follow_connectors = (label, open_ends)
+        return state
+
+    def _add(
+        self,
+        label: str,
+        state: State,
+        transitions: Mapping[str, str | None] | None,
+        remapping: Mapping[str, str] | None,
+        constants: Mapping[str, Any] | None,
+    ) -> State:
+        if self._frame is not None:
+            raise InvalidConstructionError(
+                f"{label}: add: got a new state while the machine runs; expected it before or "
+                "after."
+            )
+        self._store_child(label, state, remapping)
+        self._transitions[label] = dict(transitions or {})
+        for key, value in (constants or {}).items():
+            name = f"{label}.{key}"
+            self.userdata[name] = value
+            self._remappings[label][key] = name
+            state.register_input_keys([key])
+        if self._follow_connectors is not None:
+            before, outcomes = self._follow_connectors
+            self._transitions[before].update(dict.fromkeys(outcomes, label))
+            self._follow_connectors = None
+        if self._initial_state_label is None:
+            self._initial_state_label = label
+        return state
+
+    # -- structure -----------------------------------------------------------------------------
+
+    def set_initial_state(
+        self, initial_states: Sequence[str], userdata: UserData | None = None
+    ) -> None:
+        """Choose where the next run begins, that one only, and add to the userdata.
+
+        Raises:
+            InvalidStateError: more than one state, or one that is not there.
+        """
+        if isinstance(initial_states, str):
+            initial_states = [initial_states]
+        labels = list(initial_states)
+        unknown = [label for label in labels if label not in self._states]
+        if len(labels) > 1 or unknown:
+            raise InvalidStateError(
+                f"initial state: got {labels!r}; expected one of {sorted(self._states)}."
+                f"{did_you_mean(unknown[0], self._states) if unknown else ''}"
+            )
+        if labels:
+            if not self.is_opened() and self._initial_state_label is not None:
+                self._next_initial = labels[0]
+            else:
+                self._initial_state_label = labels[0]
+        if userdata is not None:
+            self.userdata.update(userdata)
+
+    def get_initial_states(self) -> list[str]:
+        """Return the label of the state that the next run begins with."""
+        label = self._next_initial or self._initial_state_label
+        return [] if label is None else [label]
+
+    def get_active_states(self) -> list[str]:
+        """Return the label of the active state; ['None'] when idle."""
+        return [str(self._current_label)]
+
+    @property
+    def _current_label(self) -> str | None:
+        frame = self._frame
+        step = None if frame is None else frame.step
+        return None if step is None else step.label
+
+    @property
+    def _current_state(self) -> State | None:
+        frame = self._frame
+        step = None if frame is None else frame.step
+        return None if step is None else step.state
+
+    @property
+    def _is_running(self) -> bool:
+        return self._frame is not None
+
+    def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
+        """Return the edges as (outcome, from label, to label or container outcome)."""
+        return [
+            (outcome, child.label, target or outcome)
+            for child in self._child_specs()
+            for outcome, target in child.targets().items()
+        ]
+
+    def check_state_spec(
+        self, label: str, state: State, transitions: Mapping[str, str | None]
+    ) -> None:
+        """Check that `transitions` leave from outcomes of `state`.
+
+        Raises:
+            InvalidTransitionError: one does not.
+        """
+        outcomes = state.get_registered_outcomes()
+        for outcome in transitions:
+            if outcome not in outcomes:
+                raise InvalidTransitionError(
+                    f"{label}: transition from an unknown outcome: got {outcome!r}; expected one "
+                    f"of {sorted(outcomes)}.{did_you_mean(outcome, outcomes)}"
+                )
+
+    def find_problems(self, where: str) -> tuple[str, ...]:
+        """Return what is wrong with this machine itself."""
+        initial = self._next_initial or self._initial_state_label
+        outcomes = self.get_registered_outcomes()
+        spec = MachineSpec(where, outcomes, tuple(self._child_specs()), initial)
+        return machine_problems(spec)
+
+    def _child_specs(self) -> Iterable[ChildSpec]:
+        for label, state in self._states.items():
+            outcomes = tuple(state.get_registered_outcomes())
+            yield ChildSpec(label, outcomes, tuple(self._transitions[label].items()))
+
+    def describe_structure(self) -> Structure:
+        """Return the children and the edges between them."""
+        edges = []
+        for child in self._child_specs():
+            for outcome, target in child.targets().items():
+                ends = not target or target not in self._states
+                edges.append(
+                    TransitionRecord(child.label, outcome, target or outcome, ends, not target)
+                )
+        children = tuple(
+            (label, state, tuple(self._remappings[label].items()))
+            for label, state in self._states.items()
+        )
+        return Structure(children, tuple(self.get_initial_states()), tuple(edges))
+
+    # -- running -------------------------------------------------------------------------------
+
+    def _compile(self, frame: Frame) -> _Plan:
+        problems = self.find_problems(frame.path)
+        if problems:
+            raise InconsistentMachineError(f"{type(self).__name__} {frame.path!r}", problems)
+        return _Plan(self)
+
+    def _run_children(self, frame: Frame, plan: _Plan) -> str:
+        if self._start_cbs:
+            self.call_start_cbs()
+        label, self._next_initial = self._next_initial or self._initial_state_label, None
+        if frame.run.watched:
+            log.loginfo(f"{frame.path}: starting in {label!r}, keys {self.userdata.keys()}")
+        assert label is not None
+        last, outcome = self._loop(frame, plan.steps[label])
+        if frame.run.watched:
+            log.loginfo(f"{frame.path}: {last!r} ended it with {outcome!r}")
+        if self._termination_cbs:
+            frame.step = None
+            self.call_termination_cbs([last], outcome)
+        return outcome
+
+    def _loop(self, frame: Frame, step: Step) -> tuple[str, str]:
+        """Run step after step; return the last label and the machine's outcome.
+
+        This is the hot path. While nobody watches, waits or asks for a preempt, a transition is
+        one call, one look-up and a few flags.
+        """
+        run = frame.run
+        try:
+            while True:
+                frame.step = step
+                if self._preempt_requested or run.watched or self._transition_cbs:
+                    following = self._careful(frame, step)
+                else:
+                    outcome = step.execute(step.userdata)
+                    if self._preempt_requested or step.state._preempt_requested:  # noqa: SLF001
+                        following = self._after_preempt(frame, step, outcome)
+                    else:
+                        following = step.next[outcome]
+                if following.final:
+                    return step.label, following.outcome
+                step = following
+        except SmachError:
+            raise
+        except Exception as error:
+            self._raise_user_error(frame, step, error)
+
+    def _careful(self, frame: Frame, step: Step) -> Following:
+        """Run one step with everything that may want to know of it."""
+        run = frame.run
+        if self._preempt_requested:
+            return self._preempted(frame, step)
+        watched = run.watched
+        if watched:
+            frame.emit(Entered)
+        try:
+            outcome = step.execute(step.watched_userdata(frame) if watched else step.userdata)
+        except Exception as error:
+            frame.emit(Failed, f"{type(error).__name__}: {error}")
+            raise
+        if watched:
+            frame.emit(Left, outcome)
+        following = self._after_preempt(frame, step, outcome)
+        if not following.final:
+            frame.step = following
+            if watched:
+                log.loginfo(f"{frame.path}: {step.label!r} -{outcome}-> {following.label!r}")
+            if self._transition_cbs:
+                self.call_transition_cbs()
+        return following
+
+    def _preempted(self, frame: Frame, step: Step) -> End:
+        """End because of a preempt, before `step` has begun."""
+        frame.emit_own(Preempted, step.label)
+        return End("preempted")
+
+    def _after_preempt(self, frame: Frame, step: Step, outcome: str) -> Following:
+        """Follow `outcome` when there may have been a preempt meanwhile.
+
+        A child that ended 'preempted', or said that it served the preempt, has taken it up: the
+        machine goes where its outcome leads. A child that just finished keeps its outcome if that
+        ends the machine; else the machine ends 'preempted', and nothing more is started.
+        """
+        state = step.state
+        with self._lock:  # whoever passes the preempt on is done after this
+            served = frame.told is step and not state.preempt_requested()
+            if state.preempt_requested():
+                state.recall_preempt()
+            frame.told = None
+            if self._preempt_requested:
+                if outcome == "preempted" and outcome not in step.next:
+                    return self._preempted(frame, step)
+                following = self._following(frame, step, outcome)
+                if following.final:
+                    return following
+                if served or outcome == "preempted":
+                    self._preempt_requested = False
+                    return following
+                return self._preempted(frame, step)
+        return self._following(frame, step, outcome)
+
+    def _following(self, frame: Frame, step: Step, outcome: str) -> Following:
+        try:
+            return step.next[outcome]
+        except (KeyError, TypeError):
+            self._raise_bad_outcome(frame, step, outcome)
+
+    def _raise_user_error(self, frame: Frame, step: Step, error: Exception) -> NoReturn:
+        """Raise what a step's failure means: a bad outcome, or code that raised."""
+        trace = error.__traceback__
+        if isinstance(error, (KeyError, TypeError)) and trace is not None and not trace.tb_next:
+            self._raise_bad_outcome(frame, step, error.args[0] if error.args else None)
+        path = f"{frame.path}/{step.label}"
+        raise InvalidUserCodeError(
+            f"{path}: {type(step.state).__name__} raised {type(error).__name__}: {error}",
+            path=path,
+        ) from error
+
+    def _raise_bad_outcome(self, frame: Frame, step: Step, outcome: object) -> NoReturn:
+        outcomes = step.state.get_registered_outcomes()
+        raise InvalidTransitionError(
+            f"{frame.path}/{step.label}: unknown outcome: got {outcome!r}; expected one of "
+            f"{sorted(outcomes)}.{did_you_mean(outcome, outcomes)}"
+        ) from None

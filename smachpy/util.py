@@ -1,0 +1,127 @@
+"""SMACH's small functions: the shutdown check and interfaces of callbacks."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
+
+from smachpy._core.names import unique_names
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+__all__ = [
+    "CBInterface",
+    "cb_interface",
+    "has_smach_interface",
+    "is_shutdown",
+    "set_shutdown_check",
+]
+
+P = ParamSpec("P")
+R_co = TypeVar("R_co", covariant=True)
+
+
+def _never() -> bool:
+    return False
+
+
+_check: list[Callable[[], bool]] = [_never]
+
+
+def is_shutdown() -> bool:
+    """Tell whether the program is shutting down, by the check of `set_shutdown_check`."""
+    return _check[0]()
+
+
+def set_shutdown_check(cb: Callable[[], bool]) -> None:
+    """Make `cb` say whether the program is shutting down; machines then end 'preempted'."""
+    _check[0] = cb
+
+
+def has_shutdown_check() -> bool:
+    """Tell whether `set_shutdown_check` was called."""
+    return _check[0] is not _never
+
+
+def has_smach_interface(obj: object) -> bool:
+    """Tell whether `obj` declares outcomes and keys as a state does."""
+    return (
+        hasattr(obj, "get_registered_input_keys")
+        and hasattr(obj, "get_registered_output_keys")
+        and hasattr(obj, "get_registered_outcomes")
+    )
+
+
+class CBInterface(Generic[P, R_co]):
+    """A callback together with the outcomes and keys that it adds to its state.
+
+    Args:
+        cb: The callback.
+        outcomes: Outcomes that it may return.
+        input_keys: Userdata keys that it reads.
+        output_keys: Userdata keys that it writes.
+        io_keys: Keys that it reads and writes.
+    """
+
+    def __init__(
+        self,
+        cb: Callable[P, R_co],
+        outcomes: Iterable[str] | None = None,
+        input_keys: Iterable[str] | None = None,
+        output_keys: Iterable[str] | None = None,
+        io_keys: Iterable[str] | None = None,
+    ) -> None:
+        both = unique_names(io_keys or (), "io_keys")
+        self._cb = cb
+        self._outcomes = unique_names(outcomes or (), "outcomes")
+        self._input_keys = unique_names((*unique_names(input_keys or (), "input_keys"), *both))
+        self._output_keys = unique_names((*unique_names(output_keys or (), "output_keys"), *both))
+        self.__doc__ = cb.__doc__
+        self.__name__ = getattr(cb, "__name__", type(cb).__name__)
+        self.__wrapped__ = cb
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R_co:
+        """Call the callback."""
+        return self._cb(*args, **kwargs)
+
+    def __get__(self, instance: object, owner: type | None = None) -> Any:
+        """Bind to an instance, so that the decorator works on methods too."""
+        if instance is None or not hasattr(self._cb, "__get__"):
+            return self
+        bound = self._cb.__get__(instance, owner)
+        return CBInterface(bound, self._outcomes, self._input_keys, self._output_keys)
+
+    def get_registered_outcomes(self) -> tuple[str, ...]:
+        """Return the outcomes, in the order of their declaration."""
+        return self._outcomes
+
+    def get_registered_input_keys(self) -> tuple[str, ...]:
+        """Return the keys that the callback reads."""
+        return self._input_keys
+
+    def get_registered_output_keys(self) -> tuple[str, ...]:
+        """Return the keys that the callback writes."""
+        return self._output_keys
+
+
+class cb_interface:  # noqa: N801  SMACH's name
+    """Decorator that declares a callback's outcomes and keys; gives a `CBInterface`."""
+
+    def __init__(
+        self,
+        outcomes: Iterable[str] | None = None,
+        input_keys: Iterable[str] | None = None,
+        output_keys: Iterable[str] | None = None,
+        *,
+        io_keys: Iterable[str] | None = None,
+    ) -> None:
+        self._interface = (
+            tuple(outcomes or ()),
+            tuple(input_keys or ()),
+            tuple(output_keys or ()),
+            tuple(io_keys or ()),
+        )
+
+    def __call__(self, cb: Callable[P, R_co]) -> CBInterface[P, R_co]:
+        """Attach the interface to `cb`."""
+        return CBInterface(cb, *self._interface)
