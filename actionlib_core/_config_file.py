@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 # Files named in a configuration file are looked for beside it.
 _FILE_FIELDS = frozenset({"ca", "certificate", "key", "password_file", "users_file"})
+_EXPECTED = {float: "a number", int: "a whole number", bool: "true or false"}
 
 
 def read_config_file(path: Path) -> Config:
@@ -100,8 +101,7 @@ class _Reader:
             if path.rpartition(".")[2] in _FILE_FIELDS:
                 return str(self._folder / value)
             return str(value)
-        return self._report(path, "wrong type", value, {float: "a number", int: "a whole number", bool: "true or false"}
-                            .get(hint, "a text"))  # fmt: skip
+        return self._report(path, "wrong type", value, _EXPECTED.get(hint, "a text"))
 
     def _report(self, path: str, what: str, value: object, expected: object) -> object:
         self.problems.append(

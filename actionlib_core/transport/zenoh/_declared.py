@@ -88,7 +88,10 @@ class Publisher(Declared):
             raise TransportError(f"{self._key}: cannot send: {error}") from error
 
     def matching(self) -> bool:
-        return not self._inlet.closed and self._port.matching_status
+        if self._inlet.closed:
+            return False
+        status: Any = self._port.matching_status  # zenoh's stub says bool
+        return bool(status.matching)
 
 
 class LatchedPublisher(Publisher):

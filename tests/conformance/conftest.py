@@ -1,0 +1,115 @@
+"""One suite, several networks: memory on virtual and on real time, and zenoh."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+import pytest
+
+from actionlib_core.clock import RealClock, VirtualClock, use_clock
+from actionlib_core.transport.memory import MemoryNetwork
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from actionlib_core.clock import Clock
+    from actionlib_core.transport import Presence, Transport
+
+T = TypeVar("T")
+DEADLINE_S = 10.0
+
+
+class Inbox(Generic[T]):
+    """A callback that collects, and waits for what it collects."""
+
+    def __init__(self, clock: Clock) -> None:
+        self.clock = clock
+        self.items: list[T] = []
+        self._changed = clock.event()
+
+    def __call__(self, item: T) -> None:
+        self.items.append(item)
+        self._changed.set()
+
+    def wait(self, condition: Callable[[list[T]], bool]) -> list[T]:
+        deadline = self.clock.now() + DEADLINE_S
+        while True:
+            self._changed.clear()
+            if condition(self.items):
+                return self.items
+            left = deadline - self.clock.now()
+            assert left > 0, f"still only {self.items}"
+            self._changed.wait(left)
+
+    def wait_for(self, count: int) -> list[T]:
+        return self.wait(lambda items: len(items) >= count)
+
+
+class Network:
+    """Sessions that can reach each other, closed at the end of the test."""
+
+    def __init__(self, clock: Clock, open_session: Callable[[], Transport]) -> None:
+        self.clock = clock
+        self._open = open_session
+        self._sessions: list[Transport] = []
+        self._meetings = itertools.count()
+
+    def session(self) -> Transport:
+        session = self._open()
+        self._sessions.append(session)
+        return session
+
+    def inbox(self) -> Inbox:
+        return Inbox(self.clock)
+
+    def meet(self, *sessions: Transport) -> None:
+        """Wait until each session knows what the others have declared so far."""
+        meeting = next(self._meetings)
+        inboxes: list[Inbox[Presence]] = []
+        handles = []
+        for session in sessions:
+            inbox = self.inbox()
+            inboxes.append(inbox)
+            handles.append(session.watch_alive(f"@meeting/{meeting}/*", inbox))
+        for session in sessions:
+            handles.append(session.declare_alive(f"@meeting/{meeting}/{session.session_id}"))
+        for inbox in inboxes:
+            inbox.wait_for(len(sessions))
+        for handle in handles:
+            handle.close()
+
+    def close(self) -> None:
+        for session in self._sessions:
+            session.close()
+
+
+def _memory(clock: Clock) -> Network:
+    return Network(clock, MemoryNetwork(clock).session)
+
+
+def _zenoh() -> Network:
+    from actionlib_core.transport.zenoh import ZenohTransport
+
+    return Network(RealClock(), ZenohTransport)
+
+
+@pytest.fixture(
+    params=[
+        "memory-virtual",
+        "memory-seeded",
+        "memory-real",
+        pytest.param("zenoh", marks=pytest.mark.zenoh),
+    ]
+)
+def network(request: pytest.FixtureRequest) -> Iterator[Network]:
+    if request.param in {"memory-virtual", "memory-seeded"}:
+        seed = None if request.param == "memory-virtual" else 7
+        with VirtualClock(seed) as clock, use_clock(clock):
+            network = _memory(clock)
+            yield network
+            network.close()
+    else:
+        network = _zenoh() if request.param == "zenoh" else _memory(RealClock())
+        yield network
+        network.close()

@@ -1,0 +1,627 @@
+"""Every promise of the Transport protocol, on every network."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+from actionlib_core.exceptions import TransportError
+from actionlib_core.transport import Presence, Quality
+
+GOAL = "robot_0/move_base/goal"
+LATCH = Quality(latch=True)
+
+
+def payloads(items):
+    return [item.payload for item in items]
+
+
+# -- publishing ------------------------------------------------------------------------------------
+
+
+def test_put_reaches_subscriber_with_key_encoding_and_source(network):
+    a, b = network.session(), network.session()
+    inbox = network.inbox()
+    b.subscribe(GOAL, inbox)
+    publisher = a.publisher(GOAL, "ros1/pkg/Type;md5=12", Quality(express=True))
+    network.meet(a, b)
+    publisher.put(b"one")
+    assert inbox.wait_for(1) == [(GOAL, b"one", "ros1/pkg/Type;md5=12", a.session_id)]
+
+
+def test_put_without_encoding_arrives_with_empty_encoding(network):
+    a, b = network.session(), network.session()
+    inbox = network.inbox()
+    b.subscribe(GOAL, inbox)
+    publisher = a.publisher(GOAL)
+    network.meet(a, b)
+    publisher.put(b"")
+    assert inbox.wait_for(1) == [(GOAL, b"", "", a.session_id)]
+
+
+def test_messages_of_one_sender_keep_their_order(network):
+    a, b = network.session(), network.session()
+    inbox = network.inbox()
+    b.subscribe(GOAL, inbox)
+    publisher = a.publisher(GOAL)
+    network.meet(a, b)
+    sent = [str(number).encode() for number in range(500)]
+    for payload in sent:
+        publisher.put(payload)
+    assert payloads(inbox.wait_for(500)) == sent
+
+
+def test_large_payload_arrives_whole(network):
+    a, b = network.session(), network.session()
+    inbox = network.inbox()
+    b.subscribe(GOAL, inbox)
+    publisher = a.publisher(GOAL)
+    network.meet(a, b)
+    publisher.put(bytes(range(256)) * 20_000)
+    assert payloads(inbox.wait_for(1)) == [bytes(range(256)) * 20_000]
+
+
+def test_every_subscriber_of_the_key_gets_it_and_no_other(network):
+    a, b, c = (network.session() for _ in range(3))
+    first, second, other = network.inbox(), network.inbox(), network.inbox()
+    b.subscribe(GOAL, first)
+    c.subscribe(GOAL, second)
+    c.subscribe("robot_0/move_base/goals", other)
+    publisher = a.publisher(GOAL)
+    last = a.publisher("robot_0/move_base/goals")
+    network.meet(a, b, c)
+    publisher.put(b"x")
+    last.put(b"y")
+    assert payloads(first.wait_for(1)) == [b"x"]
+    assert payloads(second.wait_for(1)) == [b"x"]
+    assert payloads(other.wait_for(1)) == [b"y"]
+
+
+def test_own_puts_arrive_off_the_callers_stack(network):
+    a = network.session()
+    inside = []
+    inbox = network.inbox()
+    putting = threading.local()
+
+    def callback(sample):
+        inside.append(getattr(putting, "now", False))
+        inbox(sample)
+
+    a.subscribe(GOAL, callback)
+    publisher = a.publisher(GOAL)
+    putting.now = True
+    publisher.put(b"x")
+    putting.now = False
+    assert payloads(inbox.wait_for(1)) == [b"x"]
+    assert inside == [False]
+
+
+def test_callback_may_put_on_its_own_key(network):
+    a, b = network.session(), network.session()
+    inbox = network.inbox()
+
+    def count_down(sample):
+        inbox(sample)
+        left = int(sample.payload) - 1
+        if left >= 0:
+            answer.put(str(left).encode())
+
+    answer = b.publisher(GOAL)
+    b.subscribe(GOAL, count_down)
+    publisher = a.publisher(GOAL)
+    network.meet(a, b)
+    publisher.put(b"3")
+    assert payloads(inbox.wait_for(4)) == [b"3", b"2", b"1", b"0"]
+
+
+def test_callback_may_declare_and_close(network):
+    a, b = network.session(), network.session()
+    inbox, later = network.inbox(), network.inbox()
+    handles = []
+
+    def callback(sample):
+        handles.pop().close()
+        b.subscribe("later", later)
+        b.declare_alive("@later/b")
+        inbox(sample)
+
+    handles.append(b.subscribe(GOAL, callback))
+    alive = network.inbox()
+    a.watch_alive("@later/*", alive)
+    publisher = a.publisher(GOAL)
+    second = a.publisher("later")
+    network.meet(a, b)
+    publisher.put(b"x")
+    alive.wait_for(1)
+    publisher.put(b"y")
+    second.put(b"z")
+    assert payloads(later.wait_for(1)) == [b"z"]
+    assert payloads(inbox.items) == [b"x"]
+
+
+def test_matching_follows_the_subscribers(network):
+    a, b = network.session(), network.session()
+    publisher = a.publisher(GOAL)
+    assert not publisher.matching()
+    subscriber = b.subscribe(GOAL, print)
+    network.meet(a, b)
+    assert publisher.matching()
+    subscriber.close()
+    network.meet(a, b)
+    assert not publisher.matching()
+
+
+def test_raising_callback_is_reported_and_the_next_message_comes(network, monkeypatch):
+    reported = []
+    monkeypatch.setattr(threading, "excepthook", lambda args: reported.append(args.exc_value))
+    a, b = network.session(), network.session()
+    inbox = network.inbox()
+
+    def callback(sample):
+        inbox(sample)
+        if sample.payload == b"bad":
+            raise ValueError("bad sample")
+
+    b.subscribe(GOAL, callback)
+    publisher = a.publisher(GOAL)
+    network.meet(a, b)
+    publisher.put(b"bad")
+    publisher.put(b"good")
+    assert payloads(inbox.wait_for(2)) == [b"bad", b"good"]
+    assert [str(error) for error in reported] == ["bad sample"]
+
+
+# -- latching --------------------------------------------------------------------------------------
+
+
+def test_late_subscriber_gets_exactly_the_last_message(network):
+    a, b = network.session(), network.session()
+    publisher = a.publisher(GOAL, "enc", LATCH)
+    for payload in (b"1", b"2", b"3"):
+        publisher.put(payload)
+    network.meet(a, b)
+    inbox = network.inbox()
+    b.subscribe(GOAL, inbox)
+    assert inbox.wait_for(1) == [(GOAL, b"3", "enc", a.session_id)]
+    publisher.put(b"4")
+    assert payloads(inbox.wait_for(2)) == [b"3", b"4"]
+
+
+def test_early_subscriber_gets_every_latched_message_once(network):
+    a, b = network.session(), network.session()
+    inbox = network.inbox()
+    b.subscribe(GOAL, inbox)
+    network.meet(a, b)
+    publisher = a.publisher(GOAL, "", LATCH)
+    network.meet(a, b)
+    for payload in (b"1", b"2", b"3"):
+        publisher.put(payload)
+    assert payloads(inbox.wait_for(3)) == [b"1", b"2", b"3"]
+    late = network.inbox()
+    b.subscribe(GOAL, late)
+    late.wait_for(1)
+    publisher.put(b"end")
+    assert payloads(late.wait_for(2)) == [b"3", b"end"]
+    assert payloads(inbox.wait_for(4)) == [b"1", b"2", b"3", b"end"]
+
+
+def test_subscriber_of_the_same_session_gets_the_latched_message(network):
+    a = network.session()
+    publisher = a.publisher(GOAL, "", LATCH)
+    publisher.put(b"1")
+    inbox = network.inbox()
+    a.subscribe(GOAL, inbox)
+    assert payloads(inbox.wait_for(1)) == [b"1"]
+
+
+def test_every_latched_publisher_is_heard(network):
+    a, b, c = (network.session() for _ in range(3))
+    for session, payload in ((a, b"a"), (b, b"b")):
+        session.publisher(GOAL, "", LATCH).put(payload)
+    network.meet(a, b, c)
+    inbox = network.inbox()
+    c.subscribe(GOAL, inbox)
+    assert sorted(payloads(inbox.wait_for(2))) == [b"a", b"b"]
+
+
+def test_closed_latched_publisher_is_forgotten(network):
+    a, b = network.session(), network.session()
+    old = a.publisher(GOAL, "", LATCH)
+    old.put(b"old")
+    old.close()
+    new = a.publisher(GOAL, "", LATCH)
+    new.put(b"new")
+    network.meet(a, b)
+    inbox = network.inbox()
+    b.subscribe(GOAL, inbox)
+    inbox.wait_for(1)
+    new.put(b"end")
+    assert payloads(inbox.wait_for(2)) == [b"new", b"end"]
+
+
+def test_without_history_the_latched_message_does_not_come(network):
+    a, b = network.session(), network.session()
+    publisher = a.publisher(GOAL, "", LATCH)
+    publisher.put(b"1")
+    inbox = network.inbox()
+    b.subscribe(GOAL, inbox, history=False)
+    network.meet(a, b)
+    publisher.put(b"2")
+    assert payloads(inbox.wait_for(1)) == [b"2"]
+
+
+# -- queries ---------------------------------------------------------------------------------------
+
+
+def ask(network, session, key="add", payload=b"?", timeout=5.0):
+    replies, done = network.inbox(), network.inbox()
+    handle = session.query(
+        key, payload, encoding="q", timeout=timeout, on_reply=replies, on_done=lambda: done("done")
+    )
+    return handle, replies, done
+
+
+def test_query_gets_the_answer_and_one_done(network):
+    a, b = network.session(), network.session()
+    seen = []
+
+    def answer(query):
+        seen.append((query.key, query.payload, query.encoding))
+        query.reply(b"yes", "r")
+        query.finish()
+        query.finish()
+        query.reply(b"too late")
+
+    b.queryable("add", answer)
+    network.meet(a, b)
+    _, replies, done = ask(network, a)
+    done.wait_for(1)
+    assert replies.items == [("add", b"yes", "r", False)]
+    assert seen == [("add", b"?", "q")]
+    ask(network, a)[2].wait_for(1)
+    assert done.items == ["done"]
+
+
+def test_query_may_be_answered_later_from_another_thread(network):
+    a, b = network.session(), network.session()
+
+    def answer(query):
+        def later():
+            query.reply(b"later")
+            query.finish()
+
+        network.clock.spawn(later, name="later")
+
+    b.queryable("add", answer)
+    network.meet(a, b)
+    _, replies, done = ask(network, a)
+    done.wait_for(1)
+    assert payloads(replies.items) == [b"later"]
+
+
+def test_query_to_the_own_session_runs_off_the_callers_stack(network):
+    a = network.session()
+    held = threading.Lock()
+
+    def answer(query):
+        with held:
+            query.reply(b"self")
+            query.finish()
+
+    a.queryable("add", answer)
+    with held:
+        _, replies, done = ask(network, a)
+    done.wait_for(1)
+    assert payloads(replies.items) == [b"self"]
+
+
+def test_every_queryable_is_asked(network):
+    a, b, c = (network.session() for _ in range(3))
+    for session, payload in ((a, b"a"), (b, b"b"), (c, b"c")):
+
+        def answer(query, payload=payload):
+            query.reply(payload)
+            query.finish()
+
+        session.queryable("add", answer)
+    network.meet(a, b, c)
+    _, replies, done = ask(network, a)
+    done.wait_for(1)
+    assert sorted(payloads(replies.items)) == [b"a", b"b", b"c"]
+
+
+def test_query_that_nobody_answers_is_done_at_once(network):
+    a = network.session()
+    start = network.clock.now()
+    _, replies, done = ask(network, a, timeout=60.0)
+    done.wait_for(1)
+    assert replies.items == []
+    assert network.clock.now() - start < 5.0
+
+
+def test_error_reply_is_marked(network):
+    a, b = network.session(), network.session()
+
+    def answer(query):
+        query.reply_error("no: überlast")
+        query.finish()
+
+    b.queryable("add", answer)
+    network.meet(a, b)
+    _, replies, done = ask(network, a)
+    done.wait_for(1)
+    assert [(r.payload.decode(), r.error) for r in replies.items] == [("no: überlast", True)]
+
+
+def test_query_ends_at_its_timeout_without_a_reply(network):
+    a, b = network.session(), network.session()
+    kept = []
+    b.queryable("add", kept.append)
+    network.meet(a, b)
+    start = network.clock.now()
+    _, replies, done = ask(network, a, timeout=0.2)
+    done.wait_for(1)
+    assert network.clock.now() - start >= 0.15
+    assert replies.items == []
+    kept[0].reply(b"late")
+    kept[0].finish()
+    ask(network, a, key="nobody")[2].wait_for(1)
+    assert replies.items == []
+    assert done.items == ["done"]
+
+
+def test_raising_queryable_answers_with_its_error(network, monkeypatch):
+    reported = []
+    monkeypatch.setattr(threading, "excepthook", lambda args: reported.append(args.exc_value))
+    a, b = network.session(), network.session()
+
+    def answer(query):
+        raise ValueError("cannot add")
+
+    b.queryable("add", answer)
+    network.meet(a, b)
+    _, replies, done = ask(network, a)
+    done.wait_for(1)
+    assert [(r.payload, r.error) for r in replies.items] == [(b"ValueError: cannot add", True)]
+    assert [str(error) for error in reported] == ["cannot add"]
+
+
+def test_query_ends_when_the_answering_session_closes(network):
+    a, b = network.session(), network.session()
+    asked = network.inbox()
+    b.queryable("add", asked)
+    network.meet(a, b)
+    start = network.clock.now()
+    _, replies, done = ask(network, a, timeout=60.0)
+    asked.wait_for(1)
+    b.close()
+    done.wait_for(1)
+    assert replies.items == []
+    assert network.clock.now() - start < 5.0
+
+
+def test_closed_query_calls_nothing(network):
+    a, b = network.session(), network.session()
+    asked = network.inbox()
+    b.queryable("add", asked)
+    network.meet(a, b)
+    handle, replies, done = ask(network, a)
+    asked.wait_for(1)
+    handle.close()
+    handle.close()
+    asked.items[0].reply(b"x")
+    asked.items[0].finish()
+    ask(network, a, key="nobody")[2].wait_for(1)
+    assert (replies.items, done.items) == ([], [])
+
+
+def test_closed_queryable_is_not_asked(network):
+    a, b = network.session(), network.session()
+    asked = network.inbox()
+    b.queryable("add", asked).close()
+    network.meet(a, b)
+    ask(network, a)[2].wait_for(1)
+    assert asked.items == []
+
+
+# -- presence --------------------------------------------------------------------------------------
+
+
+def test_watch_hears_existing_tokens_first_then_changes(network):
+    a, b = network.session(), network.session()
+    first = b.declare_alive("@x/server/one")
+    network.meet(a, b)
+    inbox = network.inbox()
+    a.watch_alive("@x/*/**", inbox)
+    inbox.wait_for(1)
+    second = b.declare_alive("@x/server/two")
+    inbox.wait_for(2)
+    first.close()
+    inbox.wait_for(3)
+    second.close()
+    assert inbox.wait_for(4) == [
+        Presence("@x/server/one", alive=True),
+        Presence("@x/server/two", alive=True),
+        Presence("@x/server/one", alive=False),
+        Presence("@x/server/two", alive=False),
+    ]
+
+
+def test_watch_hears_the_own_sessions_tokens_too(network):
+    a = network.session()
+    before = a.declare_alive("@x/one")
+    inbox = network.inbox()
+    a.watch_alive("@x/*", inbox)
+    inbox.wait_for(1)
+    after = a.declare_alive("@x/two")
+    inbox.wait_for(2)
+    after.close()
+    before.close()
+    assert [(p.key[-3:], p.alive) for p in inbox.wait_for(4)] == [
+        ("one", True), ("two", True), ("two", False), ("one", False),
+    ]  # fmt: skip
+
+
+def test_token_declared_twice_vanishes_with_the_last(network):
+    a, b = network.session(), network.session()
+    inbox = network.inbox()
+    a.watch_alive("@x/*", inbox)
+    first, second = b.declare_alive("@x/one"), b.declare_alive("@x/one")
+    network.meet(a, b)
+    first.close()
+    network.meet(a, b)
+    assert inbox.items == [Presence("@x/one", alive=True)]
+    second.close()
+    assert inbox.wait_for(2)[1] == Presence("@x/one", alive=False)
+
+
+def test_tokens_vanish_with_their_session(network):
+    a, b = network.session(), network.session()
+    inbox = network.inbox()
+    a.watch_alive("@x/**", inbox)
+    b.declare_alive("@x/one")
+    b.declare_alive("@x/two/three")
+    inbox.wait_for(2)
+    b.close()
+    gone = {p.key for p in inbox.wait_for(4) if not p.alive}
+    assert gone == {"@x/one", "@x/two/three"}
+
+
+def test_closed_watch_hears_nothing(network):
+    a, b = network.session(), network.session()
+    closed, open_ = network.inbox(), network.inbox()
+    a.watch_alive("@x/*", closed).close()
+    a.watch_alive("@x/*", open_)
+    b.declare_alive("@x/one")
+    open_.wait_for(1)
+    assert closed.items == []
+
+
+def test_list_returns_what_matches_now(network):
+    a, b = network.session(), network.session()
+    a.declare_alive("@x/action/0/robot_0/move_base")
+    b.declare_alive("@x/action/1/robot_1/move_base")
+    gone = b.declare_alive("@x/action/2/robot_1/dock")
+    network.meet(a, b)
+    gone.close()
+    network.meet(a, b)
+    assert a.list_alive("@x/action/*/**", 5.0) == [
+        "@x/action/0/robot_0/move_base",
+        "@x/action/1/robot_1/move_base",
+    ]
+    assert a.list_alive("@x/*/*/robot_1/**", 5.0) == ["@x/action/1/robot_1/move_base"]
+    assert a.list_alive("@x/service/**", 5.0) == []
+    assert a.list_alive("*/**", 5.0) == []  # no wildcard stands for a word with '@'
+
+
+# -- closing ---------------------------------------------------------------------------------------
+
+
+def test_closed_subscriber_gets_nothing_more(network):
+    a, b = network.session(), network.session()
+    closed, open_ = network.inbox(), network.inbox()
+    subscriber = b.subscribe(GOAL, closed)
+    b.subscribe(GOAL, open_)
+    publisher = a.publisher(GOAL)
+    network.meet(a, b)
+    publisher.put(b"1")
+    open_.wait_for(1)
+    closed.wait_for(1)
+    subscriber.close()
+    subscriber.close()
+    publisher.put(b"2")
+    open_.wait_for(2)
+    assert payloads(closed.items) == [b"1"]
+
+
+def test_closed_publisher_raises(network):
+    a = network.session()
+    publisher = a.publisher(GOAL)
+    publisher.close()
+    publisher.close()
+    with pytest.raises(TransportError, match="publisher is closed"):
+        publisher.put(b"x")
+
+
+def test_closed_session_raises_on_everything_but_close(network):
+    a = network.session()
+    publisher = a.publisher(GOAL)
+    handles = [
+        a.subscribe(GOAL, print),
+        a.queryable("q", print),
+        a.declare_alive("@x/a"),
+        a.watch_alive("@x/*", print),
+    ]
+    a.close()
+    a.close()
+    for handle in handles:
+        handle.close()
+    calls = [
+        lambda: publisher.put(b""),
+        lambda: a.publisher(GOAL),
+        lambda: a.subscribe(GOAL, print),
+        lambda: a.queryable("q", print),
+        lambda: a.query("q", b"", timeout=1.0, on_reply=print, on_done=print),
+        lambda: a.declare_alive("@x/a"),
+        lambda: a.watch_alive("@x/*", print),
+        lambda: a.list_alive("@x/*", 1.0),
+    ]
+    for call in calls:
+        with pytest.raises(TransportError, match="closed"):
+            call()
+
+
+def test_session_may_be_closed_from_its_own_callback(network):
+    a, b = network.session(), network.session()
+    inbox = network.inbox()
+
+    def callback(sample):
+        b.close()
+        inbox(sample)
+
+    b.subscribe(GOAL, callback)
+    publisher = a.publisher(GOAL)
+    network.meet(a, b)
+    publisher.put(b"1")
+    publisher.put(b"2")
+    alive = network.inbox()
+    inbox.wait_for(1)
+    a.watch_alive("@x/*", alive)
+    a.declare_alive("@x/end")
+    alive.wait_for(1)
+    assert payloads(inbox.items) == [b"1"]
+
+
+def test_close_takes_under_a_second_with_queries_open(network):
+    a, b = network.session(), network.session()
+    asked = network.inbox()
+    b.queryable("add", asked)
+    network.meet(a, b)
+    _, replies, done = ask(network, a, timeout=60.0)
+    asked.wait_for(1)
+    start = network.clock.now()
+    a.close()
+    assert network.clock.now() - start < 1.0
+    assert (replies.items, done.items) == ([], [])
+
+
+@pytest.mark.parametrize("key", ["", "/goal", "goal/", "a//b", "a/*", "a/**", "a$b", "a?b", "a#b"])
+def test_malformed_key_is_refused_with_the_key(network, key):
+    a = network.session()
+    for call in (
+        lambda: a.publisher(key),
+        lambda: a.subscribe(key, print),
+        lambda: a.queryable(key, print),
+        lambda: a.declare_alive(key),
+        lambda: a.query(key, b"", timeout=1.0, on_reply=print, on_done=print),
+    ):
+        with pytest.raises(TransportError, match="key: not usable"):
+            call()
+
+
+def test_session_ids_are_lower_case_hexadecimal_and_unique(network):
+    ids = {network.session().session_id for _ in range(5)}
+    assert len(ids) == 5
+    for session_id in ids:
+        assert session_id == f"{int(session_id, 16):x}".rjust(len(session_id), "0")
