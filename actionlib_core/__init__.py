@@ -1,0 +1,77 @@
+"""Actions, services, topics, messages and time over Zenoh, without ROS.
+
+`import actionlib_core as actionlib` runs programs written for ROS 1's actionlib. Everything here is
+loaded when it is first used, so importing the package costs next to nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from actionlib_core.action_client import ActionClient as ActionClient
+    from actionlib_core.action_client import ClientGoalHandle as ClientGoalHandle
+    from actionlib_core.action_client import CommState as CommState
+    from actionlib_core.action_client import CommStateMachine as CommStateMachine
+    from actionlib_core.action_client import GoalManager as GoalManager
+    from actionlib_core.action_client import TerminalState as TerminalState
+    from actionlib_core.action_client import get_name_of_constant as get_name_of_constant
+    from actionlib_core.action_server import ActionServer as ActionServer
+    from actionlib_core.action_server import nop_cb as nop_cb
+    from actionlib_core.exceptions import ActionException as ActionException
+    from actionlib_core.exceptions import ActionlibError as ActionlibError
+    from actionlib_core.goal_id_generator import GoalIDGenerator as GoalIDGenerator
+    from actionlib_core.handle_tracker_deleter import HandleTrackerDeleter as HandleTrackerDeleter
+    from actionlib_core.node import Node as Node
+    from actionlib_core.node import get_node as get_node
+    from actionlib_core.node import init as init
+    from actionlib_core.node import use_node as use_node
+    from actionlib_core.server_goal_handle import ServerGoalHandle as ServerGoalHandle
+    from actionlib_core.simple_action_client import SimpleActionClient as SimpleActionClient
+    from actionlib_core.simple_action_client import SimpleGoalState as SimpleGoalState
+    from actionlib_core.simple_action_server import SimpleActionServer as SimpleActionServer
+    from actionlib_core.status_tracker import StatusTracker as StatusTracker
+    from actionlib_core.time import Duration as Duration
+    from actionlib_core.time import Time as Time
+
+# Module -> the names that are taken from it. The modules are attributes too, as in ROS 1.
+_NAMES = {
+    "action_client": (
+        "ActionClient",
+        "ClientGoalHandle",
+        "CommState",
+        "CommStateMachine",
+        "GoalManager",
+        "TerminalState",
+        "get_name_of_constant",
+    ),
+    "action_server": ("ActionServer", "nop_cb"),
+    "exceptions": ("ActionException", "ActionlibError"),
+    "goal_id_generator": ("GoalIDGenerator",),
+    "handle_tracker_deleter": ("HandleTrackerDeleter",),
+    "node": ("Node", "get_node", "init", "use_node"),
+    "server_goal_handle": ("ServerGoalHandle",),
+    "simple_action_client": ("SimpleActionClient", "SimpleGoalState"),
+    "simple_action_server": ("SimpleActionServer",),
+    "status_tracker": ("StatusTracker",),
+    "time": ("Duration", "Time"),
+}
+_MODULE_OF = {name: module for module, names in _NAMES.items() for name in names}
+
+__all__ = sorted(_MODULE_OF)  # noqa: PLE0605  one list for both purposes
+
+
+def __getattr__(name: str) -> Any:
+    module = _MODULE_OF.get(name)
+    if module is not None:
+        value = getattr(importlib.import_module(f"{__name__}.{module}"), name)
+        globals()[name] = value
+        return value
+    if name in _NAMES:
+        return importlib.import_module(f"{__name__}.{name}")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__, *_NAMES})

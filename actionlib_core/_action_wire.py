@@ -1,0 +1,238 @@
+"""Actions on the wire: which keys, which messages, and the bytes that are read without a class.
+
+The five topics of ROS 1 actionlib under the action's name, each with its ROS message, and two
+additions of ours: clients acknowledge results on `ack`, and a query on `result` asks for what was
+missed. `docs/wire_protocol.md` describes them for writers of other clients.
+"""
+
+from __future__ import annotations
+
+import functools
+import struct
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+
+from actionlib_core.exceptions import ActionException
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+T = TypeVar("T")
+
+_U32 = struct.Struct("<I")
+_TIME = struct.Struct("<II")
+_HEADER = struct.Struct("<IIII")  # seq, stamp, length of an empty frame_id
+_NS = 1_000_000_000
+
+
+class ActionKeys(NamedTuple):
+    """The keys of one action."""
+
+    goal: str
+    cancel: str
+    status: str
+    feedback: str
+    result: str
+    ack: str
+
+
+def action_keys(name: str) -> ActionKeys:
+    """Return the keys of the action `name` (resolved, no slash in front)."""
+    return ActionKeys(*(f"{name}/{word}" for word in ActionKeys._fields))
+
+
+@dataclass(frozen=True, slots=True)
+class ActionTypes:
+    """The message classes of an action.
+
+    Attributes:
+        action: XAction, as the user gave it.
+        action_goal: XActionGoal, with header and goal id around the goal.
+        action_result: XActionResult, with header and status around the result.
+        action_feedback: XActionFeedback, with header and status around the feedback.
+        goal: XGoal.
+        result: XResult.
+        feedback: XFeedback.
+    """
+
+    action: Any
+    action_goal: Any
+    action_result: Any
+    action_feedback: Any
+    goal: Any
+    result: Any
+    feedback: Any
+
+    @classmethod
+    def of(cls, spec: Any) -> ActionTypes:
+        """Read the classes off an action class, as ROS 1 code does.
+
+        Raises:
+            ActionException: `spec` is not the class of an action.
+        """
+        try:
+            example = spec()
+            parts = example.action_goal, example.action_result, example.action_feedback
+            inner = parts[0].goal, parts[1].result, parts[2].feedback
+        except (AttributeError, TypeError) as error:
+            raise ActionException(
+                f"ActionSpec: got {spec!r}; expected an action class such as "
+                "actionlib_core.interfaces.move_base_msgs.msg.MoveBaseAction. Try the name that "
+                "ends with 'Action'."
+            ) from error
+        return cls(spec, *(type(part) for part in parts), *(type(part) for part in inner))
+
+
+class StatusEntry(NamedTuple):
+    """One goal's status: an actionlib_msgs/GoalStatus."""
+
+    id: str
+    stamp_ns: int
+    status: int
+    text: str
+
+
+def _reads(what: str) -> Callable[[Callable[[bytes], T]], Callable[[bytes], T]]:
+    """Make a reader raise ValueError, naming the message, when the bytes end too early."""
+
+    def decorate(read: Callable[[bytes], T]) -> Callable[[bytes], T]:
+        @functools.wraps(read)
+        def checked(payload: bytes) -> T:
+            try:
+                return read(payload)
+            except (struct.error, IndexError) as error:
+                raise ValueError(f"{what}: got {len(payload)} bytes that end too early") from error
+
+        return checked
+
+    return decorate
+
+
+# ROS 1 writes a message as its fields one after another, without gaps. So an XActionGoal is a
+# header and a goal id in front of the bytes of the XGoal, and the front can be written and read
+# without making objects of it.
+
+
+def pack_goal(sent_ns: int, goal_id: str, goal_stamp_ns: int, goal: bytes) -> bytes:
+    """Write an XActionGoal: header, goal id, goal."""
+    return _pack_header(sent_ns) + pack_goal_id(goal_id, goal_stamp_ns) + goal
+
+
+@_reads("XActionGoal")
+def unpack_goal(payload: bytes) -> tuple[str, int, bytes]:
+    """Read an XActionGoal: its goal id, its stamp [ns], the bytes of the XGoal.
+
+    Raises:
+        ValueError: the bytes are cut short or are not text where text belongs.
+    """
+    at = _skip_header(payload)
+    stamp_ns = _read_time(payload, at)
+    goal_id, at = _read_text(payload, at + 8)
+    return goal_id, stamp_ns, payload[at:]
+
+
+def pack_goal_id(goal_id: str, stamp_ns: int) -> bytes:
+    """Write an actionlib_msgs/GoalID."""
+    raw = goal_id.encode()
+    return _TIME.pack(*divmod(stamp_ns, _NS)) + _U32.pack(len(raw)) + raw
+
+
+@_reads("GoalID")
+def unpack_goal_id(payload: bytes) -> tuple[str, int]:
+    """Read an actionlib_msgs/GoalID: the id, its stamp [ns].
+
+    Raises:
+        ValueError: the bytes are cut short or are not text where text belongs.
+    """
+    return _read_text(payload, 8)[0], _read_time(payload, 0)
+
+
+def pack_status(entry: StatusEntry) -> bytes:
+    """Write an actionlib_msgs/GoalStatus."""
+    text = entry.text.encode()
+    return b"".join(
+        (
+            pack_goal_id(entry.id, entry.stamp_ns),
+            bytes((entry.status,)),
+            _U32.pack(len(text)),
+            text,
+        )
+    )
+
+
+@_reads("GoalStatus")
+def unpack_status(payload: bytes) -> StatusEntry:
+    """Read an actionlib_msgs/GoalStatus.
+
+    Raises:
+        ValueError: the bytes are cut short or are not text where text belongs.
+    """
+    return _read_status(payload, 0)[0]
+
+
+def pack_report(sent_ns: int, entry: StatusEntry, body: bytes) -> bytes:
+    """Write an XActionResult or XActionFeedback: header, status, result or feedback."""
+    return _pack_header(sent_ns) + pack_status(entry) + body
+
+
+@_reads("XActionResult or XActionFeedback")
+def unpack_report(payload: bytes) -> tuple[StatusEntry, int]:
+    """Read the front of an XActionResult or XActionFeedback: status, where the rest begins.
+
+    Raises:
+        ValueError: the bytes are cut short or are not text where text belongs.
+    """
+    return _read_status(payload, _skip_header(payload))
+
+
+def pack_statuses(sent_ns: int, entries: Iterable[StatusEntry]) -> bytes:
+    """Write an actionlib_msgs/GoalStatusArray."""
+    parts = [pack_status(entry) for entry in entries]
+    return b"".join((_pack_header(sent_ns), _U32.pack(len(parts)), *parts))
+
+
+@_reads("GoalStatusArray")
+def unpack_statuses(payload: bytes) -> list[StatusEntry]:
+    """Read an actionlib_msgs/GoalStatusArray.
+
+    Raises:
+        ValueError: the bytes are cut short or are not text where text belongs.
+    """
+    entries = []
+    at = _skip_header(payload)
+    (count,) = _U32.unpack_from(payload, at)
+    at += 4
+    for _ in range(count):
+        entry, at = _read_status(payload, at)
+        entries.append(entry)
+    return entries
+
+
+def _pack_header(sent_ns: int) -> bytes:
+    return _HEADER.pack(0, *divmod(sent_ns, _NS), 0)
+
+
+def _skip_header(payload: bytes) -> int:
+    (length,) = _U32.unpack_from(payload, 12)
+    return 16 + int(length)
+
+
+def _read_time(payload: bytes, at: int) -> int:
+    secs, nsecs = _TIME.unpack_from(payload, at)
+    return int(secs) * _NS + int(nsecs)
+
+
+def _read_status(payload: bytes, at: int) -> tuple[StatusEntry, int]:
+    stamp_ns = _read_time(payload, at)
+    goal_id, at = _read_text(payload, at + 8)
+    status = payload[at]
+    text, at = _read_text(payload, at + 1)
+    return StatusEntry(goal_id, stamp_ns, status, text), at
+
+
+def _read_text(payload: bytes, at: int) -> tuple[str, int]:
+    (length,) = _U32.unpack_from(payload, at)
+    end = at + 4 + length
+    if end > len(payload):
+        raise IndexError(end)
+    return payload[at + 4 : end].decode(), end

@@ -1,0 +1,150 @@
+"""One goal at a time: which goal runs, which waits, which is turned away.
+
+Source:
+    `SimpleActionServer` of ROS 1 actionlib for the policy "preempt": a newer goal preempts the one
+    that runs and recalls the one that waits; a goal with an older stamp is recalled itself.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Generic, Literal, TypeVar
+
+G = TypeVar("G")
+
+Policy = Literal["preempt", "queue", "reject"]
+POLICIES: tuple[Policy, ...] = ("preempt", "queue", "reject")
+
+
+@dataclass(frozen=True, slots=True)
+class Decision(Generic[G]):
+    """What is to be done with a goal or a cancel that arrived.
+
+    Attributes:
+        recall: Goals to answer with RECALLED: a newer one came, or they were cancelled.
+        reject: The new goal, when it is to be answered with REJECTED.
+        preempt: Tell the running goal's code to stop.
+        announce: Tell that a new goal waits.
+    """
+
+    recall: tuple[G, ...] = ()
+    reject: G | None = None
+    preempt: bool = False
+    announce: bool = False
+
+
+class SingleGoal(Generic[G]):
+    """The policy of one simple action server.
+
+    Args:
+        policy: "preempt": a newer goal stops the running one. "queue": goals run one after another,
+            in the order they came. "reject": while one runs or waits, others are rejected.
+
+    Attributes:
+        current: The goal that was accepted last.
+        preempt_requested: It was asked to stop.
+
+    Threads: none of its own, no lock; the owner calls it under its lock.
+    """
+
+    def __init__(self, policy: Policy = "preempt") -> None:
+        if policy not in POLICIES:
+            raise ValueError(f"policy: got {policy!r}; expected one of {list(POLICIES)}")
+        self.policy = policy
+        self.current: G | None = None
+        self.preempt_requested = False
+        self._running = False
+        self._waiting: deque[tuple[G, int]] = deque()
+        self._current_stamp_ns = 0
+        self._cancelled_early = False
+
+    @property
+    def waiting(self) -> bool:
+        """Whether a goal waits to be accepted."""
+        return bool(self._waiting)
+
+    @property
+    def next(self) -> G | None:
+        """The goal that is accepted next."""
+        return self._waiting[0][0] if self._waiting else None
+
+    @property
+    def running(self) -> bool:
+        """Whether the current goal was accepted and has not ended."""
+        return self._running
+
+    def find(self, goal: G) -> G:
+        """Return the object known here that equals `goal`, else `goal`."""
+        known = [self.current, *(waiting for waiting, _ in self._waiting)]
+        return next((entry for entry in known if entry is not None and entry == goal), goal)
+
+    def withdraw(self) -> G | None:
+        """Take the goal out that waits to be accepted next; None when none waits."""
+        return self._waiting.popleft()[0] if self._waiting else None
+
+    def on_stop(self) -> list[G]:
+        """Note that everything ends; return the goals that wait, which wait no more."""
+        self.preempt_requested = self._running
+        waiting = [goal for goal, _ in self._waiting]
+        self._waiting.clear()
+        return waiting
+
+    def on_goal(self, goal: G, stamp_ns: int) -> Decision[G]:
+        """Take a goal that arrived."""
+        if self.policy == "queue":
+            self._waiting.append((goal, stamp_ns))
+            return Decision(announce=True)
+        if self.policy == "reject":
+            if self._running or self._waiting:
+                return Decision(reject=goal)
+            self._waiting.append((goal, stamp_ns))
+            return Decision(announce=True)
+        newest = self._waiting[-1][1] if self._waiting else self._current_stamp_ns
+        if stamp_ns < max(newest, self._current_stamp_ns):
+            return Decision(recall=(goal,))
+        older = tuple(waiting for waiting, _ in self._waiting)
+        self._waiting.clear()
+        self._waiting.append((goal, stamp_ns))
+        self._cancelled_early = False
+        self.preempt_requested = self.preempt_requested or self._running
+        return Decision(recall=older, preempt=self._running, announce=True)
+
+    def on_cancel(self, goal: G, *, recall_waiting: bool) -> Decision[G]:
+        """Take a cancel for a goal.
+
+        Args:
+            goal: The goal.
+            recall_waiting: A goal that only waits is recalled at once; else it is accepted first,
+                as in ROS, and finds itself preempted.
+        """
+        if goal is self.current and self._running:
+            self.preempt_requested = True
+            return Decision(preempt=True)
+        for entry in self._waiting:
+            if entry[0] is goal:
+                if recall_waiting:
+                    self._waiting.remove(entry)
+                    return Decision(recall=(goal,))
+                if entry is self._waiting[0]:
+                    self._cancelled_early = True
+        return Decision()
+
+    def accept(self) -> tuple[G | None, G | None]:
+        """Make the waiting goal the current one.
+
+        Returns:
+            The goal to accept, None when none waits; and the one it pushes aside, if any runs.
+        """
+        if not self._waiting:
+            return None, None
+        pushed = self.current if self._running else None
+        self.current, self._current_stamp_ns = self._waiting.popleft()
+        self._running = True
+        self.preempt_requested, self._cancelled_early = self._cancelled_early, False
+        return self.current, pushed
+
+    def on_ended(self, goal: G) -> None:
+        """Note that a goal reached a terminal status."""
+        if goal is self.current:
+            self._running = False

@@ -1,0 +1,259 @@
+"""A server's end of the wire: bytes and keys on one side, goals and answers on the other."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from typing import TYPE_CHECKING, Any, Protocol
+
+from actionlib_core._action_wire import (
+    ActionKeys,
+    action_keys,
+    unpack_goal,
+    unpack_goal_id,
+    unpack_statuses,
+)
+from actionlib_core.exceptions import (
+    ActionlibError,
+    ServerConflictError,
+    TransportError,
+    TypeMismatchError,
+)
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatusArray
+from actionlib_core.presence import (
+    Kind,
+    find_mismatch,
+    list_endpoints,
+    parse_token,
+    token_key,
+    token_pattern,
+)
+from actionlib_core.transport import Quality
+from actionlib_core.wire import check_encoding, encoding_of
+
+if TYPE_CHECKING:
+    from actionlib_core._action_wire import ActionTypes
+    from actionlib_core.node import Node
+    from actionlib_core.presence import Endpoint
+    from actionlib_core.transport import Closable, Presence, PublisherPort, Query, Sample
+
+log = logging.getLogger(__name__)
+
+LIST_TIMEOUT_S = 1.0
+RESULT = Quality(express=True, block=True)
+FEEDBACK = Quality(express=False, block=True)
+STATUS = Quality(express=False, block=False)  # said again every second: never worth waiting
+
+
+class ServerListener(Protocol):
+    """Who decides about what arrives. Called on the network's thread."""
+
+    def on_goal(self, goal_id: str, stamp_ns: int, content: Any, client: str) -> None:
+        """Take a goal."""
+
+    def on_cancel(self, goal_id: str, stamp_ns: int) -> None:
+        """Take a cancel."""
+
+    def on_acknowledged(self, goal_ids: list[str]) -> None:
+        """Take the news that results have arrived."""
+
+    def on_question(self, goal_id: str) -> tuple[Any, bytes]:
+        """Return the class and the bytes that answer "what of this goal?"."""
+
+    def on_client_lost(self, client: str) -> None:
+        """Take the death of a client's session."""
+
+    def on_conflict(self, error: ServerConflictError) -> None:
+        """Stop: another server has the name."""
+
+
+class ServerPort:
+    """Declares the keys of an action server and speaks on them.
+
+    Args:
+        node: On whose network.
+        name: The action's full name.
+        types: Its message classes.
+        listener: Decides.
+
+    Threads: the `send_` methods may be called from any thread; what arrives is handed to `listener`
+        on the network's thread.
+    """
+
+    def __init__(self, node: Node, name: str, types: ActionTypes, listener: ServerListener) -> None:
+        self._node = node
+        self._types = types
+        self._listener = listener
+        self.name = name
+        self.keys: ActionKeys = action_keys(name)
+        self._lock = threading.Lock()
+        self._declared: list[Closable] = []
+        self._publishers: dict[str, PublisherPort] = {}
+        self._clients: dict[str, Endpoint] = {}
+        self._wrong: set[str] = set()
+        self._closed = False
+        endpoint = node.endpoint(
+            Kind.ACTION_SERVER,
+            name,
+            types.action._type,
+            types.action._md5sum,
+        )
+        # The older of two servers stays, so the number tells the age: milliseconds, then a count.
+        stamp = node.clock.time_ns() // 1_000_000 * 1_000_000 + endpoint.entity % 1_000_000
+        self.endpoint = endpoint._replace(entity=stamp)
+
+    def open(self) -> None:
+        """Declare everything; the token comes last, so who sees it can be heard.
+
+        Raises:
+            ServerConflictError: the name has a server.
+            TransportError: the session is closed.
+
+        Blocks: until the network has said who has the name, `LIST_TIMEOUT_S` at most.
+        """
+        transport = self._node.transport
+        there = list_endpoints(
+            transport, kind=Kind.ACTION_SERVER, name=self.name, timeout=LIST_TIMEOUT_S
+        )
+        if there:
+            raise self._conflict(there[0])
+        self._declared = [
+            transport.subscribe(self.keys.goal, self._on_goal),
+            transport.subscribe(self.keys.cancel, self._on_cancel),
+            transport.subscribe(self.keys.ack, self._on_ack),
+            transport.queryable(self.keys.result, self._on_query),
+            transport.declare_alive(token_key(self.endpoint)),
+            transport.watch_alive(token_pattern(None, self.name), self._on_presence),
+        ]
+
+    def close(self) -> None:
+        """Undeclare everything; a second call does nothing."""
+        with self._lock:
+            self._closed = True
+            declared, self._declared = self._declared, []
+            declared.extend(self._publishers.values())
+            self._publishers = {}
+        for entry in reversed(declared):
+            entry.close()
+
+    def send_result(self, payload: bytes) -> None:
+        """Send an XActionResult."""
+        self._send(self.keys.result, self._types.action_result, RESULT, payload)
+
+    def send_feedback(self, payload: bytes) -> None:
+        """Send an XActionFeedback."""
+        self._send(self.keys.feedback, self._types.action_feedback, FEEDBACK, payload)
+
+    def send_status(self, payload: bytes) -> None:
+        """Send a GoalStatusArray."""
+        self._send(self.keys.status, GoalStatusArray, STATUS, payload)
+
+    def _send(self, key: str, message_class: Any, quality: Quality, payload: bytes) -> None:
+        publisher = self._publishers.get(key)
+        if publisher is None:
+            with self._lock:
+                if self._closed:
+                    raise TransportError(
+                        f"action {self.name!r}: the server is stopped. Try ending goals before."
+                    )
+                publisher = self._publishers.get(key)
+                if publisher is None:
+                    publisher = self._publishers[key] = self._node.transport.publisher(
+                        key, encoding_of(message_class), quality
+                    )
+        publisher.put(payload)
+
+    # -- what arrives --------------------------------------------------------------------------
+
+    def _on_goal(self, sample: Sample) -> None:
+        if not self._is_readable(sample, self._types.action_goal):
+            return
+        try:
+            goal_id, stamp_ns, body = unpack_goal(sample.payload)
+            content = self._types.goal.from_bytes(body)
+        except (ValueError, ActionlibError) as error:
+            log.error("action '%s': a goal cannot be read: %s", self.name, error)  # noqa: TRY400
+            return
+        self._listener.on_goal(goal_id, stamp_ns, content, sample.source)
+
+    def _on_cancel(self, sample: Sample) -> None:
+        if not self._is_readable(sample, GoalID):
+            return
+        try:
+            goal_id, stamp_ns = unpack_goal_id(sample.payload)
+        except ValueError as error:
+            log.error("action '%s': a cancel cannot be read: %s", self.name, error)  # noqa: TRY400
+            return
+        self._listener.on_cancel(goal_id, stamp_ns)
+
+    def _on_ack(self, sample: Sample) -> None:
+        try:
+            entries = unpack_statuses(sample.payload)
+        except ValueError as error:
+            log.error("action '%s': an ack cannot be read: %s", self.name, error)  # noqa: TRY400
+            return
+        self._listener.on_acknowledged([entry.id for entry in entries])
+
+    def _on_query(self, query: Query) -> None:
+        try:
+            goal_id, _ = unpack_goal_id(query.payload)
+        except ValueError as error:
+            query.reply_error(f"action '{self.name}': {error}; expected an actionlib_msgs/GoalID")
+        else:
+            message_class, payload = self._listener.on_question(goal_id)
+            query.reply(payload, encoding_of(message_class))
+        query.finish()
+
+    def _is_readable(self, sample: Sample, message_class: Any) -> bool:
+        """Check the type; a wrong one is reported once per sender and type."""
+        try:
+            check_encoding(
+                sample.encoding,
+                message_class,
+                name=sample.key,
+                sender=f"session {sample.source or 'unknown'}",
+            )
+        except TypeMismatchError as error:
+            self._report_once(f"{sample.source} {sample.encoding}", error)
+            return False
+        return True
+
+    def _report_once(self, about: str, error: ActionlibError) -> None:
+        with self._lock:
+            known = about in self._wrong
+            self._wrong.add(about)
+        if not known:
+            log.error("%s", error)
+
+    # -- who is there --------------------------------------------------------------------------
+
+    def _on_presence(self, presence: Presence) -> None:
+        other = parse_token(presence.key)
+        if other is None or other == self.endpoint:
+            return
+        if other.kind is Kind.ACTION_SERVER and presence.alive:
+            self._meet_server(other)
+        elif other.kind is Kind.ACTION_CLIENT:
+            self._meet_client(presence, other)
+
+    def _meet_server(self, other: Endpoint) -> None:
+        if (self.endpoint.entity, self.endpoint.session) > (other.entity, other.session):
+            self._listener.on_conflict(self._conflict(other))
+        else:
+            log.error("%s", self._conflict(other, stays=True))
+
+    def _conflict(self, other: Endpoint, *, stays: bool = False) -> ServerConflictError:
+        ends = [(end.node, end.session) for end in (self.endpoint, other)]
+        mine, others = reversed(ends) if stays else ends
+        return ServerConflictError(self.name, mine, others)
+
+    def _meet_client(self, presence: Presence, client: Endpoint) -> None:
+        if presence.alive:
+            self._clients[presence.key] = client
+            error = find_mismatch([client], self.endpoint)
+            if error is not None:
+                self._report_once(f"{client.session} {client.type} {client.md5}", error)
+        elif self._clients.pop(presence.key, None) is not None and not any(
+            end.session == client.session for end in self._clients.values()
+        ):
+            self._listener.on_client_lost(client.session)

@@ -1,0 +1,459 @@
+"""`ActionServer`: any number of goals at once, each accepted, refused and ended by your code."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from typing import TYPE_CHECKING, Any, Literal
+
+from actionlib_core._action_wire import (
+    ActionTypes,
+    StatusEntry,
+    pack_report,
+    pack_status,
+    pack_statuses,
+)
+from actionlib_core._callbacks import CallbackQueue
+from actionlib_core._core.server_goals import RESULT_TIMEOUT_S, Arrival, ServerGoal, ServerGoals
+from actionlib_core._core.states import TERMINAL, Status
+from actionlib_core._server_port import ServerPort
+from actionlib_core.exceptions import ActionException, ServerConflictError, TransportError
+from actionlib_core.goal_id_generator import GoalIDGenerator
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from actionlib_core.node import get_node
+from actionlib_core.server_goal_handle import ServerGoalHandle
+from actionlib_core.status_tracker import StatusTracker
+from actionlib_core.time import to_seconds
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.clock import Timer
+    from actionlib_core.node import Node
+    from actionlib_core.time import Duration
+
+log = logging.getLogger(__name__)
+
+STATUS_PERIOD_S = 1.0  # while goals are tracked
+STATUS_GAP_S = 0.02  # changes that follow each other faster share a message
+STATUS_GAP_PER_GOAL_S = 100e-6  # a long list is sent less often
+
+TEXT_STOPPED = "The action server was stopped"
+TEXT_CLIENT_LOST = "The client that sent this goal is gone"
+
+OnClientLost = Literal["continue", "cancel"]
+
+
+def nop_cb(goal_handle: ServerGoalHandle) -> None:
+    """Do nothing; the default callback."""
+
+
+class ActionServer:
+    """Offers an action; every goal is a `ServerGoalHandle` that your callbacks accept and end.
+
+    Args:
+        ns: The action's name.
+        ActionSpec: The action class (XAction).
+        goal_cb: Called with the handle of each new goal; it or later code accepts or rejects it.
+        cancel_cb: Called with the handle of each goal that is asked to stop.
+        auto_start: Start at once. With False, call `start` when everything is ready.
+        node: Where; the current node when None.
+        on_client_lost: What happens to the goals of a client that died: "continue" as in ROS, or
+            "cancel", as if the client had cancelled them.
+        result_timeout: How long a result waits for a client that lost its link [s].
+
+    Attributes:
+        lock: Guards the server's data. Holding it keeps goals as they are; never wait with it.
+        error: Why the server stopped by itself, None while all is well.
+
+    Raises:
+        ActionException: `ActionSpec` is not an action class.
+        InvalidNameError: the name breaks the ROS rules.
+        ServerConflictError: the name has a server already (from `start`).
+        TransportError: the network session is closed.
+
+    Threads: callbacks run one at a time, in order, on a thread of their own, without any lock.
+    """
+
+    def __init__(
+        self,
+        ns: str,
+        ActionSpec: Any,  # noqa: N803  actionlib's name
+        goal_cb: Callable[[ServerGoalHandle], object] = nop_cb,
+        cancel_cb: Callable[[ServerGoalHandle], object] = nop_cb,
+        auto_start: bool = True,
+        *,
+        node: Node | None = None,
+        on_client_lost: OnClientLost = "continue",
+        result_timeout: float | Duration = RESULT_TIMEOUT_S,
+    ) -> None:
+        if on_client_lost not in {"continue", "cancel"}:
+            raise ActionException(
+                f"action {ns!r}: on_client_lost: got {on_client_lost!r}; "
+                "expected 'continue' or 'cancel'."
+            )
+        self.node = node if node is not None else get_node()
+        self.types = ActionTypes.of(ActionSpec)
+        self.ns = self.node.resolve(ns, "action name")
+        self.lock = threading.RLock()
+        self.goal_callback = goal_cb
+        self.cancel_callback = cancel_cb
+        self.error: ServerConflictError | None = None
+        self._on_client_lost = on_client_lost
+        self._clock = self.node.clock
+        self._goals = ServerGoals(self.ns, result_timeout=to_seconds(result_timeout))
+        self._ids = GoalIDGenerator(f"/{self.node.full_name}", clock=self._clock)
+        self._port = ServerPort(self.node, self.ns, self.types, self)
+        self.callback_queue = CallbackQueue(self.node, f"{self.ns} callbacks")
+        self._forget: Callable[[], None] | None = None
+        self._started = False
+        self._stopped = False
+        self._published = -STATUS_PERIOD_S
+        self._timer: Timer | None = None
+        self._due = 0.0
+        if auto_start:
+            self.start()
+
+    # -- life ----------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Offer the action; a second call does nothing.
+
+        Raises:
+            ServerConflictError: the name has a server already.
+            TransportError: the network session is closed.
+
+        Blocks: until the network has said who has the name, 1 s at most.
+        """
+        with self.lock:
+            if self._started:
+                return
+            self._started = True
+        self._forget = self.node.on_close(self.stop)
+        try:
+            self.initialize()
+        except BaseException:
+            self._forget()
+            self._started = False
+            raise
+
+    def initialize(self) -> None:
+        """Declare the action's keys; `start` does it."""
+        self._port.open()
+
+    def stop(self) -> None:
+        """End all goals (ABORTED, or REJECTED when not yet accepted) and leave the name.
+
+        Clients see the result of each goal, then the server's absence. A second call does nothing.
+        """
+        with self.lock:
+            if self._stopped or not self._started:
+                return
+            open_goals = [goal for goal in self._goals.listed() if goal.status not in TERMINAL]
+        for goal in open_goals:
+            accepted = goal.status in {Status.ACTIVE, Status.PREEMPTING}
+            if goal.arrived and isinstance(goal.tag, StatusTracker):
+                self.finish(
+                    goal.tag, "abort" if accepted else "reject", "stop()", None, TEXT_STOPPED
+                )
+        self._leave()
+
+    def _leave(self) -> None:
+        with self.lock:
+            self._stopped = True
+            if self._timer is not None:
+                self._timer.cancel()
+        if self._forget is not None:
+            self._forget()
+        self._port.close()
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the server has left its name."""
+        return self._stopped
+
+    # -- what actionlib's users look at --------------------------------------------------------
+
+    @property
+    def ActionSpec(self) -> Any:  # noqa: N802  actionlib's names
+        """The action class."""
+        return self.types.action
+
+    @property
+    def ActionGoal(self) -> Any:  # noqa: N802
+        """The class XActionGoal."""
+        return self.types.action_goal
+
+    @property
+    def ActionResult(self) -> Any:  # noqa: N802
+        """The class XActionResult."""
+        return self.types.action_result
+
+    @property
+    def ActionResultType(self) -> Any:  # noqa: N802
+        """The class XResult."""
+        return self.types.result
+
+    @property
+    def ActionFeedback(self) -> Any:  # noqa: N802
+        """The class XActionFeedback."""
+        return self.types.action_feedback
+
+    @property
+    def status_list(self) -> list[StatusTracker]:
+        """The goals that the status list names now."""
+        with self.lock:
+            tags = [goal.tag for goal in self._goals.listed()]
+        return [tag for tag in tags if isinstance(tag, StatusTracker)]
+
+    def register_goal_callback(self, cb: Callable[[ServerGoalHandle], object] | None) -> None:
+        """Replace the goal callback; None takes it away."""
+        self.goal_callback = cb if cb is not None else nop_cb
+
+    def register_cancel_callback(
+        self, cancel_cb: Callable[[ServerGoalHandle], object] | None
+    ) -> None:
+        """Replace the cancel callback; None takes it away."""
+        self.cancel_callback = cancel_cb if cancel_cb is not None else nop_cb
+
+    # -- what handles do -----------------------------------------------------------------------
+
+    def accept(self, tracker: StatusTracker, text: str = "") -> None:
+        """Accept a goal; see `ServerGoalHandle.set_accepted`."""
+        with self.lock:
+            self._goals.step(tracker.record, "accept", "set_accepted()", text)
+        self._on_change()
+
+    def request_cancel(self, tracker: StatusTracker) -> bool:
+        """Mark a goal as asked to stop; see `ServerGoalHandle.set_cancel_requested`."""
+        with self.lock:
+            changed = self._goals.request_cancel(tracker.record)
+        if changed:
+            self._on_change()
+        return changed
+
+    def finish(self, tracker: StatusTracker, event: str, call: str, result: Any, text: str) -> None:
+        """End a goal: move it, keep its result, send it.
+
+        Args:
+            tracker: The goal.
+            event: Event of the server's table: cancel, reject, abort or succeed.
+            call: What the user called, for the error.
+            result: The XResult message; None sends one with default values.
+            text: Why, for people.
+
+        Raises:
+            IllegalTransitionError: the goal's state does not allow it.
+            MessageError: `result` does not fit the action.
+        """
+        body = self._body(result, self.types.result, call)
+        record = tracker.record
+        with self.lock:
+            self._goals.step(record, event, call, text)
+            payload = pack_report(self._clock.time_ns(), _entry(record), body)
+            record.result = payload
+            self._goals.finish(record, self._clock.now())
+            stopped = self._stopped
+        if not stopped:
+            self._port.send_result(payload)
+            self._on_change()
+
+    def release(self, tracker: StatusTracker) -> None:
+        """Give up a goal that nobody will end; its client learns that it is LOST."""
+        with self.lock:
+            self._goals.release(tracker.record, self._clock.now())
+        self._on_change()
+
+    def publish_result(self, status: GoalStatus, result: Any) -> None:
+        """Send a result under any status. Handles do it for you.
+
+        Raises:
+            MessageError: `result` does not fit the action.
+        """
+        body = self._body(result, self.types.result, "publish_result()")
+        self._port.send_result(pack_report(self._clock.time_ns(), _entry_of(status), body))
+
+    def publish_feedback(self, status: GoalStatus, feedback: Any) -> None:
+        """Send feedback for the goal that `status` names.
+
+        Raises:
+            MessageError: `feedback` does not fit the action.
+        """
+        body = self._body(feedback, self.types.feedback, "publish_feedback()")
+        self._port.send_feedback(pack_report(self._clock.time_ns(), _entry_of(status), body))
+
+    def send_feedback(self, tracker: StatusTracker, feedback: Any) -> None:
+        """Send feedback for a goal, without a status message in between."""
+        body = self._body(feedback, self.types.feedback, "publish_feedback()")
+        entry = _entry(tracker.record)
+        self._port.send_feedback(pack_report(self._clock.time_ns(), entry, body))
+
+    def _body(self, message: Any, expected: Any, call: str) -> bytes:
+        if message is None:
+            message = expected()
+        elif not isinstance(message, expected):
+            raise ActionException(
+                f"action '{self.ns}': {call}: got {message!r}; expected a message of type "
+                f"{expected._type}."
+            )
+        body: bytes = message.to_bytes()
+        return body
+
+    # -- what arrives (on the network's thread) ------------------------------------------------
+
+    def on_goal(self, goal_id: str, stamp_ns: int, content: Any, client: str) -> None:
+        """Take a goal from the network; not for users."""
+        if not goal_id:
+            goal_id = self._ids.generate_ID().id
+        record = ServerGoal(goal_id, stamp_ns or self._clock.time_ns(), client=client)
+        with self.lock:
+            if self._stopped:
+                return
+            arrival, known = self._goals.on_goal(record, self._clock.now())
+            tracker = StatusTracker.arrived(record, content, self.types)
+            if arrival is Arrival.RECALLED:
+                empty = self.types.result().to_bytes()
+                record.result = pack_report(self._clock.time_ns(), _entry(record), empty)
+        if arrival is Arrival.NEW:
+            self._deliver_goal(ServerGoalHandle(tracker, self))
+            return
+        self._say_again(goal_id, known)
+
+    def _say_again(self, goal_id: str, goal: ServerGoal | None) -> None:
+        """Answer a copy of a known goal."""
+        if goal is None:
+            with self.lock:
+                status = self._goals.past_status(goal_id) or Status.LOST
+            entry = StatusEntry(goal_id, 0, status, _text_past(status))
+            self._port.send_status(pack_statuses(self._clock.time_ns(), [entry]))
+        elif isinstance(goal.result, bytes):
+            self._port.send_result(goal.result)
+        self._on_change()
+
+    def on_cancel(self, goal_id: str, stamp_ns: int) -> None:
+        """Take a cancel from the network; not for users."""
+        with self.lock:
+            asked = self._goals.on_cancel(goal_id, stamp_ns, self._clock.now())
+        self._tell_cancelled(asked)
+
+    def on_client_lost(self, client: str) -> None:
+        """Take the death of a client; not for users."""
+        if self._on_client_lost == "continue":
+            return
+        with self.lock:
+            asked = self._goals.on_client_lost(client)
+            for goal in asked:
+                goal.text = TEXT_CLIENT_LOST
+        self._tell_cancelled(asked)
+
+    def _tell_cancelled(self, asked: list[ServerGoal]) -> None:
+        for goal in asked:
+            if isinstance(goal.tag, StatusTracker):
+                self._deliver_cancel(ServerGoalHandle(goal.tag, self))
+        self._on_change()
+
+    def on_acknowledged(self, goal_ids: list[str]) -> None:
+        """Take acknowledgements from the network; not for users."""
+        with self.lock:
+            self._goals.on_acknowledged(goal_ids, self._clock.now())
+
+    def on_question(self, goal_id: str) -> tuple[Any, bytes]:
+        """Answer what became of a goal, or of all; not for users."""
+        with self.lock:
+            if not goal_id:
+                entries = [_entry(goal) for goal in self._goals.listed()]
+                return GoalStatusArray, pack_statuses(self._clock.time_ns(), entries)
+            goal = self._goals.find(goal_id)
+            if goal is not None and isinstance(goal.result, bytes):
+                return self.types.action_result, goal.result
+            if goal is not None:
+                return GoalStatus, pack_status(_entry(goal))
+            status = self._goals.past_status(goal_id) or Status.LOST
+            return GoalStatus, pack_status(StatusEntry(goal_id, 0, status, _text_past(status)))
+
+    def on_conflict(self, error: ServerConflictError) -> None:
+        """Leave the name to the older server; not for users."""
+        with self.lock:
+            if self.error is not None or self._stopped:
+                return
+            self.error = error
+        log.error("%s", error)
+        self._leave()
+
+    # Subclasses that only note what came need no thread for it.
+
+    def _deliver_goal(self, handle: ServerGoalHandle) -> None:
+        self.callback_queue.call(self.goal_callback, handle)
+        self._on_change()
+
+    def _deliver_cancel(self, handle: ServerGoalHandle) -> None:
+        self.callback_queue.call(self.cancel_callback, handle)
+
+    # -- status --------------------------------------------------------------------------------
+
+    def publish_status(self) -> None:
+        """Send the list of all goals now."""
+        with self.lock:
+            if self._stopped or not self._started:
+                return
+            now = self._clock.now()
+            self._published = now
+            entries = [_entry(goal) for goal in self._goals.listed()]
+            self._arm(now + STATUS_PERIOD_S)
+        try:
+            self._port.send_status(pack_statuses(self._clock.time_ns(), entries))
+        except TransportError:
+            if not self._stopped:  # else `stop` came in between
+                raise
+
+    def publish_status_async(self, event: object = None) -> None:  # noqa: ARG002  actionlib's
+        """Send the list of all goals; the form that ROS timers call."""
+        self.publish_status()
+
+    def _on_change(self) -> None:
+        """Publish the status: now, or together with the changes that follow soon."""
+        with self.lock:
+            now = self._clock.now()
+            gap = STATUS_GAP_S + STATUS_GAP_PER_GOAL_S * len(self._goals)
+            due = self._published + gap
+            if due > now:
+                if self._timer is None or due < self._due:
+                    self._arm(due)
+                return
+        self.publish_status()
+
+    def _arm(self, due: float) -> None:
+        """Let the timer run at `due`. Needs the lock."""
+        if self._timer is not None:
+            self._timer.cancel()
+        self._due = due
+        self._timer = self._clock.call_later(due - self._clock.now(), self._on_timer)
+
+    def _on_timer(self) -> None:
+        with self.lock:
+            self._timer = None
+            if self._stopped:
+                return
+            soonest = self._goals.expire(self._clock.now())
+            quiet = not self._goals.listed()
+            since = self._clock.now() - self._published
+            if quiet and since > STATUS_PERIOD_S / 2:
+                if soonest is not None:
+                    self._arm(soonest)
+                return
+        self.publish_status()
+
+
+def _entry(goal: ServerGoal) -> StatusEntry:
+    return StatusEntry(goal.id, goal.stamp_ns, goal.status, goal.text)
+
+
+def _entry_of(status: GoalStatus) -> StatusEntry:
+    goal_id = status.goal_id
+    return StatusEntry(goal_id.id, goal_id.stamp.to_nsec(), status.status, status.text)
+
+
+def _text_past(status: Status) -> str:
+    if status is Status.LOST:
+        return "The action server does not know this goal"
+    return f"The goal ended {status.name}; its result is no longer kept"

@@ -1,0 +1,47 @@
+"""Goal ids: `<node>-<n>-<secs>.<nsecs>`, as ROS 1 actionlib makes them."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalID
+from actionlib_core.time import Time
+
+if TYPE_CHECKING:
+    from actionlib_core.clock import Clock
+
+_count = itertools.count(1)  # one per process: `next` is atomic
+
+
+class GoalIDGenerator:
+    """Makes ids that differ from all others on the network.
+
+    Args:
+        name: What an id begins with; the name of the default node when None.
+        clock: Gives the stamp; the current clock when None.
+
+    Threads: any; ids never repeat within a process.
+    """
+
+    def __init__(self, name: str | None = None, *, clock: Clock | None = None) -> None:
+        if name is None:
+            from actionlib_core.node import get_node
+
+            name = get_node().name
+        self._clock = clock
+        self.name = ""
+        self.set_name(name)
+
+    def set_name(self, name: str) -> None:
+        """Set what ids begin with.
+
+        Args:
+            name: Usually the node's name.
+        """
+        self.name = name
+
+    def generate_ID(self) -> GoalID:  # noqa: N802  actionlib's name
+        """Return a new id, stamped with the present time."""
+        stamp = Time.now() if self._clock is None else Time(0, self._clock.time_ns())
+        return GoalID(stamp=stamp, id=f"{self.name}-{next(_count)}-{stamp.secs}.{stamp.nsecs}")

@@ -1,0 +1,512 @@
+"""The goals of one action client, and what is done so that each of them comes to an end."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core._action_wire import pack_goal
+from actionlib_core._callbacks import CallbackQueue
+from actionlib_core._client_port import ClientPort, is_status
+from actionlib_core._core.client_goal import ClientGoal, Duty, Path
+from actionlib_core._core.states import TERMINAL, CommState, Status
+from actionlib_core.exceptions import ActionlibError, TransportError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core._action_wire import ActionTypes, StatusEntry
+    from actionlib_core.clock import Event, Timer
+    from actionlib_core.exceptions import TypeMismatchError
+    from actionlib_core.node import Node
+    from actionlib_core.presence import Endpoint
+
+log = logging.getLogger(__name__)
+
+TICK_S = 0.05  # repetitions and acknowledgements due within this go out together
+ACK_AT = 64  # so many acknowledgements go out at once
+REMEMBERED = 1024  # ids of ended goals whose result may come again
+
+
+class CommStateMachine:
+    """One goal of a client.
+
+    Args:
+        goal: Its life cycle.
+        manager: The client's goals.
+        payload: The XActionGoal as it is sent.
+        on_transition: Called under the manager's lock for each state passed; must only note it.
+        on_feedback: The same, with each XFeedback message; None when nobody wants them.
+
+    Attributes:
+        ended: Set when the goal is over; made when somebody waits for that.
+        settled: Set when the goal is over and its last callback has returned.
+    """
+
+    __slots__ = (
+        "_shown",
+        "_shown_to",
+        "asking",
+        "ended",
+        "goal",
+        "manager",
+        "on_feedback",
+        "on_transition",
+        "payload",
+        "settled",
+    )
+
+    def __init__(
+        self,
+        goal: ClientGoal,
+        manager: GoalManager,
+        payload: bytes,
+        on_transition: Callable[[CommStateMachine, CommState], None] | None,
+        on_feedback: Callable[[CommStateMachine, Any], None] | None,
+    ) -> None:
+        self.goal = goal
+        self.manager = manager
+        self.payload = payload
+        self.on_transition = on_transition
+        self.on_feedback = on_feedback
+        self.asking = False
+        self.ended: Event | None = None
+        self.settled: Event = manager.node.clock.event()
+        self._shown: CommState | None = None
+        self._shown_to = 0
+
+    def on_answered(self) -> None:
+        """Note that a question about the goal was answered, or that its time is over."""
+        self.asking = False
+
+    @property
+    def state(self) -> CommState:
+        """Where the goal stands; inside a transition callback, the state that callback is for."""
+        if self._shown is not None and self._shown_to == threading.get_ident():
+            return self._shown
+        return self.goal.comm
+
+    def show(self, state: CommState, function: Callable[..., object], *args: object) -> None:
+        """Call `function`, to which the goal stands in `state`."""
+        self._shown_to, self._shown = threading.get_ident(), state
+        try:
+            function(*args)
+        finally:
+            self._shown = None
+
+
+class GoalManager:
+    """The goals of one client. Registers a goal before it is sent; nothing that comes back is lost.
+
+    Args:
+        node: On whose network and clock.
+        name: The action's full name.
+        types: Its message classes.
+        server_lost_timeout: How long a server may be away before its goals are LOST [s].
+
+    Threads: every method may be called from any thread. One lock guards the goals; user callbacks
+        run without it, in `callbacks`.
+    """
+
+    def __init__(
+        self, node: Node, name: str, types: ActionTypes, *, server_lost_timeout: float
+    ) -> None:
+        self.node = node
+        self.name = name
+        self.types = types
+        self.callbacks = CallbackQueue(node, f"{name} client callbacks")
+        self._server_lost_timeout = server_lost_timeout
+        self._clock = node.clock
+        self._lock = threading.RLock()
+        self._machines: dict[str, CommStateMachine] = {}
+        self._ended: dict[str, None] = {}
+        self._acks: list[str] = []
+        self._servers: dict[Endpoint, TypeMismatchError | None] = {}
+        self._away: dict[Endpoint, float] = {}
+        self._waiters: list[Event] = []
+        self._timer: Timer | None = None
+        self._due = 0.0
+        self._closed = False
+        self._port = ClientPort(node, name, types, self)
+        self._port.open()
+
+    def close(self) -> None:
+        """Acknowledge what has arrived, leave the name; goals that still run are LOST here."""
+        with self._lock:
+            if self._closed:
+                return
+            for machine in list(self._machines.values()):
+                self._take(machine, machine.goal.lose("the action client was stopped"))
+            self._closed = True
+            acks, self._acks = self._acks, []
+            if self._timer is not None:
+                self._timer.cancel()
+            self._wake()
+        if acks:
+            self._port.send_acks(acks, self._clock.time_ns())
+        self._port.close()
+
+    # -- servers -------------------------------------------------------------------------------
+
+    @property
+    def server(self) -> Endpoint | None:
+        """The action's server, None while there is none of our type."""
+        with self._lock:
+            return self._server()
+
+    def _server(self) -> Endpoint | None:
+        return next((end for end, error in self._servers.items() if error is None), None)
+
+    def wait_for_server(self, timeout: float | None) -> bool:
+        """Wait for a server.
+
+        Args:
+            timeout: Longest wait [s]; None waits for ever.
+
+        Returns:
+            Whether there is one; False also when the client was stopped.
+
+        Raises:
+            TypeMismatchError: there is one of another type.
+
+        Blocks: until then.
+        """
+        deadline = None if timeout is None else self._clock.now() + timeout
+        changed = self._clock.event()
+        while True:
+            with self._lock:
+                if self._server() is not None:
+                    return True
+                self._check_types()
+                if self._closed:
+                    return False
+                changed.clear()
+                self._waiters.append(changed)
+            left = None if deadline is None else deadline - self._clock.now()
+            if not changed.wait(left) and left is not None:
+                with self._lock:
+                    if changed in self._waiters:
+                        self._waiters.remove(changed)
+                    return self._server() is not None
+
+    def _check_types(self) -> None:
+        for error in self._servers.values():
+            if error is not None:
+                raise error
+
+    def _wake(self) -> None:
+        waiters, self._waiters = self._waiters, []
+        for event in waiters:
+            event.set()
+
+    def on_server(self, server: Endpoint, error: TypeMismatchError | None) -> None:
+        """Take the appearance of a server."""
+        now = self._clock.now()
+        with self._lock:
+            self._servers[server] = error
+            if error is None:
+                returned = self._away.pop(server, None) is not None
+                for old in list(self._away):
+                    self._lose_goals_of(old, f"restarted as session {server.session}")
+                    del self._away[old]
+                for machine in self._machines.values():
+                    if returned or not machine.goal.acknowledged:
+                        machine.goal.hurry(now)
+                self._arm(now)
+            elif self._server() is None:
+                for machine in list(self._machines.values()):
+                    if not machine.goal.acknowledged:
+                        self._take(machine, machine.goal.lose(str(error)))
+            self._wake()
+
+    def on_server_gone(self, server: Endpoint) -> None:
+        """Take the disappearance of a server."""
+        with self._lock:
+            if self._servers.pop(server, self._server_lost_timeout) is not None:
+                return  # unknown, or of another type
+            if self._server_lost_timeout <= 0:
+                self._lose_goals_of(server, "is gone")
+            else:
+                now = self._clock.now()
+                self._away[server] = now + self._server_lost_timeout
+                self._arm(self._away[server])
+
+    def _lose_goals_of(self, server: Endpoint, what: str) -> None:
+        reason = f"the action server of node '{server.node}' (session {server.session}) {what}"
+        for machine in list(self._machines.values()):
+            goal = machine.goal
+            if goal.offered and goal.server in {"", server.session}:
+                self._take(machine, goal.lose(reason))
+
+    # -- what the user does --------------------------------------------------------------------
+
+    def send(
+        self,
+        goal_id: str,
+        stamp_ns: int,
+        body: bytes,
+        *,
+        on_transition: Callable[[CommStateMachine, CommState], None] | None,
+        on_feedback: Callable[[CommStateMachine, Any], None] | None,
+        ack_timeout: float | None = None,
+        created: Callable[[CommStateMachine], None] | None = None,
+    ) -> CommStateMachine:
+        """Send a goal.
+
+        Args:
+            goal_id: Its id.
+            stamp_ns: Its stamp [ns since the epoch].
+            body: The bytes of the XGoal.
+            on_transition: See `CommStateMachine`.
+            on_feedback: See `CommStateMachine`.
+            ack_timeout: Without a server that takes it for so long [s] it is LOST.
+            created: Called with the machine before anything can come back.
+
+        Raises:
+            TypeMismatchError: the action's server has another type.
+            TransportError: the client is stopped.
+        """
+        goal = ClientGoal(goal_id, ack_timeout=ack_timeout)
+        payload = pack_goal(stamp_ns, goal_id, stamp_ns, body)
+        machine = CommStateMachine(goal, self, payload, on_transition, on_feedback)
+        self._begin(machine, created)
+        return machine
+
+    def attach(
+        self,
+        goal_id: str,
+        *,
+        on_transition: Callable[[CommStateMachine, CommState], None] | None,
+        on_feedback: Callable[[CommStateMachine, Any], None] | None,
+        ack_timeout: float | None = None,
+        created: Callable[[CommStateMachine], None] | None = None,
+    ) -> CommStateMachine:
+        """Follow a goal that was sent in an earlier life; arguments as `send`."""
+        with self._lock:
+            known = self._machines.get(goal_id)
+        if known is not None:
+            raise ActionlibError(
+                f"goal {goal_id} on '{self.name}': this client follows it already."
+            )
+        goal = ClientGoal(goal_id, attached=True, ack_timeout=ack_timeout)
+        machine = CommStateMachine(goal, self, b"", on_transition, on_feedback)
+        self._begin(machine, created)
+        return machine
+
+    def _begin(
+        self, machine: CommStateMachine, created: Callable[[CommStateMachine], None] | None
+    ) -> None:
+        goal = machine.goal
+        with self._lock:
+            if self._closed:
+                raise TransportError(f"action '{self.name}': the client is stopped.")
+            if self._server() is None:
+                self._check_types()
+            now = self._clock.now()
+            duty = goal.begin(now)
+            self._machines[goal.id] = machine
+            if created is not None:
+                created(machine)
+            self._arm(goal.due)
+        self._fulfil(machine, duty)
+
+    def cancel(self, machine: CommStateMachine) -> None:
+        """Ask for a goal's end."""
+        with self._lock:
+            path, duty = machine.goal.cancel(self._clock.now())
+            self._take(machine, path)
+            self._arm(machine.goal.due)
+        self._fulfil(machine, duty)
+
+    def cancel_many(self, stamp_ns: int) -> None:
+        """Cancel the goals of all clients: all of them (0), or those at or before a stamp [ns]."""
+        self._port.send_cancel("", stamp_ns)
+
+    def wait_until_over(self, machine: CommStateMachine, timeout: float | None) -> bool:
+        """Wait until a goal is over, whatever its callbacks do; for use inside a callback.
+
+        Returns:
+            Whether it is over.
+
+        Blocks: until then, `timeout` [s] at most; None: no limit.
+        """
+        with self._lock:
+            if machine.goal.over:
+                return True
+            if machine.ended is None:
+                machine.ended = self._clock.event()
+            ended = machine.ended
+        return ended.wait(timeout)
+
+    def forget(self, machine: CommStateMachine) -> None:
+        """Follow a goal no more; it runs on. Its result is acknowledged when it comes."""
+        with self._lock:
+            if self._machines.get(machine.goal.id) is machine:
+                machine.on_transition = machine.on_feedback = None
+                machine.settled.set()
+
+    # -- what arrives --------------------------------------------------------------------------
+
+    def on_statuses(self, entries: list[StatusEntry], server: str) -> None:
+        """Take a status list."""
+        if not self._machines:
+            return
+        now = self._clock.now()
+        with self._lock:
+            listed = set()
+            for entry in entries:
+                listed.add(entry.id)
+                machine = self._machines.get(entry.id)
+                if machine is not None and is_status(entry.status):
+                    self._hear(machine, entry, server, now)
+            if len(listed) < len(self._machines) or not listed.issuperset(self._machines):
+                for machine in list(self._machines.values()):
+                    if machine.goal.id not in listed:
+                        self._take(machine, machine.goal.on_unlisted(now))
+                        self._arm(machine.goal.due)
+
+    def _hear(self, machine: CommStateMachine, entry: StatusEntry, server: str, now: float) -> None:
+        if server:
+            machine.goal.server = server
+        before = machine.goal.comm
+        self._take(machine, machine.goal.on_status(Status(entry.status), entry.text, now))
+        if machine.goal.comm is not before:
+            self._arm(machine.goal.due)
+
+    def on_feedback(self, entry: StatusEntry, payload: bytes, start: int, server: str) -> None:
+        """Take feedback."""
+        machine = self._machines.get(entry.id)
+        if machine is None:
+            return
+        feedback = None
+        if machine.on_feedback is not None:
+            try:
+                feedback = self.types.feedback.from_bytes(payload[start:])
+            except (ValueError, ActionlibError) as error:
+                log.error("action '%s': feedback cannot be read: %s", self.name, error)  # noqa: TRY400
+                return
+        with self._lock:
+            if is_status(entry.status) and not machine.goal.over:
+                self._hear(machine, entry, server, self._clock.now())
+                if machine.on_feedback is not None:
+                    machine.on_feedback(machine, feedback)
+
+    def on_result(self, entry: StatusEntry, body: bytes, server: str) -> None:
+        """Take a result."""
+        machine = self._machines.get(entry.id)
+        if machine is None:
+            if entry.id in self._ended:
+                self._acknowledge(entry.id)
+            return
+        status = Status(entry.status) if is_status(entry.status) else Status.LOST
+        text, result = entry.text, None
+        try:
+            result = self.types.result.from_bytes(body)
+        except (ValueError, ActionlibError) as error:
+            status, text = Status.LOST, f"the result cannot be read: {error}"
+        self._end(machine, status, text, result, server)
+
+    def on_answer(self, entry: StatusEntry) -> None:
+        """Take a status as the answer to a question."""
+        machine = self._machines.get(entry.id)
+        if machine is None or not is_status(entry.status):
+            return
+        if entry.status in TERMINAL:
+            self._end(machine, Status(entry.status), entry.text, None, "")
+            return
+        with self._lock:
+            if entry.status == Status.LOST:
+                self._take(machine, machine.goal.on_unknown(entry.text))
+            else:
+                self._hear(machine, entry, "", self._clock.now())
+
+    def _end(
+        self, machine: CommStateMachine, status: Status, text: str, result: Any, server: str
+    ) -> None:
+        with self._lock:
+            if server:
+                machine.goal.server = server
+            self._take(machine, machine.goal.on_result(status, text, result, self._clock.now()))
+        self._acknowledge(machine.goal.id)
+
+    def _acknowledge(self, goal_id: str) -> None:
+        with self._lock:
+            if self._closed:
+                return
+            self._acks.append(goal_id)
+            if len(self._acks) < ACK_AT:
+                self._arm(self._clock.now() + TICK_S)
+                return
+            acks, self._acks = self._acks, []
+        self._port.send_acks(acks, self._clock.time_ns())
+
+    def _take(self, machine: CommStateMachine, path: Path) -> None:
+        """Note the states a goal has passed. Needs the lock."""
+        if not path:
+            return
+        if machine.goal.over:
+            self._machines.pop(machine.goal.id, None)
+            if machine.ended is not None:
+                machine.ended.set()
+            self._ended[machine.goal.id] = None
+            if len(self._ended) > REMEMBERED:
+                del self._ended[next(iter(self._ended))]
+        if machine.on_transition is None:
+            if machine.goal.over:
+                machine.settled.set()
+            return
+        for state in path:
+            machine.on_transition(machine, state)
+
+    # -- time ----------------------------------------------------------------------------------
+
+    def _arm(self, due: float) -> None:
+        """Let the timer run at `due` or a little later. Needs the lock."""
+        if self._closed or (self._timer is not None and self._due <= due):
+            return
+        if self._timer is not None:
+            self._timer.cancel()
+        self._due = due
+        self._timer = self._clock.call_later(due - self._clock.now(), self._on_timer)
+
+    def _on_timer(self) -> None:
+        now = self._clock.now()
+        duties = []
+        with self._lock:
+            self._timer = None
+            if self._closed:
+                return
+            acks, self._acks = self._acks, []
+            for server in [end for end, until in self._away.items() if until <= now]:
+                del self._away[server]
+                self._lose_goals_of(server, "is gone")
+            for machine in list(self._machines.values()):
+                path, duty = machine.goal.tick(now)
+                self._take(machine, path)
+                if duty:
+                    duties.append((machine, duty))
+            dues = [machine.goal.due for machine in self._machines.values()]
+            dues.extend(self._away.values())
+            if dues:
+                self._arm(max(min(dues), now + TICK_S))
+        if acks:
+            self._port.send_acks(acks, self._clock.time_ns())
+        for machine, duty in duties:
+            self._fulfil(machine, duty)
+
+    def _fulfil(self, machine: CommStateMachine, duty: Duty) -> None:
+        """Send what a goal needs."""
+        goal = machine.goal
+        if Duty.CANCEL in duty:
+            self._port.send_cancel(goal.id, 0)
+        if Duty.GOAL in duty:
+            with self._lock:
+                server = self._server()
+                if server is not None or self._port.is_heard():
+                    goal.on_offered(server.session if server is not None else "")
+            if goal.offered:
+                self._port.send_goal(machine.payload)
+        if Duty.ASK in duty and not machine.asking:
+            machine.asking = True
+            self._port.ask(goal.id, machine.on_answered)

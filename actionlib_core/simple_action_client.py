@@ -1,0 +1,342 @@
+"""`SimpleActionClient`: one goal at a time, three states."""
+
+from __future__ import annotations
+
+import threading
+from functools import partial
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from actionlib_core._core.states import CommState, SimpleGoalState, Status
+from actionlib_core.action_client import ActionClient, ClientGoalHandle, to_timeout
+from actionlib_core.time import to_seconds
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.goal_manager import CommStateMachine
+    from actionlib_core.node import Node
+    from actionlib_core.time import Duration, Time
+
+__all__ = ["SimpleActionClient", "SimpleGoalState"]
+
+A = TypeVar("A")
+
+_RUNNING = frozenset({CommState.ACTIVE, CommState.PREEMPTING})
+_OVER = frozenset({CommState.DONE, CommState.LOST})
+_SHOWN = {
+    CommState.WAITING_FOR_GOAL_ACK: Status.PENDING,
+    CommState.PENDING: Status.PENDING,
+    CommState.RECALLING: Status.PENDING,
+    CommState.ACTIVE: Status.ACTIVE,
+    CommState.PREEMPTING: Status.ACTIVE,
+}
+
+
+class _Goal:
+    """The goal a simple client follows, with its callbacks."""
+
+    __slots__ = ("active_cb", "done_cb", "feedback_cb", "handle", "owner", "simple_state")
+
+    def __init__(
+        self,
+        owner: SimpleActionClient[Any],
+        done_cb: Callable[[int, Any], object] | None,
+        active_cb: Callable[[], object] | None,
+        feedback_cb: Callable[[Any], object] | None,
+    ) -> None:
+        self.owner = owner
+        self.done_cb = done_cb
+        self.active_cb = active_cb
+        self.feedback_cb = feedback_cb
+        self.simple_state = SimpleGoalState.PENDING
+        self.handle: ClientGoalHandle | None = None
+
+    def on_created(self, machine: CommStateMachine) -> None:
+        """Become the client's goal, before anything can come back."""
+        self.handle = ClientGoalHandle(machine)
+        self.owner.follow(self)
+
+    def on_transition(self, machine: CommStateMachine, state: CommState) -> None:
+        """Note a state; runs under the manager's lock."""
+        call = machine.manager.callbacks.call
+        if state in _RUNNING and self.simple_state is SimpleGoalState.PENDING:
+            self.simple_state = SimpleGoalState.ACTIVE
+            if self.active_cb is not None:
+                call(machine.show, state, self.active_cb)
+        elif state in _OVER:
+            self.simple_state = SimpleGoalState.DONE
+            if self.done_cb is not None:
+                call(
+                    machine.show,
+                    state,
+                    self.done_cb,
+                    int(machine.goal.status),
+                    machine.goal.result,
+                )
+            if self.has_callbacks or self.owner.has_condition:
+                call(self.owner.settle, machine)
+            else:
+                machine.settled.set()
+
+    @property
+    def has_callbacks(self) -> bool:
+        """Whether anything may still be waiting in the queue when the goal is over."""
+        return (self.done_cb or self.active_cb or self.feedback_cb) is not None
+
+    def on_feedback(self, machine: CommStateMachine, feedback: Any) -> None:
+        """Note feedback; runs under the manager's lock."""
+        if self.feedback_cb is not None:
+            machine.manager.callbacks.call(partial(self.feedback_cb, feedback))
+
+
+class SimpleActionClient(Generic[A]):
+    """Sends one goal at a time and waits for it.
+
+    Args:
+        ns: The action's name.
+        ActionSpec: The action class (XAction).
+        node: Where; the current node when None.
+        server_lost_timeout: How long the server may be away before the goal is LOST [s].
+
+    Attributes:
+        action_client: The `ActionClient` beneath.
+
+    Raises:
+        ActionException: `ActionSpec` is not an action class.
+        InvalidNameError: the name breaks the ROS rules.
+        TransportError: the network session is closed.
+
+    Threads: every method may be called from any thread and any callback, those of this client
+        included. Callbacks run one at a time, in the order active, feedback, done, on a thread of
+        their own, without any lock.
+    """
+
+    def __init__(
+        self,
+        ns: str,
+        ActionSpec: type[A],  # noqa: N803  actionlib's name
+        *,
+        node: Node | None = None,
+        server_lost_timeout: float | Duration = 0.0,
+    ) -> None:
+        self.action_client: ActionClient[A] = ActionClient(
+            ns, ActionSpec, node=node, server_lost_timeout=server_lost_timeout
+        )
+        self._goal: _Goal | None = None
+        self._condition: threading.Condition | None = None
+
+    # -- actionlib's attributes ----------------------------------------------------------------
+
+    @property
+    def gh(self) -> ClientGoalHandle | None:
+        """The handle of the goal that is followed."""
+        goal = self._goal
+        return None if goal is None else goal.handle
+
+    @property
+    def simple_state(self) -> SimpleGoalState:
+        """PENDING, ACTIVE or DONE; DONE also when no goal was sent."""
+        goal = self._goal
+        return SimpleGoalState.DONE if goal is None else goal.simple_state
+
+    @property
+    def done_condition(self) -> threading.Condition:
+        """A condition that is notified when a goal is over. `wait_for_result` is the better way."""
+        if self._condition is None:
+            self._condition = threading.Condition()
+        return self._condition
+
+    @property
+    def has_condition(self) -> bool:
+        """Whether anybody has asked for `done_condition`."""
+        return self._condition is not None
+
+    # -- the server ----------------------------------------------------------------------------
+
+    def wait_for_server(self, timeout: float | Duration | None = 0.0) -> bool:
+        """Wait until the action has a server.
+
+        Args:
+            timeout: Longest wait [s]; 0 and None wait for ever, as in actionlib.
+
+        Returns:
+            Whether there is one; False also when the client was stopped.
+
+        Raises:
+            TypeMismatchError: there is one, but of another type.
+
+        Blocks: until then.
+        """
+        return self.action_client.wait_for_server(timeout)
+
+    def stop(self) -> None:
+        """Leave the name. A goal that runs goes on at the server; here it is LOST."""
+        self.action_client.stop()
+
+    # -- goals ---------------------------------------------------------------------------------
+
+    def send_goal(
+        self,
+        goal: Any,
+        done_cb: Callable[[int, Any], object] | None = None,
+        active_cb: Callable[[], object] | None = None,
+        feedback_cb: Callable[[Any], object] | None = None,
+        *,
+        ack_timeout: float | Duration | None = None,
+    ) -> None:
+        """Send a goal; the former one is followed no more, but not cancelled.
+
+        Args:
+            goal: The goal message (XGoal).
+            done_cb: Called with the terminal status (`GoalStatus`) and the result message; the
+                result is None when the goal is LOST. It may send the next goal.
+            active_cb: Called when the goal starts to run.
+            feedback_cb: Called with each XFeedback message.
+            ack_timeout: When no server has taken the goal after so long [s], it is LOST; None: it
+                waits as long as it takes.
+
+        Raises:
+            ActionException: `goal` is not of the action's type.
+            MessageError: a field of `goal` has a wrong type.
+            TypeMismatchError: the action's server has another type.
+            TransportError: the client is stopped.
+        """
+        packed = self.action_client.pack(goal)
+        entry = _Goal(self, done_cb, active_cb, feedback_cb)
+        self.stop_tracking_goal()
+        self.action_client.manager.send(
+            *packed,
+            on_transition=entry.on_transition,
+            on_feedback=entry.on_feedback if feedback_cb is not None else None,
+            ack_timeout=to_seconds(ack_timeout),
+            created=entry.on_created,
+        )
+
+    def attach(
+        self,
+        goal_id: str,
+        done_cb: Callable[[int, Any], object] | None = None,
+        active_cb: Callable[[], object] | None = None,
+        feedback_cb: Callable[[Any], object] | None = None,
+        *,
+        ack_timeout: float | Duration | None = None,
+    ) -> None:
+        """Follow a goal that an earlier life of this program sent, by its id.
+
+        See `ActionClient.attach`; the other arguments are those of `send_goal`.
+        """
+        entry = _Goal(self, done_cb, active_cb, feedback_cb)
+        self.stop_tracking_goal()
+        self.action_client.manager.attach(
+            goal_id,
+            on_transition=entry.on_transition,
+            on_feedback=entry.on_feedback if feedback_cb is not None else None,
+            ack_timeout=to_seconds(ack_timeout),
+            created=entry.on_created,
+        )
+
+    def follow(self, goal: _Goal) -> None:
+        """Make `goal` the one that is followed; not for users."""
+        self._goal = goal
+
+    def settle(self, machine: CommStateMachine) -> None:
+        """Note that the last callback of a goal has returned; not for users."""
+        machine.settled.set()
+        if self._condition is not None:
+            with self._condition:
+                self._condition.notify_all()
+
+    def send_goal_and_wait(
+        self,
+        goal: Any,
+        execute_timeout: float | Duration = 0.0,
+        preempt_timeout: float | Duration = 0.0,
+    ) -> int:
+        """Send a goal and wait for its end; past `execute_timeout`, cancel it and wait again.
+
+        Args:
+            goal: The goal message (XGoal).
+            execute_timeout: Longest run [s]; 0 sets no limit.
+            preempt_timeout: Longest wait for the end after the cancel [s]; 0 sets no limit.
+
+        Returns:
+            The status (`GoalStatus`), not yet a final one when `preempt_timeout` was too short.
+
+        Blocks: until the goal is over or both times have passed.
+        """
+        self.send_goal(goal)
+        if not self.wait_for_result(execute_timeout):
+            self.cancel_goal()
+            self.wait_for_result(preempt_timeout)
+        return self.get_state()
+
+    def wait_for_result(self, timeout: float | Duration | None = 0.0) -> bool:
+        """Wait until the goal is over and `done_cb` has returned.
+
+        Called from a callback of this client, it does not wait for callbacks.
+
+        Args:
+            timeout: Longest wait [s]; 0 and None wait as long as it takes, as in actionlib: until
+                the goal is over, or its server dies, or the client is stopped.
+
+        Returns:
+            Whether the goal is over; False also when no goal was sent.
+
+        Blocks: until then.
+        """
+        handle = self.gh
+        if handle is None:
+            return False
+        machine = handle.comm_state_machine
+        if machine.manager.callbacks.is_inside():
+            return machine.manager.wait_until_over(machine, to_timeout(timeout))
+        machine.settled.wait(to_timeout(timeout))
+        return machine.goal.over and machine.settled.is_set()
+
+    def get_result(self) -> Any:
+        """Return the result message, None while there is none."""
+        handle = self.gh
+        return None if handle is None else handle.get_result()
+
+    def get_state(self) -> int:
+        """Return the goal's status (`GoalStatus`).
+
+        RECALLING is shown as PENDING, PREEMPTING as ACTIVE, no goal as LOST. While an answer to a
+        cancel is awaited, it is the last status the server gave.
+        """
+        goal = self._goal
+        if goal is None or goal.handle is None:
+            return int(Status.LOST)
+        shown = _SHOWN.get(goal.handle.get_comm_state())
+        if shown is not None:
+            return int(shown)
+        status = goal.handle.get_goal_status()
+        if status == Status.PREEMPTING:
+            return int(Status.ACTIVE)
+        return int(Status.PENDING) if status == Status.RECALLING else status
+
+    def get_goal_status_text(self) -> str:
+        """Return what the server said about the status, or why the goal is lost."""
+        handle = self.gh
+        return "" if handle is None else handle.get_goal_status_text()
+
+    def cancel_all_goals(self) -> None:
+        """Ask the server to end all goals, also those of other clients."""
+        self.action_client.cancel_all_goals()
+
+    def cancel_goals_at_and_before_time(self, time: Time | float) -> None:
+        """Ask the server to end the goals with a stamp at or before `time`, of all clients."""
+        self.action_client.cancel_goals_at_and_before_time(time)
+
+    def cancel_goal(self) -> None:
+        """Ask for the end of the goal; without one, nothing happens."""
+        handle = self.gh
+        if handle is not None:
+            handle.cancel()
+
+    def stop_tracking_goal(self) -> None:
+        """Follow the goal no more; it is not cancelled. Callbacks already due may still run."""
+        goal, self._goal = self._goal, None
+        if goal is not None and goal.handle is not None:
+            machine = goal.handle.comm_state_machine
+            machine.manager.forget(machine)

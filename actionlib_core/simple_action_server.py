@@ -1,0 +1,392 @@
+"""`SimpleActionServer`: one goal at a time, run by one callback."""
+
+from __future__ import annotations
+
+import logging
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core._core.server_goals import RESULT_TIMEOUT_S
+from actionlib_core._core.single_goal import Policy, SingleGoal
+from actionlib_core._core.states import TERMINAL, Status
+from actionlib_core.action_server import TEXT_STOPPED, ActionServer, OnClientLost
+from actionlib_core.exceptions import ActionException, IllegalTransitionError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core._core.single_goal import Decision
+    from actionlib_core.clock import Event, Task
+    from actionlib_core.exceptions import ServerConflictError
+    from actionlib_core.node import Node
+    from actionlib_core.server_goal_handle import ServerGoalHandle
+    from actionlib_core.time import Duration
+
+log = logging.getLogger(__name__)
+
+STOP_GRACE_S = 0.4  # how long `stop` waits for the execute callback to notice
+
+TEXT_ACCEPTED = "This goal has been accepted by the simple action server"
+TEXT_NEWER = "This goal was canceled because another goal was received by the simple action server"
+TEXT_CANCELLED_WAITING = "This goal was canceled before it was started"
+TEXT_BUSY = "This goal was rejected because the simple action server is busy"
+TEXT_NO_STATUS = "No terminal state was set."
+
+
+class _QuickServer(ActionServer):
+    """An action server whose goal and cancel callbacks only note what came.
+
+    They run on the network's thread, which saves a change of threads for every goal.
+    """
+
+    def _deliver_goal(self, handle: ServerGoalHandle) -> None:
+        self.goal_callback(handle)
+
+    def _deliver_cancel(self, handle: ServerGoalHandle) -> None:
+        self.cancel_callback(handle)
+
+    def on_conflict(self, error: ServerConflictError) -> None:
+        super().on_conflict(error)
+        self.on_stopped()
+
+    def on_stopped(self) -> None:
+        """Tell the simple server; it replaces this."""
+
+
+class SimpleActionServer:
+    """Offers an action whose goals run one at a time.
+
+    With `execute_cb`, each goal is run by calling it, in a thread that exists while there are
+    goals. Without, register a goal callback and call `accept_new_goal` yourself.
+
+    Args:
+        name: The action's name.
+        ActionSpec: The action class (XAction).
+        execute_cb: Called with the goal message (XGoal); it must call `set_succeeded`,
+            `set_aborted`, `set_preempted` or `set_rejected` before it returns.
+        auto_start: Start at once. With False, call `start` when everything is ready.
+        node: Where; the current node when None.
+        policy: What a new goal does while one runs: "preempt" asks the running one to stop, as in
+            ROS; "queue" waits its turn; "reject" is turned away.
+        on_client_lost: What happens to the goal of a client that died: "continue" as in ROS, or
+            "cancel", as if the client had cancelled it.
+        result_timeout: How long a result waits for a client that lost its link [s].
+
+    Attributes:
+        action_server: The `ActionServer` beneath.
+        execute_callback: `execute_cb`.
+
+    Raises:
+        ActionException: `ActionSpec` is not an action class.
+        InvalidNameError: the name breaks the ROS rules.
+        ServerConflictError: the name has a server already (from `start`).
+        TransportError: the network session is closed.
+
+    Threads: every method may be called from any thread and any callback. User callbacks run
+        without any lock.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        ActionSpec: Any,  # noqa: N803  actionlib's name
+        execute_cb: Callable[[Any], object] | None = None,
+        auto_start: bool = True,
+        *,
+        node: Node | None = None,
+        policy: Policy = "preempt",
+        on_client_lost: OnClientLost = "continue",
+        result_timeout: float | Duration = RESULT_TIMEOUT_S,
+    ) -> None:
+        self.execute_callback = execute_cb
+        self.goal_callback: Callable[[], object] | None = None
+        self.preempt_callback: Callable[[], object] | None = None
+        self._policy: SingleGoal[ServerGoalHandle] = SingleGoal(policy)
+        self._task: Task | None = None
+        self.action_server = _QuickServer(
+            name,
+            ActionSpec,
+            self.internal_goal_callback,
+            self.internal_preempt_callback,
+            False,  # noqa: FBT003  actionlib's flag
+            node=node,
+            on_client_lost=on_client_lost,
+            result_timeout=result_timeout,
+        )
+        self.action_server.on_stopped = self._ask_to_stop  # type: ignore[method-assign]
+        self.lock = self.action_server.lock
+        self._name = self.action_server.ns
+        self._queue = self.action_server.callback_queue
+        self._preempted: Event = self.action_server.node.clock.event()
+        self._forget: Callable[[], None] | None = None
+        if auto_start:
+            self.start()
+
+    # -- life ----------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Offer the action; a second call does nothing.
+
+        Raises:
+            ServerConflictError: the name has a server already.
+            TransportError: the network session is closed.
+
+        Blocks: until the network has said who has the name, 1 s at most.
+        """
+        self.action_server.start()
+        with self.lock:
+            if self._forget is None:
+                self._forget = self.action_server.node.on_close(self.stop)
+
+    def stop(self) -> None:
+        """Ask the running goal to stop, end all goals, leave the name.
+
+        Blocks: until `execute_cb` has returned, 0.4 s at most; then its goal is ABORTED.
+        """
+        forget, self._forget = self._forget, None
+        if forget is None:
+            return
+        forget()
+        task = self._task
+        self._ask_to_stop()
+        if task is not None:
+            task.join(STOP_GRACE_S)
+        self.action_server.stop()
+
+    def _ask_to_stop(self) -> None:
+        with self.lock:
+            waiting = self._policy.on_stop()
+        for handle in waiting:
+            handle.set_rejected(None, TEXT_STOPPED)
+        self._preempted.set()
+
+    # -- goals ---------------------------------------------------------------------------------
+
+    @property
+    def current_goal(self) -> ServerGoalHandle | None:
+        """The goal that was accepted last."""
+        return self._policy.current
+
+    @property
+    def next_goal(self) -> ServerGoalHandle | None:
+        """The goal that waits to be accepted next."""
+        return self._policy.next
+
+    @property
+    def preempt_request(self) -> bool:
+        """Whether the current goal is asked to stop."""
+        return self._policy.preempt_requested
+
+    def accept_new_goal(self) -> Any:
+        """Accept the waiting goal; one that still runs becomes PREEMPTED.
+
+        Returns:
+            The goal message; None when no goal waits (check `is_new_goal_available` before).
+        """
+        with self.lock:
+            new, pushed = self._policy.accept()
+            if new is None:
+                log.error(
+                    "action '%s': accept_new_goal(): no goal waits. Try is_new_goal_available().",
+                    self._name,
+                )
+                return None
+            self._preempted.clear()
+            if self._policy.preempt_requested:
+                self._preempted.set()
+        if pushed is not None and pushed.status_tracker.record.status not in TERMINAL:
+            pushed.set_canceled(None, TEXT_NEWER)
+        new.set_accepted(TEXT_ACCEPTED)
+        return new.get_goal()
+
+    def is_new_goal_available(self) -> bool:
+        """Tell whether a goal waits to be accepted."""
+        return self._policy.waiting
+
+    def is_preempt_requested(self) -> bool:
+        """Tell whether the current goal is asked to stop, by a cancel or a newer goal."""
+        return self._policy.preempt_requested
+
+    def wait_preempt(self, timeout: float | None = None) -> bool:
+        """Wait until the current goal is asked to stop.
+
+        Args:
+            timeout: Longest wait [s]; None waits for ever.
+
+        Returns:
+            Whether it is asked to stop.
+
+        Blocks: until then.
+        """
+        return self._preempted.wait(timeout)
+
+    def is_active(self) -> bool:
+        """Tell whether a goal was accepted and has not ended."""
+        goal = self._policy.current
+        if goal is None:
+            return False
+        return goal.status_tracker.record.status in {Status.ACTIVE, Status.PREEMPTING}
+
+    def set_succeeded(self, result: Any = None, text: str = "") -> None:
+        """End the current goal in success.
+
+        Args:
+            result: The result message (XResult); None sends one with default values.
+            text: Why, for people.
+
+        Raises:
+            IllegalTransitionError: the goal has ended already.
+            ActionException: no goal was accepted, or `result` is not of the action's type.
+            MessageError: a field of `result` has a wrong type.
+        """
+        self._end("set_succeeded()", "succeed", result, text)
+
+    def set_aborted(self, result: Any = None, text: str = "") -> None:
+        """End the current goal in failure; see `set_succeeded`."""
+        self._end("set_aborted()", "abort", result, text)
+
+    def set_preempted(self, result: Any = None, text: str = "") -> None:
+        """End the current goal because it was asked to stop; see `set_succeeded`."""
+        self._end("set_preempted()", "cancel", result, text)
+
+    def set_rejected(self, result: Any = None, text: str = "") -> None:
+        """Turn away the goal that waits; see `set_succeeded`.
+
+        From a goal callback only: `execute_cb` runs with a goal already accepted, which it can end
+        with `set_aborted`.
+        """
+        with self.lock:
+            handle = self._policy.withdraw()
+        if handle is None:
+            raise ActionException(
+                f"action '{self._name}': set_rejected(): got no waiting goal; expected one. Try "
+                "calling it from the goal callback, before accept_new_goal()."
+            )
+        handle.set_rejected(result, text)
+
+    def _end(self, call: str, event: str, result: Any, text: str) -> None:
+        goal = self._policy.current
+        if goal is None:
+            raise ActionException(
+                f"action '{self._name}': {call}: got no goal; expected one that was accepted."
+            )
+        self.action_server.finish(goal.status_tracker, event, call, result, text)
+        with self.lock:
+            self._policy.on_ended(goal)
+
+    def publish_feedback(self, feedback: Any) -> None:
+        """Send feedback (XFeedback) to the current goal's client.
+
+        Raises:
+            ActionException: no goal was accepted, or `feedback` is not of the action's type.
+            MessageError: a field of `feedback` has a wrong type.
+        """
+        goal = self._policy.current
+        if goal is None:
+            raise ActionException(
+                f"action '{self._name}': publish_feedback(): got no goal; expected one that was "
+                "accepted."
+            )
+        self.action_server.send_feedback(goal.status_tracker, feedback)
+
+    def get_default_result(self) -> Any:
+        """Return a new result message with default values."""
+        return self.action_server.ActionResultType()
+
+    def register_goal_callback(self, cb: Callable[[], object] | None) -> None:
+        """Call `cb` when a goal has come that waits to be accepted.
+
+        Raises:
+            ActionException: the server has an `execute_cb`, which gets the goals.
+        """
+        if self.execute_callback is not None and cb is not None:
+            raise ActionException(
+                f"action '{self._name}': register_goal_callback(): got a callback beside "
+                "execute_cb; expected one of the two."
+            )
+        self.goal_callback = cb
+
+    def register_preempt_callback(self, cb: Callable[[], object] | None) -> None:
+        """Call `cb` when the current goal is asked to stop."""
+        self.preempt_callback = cb
+
+    # -- what arrives (on the network's thread) ------------------------------------------------
+
+    def internal_goal_callback(self, goal: ServerGoalHandle) -> None:
+        """Take a new goal; the `ActionServer` beneath calls it."""
+        with self.lock:
+            stamp_ns = goal.status_tracker.record.stamp_ns
+            decision = self._policy.on_goal(goal, stamp_ns)
+            if decision.announce:
+                self._start_execution()
+        self._carry_out(decision, TEXT_NEWER)
+
+    def internal_preempt_callback(self, preempt: ServerGoalHandle) -> None:
+        """Take a cancel; the `ActionServer` beneath calls it."""
+        with self.lock:
+            goal = self._policy.find(preempt)
+            decision = self._policy.on_cancel(
+                goal, recall_waiting=self.execute_callback is not None
+            )
+        self._carry_out(decision, TEXT_CANCELLED_WAITING)
+
+    def _carry_out(self, decision: Decision[ServerGoalHandle], text: str) -> None:
+        for older in decision.recall:
+            older.set_canceled(None, text)
+        if decision.reject is not None:
+            decision.reject.set_rejected(None, TEXT_BUSY)
+        if decision.preempt:
+            self._preempted.set()
+            if self.preempt_callback is not None:
+                self._queue.call(self.preempt_callback)
+        if decision.announce and self.goal_callback is not None:
+            self._queue.call(self.goal_callback)
+
+    # -- execution -----------------------------------------------------------------------------
+
+    def _start_execution(self) -> None:
+        """Start the thread that runs goals, unless it runs. Needs the lock."""
+        if self.execute_callback is not None and self._task is None:
+            self._task = self._queue.spawn(self.executeLoop, f"{self._name} execute")
+
+    def executeLoop(self) -> None:  # noqa: N802  actionlib's name
+        """Run the goals that wait, until none does."""
+        while True:
+            with self.lock:
+                if not self._policy.waiting:
+                    self._task = None
+                    return
+            goal = self.accept_new_goal()
+            if self.execute_callback is not None:
+                self._run(partial(self.execute_callback, goal))
+
+    def _run(self, execute: Callable[[], object]) -> None:
+        """Run one goal and make sure that it ends."""
+        handle = self._policy.current
+        assert handle is not None
+        text = TEXT_NO_STATUS
+        try:
+            execute()
+        except IllegalTransitionError as error:
+            if self.action_server.stopped:  # the goal was ended by `stop`
+                return
+            text = self._report(error)
+        except Exception as error:  # noqa: BLE001  a border: told to the client and logged
+            text = self._report(error)
+        except BaseException as error:
+            self._abort(handle, f"Exception in execute callback: {error!r}")
+            with self.lock:
+                self._task = None
+            raise
+        self._abort(handle, text)
+
+    def _report(self, error: Exception) -> str:
+        log.error("action '%s': exception in execute callback", self._name, exc_info=error)
+        return f"Exception in execute callback: {error}"
+
+    def _abort(self, handle: ServerGoalHandle, text: str) -> None:
+        """End a goal that its callback has left without an end."""
+        with self.lock:
+            running = handle.status_tracker.record.status not in TERMINAL
+            if running and handle is self._policy.current:
+                self._end("the end of execute_cb", "abort", None, text)
