@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import threading
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -42,11 +43,10 @@ def no_leaks() -> Iterator[None]:
     """Fail a test that leaves a thread or a process behind."""
     threads, children = _threads(), _children()
     yield
-    left = _threads() - threads
-    for thread in left:
-        if thread is not threading.current_thread():
-            thread.join(GRACE_S if thread.name not in CACHED else 0)
-    left = {t for t in left if t.is_alive() and t.name not in CACHED}
+    deadline = time.monotonic() + GRACE_S
+    # A thread that becomes idle in a cache does not end, so look again in short intervals.
+    while (left := _threads() - threads) and time.monotonic() < deadline:
+        next(iter(left)).join(0.005)
     assert not left, f"threads left behind: {sorted(t.name for t in left)}"
     assert not _children() - children, f"processes left behind: {_children() - children}"
 

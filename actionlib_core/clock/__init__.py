@@ -13,8 +13,8 @@ from actionlib_core.clock._protocol import Task as Task
 from actionlib_core.clock._protocol import Timer as Timer
 from actionlib_core.clock._real import RealClock as RealClock
 from actionlib_core.clock._serial import SerialExecutor as SerialExecutor
-from actionlib_core.clock._virtual import Deadlock as Deadlock
 from actionlib_core.clock._virtual import VirtualClock as VirtualClock
+from actionlib_core.clock._virtual_parts import Deadlock as Deadlock
 
 __all__ = [
     "Clock",

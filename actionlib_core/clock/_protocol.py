@@ -105,8 +105,8 @@ class Clock(Protocol):
         """
         ...
 
-    def event(self) -> Event:
-        """Make an event, not set."""
+    def event(self, name: str = "an event") -> Event:
+        """Make an event, not set; `name` says in reports what a waiter waits for."""
         ...
 
     def spawn(self, target: Callable[[], object], *, name: str) -> Task:

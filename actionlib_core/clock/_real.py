@@ -12,13 +12,12 @@ import time
 from typing import TYPE_CHECKING, TypeVar
 
 from actionlib_core.clock._serial import report_thread_exception
+from actionlib_core.clock._threads import ThreadCache, mark_idle
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
 
 T = TypeVar("T")
-
-IDLE_S = 5.0  # a cached thread without work ends after this
 
 
 class RealEvent:
@@ -76,68 +75,6 @@ class RealEvent:
 _LONGEST_S = threading.TIMEOUT_MAX
 
 
-class _Worker:
-    """One cached thread: runs tasks handed to it, ends after `IDLE_S` without any."""
-
-    def __init__(self, cache: _ThreadCache) -> None:
-        self._cache = cache
-        self._wake = _thread.allocate_lock()
-        self._wake.acquire()
-        self._task: RealTask | None = None
-        self._thread = threading.Thread(target=self._run, name="idle", daemon=True)
-        self._started = False
-
-    def give(self, task: RealTask) -> None:
-        self._task = task
-        if self._started:
-            self._wake.release()
-        else:
-            self._started = True
-            self._thread.start()
-
-    def _run(self) -> None:
-        while True:
-            task = self._task
-            self._task = None
-            assert task is not None
-            self._thread.name = task.name
-            task.run()
-            self._thread.name = "idle"
-            del task
-            self._cache.put_back(self)
-            if not self._wake.acquire(timeout=IDLE_S):
-                if self._cache.retire(self):
-                    return
-                self._wake.acquire()  # `give` chose this worker at the last moment
-
-
-class _ThreadCache:
-    """Idle threads, newest first; starting one from here costs a lock hand-over."""
-
-    def __init__(self) -> None:
-        self._idle: list[_Worker] = []
-        self._lock = threading.Lock()
-
-    def start(self, task: RealTask) -> None:
-        with self._lock:
-            worker = self._idle.pop() if self._idle else None
-        if worker is None:
-            worker = _Worker(self)
-        worker.give(task)
-
-    def put_back(self, worker: _Worker) -> None:
-        with self._lock:
-            self._idle.append(worker)
-
-    def retire(self, worker: _Worker) -> bool:
-        with self._lock:
-            try:
-                self._idle.remove(worker)
-            except ValueError:
-                return False
-            return True
-
-
 class RealTask:
     """A target running in a cached thread."""
 
@@ -166,6 +103,7 @@ class RealTask:
         finally:
             self._ident = None
             del self._target, self._context
+            mark_idle()
             self._done.set()
 
     def is_alive(self) -> bool:
@@ -238,7 +176,7 @@ class RealClock:
     """Monotonic and wall time of the computer, real threads."""
 
     def __init__(self) -> None:
-        self._cache = _ThreadCache()
+        self._cache = ThreadCache()
         self._timers = _TimerThread(self)
 
     now = staticmethod(time.monotonic)
@@ -248,7 +186,7 @@ class RealClock:
         if seconds > 0:
             time.sleep(seconds)
 
-    def event(self) -> RealEvent:
+    def event(self, name: str = "an event") -> RealEvent:  # noqa: ARG002  for virtual time
         return RealEvent()
 
     def spawn(self, target: Callable[[], object], *, name: str) -> RealTask:

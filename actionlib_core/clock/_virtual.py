@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
-import _thread
 import asyncio
+import contextlib
 import contextvars
 import heapq
 import itertools
+import operator
 import random
-import selectors
 import threading
-from typing import TYPE_CHECKING, TypeVar
+import time
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from actionlib_core.clock._real import RealEvent
 from actionlib_core.clock._serial import report_thread_exception
+from actionlib_core.clock._threads import ThreadCache
+from actionlib_core.clock._virtual_loop import VirtualLoop
+from actionlib_core.clock._virtual_parts import (
+    Deadlock,
+    Participant,
+    Stopped,
+    VirtualEvent,
+    VirtualTask,
+    VirtualTimer,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine, Mapping
+    from collections.abc import Callable, Coroutine, Iterator, Mapping
     from types import TracebackType
     from typing import Self
-
-    from _typeshed import FileDescriptorLike as _File
 
 T = TypeVar("T")
 
@@ -27,100 +37,9 @@ START_TIME_NS = 1_000_000_000 * 1_000_000_000  # 2001-09-09T01:46:40Z: stamps of
 INTERRUPT_S = 1.0  # real seconds that an interrupted thread waits for its turn
 JOIN_S = 5.0  # real seconds that `close` gives a thread to unwind
 
-
-class Deadlock(Exception):  # noqa: N818  the field's word
-    """Every participant waits and nothing can ever wake one of them.
-
-    Attributes:
-        waits: Participant name -> what it waits for.
-    """
-
-    def __init__(self, waits: Mapping[str, str]) -> None:
-        self.waits = dict(waits)
-        lines = [f"  - {name}: waits for {what}" for name, what in self.waits.items()]
-        super().__init__(
-            "virtual clock: every participant waits and no deadline is left; "
-            "expected at least one that can go on:\n" + "\n".join(lines)
-        )
-
-
-class _Stopped(BaseException):
-    """The clock was closed while this participant waited."""
-
-
-class _Participant:
-    """One thread under the clock; `gate` is locked while it must not run."""
-
-    __slots__ = ("error", "event", "gate", "name", "waiting", "woken")
-
-    def __init__(self, name: str) -> None:
-        self.name = name
-        self.gate = _thread.allocate_lock()
-        self.gate.acquire()
-        self.waiting = ""
-        self.event: VirtualEvent | None = None
-        self.woken = True
-        self.error: BaseException | None = None
-
-
-class VirtualEvent:
-    """An event of a `VirtualClock`; `set` may come from any thread."""
-
-    __slots__ = ("_clock", "_flag", "_waiters", "name")
-
-    def __init__(self, clock: VirtualClock, name: str = "an event") -> None:
-        self._clock = clock
-        self._flag = False
-        self._waiters: list[_Participant] = []
-        self.name = name
-
-    def is_set(self) -> bool:
-        return self._flag
-
-    def set(self) -> None:
-        self._flag = True
-        if self._waiters:
-            self._clock._wake_all(self._waiters)  # noqa: SLF001  the two are one module's secret
-
-    def clear(self) -> None:
-        self._flag = False
-
-    def wait(self, timeout: float | None = None) -> bool:
-        if self._flag:
-            return True
-        if timeout is not None and timeout <= 0:
-            return False
-        return self._clock._wait(self, timeout) or self._flag  # noqa: SLF001
-
-
-class VirtualTask:
-    """A participant's thread as its starter sees it."""
-
-    __slots__ = ("_done", "error", "ident", "name")
-
-    def __init__(self, clock: VirtualClock, name: str) -> None:
-        self._done = VirtualEvent(clock, f"the end of {name}")
-        self.name = name
-        self.ident: int | None = None
-        self.error: BaseException | None = None
-
-    def is_alive(self) -> bool:
-        return not self._done.is_set()
-
-    def join(self, timeout: float | None = None) -> bool:
-        return self._done.wait(timeout)
-
-
-class VirtualTimer:
-    """A scheduled callback."""
-
-    __slots__ = ("callback",)
-
-    def __init__(self, callback: Callable[[], object]) -> None:
-        self.callback: Callable[[], object] | None = callback
-
-    def cancel(self) -> None:
-        self.callback = None
+# Operating-system threads, so that thread identity, thread-local data and stacks are what user code
+# expects; a hand-over between two of them costs about 20 us, a start from this cache about 60 us.
+_THREADS = ThreadCache()
 
 
 class VirtualClock:
@@ -134,21 +53,40 @@ class VirtualClock:
 
     Use it as a context manager, or `close` it: participants that still wait are ended.
 
+    Args:
+        seed: Picks the interleaving.
+        rate: Virtual seconds per real second, for watching a run; None jumps at once.
+        choose: Called with a number n of participants and callbacks that can go on, n > 1, gives
+            the index of the next one, in place of `seed`; to go through interleavings one by one.
+
     Threads: only participants may wait; `Event.set` and `call_later` may come from any thread.
+
+    Raises:
+        ValueError: `rate` is not above 0.
     """
 
-    def __init__(self, seed: int | None = None) -> None:
+    def __init__(
+        self,
+        seed: int | None = None,
+        *,
+        rate: float | None = None,
+        choose: Callable[[int], int] | None = None,
+    ) -> None:
+        if rate is not None and not rate > 0:
+            raise ValueError(f"virtual clock: rate: got {rate!r}; expected a number over 0.")
         self.seed = seed
-        self._random = None if seed is None else random.Random(seed)  # noqa: S311  no secret
+        self.rate = rate
+        self._pick = choose or _picker(seed)
         self._now = 0.0
+        self._stepped = time.monotonic()
+        self._poke = RealEvent()
         self._lock = threading.RLock()
-        self._ready: list[_Participant | VirtualTimer] = []
-        self._deadlines: list[tuple[float, int, _Participant | VirtualTimer, int]] = []
+        self._ready: list[Participant | VirtualTimer] = []
+        self._deadlines: list[tuple[float, int, Participant | VirtualTimer, int]] = []
         self._count = itertools.count()
-        self._waits: dict[_Participant, int] = {}
-        self._owner = _Participant(threading.current_thread().name)
-        self._participants: dict[int, _Participant] = {threading.get_ident(): self._owner}
-        self._threads: list[threading.Thread] = []
+        self._waits: dict[Participant, int] = {}
+        self._owner = Participant(threading.current_thread().name)
+        self._participants: dict[int, Participant] = {threading.get_ident(): self._owner}
         self._in_callback = False
         self._closed = False
 
@@ -168,35 +106,8 @@ class VirtualClock:
         return VirtualEvent(self, name)
 
     def spawn(self, target: Callable[[], object], *, name: str) -> VirtualTask:
-        task = VirtualTask(self, name)
-        participant = _Participant(name)
-        context = contextvars.copy_context()
-
-        def run() -> None:
-            participant.gate.acquire()
-            task.ident = threading.get_ident()
-            try:
-                if not self._closed:
-                    context.run(target)
-            except _Stopped:
-                pass
-            except BaseException as error:  # noqa: BLE001  the thread's border: kept and reported
-                task.error = error
-                if not isinstance(error, SystemExit):
-                    report_thread_exception()
-            finally:
-                task.ident = None
-                task._done.set()  # noqa: SLF001
-                self._leave()
-
-        thread = threading.Thread(target=run, name=name, daemon=True)
-        with self._lock:
-            self._threads = [t for t in self._threads if t.is_alive()]
-            thread.start()
-            self._threads.append(thread)
-            assert thread.ident is not None
-            self._participants[thread.ident] = participant
-            self._ready.append(participant)
+        task = self.adopt(target, name=name)
+        _THREADS.start(task)
         return task
 
     def call_later(self, delay: float, callback: Callable[[], object]) -> VirtualTimer:
@@ -206,11 +117,36 @@ class VirtualClock:
                 self._ready.append(timer)
             else:
                 self._push(self._now + delay, timer, 0)
+        self._poke.set()
         return timer
 
     def run_async(self, main: Coroutine[object, object, T]) -> T:
-        with asyncio.Runner(loop_factory=lambda: _VirtualLoop(self)) as runner:
+        with asyncio.Runner(loop_factory=lambda: VirtualLoop(self)) as runner:
             return runner.run(main)
+
+    @contextlib.contextmanager
+    def patched(self) -> Iterator[Self]:
+        """Put `time.sleep`, `threading.Event().wait` and the like of user code on this clock.
+
+        Covered inside the block, for this clock's participants only (other threads keep real time):
+        `time.sleep`, `time`, `monotonic`, `perf_counter` and their `_ns` forms; in `threading`:
+        `Event`, `Condition`, `Semaphore`, `Barrier`, `Timer`, `Thread.start` (the new thread is a
+        participant), `Thread.join`, `Lock` and `RLock` made inside the block; `queue`,
+        `concurrent.futures` with threads, `asyncio.run` and `asyncio.sleep`. Names that modules
+        imported before (`from time import sleep`) are covered too.
+
+        Not covered, because Python offers no place to do it: `datetime.now()`, `Lock` and `RLock`
+        made before the block and held across a wait, sockets, subprocesses (they take real time,
+        and the mission stands still meanwhile), code in C, references kept elsewhere than in a
+        module's globals. `time.sleep(0)` lets a microsecond pass, so that a loop around it ends.
+        """
+        from actionlib_core.clock._patched import install, remove
+
+        install(self)
+        try:
+            yield self
+        finally:
+            remove(self)
 
     # -- life ----------------------------------------------------------------------------------
 
@@ -223,9 +159,8 @@ class VirtualClock:
             self._closed = True
         while True:
             with self._lock:
-                others = [p for p in self._waits if p is not self._owner]
-                others += [p for p in self._ready if isinstance(p, _Participant)]
-                threads = [t for t in self._threads if t is not threading.current_thread()]
+                others = [p for p in (*self._waits, *self._ready) if isinstance(p, Participant)]
+                others = [p for p in others if p is not self._owner]
                 self._waits.clear()
                 self._ready.clear()
                 self._deadlines.clear()
@@ -233,8 +168,8 @@ class VirtualClock:
                 break
             for participant in others:
                 participant.gate.release()
-            for thread in threads:
-                thread.join(JOIN_S)
+            for participant in others:
+                participant.ended.wait(JOIN_S)
 
     def __enter__(self) -> Self:
         return self
@@ -247,9 +182,27 @@ class VirtualClock:
     ) -> None:
         self.close()
 
+    # -- for `patched()` ------------------------------------------------------------------------
+
+    def is_participant(self, ident: int) -> bool:
+        """Tell whether the thread `ident` takes part in this clock."""
+        return ident in self._participants
+
+    def adopt(self, target: Callable[[], object], *, name: str) -> VirtualTask:
+        """Make a participant whose thread is the caller's business: it calls `VirtualTask.run`."""
+        task = VirtualTask(self, target, contextvars.copy_context(), name)
+        with self._lock:
+            self._ready.append(task.participant)
+        return task
+
+    def disown(self, task: VirtualTask) -> None:
+        """Forget a participant whose thread could not be started."""
+        with self._lock:
+            self._ready.remove(task.participant)
+
     # -- scheduling ----------------------------------------------------------------------------
 
-    def _push(self, due: float, what: _Participant | VirtualTimer, wait: int) -> None:
+    def _push(self, due: float, what: Participant | VirtualTimer, wait: int) -> None:
         heapq.heappush(self._deadlines, (due, next(self._count), what, wait))
 
     def _wait(self, event: VirtualEvent | None, timeout: float | None) -> bool:
@@ -264,90 +217,147 @@ class VirtualClock:
             raise RuntimeError("virtual clock: a callback may not wait. Try clock.spawn(...).")
         with self._lock:
             if self._closed:
-                raise _Stopped
+                raise Stopped
+            deadline = None if timeout is None else self._now + timeout
+            if deadline is not None and self._is_alone(deadline):
+                self._now = deadline
+                return False
             wait = next(self._count)
             self._waits[me] = wait
             me.event, me.woken = event, False
-            me.waiting = _describe(event, None if timeout is None else self._now + timeout)
+            me.waiting = _describe(event, deadline)
             if event is not None:
                 event._waiters.append(me)  # noqa: SLF001
-            if timeout is not None:
-                self._push(self._now + timeout, me, wait)
-        if self._pass_on(me):
-            self._sit_out(me)
+            if deadline is not None:
+                self._push(deadline, me, wait)
+        self._hand_over(me)
         if me.error is not None:
             error, me.error = me.error, None
             raise error
         self._check_open(me)
         return me.woken
 
-    def _check_open(self, me: _Participant) -> None:
-        if self._closed and me is not self._owner:
-            raise _Stopped
+    def _is_alone(self, deadline: float) -> bool:
+        """Tell whether nobody can go on before `deadline`: the wait is a step of time, no more."""
+        if self._ready or self.rate is not None:
+            return False
+        due = self._next_due()
+        return due is None or due > deadline
 
-    def _sit_out(self, me: _Participant) -> None:
-        """Wait for the turn; so does, for a moment, what a signal handler raised."""
+    def _check_open(self, me: Participant) -> None:
+        if self._closed and me is not self._owner:
+            raise Stopped
+
+    def _enter(self, me: Participant) -> bool:
+        """Take the first turn in a new thread; False when the clock was closed before it came."""
+        me.gate.acquire()
+        with self._lock:
+            self._participants[threading.get_ident()] = me
+        return not self._closed
+
+    def _hand_over(self, me: Participant) -> None:
+        """Let the next one run and wait for my turn; so does, a moment, what a signal raised."""
+        steps: list[object] = []  # what was done when a signal handler raises: nothing, given, had
+        chosen: Participant | None = None
         try:
-            me.gate.acquire()
+            chosen = self._next_turn()
+            if chosen is me:
+                return
+            gates: tuple[Any, ...] = (me.gate.acquire,)
+            if chosen is not None:
+                gates = (chosen.gate.release, me.gate.acquire)
+            steps.extend(map(operator.call, gates))  # no signal handler gets in between the two
         except BaseException as error:
             with self._lock:
                 self._wake(me)
-            if not me.gate.acquire(timeout=INTERRUPT_S):
+                if not steps:  # the turn is still mine
+                    self._ready = [r for r in self._ready if r is not me]
+                    self._ready[:0] = [] if chosen in {None, me} else [chosen]
+                    raise
+            self._poke.set()
+            if len(steps) == 1 and not me.gate.acquire(timeout=INTERRUPT_S):
                 self._closed = True  # another participant never waits: this clock is broken
                 raise
             me.error = error
 
-    def _leave(self) -> None:
+    def _leave(self, me: Participant) -> None:
         """Hand the turn on for good: the participant's thread ends."""
         with self._lock:
             self._participants.pop(threading.get_ident(), None)
-            if self._closed:
-                return
-        self._pass_on(None)
+            closed = self._closed
+        chosen = None if closed else self._next_turn()
+        if chosen is not None:
+            chosen.gate.release()
+        me.ended.set()
 
-    def _pass_on(self, me: _Participant | None) -> bool:
-        """Run callbacks and choose who goes on; False when that is `me`."""
+    def _next_turn(self) -> Participant | None:
+        """Run callbacks and choose who goes on; None when nobody can."""
         while True:
             with self._lock:
-                chosen = self._choose()
-            if isinstance(chosen, VirtualTimer):
+                pause = self._pause()
+                chosen = None if pause else self._choose()
+            if pause:
+                self._pace(pause)
+            elif isinstance(chosen, VirtualTimer):
                 self._call(chosen)
-            elif chosen is me:
-                return False
             else:
-                if chosen is not None:
-                    chosen.gate.release()
-                return True
+                return chosen
 
-    def _choose(self) -> _Participant | VirtualTimer | None:
+    def _pause(self) -> float:
+        """Return the real seconds to wait before the next jump."""
+        self._poke.clear()
+        due = self._next_due()
+        if self.rate is None or self._ready or due is None:
+            return 0.0
+        return max(0.0, (due - self._now) / self.rate - (time.monotonic() - self._stepped))
+
+    def _pace(self, pause: float) -> None:
+        """Let real time pass; a call from outside ends it early, with the time it took."""
+        if self._poke.wait(pause) and self.rate is not None:
+            with self._lock:
+                real = time.monotonic()
+                due = self._next_due()
+                passed = self._now + (real - self._stepped) * self.rate
+                self._now = passed if due is None else min(passed, due)
+                self._stepped = real
+
+    def _choose(self) -> Participant | VirtualTimer | None:
         if not self._ready:
             self._jump()
         if self._ready:
-            if self._random is None or len(self._ready) == 1:
-                return self._ready.pop(0)
-            return self._ready.pop(self._random.randrange(len(self._ready)))
+            return self._ready.pop(self._pick(len(self._ready)) if len(self._ready) > 1 else 0)
         if self._owner in self._waits:
-            waits = {p.name: p.waiting for p in self._waits}
-            self._owner.error = Deadlock(waits)
+            self._owner.error = Deadlock(_name_waits(self._waits))
             self._wake(self._owner)
             self._ready.clear()
             return self._owner
         return None
 
-    def _jump(self) -> None:
-        """Advance to the next deadline that still matters; all that are due become ready."""
-        due = None
+    def _next_due(self) -> float | None:
+        """Return the next deadline that still matters."""
         while self._deadlines:
-            time, _, what, wait = self._deadlines[0]
-            if due is not None and time > due:
-                return
+            due, _, what, wait = self._deadlines[0]
+            if (
+                what.callback is not None
+                if isinstance(what, VirtualTimer)
+                else (self._waits.get(what) == wait)
+            ):
+                return due
             heapq.heappop(self._deadlines)
+        return None
+
+    def _jump(self) -> None:
+        """Advance to the next deadline; all that are due become ready."""
+        due = self._next_due()
+        if due is None:
+            return
+        self._now = max(due, self._now)
+        self._stepped = time.monotonic() if self.rate is not None else 0.0
+        while self._next_due() == due:
+            what = heapq.heappop(self._deadlines)[2]
             if isinstance(what, VirtualTimer):
-                if what.callback is not None:
-                    due = self._now = max(time, self._now)
-                    self._ready.append(what)
-            elif self._waits.get(what) == wait:
-                due = self._now = max(time, self._now)
+                self._ready.append(what)
+            else:
                 self._end_wait(what, woken=False)
 
     def _call(self, timer: VirtualTimer) -> None:
@@ -362,16 +372,17 @@ class VirtualClock:
         finally:
             self._in_callback = False
 
-    def _wake_all(self, waiters: list[_Participant]) -> None:
+    def _wake_all(self, waiters: list[Participant]) -> None:
         with self._lock:
             for participant in tuple(waiters):
                 self._wake(participant)
+        self._poke.set()
 
-    def _wake(self, participant: _Participant) -> None:
+    def _wake(self, participant: Participant) -> None:
         if participant in self._waits:
             self._end_wait(participant, woken=True)
 
-    def _end_wait(self, participant: _Participant, *, woken: bool) -> None:
+    def _end_wait(self, participant: Participant, *, woken: bool) -> None:
         del self._waits[participant]
         event, participant.event = participant.event, None
         if event is not None and participant in event._waiters:  # noqa: SLF001
@@ -385,41 +396,19 @@ def _describe(event: VirtualEvent | None, deadline: float | None) -> str:
     return what if deadline is None else f"{what} (until {deadline:.6g} s)"
 
 
-class _VirtualSelector(selectors.BaseSelector):
-    """What asyncio waits on: no sockets, only the clock."""
-
-    def __init__(self, clock: VirtualClock) -> None:
-        self.wakeup = clock.event("a coroutine")
-        self._keys: dict[object, selectors.SelectorKey] = {}
-
-    def register(self, fileobj: _File, events: int, data: object = None) -> selectors.SelectorKey:
-        fd = fileobj if isinstance(fileobj, int) else fileobj.fileno()
-        key = selectors.SelectorKey(fileobj, fd, events, data)
-        self._keys[fileobj] = key
-        return key
-
-    def unregister(self, fileobj: _File) -> selectors.SelectorKey:
-        return self._keys.pop(fileobj)
-
-    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
-        self.wakeup.wait(timeout)
-        self.wakeup.clear()
-        return []
-
-    def get_map(self) -> Mapping[object, selectors.SelectorKey]:  # type: ignore[override]
-        return self._keys
+def _name_waits(waits: Mapping[Participant, int]) -> dict[str, str]:
+    """Say who waits for what; a name that comes twice is numbered."""
+    named: dict[str, str] = {}
+    for participant in waits:
+        name, number = participant.name, 1
+        while name in named:
+            number += 1
+            name = f"{participant.name} ({number})"
+        named[name] = participant.waiting
+    return named
 
 
-class _VirtualLoop(asyncio.SelectorEventLoop):
-    """An event loop whose time and waiting are the clock's."""
-
-    def __init__(self, clock: VirtualClock) -> None:
-        self._virtual_clock = clock
-        self._virtual_selector = _VirtualSelector(clock)
-        super().__init__(self._virtual_selector)
-
-    def time(self) -> float:
-        return self._virtual_clock.now()
-
-    def _write_to_self(self) -> None:
-        self._virtual_selector.wakeup.set()
+def _picker(seed: int | None) -> Callable[[int], int]:
+    if seed is None:
+        return lambda _: 0
+    return random.Random(seed).randrange  # noqa: S311  no secret

@@ -128,52 +128,57 @@ def test_a_callback_may_not_wait(clock, monkeypatch):
     assert "a callback may not wait" in reported[0]
 
 
-def test_a_raising_signal_handler_waits_for_the_turn_then_goes_on(clock):
-    class Interrupt(Exception):
-        pass
+class Interrupt(Exception):
+    pass
+
+
+@pytest.fixture
+def alarm():
+    """A way to interrupt the main thread, once, wherever it waits."""
+    raised = []
 
     def handler(*_):
-        raise Interrupt
+        if not raised:
+            raised.append(True)
+            raise Interrupt
 
+    def interrupt():
+        # A signal that comes just before the wait is seen only after it: send until seen.
+        while not raised:
+            signal.pthread_kill(threading.main_thread().ident, signal.SIGUSR1)
+            threading.Event().wait(0.001)
+
+    previous = signal.signal(signal.SIGUSR1, handler)
+    yield interrupt
+    signal.signal(signal.SIGUSR1, previous)
+
+
+def test_a_raising_signal_handler_waits_for_the_turn_then_goes_on(clock, alarm):
     # The participant holds the turn while the signal reaches the waiting main thread.
     def work():
-        signal.pthread_kill(threading.main_thread().ident, signal.SIGALRM)
+        alarm()
         while clock._owner in clock._waits:
             pass
         clock.sleep(1)
 
-    previous = signal.signal(signal.SIGALRM, handler)
-    try:
-        task = clock.spawn(work, name="t")
-        with pytest.raises(Interrupt):
-            clock.event().wait()
-    finally:
-        signal.signal(signal.SIGALRM, previous)
+    task = clock.spawn(work, name="t")
+    with pytest.raises(Interrupt):
+        clock.event().wait()
     assert task.join()
 
 
-def test_an_interrupt_ends_the_wait_for_a_participant_that_never_waits(clock, monkeypatch):
-    class Interrupt(Exception):
-        pass
-
-    def handler(*_):
-        raise Interrupt
-
+def test_an_interrupt_ends_the_wait_for_a_participant_that_never_waits(clock, alarm, monkeypatch):
     monkeypatch.setattr("actionlib_core.clock._virtual.INTERRUPT_S", 0.01)
     stop = threading.Event()
 
     def hog():
-        signal.pthread_kill(threading.main_thread().ident, signal.SIGALRM)
+        alarm()
         stop.wait(5)
 
-    previous = signal.signal(signal.SIGALRM, handler)
-    try:
-        clock.spawn(hog, name="hog")
-        with pytest.raises(Interrupt):
-            clock.event().wait()
-    finally:
-        signal.signal(signal.SIGALRM, previous)
-        stop.set()
+    clock.spawn(hog, name="hog")
+    with pytest.raises(Interrupt):
+        clock.event().wait()
+    stop.set()
 
 
 def test_ten_hours_of_sleeps_cost_little(clock):

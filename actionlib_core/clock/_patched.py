@@ -1,0 +1,338 @@
+"""Python's own ways to wait, put on a virtual clock for the threads that take part in it.
+
+The replacements look at the calling thread: a participant of a clock that is inside `patched()`
+gets virtual time, every other thread what Python always did. They are installed with the first
+clock and removed with the last one.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import queue
+import sys
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.clock._current import use_clock
+from actionlib_core.clock._virtual_loop import VirtualLoop
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import FrameType
+
+    from actionlib_core.clock._virtual import VirtualClock
+    from actionlib_core.clock._virtual_parts import VirtualEvent, VirtualTask
+
+YIELD_S = 1e-6  # `time.sleep(0)`: others get their turn, and a loop around it ends
+# Modules that wait for something outside the process, or measure the test run itself.
+REAL_TIME = (
+    "actionlib_core.clock",
+    "multiprocessing",
+    "selectors",
+    "subprocess",
+    "socketserver",
+    "faulthandler",
+    "importlib",
+    "_frozen_importlib",
+    "_thread",
+    "_pytest",
+    "pluggy",
+    "execnet",
+    "xdist",
+    "pytest_timeout",
+)
+# Packages whose locks guard a few lines that never wait.
+SHORT_LOCKS = ("actionlib_core", "smachpy", "viz", "logging")
+
+_sleep, _allocate = time.sleep, threading.Lock
+_thread_start, _thread_join = threading.Thread.start, threading.Thread.join
+_thread_is_alive = threading.Thread.is_alive
+
+_guard = _allocate()
+_clocks: list[VirtualClock] = []  # those inside `patched()`
+_bypass: set[int] = set()  # threads that are starting or joining a thread for real
+_places: list[tuple[dict[str, Any], str, Any, Any]] = []  # module globals that were replaced
+_seen: dict[str, tuple[int, int]] = {}  # modules searched before: identity and size
+_found: dict[str, list[tuple[str, Any]]] = {}  # what the search gave
+_tasks: dict[threading.Thread, VirtualTask] = {}  # user threads that take part, while they run
+
+
+def install(clock: VirtualClock) -> None:
+    """Put the participants of `clock` on it."""
+    with _guard:
+        _clocks.append(clock)
+        if len(_clocks) == 1:
+            _replace()
+
+
+def remove(clock: VirtualClock) -> None:
+    """Undo `install`; with the last clock Python is as it was."""
+    with _guard:
+        _clocks.remove(clock)
+        if not _clocks:
+            _restore()
+
+
+def _here() -> VirtualClock | None:
+    """Return the clock that the calling thread takes part in."""
+    ident = threading.get_ident()
+    if ident not in _bypass:
+        for clock in _clocks:
+            if clock.is_participant(ident):
+                return clock
+    return None
+
+
+def _belongs(frame: FrameType, packages: tuple[str, ...]) -> bool:
+    return _is_in(frame.f_globals.get("__name__", ""), packages)
+
+
+def _is_in(module: str, packages: tuple[str, ...]) -> bool:
+    return module in packages or module.startswith(tuple(f"{name}." for name in packages))
+
+
+# -- time ------------------------------------------------------------------------------------------
+
+
+def _virtual_sleep(seconds: float, /) -> None:
+    clock = _here()
+    if clock is None or _belongs(sys._getframe(1), REAL_TIME):  # noqa: SLF001  the caller decides
+        _sleep(seconds)
+    elif seconds < 0:
+        raise ValueError("sleep length must be non-negative")
+    else:
+        clock.sleep(max(seconds, YIELD_S))
+
+
+def _reader(real: Callable[[], Any], virtual: Callable[[VirtualClock], Any]) -> Callable[[], Any]:
+    def read() -> Any:
+        clock = _here()
+        if clock is None or _belongs(sys._getframe(1), REAL_TIME):  # noqa: SLF001
+            return real()
+        return virtual(clock)
+
+    return read
+
+
+def _now_ns(clock: VirtualClock) -> int:
+    return round(clock.now() * 1e9)
+
+
+# -- locks -----------------------------------------------------------------------------------------
+
+
+class PatchedLock:
+    """A lock that participants wait for in virtual time, other threads in real time."""
+
+    def __init__(self) -> None:
+        self._real = _allocate()
+        self._waiters: list[VirtualEvent] = []
+
+    def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
+        if self._real.acquire(blocking=False):
+            return True
+        if not blocking:
+            return False
+        clock = _here()
+        if clock is None:
+            return self._real.acquire(timeout=timeout)
+        return self._wait(clock, None if timeout < 0 else clock.now() + timeout)
+
+    def _wait(self, clock: VirtualClock, deadline: float | None) -> bool:
+        event = clock.event(f"what {_call_site()} waits for")
+        self._waiters.append(event)
+        try:
+            while not self._real.acquire(blocking=False):
+                left = None if deadline is None else deadline - clock.now()
+                if not event.wait(left):
+                    return self._real.acquire(blocking=False)
+                event.clear()
+            return True
+        finally:
+            self._waiters.remove(event)
+
+    def release(self) -> None:
+        self._real.release()
+        for event in tuple(self._waiters):
+            event.set()
+
+    def locked(self) -> bool:
+        return self._real.locked()
+
+    def _at_fork_reinit(self) -> None:
+        self._real = _allocate()
+        self._waiters.clear()
+
+    def __enter__(self) -> bool:
+        return self.acquire()
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+
+def _call_site() -> str:
+    """Name the line of the user's code that waits."""
+    frame: FrameType | None = sys._getframe(1)  # noqa: SLF001
+    while frame is not None and _belongs(frame, _WAITERS):
+        frame = frame.f_back
+    if frame is None:
+        return "a thread"
+    return f"{frame.f_code.co_filename}:{frame.f_lineno}"
+
+
+_WAITERS = ("actionlib_core.clock", "asyncio", "concurrent.futures", "queue", "threading")
+
+
+def _lock() -> Any:
+    return _allocate() if _is_short(sys._getframe(1)) else PatchedLock()  # noqa: SLF001
+
+
+def _is_short(caller: FrameType) -> bool:
+    """Tell whether a lock made there stays a real one: no participant's, ours, or a module's."""
+    if _here() is None or caller.f_code.co_name == "<module>":
+        return True
+    return _belongs(caller, SHORT_LOCKS)
+
+
+def _make_rlock(real: Callable[[], Any]) -> Callable[[], Any]:
+    def make() -> Any:
+        if _is_short(sys._getframe(1)):  # noqa: SLF001
+            return real()
+        return threading._RLock()  # noqa: SLF001  on `_allocate_lock`
+
+    return make
+
+
+def _make_simple_queue(real: Callable[[], Any]) -> Callable[[], Any]:
+    def make() -> Any:
+        return real() if _here() is None else queue._PySimpleQueue()  # type: ignore[attr-defined]  # noqa: SLF001
+
+    return make
+
+
+# -- threads ---------------------------------------------------------------------------------------
+
+
+def _start(thread: threading.Thread) -> None:
+    """Start a thread; a participant's thread becomes a participant."""
+    clock = _here()
+    if clock is None or _belongs(sys._getframe(1), REAL_TIME):  # noqa: SLF001
+        _thread_start(thread)
+        return
+    run = thread.run
+
+    def target() -> None:
+        with use_clock(clock):
+            run()
+
+    task = clock.adopt(target, name=thread.name)
+
+    def run_in_turn() -> None:
+        name = thread.name
+        try:
+            task.run()
+        finally:
+            thread.name = name
+            del thread.run
+            _tasks.pop(thread, None)
+
+    thread.run = run_in_turn  # type: ignore[method-assign]
+    _tasks[thread] = task
+    try:
+        _really(_thread_start, thread)
+    except BaseException:
+        clock.disown(task)
+        del _tasks[thread]
+        raise
+
+
+def _join(thread: threading.Thread, timeout: float | None = None) -> None:
+    task = _tasks.get(thread)
+    if task is None or _here() is None:
+        _really(_thread_join, thread, timeout)
+    elif task.join(timeout):
+        _really(_thread_join, thread)  # its last steps after its turn
+
+
+def _is_alive(thread: threading.Thread) -> bool:
+    task = _tasks.get(thread)
+    return _thread_is_alive(thread) if task is None else task.is_alive()
+
+
+def _really(function: Callable[..., None], *arguments: object) -> None:
+    """Call what waits for a thread that is about to start or end, in real time."""
+    ident = threading.get_ident()
+    _bypass.add(ident)
+    try:
+        function(*arguments)
+    finally:
+        _bypass.discard(ident)
+
+
+# -- asyncio ---------------------------------------------------------------------------------------
+
+
+def _make_loop(real: Callable[[], Any]) -> Callable[[], Any]:
+    def make() -> asyncio.AbstractEventLoop:
+        clock = _here()
+        loop: asyncio.AbstractEventLoop = real() if clock is None else VirtualLoop(clock)
+        return loop
+
+    return make
+
+
+# -- replacing -------------------------------------------------------------------------------------
+
+
+def _replacements() -> dict[int, Any]:
+    """Map the identity of what is replaced to its replacement."""
+    pairs: list[tuple[Any, Any]] = [
+        (time.sleep, _virtual_sleep),
+        (time.time, _reader(time.time, lambda clock: clock.time_ns() / 1e9)),
+        (time.time_ns, _reader(time.time_ns, lambda clock: clock.time_ns())),
+        (time.monotonic, _reader(time.monotonic, lambda clock: clock.now())),
+        (time.monotonic_ns, _reader(time.monotonic_ns, _now_ns)),
+        (time.perf_counter, _reader(time.perf_counter, lambda clock: clock.now())),
+        (time.perf_counter_ns, _reader(time.perf_counter_ns, _now_ns)),
+        (threading.Lock, _lock),
+        (threading.RLock, _make_rlock(threading.RLock)),
+        (queue.SimpleQueue, _make_simple_queue(queue.SimpleQueue)),
+        (asyncio.events.new_event_loop, _make_loop(asyncio.events.new_event_loop)),
+    ]
+    return {id(real): fake for real, fake in pairs}
+
+
+_FAKES = _replacements()
+
+
+def _replace() -> None:
+    for name, module in list(sys.modules.items()):
+        names = getattr(module, "__dict__", None)
+        if type(names) is dict and not _is_in(name, REAL_TIME):
+            for key, real in _search(name, names):
+                if names.get(key) is real:
+                    names[key] = _FAKES[id(real)]
+                    _places.append((names, key, real, _FAKES[id(real)]))
+    threading.Thread.start = _start  # type: ignore[method-assign, assignment]
+    threading.Thread.join = _join  # type: ignore[method-assign, assignment]
+    threading.Thread.is_alive = _is_alive  # type: ignore[method-assign, assignment]
+
+
+def _search(name: str, names: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Return what is to be replaced in a module; a second search of it costs nothing."""
+    key = (id(names), len(names))
+    if _seen.get(name) != key:
+        _found[name] = [(n, value) for n, value in list(names.items()) if id(value) in _FAKES]
+        _seen[name] = key
+    return _found[name]
+
+
+def _restore() -> None:
+    threading.Thread.start = _thread_start  # type: ignore[method-assign]
+    threading.Thread.join = _thread_join  # type: ignore[method-assign]
+    threading.Thread.is_alive = _thread_is_alive  # type: ignore[method-assign]
+    for names, key, real, fake in _places:
+        if names.get(key) is fake:
+            names[key] = real
+    _places.clear()

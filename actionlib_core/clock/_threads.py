@@ -1,0 +1,86 @@
+"""Threads that are used again: starting one costs a lock hand-over instead of a thread."""
+
+from __future__ import annotations
+
+import _thread
+import threading
+from typing import Protocol
+
+IDLE_S = 5.0  # a cached thread without work ends after this
+IDLE_NAME = "idle"  # what a cached thread is called between two jobs
+
+
+class Job(Protocol):
+    """What a cached thread runs."""
+
+    name: str
+
+    def run(self) -> None:
+        """Do the work; lets nothing through and ends with `mark_idle`."""
+        ...
+
+
+def mark_idle() -> None:
+    """Call this thread idle, before anybody hears that its job has ended."""
+    threading.current_thread().name = IDLE_NAME
+
+
+class _Worker:
+    """One cached thread: runs tasks handed to it, ends after `IDLE_S` without any."""
+
+    def __init__(self, cache: ThreadCache) -> None:
+        self._cache = cache
+        self._wake = _thread.allocate_lock()
+        self._wake.acquire()
+        self._task: Job | None = None
+        self._thread = threading.Thread(target=self._run, name=IDLE_NAME, daemon=True)
+        self._started = False
+
+    def give(self, task: Job) -> None:
+        self._task = task
+        if self._started:
+            self._wake.release()
+        else:
+            self._started = True
+            self._thread.start()
+
+    def _run(self) -> None:
+        while True:
+            task = self._task
+            self._task = None
+            assert task is not None
+            self._thread.name = task.name
+            task.run()
+            del task
+            self._cache.put_back(self)
+            if not self._wake.acquire(timeout=IDLE_S):
+                if self._cache.retire(self):
+                    return
+                self._wake.acquire()  # `give` chose this worker at the last moment
+
+
+class ThreadCache:
+    """Idle threads, newest first; starting one from here costs a lock hand-over."""
+
+    def __init__(self) -> None:
+        self._idle: list[_Worker] = []
+        self._lock = threading.Lock()
+
+    def start(self, task: Job) -> None:
+        with self._lock:
+            worker = self._idle.pop() if self._idle else None
+        if worker is None:
+            worker = _Worker(self)
+        worker.give(task)
+
+    def put_back(self, worker: _Worker) -> None:
+        with self._lock:
+            self._idle.append(worker)
+
+    def retire(self, worker: _Worker) -> bool:
+        with self._lock:
+            try:
+                self._idle.remove(worker)
+            except ValueError:
+                return False
+            return True
