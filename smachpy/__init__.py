@@ -59,6 +59,7 @@ from smachpy.util import set_shutdown_check as set_shutdown_check
 
 if TYPE_CHECKING:
     from smachpy.introspection import Kind as Kind
+    from smachpy.simple_action_state import SimpleActionState as SimpleActionState
 
 __all__ = [
     "CBInterface",
@@ -76,6 +77,7 @@ __all__ = [
     "Retry",
     "Rule",
     "Sequence",
+    "SimpleActionState",
     "SmachError",
     "State",
     "StateMachine",
@@ -98,7 +100,9 @@ __all__ = [
 ]
 
 # Names of states that need actionlib_core -> module that defines them; imported on first use.
-_LAZY: dict[str, str] = {}
+_LAZY: dict[str, str] = {
+    "SimpleActionState": "smachpy.simple_action_state",
+}
 
 
 def __getattr__(name: str) -> Any:

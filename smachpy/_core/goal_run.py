@@ -1,8 +1,8 @@
 """One execution of an action state as decisions: when to cancel, when to give up, which outcome.
 
-    RUNNING --preempt, failure, exec_timeout--> CANCELLING --the goal ends, preempt_timeout--> ENDED
-       |                                                                               ^
-       +----------------------------------- the goal ends -----------------------------+
+    RUNNING --preempt, failure, exec_timeout--> CANCELLING --goal's end, preempt_timeout--> ENDED
+       |                                                                                      ^
+       +------------------------------------- goal's end -------------------------------------+
 
 Time is an argument, nothing waits here; `smachpy.simple_action_state` carries the decisions out.
 """

@@ -72,13 +72,18 @@ class GoalExchange:
             TypeMismatchError: the server is of another type.
             TransportError: the node is closed.
         """
-        self._machine = self._client.manager.send(
-            *self._client.pack(goal),
-            on_transition=self._note_transition,
-            on_feedback=self._note_feedback,
-            ack_timeout=ack_timeout,
-        )
-        self.goal_id = self._machine.goal.id
+        try:
+            machine = self._client.manager.send(
+                *self._client.pack(goal),
+                on_transition=self._note_transition,
+                on_feedback=self._note_feedback,
+                ack_timeout=ack_timeout,
+                created=self._note_created,
+            )
+        except BaseException:  # interrupted half-way: the goal may be out
+            self.cancel()
+            raise
+        self.goal_id = machine.goal.id
         self._emit(GoalSent, self.goal_id, goal)
 
     def follow(
@@ -113,9 +118,7 @@ class GoalExchange:
         except BaseException:
             self.cancel()  # KeyboardInterrupt and the like: nobody waits for the goal any more
             raise
-        self._emit(
-            GoalDone, self.goal_id, self.run.status, self.run.text, self.result
-        )
+        self._emit(GoalDone, self.goal_id, self.run.status, self.run.text, self.result)
         if failure is not None:
             raise failure
 
@@ -137,6 +140,9 @@ class GoalExchange:
             if step is Step.ABANDON:
                 machine.manager.forget(machine)
             return step is not Step.WAIT
+
+    def _note_created(self, machine: CommStateMachine) -> None:
+        self._machine = machine
 
     def _note_transition(self, _machine: CommStateMachine, state: CommState) -> None:
         if state in _RUNNING:

@@ -1,0 +1,322 @@
+"""`SimpleActionState`: a state that sends a goal to an action server and waits for its end."""
+
+from __future__ import annotations
+
+import copy
+from typing import TYPE_CHECKING, Any, ClassVar, TypedDict
+
+from actionlib_core._action_wire import ActionTypes
+from actionlib_core.action_client import ActionClient
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
+from actionlib_core.node import get_node
+from actionlib_core.time import to_seconds
+from smachpy import log
+from smachpy._core.goal_run import ABORTED, OUTCOMES, PREEMPTED, GoalRun
+from smachpy._core.readonly import writable
+from smachpy._runtime.goal_exchange import GoalExchange
+from smachpy._runtime.interface import adopt_interface
+from smachpy._runtime.wakeup import Wakeup
+from smachpy.exceptions import InvalidStateError, did_you_mean
+from smachpy.state import State
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+    from typing import Unpack
+
+    from actionlib_core.node import Node
+    from actionlib_core.time import Duration
+    from smachpy.introspection import Kind
+    from smachpy.state import RetrySpec
+
+__all__ = ["ActionStateOptions", "SimpleActionState"]
+
+SHORTEST_ACK_S = 1.0
+"""A server that is there is given this long to answer, however short `server_wait_timeout` is."""
+
+MARGIN_S = 5.0
+"""The machine leaves the state's thread behind only so long after the goal was abandoned [s]."""
+
+
+class ActionStateOptions(TypedDict, total=False):
+    """`smachpy.state.StateOptions` without `preempt_timeout`, which is an argument here."""
+
+    timeout: float | None
+    timeout_outcome: str
+    retry: RetrySpec | None
+    on_exception: Mapping[type[BaseException], str] | None
+    on_enter: Callable[[Any], object] | None
+    on_exit: Callable[[Any, str], object] | None
+
+
+class SimpleActionState(State):
+    """Sends a goal and waits for its end. Outcomes: 'succeeded', 'aborted', 'preempted'.
+
+    The goal is made of `goal` or `goal_key`, then `goal_slots`, then `goal_cb`, anew for each run.
+    All callbacks run in the thread that runs the state, hold no lock, and may raise: a goal that is
+    under way is cancelled first.
+
+    'preempted' answers a preempt of this state: a goal that somebody else stopped is 'aborted', as
+    is one that the server aborted, rejected or lost. The reason is logged and in the event
+    `smachpy.events.GoalDone`.
+
+    Args:
+        action_name: Name of the action.
+        action_spec: Its class (XAction).
+        goal: The goal (XGoal), or what the slots and the callback begin with.
+        goal_key: Userdata key that holds the goal.
+        goal_slots: Names of goal fields that are set from userdata keys of the same name.
+        goal_cb: Called as `goal_cb(userdata, goal, *goal_cb_args, **goal_cb_kwargs)`; changes the
+            goal or returns another. Its `cb_interface` is added, as those of the other callbacks.
+        goal_cb_args: Arguments for it.
+        goal_cb_kwargs: Keyword arguments for it.
+        result_key: Userdata key that gets the result (XResult), if one came.
+        result_slots: Names of result fields that are written to userdata keys of the same name.
+        result_cb: Called as `result_cb(userdata, status, result, *result_cb_args,
+            **result_cb_kwargs)` once a goal that was sent has ended; `status` is a number of
+            `GoalStatus`. Without a result from the server it gets an empty one. May return the
+            outcome.
+        result_cb_args: Arguments for it.
+        result_cb_kwargs: Keyword arguments for it.
+        input_keys: More keys to read, for the callbacks.
+        output_keys: More keys to write, for the callbacks.
+        outcomes: More outcomes, for `result_cb`.
+        exec_timeout: A goal that has not ended so long [s] after it was sent is cancelled, and the
+            outcome is 'aborted'; None: no limit.
+        preempt_timeout: A cancelled goal that has not ended after so long [s] is abandoned and
+            reported; it may still run on the server. None: no limit.
+        server_wait_timeout: 'aborted' when no server has taken the goal after so long [s]; None: no
+            limit. Under one second counts as one second.
+        feedback_cb: Called as `feedback_cb(userdata, feedback)` for each XFeedback.
+        feedback_key: Userdata key that gets each XFeedback.
+        node: Where the client is; the current node when None.
+        **options: See `smachpy.state.StateOptions`.
+
+    Raises:
+        ActionException: `action_spec` is no action class.
+        InvalidStateError: an argument does not fit the action; all problems at once.
+    """
+
+    kind: ClassVar[Kind] = "action"
+
+    WAITING_FOR_SERVER: ClassVar[int] = 0
+    INACTIVE: ClassVar[int] = 1
+    ACTIVE: ClassVar[int] = 2
+    PREEMPTING: ClassVar[int] = 3
+    COMPLETED: ClassVar[int] = 4
+
+    def __init__(
+        self,
+        action_name: str,
+        action_spec: Any,
+        goal: Any = None,
+        goal_key: str | None = None,
+        goal_slots: Iterable[str] = (),
+        goal_cb: Callable[..., Any] | None = None,
+        goal_cb_args: Iterable[Any] = (),
+        goal_cb_kwargs: Mapping[str, Any] | None = None,
+        result_key: str | None = None,
+        result_slots: Iterable[str] = (),
+        result_cb: Callable[..., str | None] | None = None,
+        result_cb_args: Iterable[Any] = (),
+        result_cb_kwargs: Mapping[str, Any] | None = None,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        outcomes: Iterable[str] = (),
+        exec_timeout: float | Duration | None = None,
+        preempt_timeout: float | Duration | None = 60.0,
+        server_wait_timeout: float | Duration | None = 60.0,
+        *,
+        feedback_cb: Callable[[Any, Any], object] | None = None,
+        feedback_key: str | None = None,
+        node: Node | None = None,
+        **options: Unpack[ActionStateOptions],
+    ) -> None:
+        super().__init__((*OUTCOMES, *outcomes), input_keys, output_keys, **options)
+        self._action_name = action_name
+        self._types = ActionTypes.of(action_spec)
+        self._goal = copy.deepcopy(goal)
+        self._goal_key = goal_key
+        self._goal_slots = tuple(goal_slots)
+        self._goal_cb = goal_cb
+        self._goal_cb_args = tuple(goal_cb_args)
+        self._goal_cb_kwargs = dict(goal_cb_kwargs or {})
+        self._result_key = result_key
+        self._result_slots = tuple(result_slots)
+        self._result_cb = result_cb
+        self._result_cb_args = tuple(result_cb_args)
+        self._result_cb_kwargs = dict(result_cb_kwargs or {})
+        self._feedback_cb = feedback_cb
+        self._feedback_key = feedback_key
+        self._exec_s = to_seconds(exec_timeout)
+        self._preempt_s = to_seconds(preempt_timeout)
+        self._server_wait_s = to_seconds(server_wait_timeout)
+        self.preempt_timeout = None if self._preempt_s is None else self._preempt_s + MARGIN_S
+        self._node = node
+        self._client: ActionClient[Any] | None = None
+        self._exchange: GoalExchange | None = None
+        self._check_arguments()
+        self._declare_keys()
+
+    def _check_arguments(self) -> None:
+        types, problems = self._types, []
+        if self._goal is not None and not isinstance(self._goal, types.goal):
+            problems.append(
+                f"goal: got {self._goal!r}; expected a message of type {types.goal._type}."
+            )
+        for name, slots, message in (
+            ("goal_slots", self._goal_slots, types.goal),
+            ("result_slots", self._result_slots, types.result),
+        ):
+            known = list(message.__slots__)
+            problems += [
+                f"{name}: got {slot!r}; expected fields of {message._type}: {known}."
+                f"{did_you_mean(slot, known)}"
+                for slot in slots
+                if slot not in known
+            ]
+        for name in ("exec", "preempt", "server_wait"):
+            seconds = getattr(self, f"_{name}_s")
+            if seconds is not None and seconds < 0:
+                problems.append(f"{name}_timeout: got {seconds!r}; expected seconds >= 0, or None.")
+        if problems:
+            where = f"{type(self).__name__} {self._action_name!r}"
+            raise InvalidStateError("\n".join(f"{where}: {problem}" for problem in problems))
+
+    def _declare_keys(self) -> None:
+        self.register_input_keys([*filter(None, [self._goal_key]), *self._goal_slots])
+        self.register_output_keys([*filter(None, [self._result_key]), *self._result_slots])
+        self.register_output_keys(filter(None, [self._feedback_key]))
+        adopt_interface(self, self._goal_cb, "goal_cb", outcomes=False)
+        adopt_interface(self, self._result_cb, "result_cb")
+        adopt_interface(self, self._feedback_cb, "feedback_cb", outcomes=False)
+
+    # -- running -------------------------------------------------------------------------------
+
+    def execute(self, ud: Any) -> str:
+        """Send the goal and wait for its end.
+
+        What a callback raises goes through, once the goal has ended.
+
+        Raises:
+            MessageError: a field of the goal has a wrong type.
+            TypeMismatchError: the action's server is of another type.
+
+        Blocks: until the goal has ended, `exec_timeout` + `preempt_timeout` at most; a preempt
+            cancels the goal at once.
+        """
+        with Wakeup(self) as wake:
+            if self._is_preempted():
+                return PREEMPTED
+            goal = self._make_goal(ud)
+            client = self._get_client()
+            if self._is_preempted():
+                return PREEMPTED
+            run = GoalRun(
+                wake.clock.now(), exec_timeout=self._exec_s, preempt_timeout=self._preempt_s
+            )
+            exchange = GoalExchange(client, wake, self._scope(), run)
+            self._exchange = exchange
+            wait_s = self._server_wait_s
+            exchange.send(goal, ack_timeout=None if wait_s is None else max(wait_s, SHORTEST_ACK_S))
+            exchange.follow(
+                self.preempt_requested, lambda feedback: self._on_feedback(ud, feedback)
+            )
+        return self._finish(ud, exchange)
+
+    def _is_preempted(self) -> bool:
+        if not self.preempt_requested():
+            return False
+        self.service_preempt()
+        return True
+
+    def _make_goal(self, ud: Any) -> Any:
+        """Return the goal of this run; nothing in it is shared with userdata or other runs."""
+        if self._goal_key is not None:
+            goal = copy.deepcopy(writable(ud[self._goal_key]))
+        elif self._goal is not None:
+            goal = copy.deepcopy(self._goal)
+        else:
+            goal = self._types.goal()
+        for slot in self._goal_slots:
+            setattr(goal, slot, copy.deepcopy(writable(ud[slot])))
+        if self._goal_cb is not None:
+            made = self._goal_cb(ud, goal, *self._goal_cb_args, **self._goal_cb_kwargs)
+            goal = copy.deepcopy(writable(goal if made is None else made))
+        return goal
+
+    def _get_client(self) -> ActionClient[Any]:
+        """Return the client on the node in force, made when there is none yet."""
+        node = self._node if self._node is not None else get_node()
+        if self._client is None or self._client.node is not node or node.closed:
+            if self._client is not None:
+                self._client.stop()
+            self._client = ActionClient(self._action_name, self._types.action, node=node)
+        return self._client
+
+    def _on_feedback(self, ud: Any, feedback: Any) -> None:
+        if self._feedback_key is not None:
+            ud[self._feedback_key] = feedback
+        if self._feedback_cb is not None:
+            self._feedback_cb(ud, feedback)
+
+    def _finish(self, ud: Any, exchange: GoalExchange) -> str:
+        """Hand the result on and choose the outcome."""
+        run, result = exchange.run, exchange.result
+        if run.preempted:
+            self.service_preempt()
+        if result is not None:
+            if self._result_key is not None:
+                ud[self._result_key] = result
+            for slot in self._result_slots:
+                ud[slot] = getattr(result, slot)
+        if run.outcome == ABORTED or run.abandoned:
+            log.logwarn(self._explain(exchange))
+        if self._result_cb is not None:
+            chosen = self._result_cb(
+                ud,
+                getattr(GoalStatus, run.status),
+                self._types.result() if result is None else result,
+                *self._result_cb_args,
+                **self._result_cb_kwargs,
+            )
+            if chosen is not None:
+                return chosen
+        return run.outcome
+
+    def _explain(self, exchange: GoalExchange) -> str:
+        run, scope = exchange.run, self._scope()
+        where = f"{type(self).__name__} {self._action_name!r}" if scope is None else scope.path
+        text = f"{where}: goal {exchange.goal_id} on '{self._action_name}': {run.reason}"
+        if run.abandoned:
+            return f"{text}. It was abandoned and may still run."
+        if exchange.unanswered:
+            name = self._types.action._type
+            return (
+                f"{text}. Try starting an action server of type {name} on '{self._action_name}'; "
+                "`actionlib list -t` shows those that run."
+            )
+        return text
+
+    # -- for pictures and for SMACH ------------------------------------------------------------
+
+    @property
+    def _status(self) -> int:
+        """Which of the five constants holds."""
+        exchange = self._exchange
+        if exchange is None:
+            return self.INACTIVE
+        if exchange.run.status:
+            return self.COMPLETED
+        if exchange.run.cancelling:
+            return self.PREEMPTING
+        return self.ACTIVE if exchange.accepted else self.WAITING_FOR_SERVER
+
+    def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
+        """Add the action and the timeouts."""
+        kind, details = super().describe_details()
+        own = [("action", self._action_name), ("type", str(self._types.action._type))]
+        for name in ("exec", "preempt", "server_wait"):
+            seconds = getattr(self, f"_{name}_s")
+            if seconds is not None:
+                own.append((f"{name}_timeout", f"{seconds:g} s"))
+        return kind, (*own, *details)
