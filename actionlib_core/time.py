@@ -6,6 +6,7 @@ seconds: ``Time.now() + 0.5``, ``Duration(2) < 2.5``, ``float(Duration(1, 500_00
 
 from __future__ import annotations
 
+import math
 from typing import Any, ClassVar, Self, SupportsFloat, SupportsInt, TypeAlias, overload
 
 from actionlib_core.clock import current_clock
@@ -273,6 +274,8 @@ def _number(value: Any, where: str) -> float:
 
 def _split(seconds: float) -> tuple[int, int]:
     """Split float seconds into whole seconds and nanoseconds."""
+    if not math.isfinite(seconds):
+        raise ValueError(f"seconds: got {seconds}; expected a finite number")
     whole = int(seconds // 1)
     return whole, round((seconds - whole) * 1e9)
 

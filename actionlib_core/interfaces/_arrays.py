@@ -39,17 +39,18 @@ def numbers(code: str, values: Any) -> bytes:
     if kind is list or kind is tuple:
         return struct.pack(f"<{len(values)}{code}", *values)
     if hasattr(values, "__array_interface__") or hasattr(values, "itemsize"):
-        return _buffer(code, memoryview(values))
+        return _buffer(code, values)
     raise MismatchError
 
 
-def _buffer(code: str, view: memoryview) -> bytes:
+def _buffer(code: str, values: Any) -> bytes:
+    view = memoryview(values)
     if view.ndim != 1:
         raise MismatchError
     spelt = view.format.lstrip("@=<") if view.format else "B"
     if _NATIVE.get(spelt, spelt) == code and sys.byteorder == "little":
         return view.tobytes()
-    return struct.pack(f"<{len(view)}{code}", *view.tolist())
+    return struct.pack(f"<{len(view)}{code}", *values.tolist())
 
 
 def octets(values: Any) -> bytes:
@@ -62,7 +63,7 @@ def octets(values: Any) -> bytes:
     if hasattr(values, "__array_interface__") or hasattr(values, "itemsize"):
         view = memoryview(values)
         if view.ndim == 1:
-            return view.tobytes() if view.itemsize == 1 else bytes(view.tolist())
+            return view.tobytes() if view.itemsize == 1 else bytes(values.tolist())
     raise MismatchError
 
 

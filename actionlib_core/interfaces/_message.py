@@ -200,6 +200,10 @@ def make_class(
     write, read = make_codecs(cls, definition, resolve)
     cls._write = staticmethod(write)
     cls._read = staticmethod(read)
+    for field in definition.fields:
+        if field.name != field.attribute and not hasattr(Message, field.name):
+            # `getattr(message, "in")` works too, under the field's own name.
+            setattr(cls, field.name, cls.__dict__[field.attribute])
     return cast("type[Message]", cls)
 
 
@@ -215,11 +219,10 @@ def _make_init(definition: Definition, resolve: Callable[[str], type[Message]]) 
         "Time": Time,
         "Duration": Duration,
         "to_time": to_time,
-        "unknown": _raise_unknown,
+        "take_extra": _take_extra,
     }
     names = [field.attribute for field in definition.fields]
     lines = [f"def __init__({', '.join(['self', *(f'{n}=None' for n in names), '**extra'])}):"]
-    lines.append("    if extra: unknown(self, extra)")
     for field in definition.fields:
         name = field.attribute
         default = default_source(field.type, resolve, scope)
@@ -229,20 +232,26 @@ def _make_init(definition: Definition, resolve: Callable[[str], type[Message]]) 
             given = f"{name} if {name}.__class__ is {cls} else to_time({cls}, {name})"
             given = f"({given})"
         lines.append(f"    self.{name} = {default} if {name} is None else {given}")
+    lines.append("    if extra: take_extra(self, extra)")
     # The text holds only names checked by the parser.
     exec(compile("\n".join(lines), f"<__init__ of {definition.name}>", "exec"), scope)  # noqa: S102
     return scope["__init__"]
 
 
-def _raise_unknown(message: Message, extra: dict[str, Any]) -> None:
+def _take_extra(message: Message, extra: dict[str, Any]) -> None:
+    """Take fields by their ROS names where Python's differ (`in`), and refuse unknown ones."""
     known = list(message.__slots__)
-    raise FieldError(
-        *(
-            f"{message._type}: got unknown field {name!r}; expected {', '.join(known) or 'none'}."
-            + did_you_mean(name, known)
-            for name in extra
-        )
-    )
+    ours = {field.name: field.attribute for field in message._definition.fields}
+    problems = [
+        f"{message._type}: got unknown field {name!r}; expected {', '.join(known) or 'none'}."
+        + did_you_mean(name, known)
+        for name in extra
+        if name not in ours
+    ]
+    if problems:
+        raise FieldError(*problems)
+    for name, value in extra.items():
+        setattr(message, ours[name], value)
 
 
 __all__ = ["Buffer", "Message", "attribute_of", "make_class"]

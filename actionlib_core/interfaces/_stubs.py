@@ -182,4 +182,9 @@ class _Stub:
 
 
 def _escaped(text: str) -> str:
-    return text.replace("\\", "\\\\").replace('"""', '\\"""').rstrip('"')
+    return text.replace("\\", "\\\\").replace('"', '\\"')
+
+
+if __name__ == "__main__":
+    # For us, after a change to the bundled definitions.
+    write(bundled_stubs(), BUNDLED.parent)

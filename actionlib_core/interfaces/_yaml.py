@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +12,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from actionlib_core.interfaces._message import Message
+
+_ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t"}
+_LARGEST_BMP = 0xFFFF
 
 
 def dump(message: Message) -> str:
@@ -60,9 +62,18 @@ def _scalar(value: Any) -> str:
             return ".inf" if value > 0 else "-.inf"
         return repr(value)
     if isinstance(value, str):
-        # JSON strings are YAML strings, for every character.
-        return json.dumps(value, ensure_ascii=not value.isprintable())
+        return '"' + "".join(map(_character, value)) + '"'
     return str(value)
+
+
+def _character(character: str) -> str:
+    """Return a character of a double-quoted YAML string, escaped where it has to be."""
+    if character in _ESCAPES:
+        return _ESCAPES[character]
+    if character.isprintable():
+        return character
+    code = ord(character)
+    return f"\\u{code:04x}" if code <= _LARGEST_BMP else f"\\U{code:08x}"
 
 
 def load(text: str, where: str) -> Mapping[str, Any]:
@@ -76,7 +87,7 @@ def load(text: str, where: str) -> Mapping[str, Any]:
 
     try:
         values = YAML(typ="safe", pure=True).load(text)
-    except YAMLError as error:
+    except (YAMLError, ValueError, OverflowError, RecursionError) as error:
         raise FieldError(f"{where}: malformed YAML: {error}") from error
     if values is None:
         return {}
