@@ -1,19 +1,23 @@
-"""Waypoint lists: where a mission drives, read from YAML and checked against a map."""
+"""Waypoint lists: where a mission drives, read from YAML and checked against the map."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from actionlib_core.interfaces.geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseGoal
+from actionlib_core.interfaces.std_msgs.msg import Header
 from missions.checked_yaml import REQUIRED, Document, Limits
 from missions.exceptions import NavigationError
-from missions.move_base.geometry import Pose2D, wrap_angle
+from missions.move_base.config import SimConfig, load_config
+from missions.move_base.geometry import Pose2D, quaternion_of, wrap_angle
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from missions.checked_yaml import Section
-    from missions.move_base.planner import Planner
+    from missions.move_base.costmap import Costmap
 
 _SHARE: Final = Limits(low=0.0, high=1.0)
 
@@ -29,6 +33,10 @@ class Waypoint:
 
     name: str
     pose: Pose2D
+
+    def goal(self) -> MoveBaseGoal:
+        """Return the `move_base` goal that drives here."""
+        return goal_at(self.pose)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,41 +56,61 @@ class Route:
     charge_until: float
 
 
-def load_route(path: Path, planner: Planner | None = None) -> Route:
+def goal_at(pose: Pose2D, frame: str = "map") -> MoveBaseGoal:
+    """Return the `move_base` goal that drives to a pose in the frame "map" or "base_link"."""
+    turn = Quaternion(*quaternion_of(pose.yaw))
+    there = Pose(position=Point(pose.x, pose.y, 0.0), orientation=turn)
+    return MoveBaseGoal(target_pose=PoseStamped(header=Header(frame_id=frame), pose=there))
+
+
+def load_route(path: Path) -> Route:
     """Read a waypoint file.
 
-    Args:
-        path: The YAML file.
-        planner: Of the floor the robot drives on, to find places where it cannot stand; None when
-            the floor is not known here (then the robot's server refuses them).
+    With the field `map` (and `robot`, for its radius) every place is checked against that floor;
+    without it only the robot's server can refuse places where the robot cannot stand.
 
     Raises:
         InputFileError: with the line and field of every problem.
     """
     document = Document(path)
     top = document.top
+    floor = _floor(top, path)
     low = top.number("low_battery", 0.3, _SHARE)
     until = top.number("charge_until", 0.9, _SHARE)
     if "charge_until" in top and until <= low:
         top.problem("charge_until", f"more than low_battery ({low:g})")
-    dock = _waypoint(top.section("dock"), "dock", planner)
+    dock = _waypoint(top.section("dock"), "dock", floor)
     waypoints = tuple(
-        _waypoint(row, f"waypoint {i}", planner) for i, row in enumerate(top.rows("waypoints"), 1)
+        _waypoint(row, f"waypoint {i}", floor) for i, row in enumerate(top.rows("waypoints"), 1)
     )
     top.close()
     document.check()
     return Route(waypoints, dock, low, until)
 
 
-def _waypoint(section: Section, default_name: str, planner: Planner | None) -> Waypoint:
+def _floor(top: Section, path: Path) -> Costmap | None:
+    """Return the floor that the file names, inflated by its robot."""
+    robot = SimConfig()
+    if "robot" in top:
+        robot = load_config(path.parent / top.text("robot", REQUIRED))
+    if "map" not in top:
+        return None
+    from missions.move_base.costmap import Costmap
+    from missions.move_base.occupancy import load_map
+
+    grid = load_map(path.parent / top.text("map", REQUIRED))
+    return Costmap(grid, robot.robot.radius, robot.planner)
+
+
+def _waypoint(section: Section, default_name: str, floor: Costmap | None) -> Waypoint:
     name = section.text("name", default_name)
     x = section.number("x", REQUIRED, unit="m")
     y = section.number("y", REQUIRED, unit="m")
     yaw = section.number("yaw", 0.0, unit="rad")
     section.close()
-    if planner is not None and "x" in section and "y" in section:
+    if floor is not None and "x" in section and "y" in section:
         try:
-            planner.check_goal((x, y))
+            floor.check_place(x, y)
         except NavigationError as error:
             reason = str(error).removeprefix("goal ")
             section.problem("x", "a place where the robot can stand", f"{name}: {reason}.")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
+from missions.exceptions import NavigationError
 from missions.move_base.occupancy import OCCUPIED, UNKNOWN
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ class Obstacle(NamedTuple):
 class Costmap:
     """A map inflated by the robot's body.
 
-    Immutable: obstacles that appear make a new one (`with_obstacles`).
+    Immutable: obstacles that appear make a new one.
 
     Attributes:
         map: The map beneath.
@@ -59,8 +60,6 @@ class Costmap:
         self.map = grid
         self.obstacles = tuple(obstacles)
         self.radius = body_radius + config.margin
-        self._body_radius = body_radius
-        self._config = config
         solid = grid.cells >= _HALF_OCCUPIED
         if not config.unknown_is_free:
             solid |= grid.cells == UNKNOWN
@@ -77,10 +76,6 @@ class Costmap:
         origin, scale = grid.origin, 1.0 / grid.resolution
         self._ux, self._uy = math.cos(origin.yaw) * scale, math.sin(origin.yaw) * scale
 
-    def with_obstacles(self, obstacles: Iterable[Obstacle]) -> Costmap:
-        """Return the same floor with these obstacles instead."""
-        return Costmap(self.map, self._body_radius, self._config, obstacles)
-
     def is_free(self, x: float, y: float) -> bool:
         """Tell whether the robot's centre may be at this point of the map frame."""
         index = self._index(x, y)
@@ -94,10 +89,23 @@ class Costmap:
         index = self._index(x, y)
         return index < 0 or self._touching[index] == 1
 
-    def is_solid(self, x: float, y: float) -> bool:
-        """Tell whether the point itself lies in something solid or unknown, or off the map."""
+    def check_place(self, x: float, y: float) -> tuple[int, int]:
+        """Return the cell (row, column) of a place where the robot is to stand.
+
+        Raises:
+            NavigationError: it cannot stand there; the text says why.
+        """
         cell = self.map.cell(x, y)
-        return cell is None or bool(self._solid[cell])
+        where = f"goal ({x:.2f}, {y:.2f})"
+        if cell is None:
+            raise NavigationError(f"{where} is outside the map")
+        if self._solid[cell]:
+            raise NavigationError(f"{where} is in a wall or another solid thing")
+        if self.blocked[cell]:
+            raise NavigationError(
+                f"{where} is too near to a wall: the robot needs {self.radius:.2f} m around it"
+            )
+        return cell
 
     def _index(self, x: float, y: float) -> int:
         """Return the number of the cell at a point, counted row by row; -1 outside the map."""

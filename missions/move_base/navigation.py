@@ -36,7 +36,7 @@ def drive_to(robot: Robot, goal: Pose2D) -> Generator[Command]:
             may still be moving then.
     """
     place = (goal.x, goal.y)
-    robot.check_goal(place)
+    robot.check_place(*place)
     robot.look()
     recoveries = 0
     while True:

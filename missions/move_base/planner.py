@@ -54,7 +54,7 @@ class Planner:
             NavigationError: the goal is outside the map, in something solid, too near to it, or
                 cannot be reached.
         """
-        target = self.check_goal(goal)
+        target = self.costmap.check_place(*goal)
         source = self._start_cell(start)
         with self._lock:
             way = self._ways.get((source, goal))
@@ -74,25 +74,6 @@ class Planner:
             corners.insert(0, start)
         corners[-1] = goal
         return self._smooth(corners)
-
-    def check_goal(self, goal: Point) -> Cell:
-        """Return the goal's cell.
-
-        Raises:
-            NavigationError: the robot cannot stand there.
-        """
-        costmap = self.costmap
-        cell = costmap.map.cell(*goal)
-        where = f"goal ({goal[0]:.2f}, {goal[1]:.2f})"
-        if cell is None:
-            raise NavigationError(f"{where} is outside the map")
-        if costmap.is_solid(*goal):
-            raise NavigationError(f"{where} is in a wall or another solid thing")
-        if costmap.blocked[cell]:
-            raise NavigationError(
-                f"{where} is too near to a wall: the robot needs {costmap.radius:.2f} m around it"
-            )
-        return cell
 
     def _start_cell(self, start: Point) -> Cell:
         """Return the cell to search from: the robot's own, or the nearest one that is free."""

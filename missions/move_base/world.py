@@ -88,7 +88,7 @@ class Robot:
         self._known: tuple[Obstacle, ...] = ()
         self.planner = self._planner(())
         try:
-            self.check_goal((pose.x, pose.y))
+            self.check_place(pose.x, pose.y)
         except NavigationError as error:
             raise NavigationError(f"start pose: {error}".replace("goal ", "", 1)) from None
         self.body = Body(config.robot, pose)
@@ -136,13 +136,13 @@ class Robot:
         self.planner = self._planner(self._known)
         self.look()
 
-    def check_goal(self, place: tuple[float, float]) -> None:
-        """Check a goal against the map alone: obstacles may go, walls do not.
+    def check_place(self, x: float, y: float) -> None:
+        """Check a place against the map alone: obstacles may go, walls do not.
 
         Raises:
             NavigationError: the robot can never stand there.
         """
-        self._planner(()).check_goal(place)
+        self._planner(()).costmap.check_place(x, y)
 
     @property
     def known_obstacles(self) -> tuple[Obstacle, ...]:

@@ -41,8 +41,9 @@ def test_the_body_keeps_clear_of_walls_by_its_radius():
 def test_unknown_floor_is_solid_unless_the_config_says_otherwise():
     grid = hall()
     grid.cells[:, 60:] = -1
-    assert Costmap(grid, 0.2, PlannerConfig()).is_solid(5, 2)
-    assert not Costmap(grid, 0.2, PlannerConfig(unknown_is_free=True)).is_solid(5, 2)
+    with pytest.raises(NavigationError, match="in a wall or another solid thing"):
+        Costmap(grid, 0.2, PlannerConfig()).check_place(5, 2)
+    assert Costmap(grid, 0.2, PlannerConfig(unknown_is_free=True)).check_place(5, 2) == (40, 100)
 
 
 def test_cost_falls_with_the_distance_from_walls():

@@ -1,0 +1,123 @@
+"""`smachpy list` and `smachpy run`."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from missions.maps import OFFICE_MAP, OFFICE_ROBOT
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+def register_list(subparsers: Any) -> None:
+    """Add `smachpy list`."""
+    parser = subparsers.add_parser(
+        "list", help="name the missions", description="Name the missions that are installed."
+    )
+    parser.set_defaults(run=_list)
+
+
+def register_run(subparsers: Any) -> None:
+    """Add `smachpy run`."""
+    parser = subparsers.add_parser(
+        "run",
+        help="run a mission",
+        description="Run a mission to its end and show it in the terminal. Exit codes: 0 it "
+        "succeeded, 1 it ended otherwise, 2 bad input, 130 Ctrl-C (the mission was preempted).",
+    )
+    parser.add_argument(
+        "target", metavar="MISSION", help="a name of `smachpy list`, module:factory, or a .py file"
+    )
+    parser.add_argument(
+        "--input",
+        "-i",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        type=_input,
+        help="an argument of the mission's function, or a userdata key; the value is YAML",
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="write pictures of the run there")
+    parser.add_argument("--plain", action="store_true", help="lines only, for logs")
+    parser.add_argument(
+        "--success",
+        action="append",
+        default=[],
+        metavar="OUTCOME",
+        help="an outcome that counts as success (default: succeeded)",
+    )
+    parser.add_argument(
+        "--server-timeout",
+        type=float,
+        default=10.0,
+        metavar="S",
+        help="how long to wait for the mission's action servers [s] (default: %(default)g)",
+    )
+    robot = parser.add_argument_group("the simulated robot")
+    robot.add_argument(
+        "--start-robot",
+        action=argparse.BooleanOptionalAction,
+        default=False,
+        help="start it for this run (default: use one that runs)",
+    )
+    robot.add_argument(
+        "--map", type=Path, default=OFFICE_MAP, metavar="FILE", help="its map (default: the office)"
+    )
+    robot.add_argument(
+        "--config", type=Path, default=OFFICE_ROBOT, metavar="FILE", help="its parameters"
+    )
+    robot.add_argument(
+        "--pose", type=float, nargs=3, metavar=("X", "Y", "YAW"), help="where it starts [m, m, rad]"
+    )
+    parser.set_defaults(run=_run)
+
+
+def _list(_args: argparse.Namespace) -> int:
+    from rich.console import Console
+    from rich.table import Table
+
+    from smachpy.targets import list_missions
+
+    table = Table(box=None, pad_edge=False, show_header=False)
+    table.add_column(style="bold")
+    table.add_column()
+    for target in list_missions():
+        table.add_row(target.name, target.summary)
+    Console(highlight=False).print(table)
+    return 0
+
+
+def _run(args: argparse.Namespace) -> int:
+    from missions.runner import RunOptions, run_mission
+    from smachpy.targets import load_target
+
+    pose: Sequence[float] = args.pose or ()
+    options = RunOptions(
+        inputs=dict(args.input),
+        start_robot=args.start_robot,
+        robot_arguments=("--pose", *(str(value) for value in pose)) if pose else (),
+        map=args.map,
+        config=args.config,
+        out=args.out,
+        plain=args.plain,
+        success=tuple(args.success),
+        server_timeout=args.server_timeout,
+    )
+    return run_mission(load_target(args.target), options)
+
+
+def _input(text: str) -> tuple[str, object]:
+    """Read KEY=VALUE, where VALUE is YAML: 3, 0.5, true, [1, 2], some words."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    key, equals, value = text.partition("=")
+    if not (key and equals):
+        raise argparse.ArgumentTypeError(f"got {text!r}; expected KEY=VALUE")
+    try:
+        return key, YAML(typ="safe", pure=True).load(value)
+    except YAMLError:
+        return key, value

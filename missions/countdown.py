@@ -1,0 +1,224 @@
+"""Countdown: a server that counts down n seconds, a client that starts it, a client that stops it.
+
+    COUNTDOWN
+      COUNT           starts it and waits for zero
+      START_TWICE     both at once: a second start preempts the first
+        FIRST         counts from 5
+        SECOND        starts two seconds later, counts from 3
+      STOP            counts from 10 and is stopped after two seconds
+
+Run all of it: `smachpy run countdown`. As three programs:
+
+    python -m missions.countdown server
+    python -m missions.countdown start 10
+    python -m missions.countdown stop
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import TYPE_CHECKING
+
+from actionlib_core import shutdown
+from actionlib_core.clock import current_clock
+from actionlib_core.exceptions import ActionlibError
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
+from actionlib_core.simple_action_client import SimpleActionClient
+from actionlib_core.simple_action_server import SimpleActionServer
+from missions.interfaces import (
+    CountdownAction,
+    CountdownFeedback,
+    CountdownGoal,
+    CountdownResult,
+)
+from smachpy import Concurrence, SimpleActionState, State, StateMachine, UserData
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from actionlib_core.node import Node
+
+NAME = "countdown"
+SERVER_WAIT = 3.0  # [s] the programs `start` and `stop` wait for a server
+
+
+class CountdownServer:
+    """Counts down, one step a second.
+
+    Args:
+        show: Called with each second.
+        node: Where it is on the network; None takes the node in force.
+    """
+
+    def __init__(
+        self, show: Callable[[int], object] = lambda _seconds: None, *, node: Node | None = None
+    ) -> None:
+        self._show = show
+        self._server = SimpleActionServer(
+            NAME, CountdownAction, self._count, auto_start=False, node=node
+        )
+        self._clock = current_clock() if node is None else node.clock
+        self._stop = self._clock.event()
+        self._server.register_preempt_callback(self._stop.set)
+        self._server.start()
+
+    def close(self) -> None:
+        """Leave the network; a running countdown is aborted."""
+        self._stop.set()
+        self._server.stop()
+
+    def _count(self, goal: CountdownGoal) -> None:
+        self._stop.clear()
+        left = goal.seconds
+        while left > 0:
+            if self._server.is_preempt_requested():
+                text = f"stopped with {left} s left"
+                self._server.set_preempted(CountdownResult(seconds_left=left), text)
+                return
+            self._show(left)
+            self._server.publish_feedback(CountdownFeedback(seconds_left=left))
+            if not self._stop.wait(1.0):  # a preempt ends the second early
+                left -= 1
+        self._show(0)
+        self._server.set_succeeded(CountdownResult(seconds_left=0), "zero")
+
+
+def countdown(seconds: int = 3) -> StateMachine:
+    """Count down; start twice; start and stop.
+
+    Args:
+        seconds: Where the first countdown begins.
+    """
+    sm = StateMachine(outcomes=["succeeded", "aborted", "preempted"], name="COUNTDOWN")
+    server: list[CountdownServer] = []
+    sm.register_start_cb(lambda _ud, _initial: server.append(CountdownServer()))
+    sm.register_termination_cb(lambda _ud, _final, _outcome: server.pop().close())
+    with sm:
+        StateMachine.add("COUNT", count_from(seconds), transitions={"succeeded": "START_TWICE"})
+        StateMachine.add("START_TWICE", start_twice(), transitions={"succeeded": "STOP"})
+        StateMachine.add(
+            "STOP",
+            SimpleActionState(
+                NAME,
+                CountdownAction,
+                goal=CountdownGoal(seconds=10),
+                timeout=2.0,
+                timeout_outcome="stopped",
+            ),
+            transitions={"stopped": "succeeded", "succeeded": "aborted"},
+        )
+    return sm
+
+
+countdown.serves = (NAME,)  # type: ignore[attr-defined]  # so that nobody waits for it beforehand
+
+
+def count_from(seconds: int) -> SimpleActionState:
+    """Start the countdown and wait for zero."""
+    return SimpleActionState(NAME, CountdownAction, goal=CountdownGoal(seconds=seconds))
+
+
+def start_twice() -> Concurrence:
+    """Start it; start it again two seconds later, which preempts the first."""
+    both = Concurrence(
+        outcomes=["succeeded", "aborted", "preempted"],
+        default_outcome="aborted",
+        outcome_map={"succeeded": {"FIRST": "taken_over", "SECOND": "succeeded"}},
+    )
+    second = StateMachine(outcomes=["succeeded", "aborted", "preempted"])
+    with second:
+        StateMachine.add("WAIT", Wait(2.0), transitions={"done": "COUNT"})
+        StateMachine.add("COUNT", count_from(3))
+    with both:
+        Concurrence.add(
+            "FIRST",
+            SimpleActionState(
+                NAME,
+                CountdownAction,
+                goal=CountdownGoal(seconds=5),
+                outcomes=["taken_over"],
+                result_cb=taken_over,
+            ),
+        )
+        Concurrence.add("SECOND", second)
+    return both
+
+
+def taken_over(_userdata: UserData, status: int, _result: CountdownResult) -> str | None:
+    """Name the end of a goal that somebody else's goal preempted."""
+    return "taken_over" if status == GoalStatus.PREEMPTED else None
+
+
+class Wait(State):
+    """Let some seconds pass."""
+
+    def __init__(self, seconds: float) -> None:
+        super().__init__(outcomes=["done", "preempted"])
+        self.seconds = seconds
+
+    def execute(self, userdata: UserData) -> str:
+        """Wait, unless called off."""
+        del userdata
+        self.sleep(self.seconds)
+        return "preempted" if self.preempt_requested() else "done"
+
+
+# -- the three programs ----------------------------------------------------------------------------
+
+
+def serve() -> int:
+    """Offer the countdown until Ctrl-C."""
+    with shutdown.handle_signals():
+        server = CountdownServer(show=print)
+        print(f"{NAME}: ready; stop with Ctrl-C")
+        shutdown.event().wait()
+        server.close()
+    return 0
+
+
+def start(seconds: int) -> int:
+    """Start a countdown and show each second; Ctrl-C leaves it running."""
+    client = connect()
+    client.send_goal(
+        CountdownGoal(seconds=seconds), feedback_cb=lambda feedback: print(feedback.seconds_left)
+    )
+    client.wait_for_result()
+    print(client.get_goal_status_text())
+    return 0 if client.get_state() == GoalStatus.SUCCEEDED else 1
+
+
+def stop() -> int:
+    """Stop every countdown."""
+    connect().cancel_all_goals()
+    return 0
+
+
+def connect() -> SimpleActionClient[CountdownAction]:
+    """Return a client that has found the server."""
+    client = SimpleActionClient(NAME, CountdownAction)
+    if not client.wait_for_server(SERVER_WAIT):
+        raise ActionlibError(
+            f"action {NAME!r}: got no server within {SERVER_WAIT:g} s; expected one. "
+            "Try: python -m missions.countdown server"
+        )
+    return client
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one of the three programs."""
+    parser = argparse.ArgumentParser(prog="python -m missions.countdown")
+    parser.add_argument("program", choices=["server", "start", "stop"])
+    parser.add_argument("seconds", type=int, nargs="?", default=10)
+    args = parser.parse_args(argv)
+    try:
+        if args.program == "server":
+            return serve()
+        return start(args.seconds) if args.program == "start" else stop()
+    except ActionlibError as error:
+        print(f"countdown: {error}", file=sys.stderr)
+        return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())

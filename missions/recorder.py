@@ -1,0 +1,97 @@
+"""Collects, from a mission's events, where the robot drove and what for."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, Any
+
+from missions.move_base.geometry import Pose2D, yaw_of
+from missions.waypoints import Waypoint
+from smachpy import events as ev
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from missions.move_base.occupancy import OccupancyMap
+    from missions.move_base.track import GoalMark
+
+_SAME_PLACE = 0.05  # [m] a goal this near to a named waypoint has its name
+
+
+class TrackRecorder:
+    """Listens to a mission and can draw its track; for `machine.subscribe(recorder.on_event)`.
+
+    The track is made of the poses that `move_base` reports as feedback. A goal is named after the
+    waypoint that a state wrote to userdata, else after the state that sent it.
+
+    Threads: `on_event` may be called from any thread.
+    """
+
+    def __init__(self) -> None:
+        self.track: list[tuple[float, float]] = []
+        self._lock = threading.Lock()
+        self._names: list[Waypoint] = []
+        self._goals: dict[str, tuple[Pose2D, str, bool]] = {}
+
+    @property
+    def has_goals(self) -> bool:
+        """Whether any goal was a place to drive to."""
+        return bool(self._goals)
+
+    def on_event(self, event: ev.Event) -> None:
+        """Take one event in."""
+        with self._lock:
+            if isinstance(event, ev.GoalFeedback):
+                self._on_feedback(event.feedback)
+            elif isinstance(event, ev.GoalSent):
+                self._on_goal(event)
+            elif isinstance(event, ev.GoalDone) and event.goal_id in self._goals:
+                pose, label, _ = self._goals[event.goal_id]
+                self._goals[event.goal_id] = pose, label, event.status == "SUCCEEDED"
+            elif isinstance(event, ev.UserdataWritten) and isinstance(event.value, Waypoint):
+                self._names.append(event.value)
+
+    def draw(self, path: Path, grid: OccupancyMap, *, dock: Pose2D | None, title: str) -> None:
+        """Write the picture of the drive.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        from missions.move_base.track import draw_track
+
+        with self._lock:
+            track, goals = list(self.track), self._marks()
+        draw_track(path, grid, track, goals, dock=dock, title=title)
+
+    def _marks(self) -> list[GoalMark]:
+        from missions.move_base.track import GoalMark
+
+        return [
+            GoalMark(pose, self._name(pose) or label, reached=reached)
+            for pose, label, reached in self._goals.values()
+        ]
+
+    def _on_goal(self, event: ev.GoalSent) -> None:
+        target = getattr(event.goal, "target_pose", None)
+        if target is not None and target.header.frame_id.removeprefix("/") == "map":
+            label = event.path.rpartition("/")[2].replace("_", " ").lower()
+            self._goals[event.goal_id] = _pose(target.pose), label, False
+
+    def _on_feedback(self, feedback: Any) -> None:
+        base = getattr(feedback, "base_position", None)
+        if base is not None:
+            place = (base.pose.position.x, base.pose.position.y)
+            if not self.track or self.track[-1] != place:
+                self.track.append(place)
+
+    def _name(self, pose: Pose2D) -> str:
+        for waypoint in reversed(self._names):
+            if waypoint.pose.distance(pose) < _SAME_PLACE:
+                return waypoint.name
+        return ""
+
+
+def _pose(message: Any) -> Pose2D:
+    turn = message.orientation
+    yaw = yaw_of(turn.x, turn.y, turn.z, turn.w)
+    return Pose2D(message.position.x, message.position.y, yaw)

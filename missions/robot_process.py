@@ -1,0 +1,114 @@
+"""The simulated robot as a child process that never outlives its parent."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections import deque
+from typing import TYPE_CHECKING, Final
+
+from actionlib_core.clock import current_clock
+from missions.exceptions import MissionError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from types import TracebackType
+    from typing import IO, Self
+
+_GRACE: Final = 1.5  # [s] from the end of its standard input until it is terminated
+_LAST_GRACE: Final = 1.0  # [s] from then until it is killed
+_KEPT_LINES: Final = 40  # of what it said
+
+
+class RobotProcess:
+    """Runs `python -m missions.move_base`; a context manager.
+
+    The robot lives as long as its standard input is open: when this process ends, however it ends,
+    the system closes the pipe and the robot goes. It has a session of its own, so that Ctrl-C in
+    the terminal reaches only the mission, which can then still stop the robot.
+
+    Args:
+        arguments: Further arguments for it (`--map`, `--config`, `--pose`, ...).
+        on_exit: Called when the process has ended, whatever the reason.
+
+    Threads: `on_exit` is called from a thread of the clock.
+    """
+
+    def __init__(
+        self, arguments: Sequence[str] = (), *, on_exit: Callable[[], object] = lambda: None
+    ) -> None:
+        self._command = [sys.executable, "-m", "missions.move_base", "--child", *arguments]
+        self._on_exit = on_exit
+        self._said: deque[str] = deque(maxlen=_KEPT_LINES)
+        self._ended = current_clock().event()
+        self._process: subprocess.Popen[str] | None = None
+
+    def __enter__(self) -> Self:
+        self._process = subprocess.Popen(  # noqa: S603  our own interpreter and module
+            self._command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+            start_new_session=True,
+        )
+        stderr = self._process.stderr
+        assert stderr is not None
+        current_clock().spawn(lambda: self._watch(stderr), name="robot process")
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.stop()
+
+    @property
+    def pid(self) -> int:
+        """The process id."""
+        assert self._process is not None
+        return self._process.pid
+
+    def ended(self) -> bool:
+        """Tell whether the process has ended."""
+        return self._ended.is_set()
+
+    def check(self) -> None:
+        """Raise when it ended by itself.
+
+        Raises:
+            MissionError: with what it said.
+        """
+        if self._ended.is_set() and self._process is not None and self._process.returncode:
+            said = "".join(self._said).strip()
+            code = self._process.returncode
+            raise MissionError(said or f"the robot process ended with exit code {code}")
+
+    def stop(self) -> None:
+        """End the process; a second call does nothing.
+
+        Blocks: until it has ended, 2.5 s at most.
+        """
+        process = self._process
+        if process is None:
+            return
+        if process.stdin is not None:
+            process.stdin.close()
+        if not self._ended.wait(_GRACE):
+            process.terminate()
+            if not self._ended.wait(_LAST_GRACE):
+                process.kill()
+                self._ended.wait(_LAST_GRACE)
+
+    def _watch(self, stderr: IO[str]) -> None:
+        """Read what it says until it ends."""
+        assert self._process is not None
+        with stderr:
+            for line in stderr:
+                self._said.append(line)
+        self._process.wait()
+        self._ended.set()
+        self._on_exit()

@@ -1,0 +1,248 @@
+"""Run one mission for a person: robot, terminal view, signals, pictures, exit code."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
+
+import viz
+from actionlib_core import shutdown
+from actionlib_core.node import get_node
+from actionlib_core.presence import Kind, parse_token, token_pattern
+from missions.exceptions import MissionError
+from missions.maps import OFFICE_MAP, OFFICE_ROBOT
+from missions.recorder import TrackRecorder
+from missions.robot_process import RobotProcess
+from smachpy import describe
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from actionlib_core.node import Node
+    from actionlib_core.transport import Presence
+    from smachpy.container import Container
+    from smachpy.introspection import StateRecord
+    from smachpy.targets import Target
+
+EXIT_SUCCESS: Final = 0
+EXIT_OTHER_OUTCOME: Final = 1
+_SIGNAL_EXIT: Final = 128  # plus the signal's number, as shells have it
+_BAD_OUTCOMES: Final = frozenset(
+    {"aborted", "preempted", "failed", "failure", "error", "invalid", "false", "lost", "rejected"}
+)
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """How to run a mission.
+
+    Attributes:
+        inputs: Arguments of the mission's function, or values of its userdata keys.
+        start_robot: Start the simulated robot as a process of its own.
+        robot_arguments: Further arguments for it.
+        map: The robot's map, also for the picture of the track.
+        config: The robot's parameters.
+        out: Folder for pictures; None writes none.
+        plain: Only lines, no panel.
+        success: Outcomes that count as success; empty takes 'succeeded', or all that do not sound
+            like a failure.
+        server_timeout: How long to wait for the action servers that the mission needs [s].
+    """
+
+    inputs: Mapping[str, object] = field(default_factory=dict)
+    start_robot: bool = False
+    robot_arguments: tuple[str, ...] = ()
+    map: Path = OFFICE_MAP
+    config: Path = OFFICE_ROBOT
+    out: Path | None = None
+    plain: bool = False
+    success: tuple[str, ...] = ()
+    server_timeout: float = 5.0
+
+
+def run_mission(target: Target, options: RunOptions) -> int:
+    """Run it to its end and return the exit code.
+
+    Ctrl-C and SIGTERM preempt the mission, a second Ctrl-C ends the process.
+
+    Raises:
+        SmachError: the inputs do not fit, a server is missing, or the robot cannot start.
+
+    Blocks: until the mission has ended.
+    """
+    machine = build(target, options.inputs)
+    record = describe(machine)
+    needed = needed_servers(record) - set(getattr(target.thing, "serves", ()))
+    recorder = TrackRecorder()
+    with contextlib.ExitStack() as stack:
+        ending = stack.enter_context(shutdown.handle_signals())
+        waiter = _ServerWait(get_node(), needed)
+        stack.callback(waiter.close)
+        stack.callback(ending.on_shutdown(waiter.wake))
+        robot = None
+        if options.start_robot:
+            arguments = ("--map", str(options.map), "--config", str(options.config))
+            robot = RobotProcess((*arguments, *options.robot_arguments), on_exit=waiter.wake)
+            stack.enter_context(robot)
+        if not waiter.wait(options.server_timeout, robot):
+            return _signal_exit(ending)
+        stack.callback(ending.on_shutdown(machine.request_preempt))
+        stack.callback(machine.subscribe(recorder.on_event))
+        view = stack.enter_context(viz.TerminalView(record, plain=options.plain))
+        stack.callback(machine.subscribe(view.on_event))
+        outcome = _execute(machine, view)
+        if robot is not None:
+            robot.stop()
+        if options.out is not None:
+            write_pictures(target.name, machine, view.history, recorder, outcome, options)
+        if ending.requested():
+            return _signal_exit(ending)
+    return EXIT_SUCCESS if outcome in good_outcomes(record, options) else EXIT_OTHER_OUTCOME
+
+
+def build(target: Target, inputs: Mapping[str, object]) -> Container:
+    """Make the machine: inputs become arguments of its function where it has such, else userdata.
+
+    Raises:
+        MissionError: an input is neither.
+    """
+    import inspect
+
+    thing = target.thing
+    parameters = inspect.signature(thing).parameters if inspect.isfunction(thing) else {}
+    machine = target.build(**{k: v for k, v in inputs.items() if k in parameters})
+    known = {*parameters, *machine.get_registered_input_keys(), *machine.userdata.keys()}
+    for key, value in inputs.items():
+        if key not in known:
+            raise MissionError(
+                f"--input {key}: mission {target.name!r} has no such input; expected one of "
+                f"{sorted(known)}."
+            )
+        if key not in parameters:
+            machine.userdata[key] = value
+    return machine
+
+
+def needed_servers(record: StateRecord) -> set[str]:
+    """Return the names of the actions that a machine's states call."""
+    return {
+        value
+        for state in record.walk()
+        if state.kind == "action"
+        for name, value in state.details
+        if name == "action"
+    }
+
+
+def good_outcomes(record: StateRecord, options: RunOptions) -> set[str]:
+    """Return the outcomes that count as success."""
+    if options.success:
+        return set(options.success)
+    if "succeeded" in record.outcomes:
+        return {"succeeded"}
+    return {outcome for outcome in record.outcomes if outcome.lower() not in _BAD_OUTCOMES}
+
+
+def write_pictures(
+    name: str,
+    machine: Container,
+    history: viz.History,
+    recorder: TrackRecorder,
+    outcome: str | None,
+    options: RunOptions,
+) -> None:
+    """Write `<out>/<name>.svg`, and `<out>/<name>_track.png` if the robot had places to go to.
+
+    Raises:
+        MissionError: a file cannot be written.
+    """
+    out = options.out
+    assert out is not None
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        viz.render(machine, out / f"{name}.svg", run=history)
+        if recorder.has_goals:
+            from missions.move_base.config import load_config
+            from missions.move_base.occupancy import load_map
+
+            dock = load_config(options.config).dock
+            title = f"{name}: {outcome}"
+            picture = out / f"{name}_track.png"
+            recorder.draw(picture, load_map(options.map), dock=dock, title=title)
+    except OSError as error:
+        raise MissionError(
+            f"--out {out}: cannot write: {error.strerror or error}; expected a folder for pictures."
+        ) from error
+
+
+def _execute(machine: Container, view: viz.TerminalView) -> str | None:
+    outcome: str | None = None
+    try:
+        outcome = machine.execute()
+    finally:
+        view.print_summary(outcome)
+    return outcome
+
+
+def _signal_exit(ending: shutdown.Shutdown) -> int:
+    members = signal.Signals.__members__
+    return _SIGNAL_EXIT + members.get(ending.reason or "", signal.SIGINT)
+
+
+class _ServerWait:
+    """Waits until every needed action has a server, or something makes waiting pointless."""
+
+    def __init__(self, node: Node, names: set[str]) -> None:
+        self._clock = node.clock
+        self._wake = node.clock.event()
+        self._missing = {node.resolve(name, "action name"): name for name in names}
+        self._watches = [
+            node.transport.watch_alive(token_pattern(Kind.ACTION_SERVER, full), self._on_presence)
+            for full in list(self._missing)
+        ]
+
+    def wake(self) -> None:
+        """Look again whether to go on waiting; from any thread."""
+        self._wake.set()
+
+    def close(self) -> None:
+        """Stop watching."""
+        for watch in self._watches:
+            watch.close()
+
+    def wait(self, timeout: float, robot: RobotProcess | None) -> bool:
+        """Wait; False when the program is to end.
+
+        Raises:
+            MissionError: a server is missing after `timeout` [s], or the robot could not start.
+
+        Blocks: `timeout` at most.
+        """
+        deadline = self._clock.now() + timeout
+        while self._missing and not shutdown.requested():
+            if robot is not None:
+                robot.check()
+            left = deadline - self._clock.now()
+            if left <= 0:
+                raise MissionError(_missing_text(sorted(self._missing.values()), timeout))
+            self._wake.wait(left)
+            self._wake.clear()
+        return not shutdown.requested()
+
+    def _on_presence(self, presence: Presence) -> None:
+        endpoint = parse_token(presence.key)
+        if endpoint is not None and presence.alive:
+            self._missing.pop(endpoint.name, None)
+            self._wake.set()
+
+
+def _missing_text(names: list[str], timeout: float) -> str:
+    listed = ", ".join(repr(name) for name in names)
+    what, be = ("action", "has") if len(names) == 1 else ("actions", "have")
+    text = f"{what} {listed}: {be} no server after {timeout:g} s; expected one."
+    if set(names) <= {"move_base", "charge"}:
+        return f"{text} Try --start-robot, or in another terminal: python -m missions.move_base"
+    return f"{text} Try starting it; `actionlib list` shows those that run."
