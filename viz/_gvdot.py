@@ -2,7 +2,8 @@
 
 Run as a process of its own (`python -m viz._gvdot -Tsvg file.gv`), never imported: a fault in the
 C library must not reach a robot. Understands what `viz.engine` and the `graphviz` package pass:
-`-K`, `-T`, `-o`, `-G/-N/-E name=value`, `-V`, and any number of input files.
+`-K`, `-T`, `-o`, `-G/-N/-E name=value`, `-V`, and input files or a stream of graphs on standard
+input, each ended by the line `// end of graph`.
 """
 
 from __future__ import annotations
@@ -11,8 +12,14 @@ import argparse
 import os
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pygraphviz
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+END = b"// end of graph"  # as `viz.engine.END`, which this process does not import
 
 
 def main(arguments: list[str]) -> int:
@@ -22,13 +29,13 @@ def main(arguments: list[str]) -> int:
         sys.stderr.write(f"dot - graphviz version {pygraphviz.__graphviz_version__}\n")
         return 0
     out = options.output.open("wb") if options.output else sys.stdout.buffer
-    for source in options.files or [None]:
-        try:
-            out.write(_draw(_read(source), options))
-        except (ValueError, OSError, pygraphviz.DotError) as error:
-            sys.stderr.write(f"Error: {source or '<stdin>'}: {error}\n")
-            return 1
-    out.flush()
+    try:
+        for text in _texts(options.files):
+            out.write(_draw(text, options))
+            out.flush()
+    except (ValueError, OSError, pygraphviz.DotError) as error:
+        sys.stderr.write(f"Error: {error}\n")
+        return 1
     return 0
 
 
@@ -45,9 +52,19 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _read(source: Path | None) -> str:
-    data = sys.stdin.buffer.read() if source is None else source.read_bytes()
-    return data.decode("utf-8")
+def _texts(files: list[Path]) -> Iterator[str]:
+    """Every file; without any, every graph on standard input as soon as it is complete."""
+    if files:
+        yield from (file.read_text(encoding="utf-8") for file in files)
+        return
+    lines: list[str] = []
+    for line in iter(sys.stdin.buffer.readline, b""):
+        lines.append(line.decode("utf-8"))
+        if line.rstrip() == END:
+            yield "".join(lines)
+            lines = []
+    if "".join(lines).strip():
+        yield "".join(lines)
 
 
 def _draw(text: str, options: argparse.Namespace) -> bytes:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import graphviz
 
-from viz import style
+from viz import layout, style
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -35,7 +35,8 @@ class _Writer:
         self._geometry = geometry
 
     def text(self, root: Box) -> str:
-        dot = graphviz.Digraph("machine", graph_attr=style.graph(self._theme))
+        canvas = self._geometry.get(layout.CANVAS, {})
+        dot = graphviz.Digraph("machine", graph_attr={**style.graph(self._theme), **canvas})
         dot.attr("node", **style.node_defaults(self._theme))
         dot.attr("edge", **style.edge_defaults(self._theme))
         self._box(dot, root)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import secrets
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,12 @@ if TYPE_CHECKING:
 
     from smachpy.events import Event
     from smachpy.state import State
+
+
+SHARP = 144
+"""Dots per inch of a PNG."""
+MOST_PIXELS = 16000
+"""Longest side of a PNG."""
 
 
 class PictureError(SmachError):
@@ -151,7 +158,7 @@ def atlas(
         if state.path in above:
             links[state.path] = names[above[state.path]]
         pages.append(graph.draw(Diagram(node, marks, links), colours))
-    geometries = layout.compose_all(pages, colours, engine.lay_out)
+    geometries = engine.lay_out(partial(layout.compose_all, pages, colours))
     texts = [dot.dot_text(p, colours, g) for p, g in zip(pages, geometries, strict=True)]
     place = Path(folder)
     for state, content in zip(parents, engine.draw_pages(texts), strict=True):
@@ -190,10 +197,17 @@ def _drawn(form: engine.Format) -> Callable[[StateRecord, Look, Marks], bytes]:
     def make(record: StateRecord, look: Look, marks: Marks) -> bytes:
         colours = _theme(look.theme)
         pieces = graph.draw(Diagram(_node(record, look), marks), colours)
-        places = layout.compose(pieces, colours, engine.lay_out)
-        return engine.draw(dot.dot_text(pieces, colours, places), form)
+        places = engine.lay_out(partial(layout.compose, pieces, colours))
+        text = dot.dot_text(pieces, colours, places)
+        return engine.draw(text, form, dots_per_inch=_resolution(places))
 
     return make
+
+
+def _resolution(places: layout.Geometry) -> int:
+    """Sharp on any screen, but never more pixels than image viewers can open."""
+    width, height = layout.canvas_size(places)
+    return int(min(SHARP, MOST_PIXELS * layout.INCH / max(width, height)))
 
 
 def _dot(record: StateRecord, look: Look, marks: Marks) -> bytes:

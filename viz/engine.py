@@ -10,21 +10,25 @@ import contextlib
 import importlib.util
 import json
 import os
+import selectors
 import shutil
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar
 from xml.sax.saxutils import escape
 
 from graphviz import ExecutableNotFound
 from graphviz.backend.execute import run_check
 
+from actionlib_core.clock import RealClock
 from smachpy.exceptions import SmachError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
+
+    Run = Callable[[Sequence[str]], list[dict[str, Any]]]
 
 DOT_VARIABLE = "SMACHPY_DOT"
 TIME_LIMIT = 20.0
@@ -32,8 +36,14 @@ TIME_LIMIT = 20.0
 CHEAPER = ("-Gmclimit=0.2", "-Gnslimit=3", "-Gnslimit1=3", "-Gsplines=line")
 FONTS = Path(__file__).with_name("fonts")
 
-Layout = Literal["dot", "nop2"]
-Format = Literal["svg", "png", "pdf", "json0"]
+END = "// end of graph"
+"""A comment line after every DOT text, by which a reader of a stream tells them apart."""
+
+_JSON_END = "\n}\n"
+_REAL = RealClock()  # `dot` runs in real time, whatever clock the machine has
+
+T = TypeVar("T")
+Format = Literal["svg", "png", "pdf"]
 
 
 class EngineError(SmachError):
@@ -68,35 +78,52 @@ def find_dot() -> tuple[str, ...]:
     )
 
 
-def lay_out(texts: Sequence[str]) -> list[dict[str, Any]]:
-    """Return Graphviz' JSON with positions for each DOT text.
+def lay_out(work: Callable[[Run], T]) -> T:
+    """Call `work` with a function that lays DOT texts out; return what `work` returns.
+
+    The function takes any number of texts and returns Graphviz' JSON for each; it may be called
+    again and again, one process serves all calls.
+
+    Args:
+        work: Called once more, with cheaper settings, when the first time takes too long.
 
     Raises:
         EngineError: `dot` is missing, failed or took too long.
 
     Blocks: for at most twice `TIME_LIMIT`.
     """
-    output = _run(texts, "dot", "json0").decode("utf-8")
-    decoder = json.JSONDecoder(strict=False)
-    results = []
-    at = 0
-    for _ in texts:
-        result, at = decoder.raw_decode(output, at)
-        results.append(result)
-        while at < len(output) and output[at].isspace():
-            at += 1
-    return results
+    command = [*find_dot(), "-Kdot", "-Tjson0"]
+    with _environment() as environment:
+        try:
+            with _Layouts(command, environment) as layouts:
+                return work(layouts.run)
+        except _TooSlowError:
+            pass  # once more, cheaper
+        try:
+            with _Layouts([*command, *CHEAPER], environment) as layouts:
+                return work(layouts.run)
+        except _TooSlowError as error:
+            raise EngineError(
+                f"picture: {command[0]}: no layout within {TIME_LIMIT:g} s, twice. "
+                "Try a smaller --depth, or --path to draw a part."
+            ) from error
 
 
-def draw(text: str, form: Format) -> bytes:
+def draw(text: str, form: Format, *, dots_per_inch: int = 72) -> bytes:
     """Return the picture of a DOT text that carries its positions.
+
+    Args:
+        text: The DOT text.
+        form: What to return.
+        dots_per_inch: Resolution of a PNG.
 
     Raises:
         EngineError: as `lay_out`.
 
-    Blocks: as `lay_out`.
+    Blocks: for at most `TIME_LIMIT`.
     """
-    return _run([text], "nop2", form)
+    options = [f"-Gdpi={dots_per_inch}"] if form == "png" else []
+    return _call([*find_dot(), "-Knop2", f"-T{form}", *options], [text])
 
 
 def draw_pages(texts: Sequence[str]) -> list[bytes]:
@@ -105,63 +132,138 @@ def draw_pages(texts: Sequence[str]) -> list[bytes]:
     Raises:
         EngineError: as `lay_out`.
 
-    Blocks: as `lay_out`.
+    Blocks: for at most `TIME_LIMIT`.
     """
     start = b"<?xml "
-    output = _run(texts, "nop2", "svg")
+    output = _call([*find_dot(), "-Knop2", "-Tsvg"], texts)
     return [start + page for page in output.split(start)[1:]]
 
 
-def _run(texts: Sequence[str], layout: Layout, form: Format) -> bytes:
-    command = [*find_dot(), f"-K{layout}", f"-T{form}"]
-    with _desk(texts) as (files, environment):
-        try:
-            return _call([*command, *files], environment)
-        except subprocess.TimeoutExpired:
-            pass  # once more, cheaper
-        try:
-            return _call([*command, *CHEAPER, *files], environment)
-        except subprocess.TimeoutExpired as error:
-            raise EngineError(
-                f"picture: {command[0]}: no layout within {TIME_LIMIT:g} s, twice. "
-                "Try a smaller --depth, or --path to draw a part."
-            ) from error
+class _TooSlowError(Exception):
+    """The time limit has passed."""
 
 
-def _call(command: Sequence[str], environment: dict[str, str]) -> bytes:
+class _Layouts:
+    """A `dot` process that lays out one batch of texts after another."""
+
+    def __init__(self, command: Sequence[str], environment: dict[str, str]) -> None:
+        self._command = command
+        self._environment = environment
+        self._deadline = _REAL.now() + TIME_LIMIT
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115  closed on exit
+
+    def __enter__(self) -> Self:
+        try:
+            self._process = subprocess.Popen(  # noqa: S603  the command is the user's own `dot`
+                self._command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._errors,
+                env=self._environment,
+                bufsize=0,
+            )
+        except OSError as error:
+            self._errors.close()
+            raise _cannot_start(self._command, error) from error
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._in, self._out = self._process.stdin, self._process.stdout
+        os.set_blocking(self._in.fileno(), False)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._process.kill()
+        self._process.wait()
+        self._out.close()
+        with contextlib.suppress(BrokenPipeError):
+            self._in.close()
+        self._errors.close()
+
+    def run(self, texts: Sequence[str]) -> list[dict[str, Any]]:
+        """Return the JSON of each text."""
+        output = self._exchange(_joined(texts), len(texts)).decode("utf-8")
+        decoder = json.JSONDecoder(strict=False)
+        return [decoder.decode(page + "}") for page in output.split(_JSON_END)[:-1]]
+
+    def _exchange(self, data: bytes, expected: int) -> bytes:
+        """Write and read at the same time, so that no full pipe stops either side."""
+        output = bytearray()
+        found = 0
+        with selectors.DefaultSelector() as selector:
+            selector.register(self._in, selectors.EVENT_WRITE)
+            selector.register(self._out, selectors.EVENT_READ)
+            while found < expected:
+                ready = selector.select(max(self._deadline - _REAL.now(), 0))
+                if not ready:
+                    raise _TooSlowError
+                for key, _ in ready:
+                    if key.fileobj is self._out:
+                        output += self._read()
+                        found = output.count(_JSON_END.encode())
+                    else:
+                        data = self._write(data)
+                        if not data:
+                            selector.unregister(self._in)
+        return bytes(output)
+
+    def _write(self, data: bytes) -> bytes:
+        try:
+            return data[self._in.write(data[:65536]) or 0 :]
+        except BrokenPipeError:
+            return b""  # it has ended; reading tells why
+
+    def _read(self) -> bytes:
+        piece = os.read(self._out.fileno(), 1 << 20)
+        if piece:
+            return piece
+        self._errors.seek(0)
+        raise _failed(self._command, self._process.wait(), self._errors.read())
+
+
+def _call(command: Sequence[str], texts: Sequence[str]) -> bytes:
     try:
-        done = run_check(
-            command,
-            capture_output=True,
-            stdin=subprocess.DEVNULL,
-            env=environment,
-            timeout=TIME_LIMIT,
-            quiet=True,
-        )
+        with _environment() as environment:
+            done = run_check(
+                command,
+                input=_joined(texts),
+                capture_output=True,
+                env=environment,
+                timeout=TIME_LIMIT,
+                quiet=True,
+            )
     except subprocess.CalledProcessError as error:
-        said = error.stderr.decode("utf-8", "replace").strip()[-2000:]
+        raise _failed(command, error.returncode, error.stderr) from error
+    except subprocess.TimeoutExpired as error:
         raise EngineError(
-            f"picture: {command[0]}: exit code {error.returncode}; it said: {said or 'nothing'}"
+            f"picture: {command[0]}: no picture within {TIME_LIMIT:g} s. "
+            "Try a smaller --depth, or --path to draw a part."
         ) from error
-    except (ExecutableNotFound, PermissionError) as error:
-        raise EngineError(f"picture: {command[0]} cannot be started: {error}") from error
+    except (ExecutableNotFound, OSError) as error:
+        raise _cannot_start(command, error) from error
     output: bytes = done.stdout
     return output
 
 
+def _joined(texts: Sequence[str]) -> bytes:
+    return "".join(f"{text}\n{END}\n" for text in texts).encode("utf-8", "replace")
+
+
+def _failed(command: Sequence[str], code: int, said: bytes) -> EngineError:
+    words = said.decode("utf-8", "replace").strip()[-2000:]
+    return EngineError(f"picture: {command[0]}: exit code {code}; it said: {words or 'nothing'}")
+
+
+def _cannot_start(command: Sequence[str], error: Exception) -> EngineError:
+    return EngineError(f"picture: {command[0]} cannot be started: {error}")
+
+
 @contextlib.contextmanager
-def _desk(texts: Sequence[str]) -> Iterator[tuple[list[str], dict[str, str]]]:
-    """Lay the inputs and the font configuration out in a folder that is gone afterwards."""
-    with tempfile.TemporaryDirectory(prefix="smachpy-dot-") as name:
-        folder = Path(name)
-        files = []
-        for i, text in enumerate(texts):
-            file = folder / f"{i}.gv"
-            file.write_text(text, encoding="utf-8", errors="replace")
-            files.append(str(file))
-        fonts = folder / "fonts.conf"
+def _environment() -> Iterator[dict[str, str]]:
+    """The environment of `dot`, with a font configuration that is gone afterwards."""
+    with tempfile.TemporaryDirectory(prefix="smachpy-dot-") as folder:
+        fonts = Path(folder) / "fonts.conf"
         fonts.write_text(_font_configuration(), encoding="utf-8")
-        yield files, {**os.environ, "FONTCONFIG_FILE": str(fonts)}
+        yield {**os.environ, "FONTCONFIG_FILE": str(fonts)}
 
 
 def _font_configuration() -> str:

@@ -6,7 +6,6 @@ called, the DOT text stays valid.
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 from itertools import count
 from typing import TYPE_CHECKING
@@ -121,6 +120,7 @@ class _Interior:
         self._nodes = {child.label: child for child in node.children}
         self._pills = {pill.outcome: f"{name}_o{i}" for i, pill in enumerate(node.pills)}
         self._joins: list[Vertex] = []
+        self._decided: set[tuple[str, str, Anchor]] = set()
         self._arrows: list[Arrow] = []
 
     def box(self) -> Box:
@@ -181,45 +181,46 @@ class _Interior:
             head = (
                 self._outcome(edge.target)
                 if edge.to_outcome
-                else self._entrance(edge.target, back=edge.back)
+                else self._entrance(edge.target, back=edge.back and edge.source != edge.target)
             )
             self._arrow(self._exit(edge.source, outcomes[0]), head, attributes, back=edge.back)
 
     def _decisions(self) -> None:
-        """Rules over several states meet in a bar; a rule over one state is a plain arrow."""
-        drawn = Counter(
-            (edge.source, outcome) for edge in self._node.edges for outcome in edge.outcomes
-        )
+        """Rules over several states meet in a bar; one over a single state is a plain arrow."""
         for rule in self._node.rules:
-            conditions = [c for c in rule.conditions if c[0] in self._boxes]
+            conditions = [pair for pair in rule.conditions if pair[0] in self._boxes]
             if rule.outcome not in self._pills or not conditions:
                 continue
-            if len(conditions) == 1 and not drawn[conditions[0]]:
-                self._decide(*conditions[0], self._outcome(rule.outcome), rule.outcome)
-            elif len(conditions) > 1:
+            if len(conditions) == 1 or rule.text.startswith("any of"):
+                for label, outcome in conditions:
+                    self._decide(label, outcome, self._outcome(rule.outcome), rule.outcome)
+            else:
                 self._join(rule.outcome, conditions, rule.text)
 
     def _join(self, outcome: str, conditions: list[tuple[str, str]], text: str) -> None:
-        bar = f"{self._name}_j{len(self._joins)}"
-        self._joins.append(Vertex(bar, style.join(text, self._theme)))
-        anchor = Anchor(self._name, bar.removeprefix(f"{self._name}_"), is_open=True)
+        part = f"j{len(self._joins)}"
+        self._joins.append(Vertex(f"{self._name}_{part}", style.join(text, self._theme)))
+        bar = Anchor(self._name, part, is_open=True)
         for label, child_outcome in conditions:
-            self._decide(label, child_outcome, anchor, outcome)
-        self._arrow(
-            anchor,
-            self._outcome(outcome),
-            style.decision(outcome, self._theme, self._marks, label=""),
-        )
+            self._decide(label, child_outcome, bar, outcome)
+        self._arrow(bar, self._outcome(outcome), self._deciding(self._node, outcome, named=False))
 
     def _decide(self, label: str, child_outcome: str, head: Anchor, outcome: str) -> None:
         named = self._boxes[label].entry is None and child_outcome != outcome
-        attributes = style.decision(
-            child_outcome,
+        if (label, child_outcome, head) not in self._decided:
+            self._decided.add((label, child_outcome, head))
+            attributes = self._deciding(self._nodes[label], child_outcome, named=named)
+            self._arrow(self._exit(label, child_outcome), head, attributes)
+
+    def _deciding(self, node: Node, outcome: str, *, named: bool) -> Mapping[str, str]:
+        return style.transition(
+            [outcome],
             self._theme,
             self._marks,
-            label=child_outcome if named else "",
+            counts={outcome: self._marks.taken.get((node.path, outcome), 0)},
+            labelled=named,
+            implicit=False,
         )
-        self._arrow(self._exit(label, child_outcome), head, attributes)
 
     def _exit(self, label: str, outcome: str) -> Anchor:
         box = self._boxes[label]

@@ -11,27 +11,47 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from math import ceil
-from typing import TYPE_CHECKING, Any
+from itertools import pairwise, product
+from math import ceil, dist
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import graphviz
 
 from viz import style
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from viz.graph import Anchor, Arrow, Box
     from viz.theme import Theme
 
     Engine = Callable[[Sequence[str]], list[dict[str, Any]]]
-    Geometry = dict[str, dict[str, str]]
 
+Geometry: TypeAlias = dict[str, dict[str, str]]
+
+CANVAS = "canvas"
+"""Name of the geometry of the whole picture."""
+PAD = 14
 MARGIN = 12
 DOT_RADIUS = 4
 PORT = 8
 INCH = 72.0
 _POINT = re.compile(r"(-?[\d.]+(?:e[+-]?\d+)?),(-?[\d.]+(?:e[+-]?\d+)?)")
+
+
+@dataclass(frozen=True, slots=True)
+class _Try:
+    """A way to lay a container out; of several the one with the shortest arrows is kept.
+
+    Attributes:
+        side: Where arrows come back into a container inside, `e` or `w`.
+        corner: Whether arrows that lead back leave an outcome towards that side.
+        back_first: Whether arrows that lead back are placed before the others.
+    """
+
+    side: str = "e"
+    corner: bool = False
+    back_first: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +62,7 @@ class _Page:
         width, height: Outer size with the dot and the pills that stand over the border.
         dx, dy: From coordinates of the page to coordinates of the outer box.
         floor: Height of the lower border in the outer box.
+        ink: Length of all arrows; the smaller, the tidier.
         ports: Centre and width along x in the outer box, by part.
     """
 
@@ -50,6 +71,7 @@ class _Page:
     dx: float
     dy: float
     floor: float
+    ink: float
     title: tuple[float, float]
     ports: dict[str, tuple[float, float]]
     spots: dict[str, tuple[float, float]]
@@ -75,18 +97,40 @@ def compose_all(roots: Sequence[Box], theme: Theme, run: Engine) -> list[Geometr
     pages: dict[int, _Page] = {}
     for height in range(1, max(root.height() for root in roots) + 1):
         level = [box for box in containers if box.height() == height]
-        texts = [_page_text(box, theme, pages) for box in level]
-        for box, result in zip(level, run(texts), strict=True):
-            pages[id(box)] = _page(box, result)
+        tries = [(box, how) for box in level for how in _tries(box)]
+        results = run([_page_text(box, how, theme, pages) for box, how in tries])
+        for (box, _), result in zip(tries, results, strict=True):
+            page = _page(box, result)
+            if id(box) not in pages or page.ink < pages[id(box)].ink:
+                pages[id(box)] = page
     geometries = []
     for root in roots:
-        geometry: Geometry = {}
+        page = pages[id(root)]
+        width, height = page.width + 2 * PAD, page.height + 2 * PAD
+        view = f"{width},{height},1,{page.width / 2},{page.height / 2}"
+        geometry: Geometry = {CANVAS: {"viewport": view}}
         _place(root, pages, (0.0, 0.0), geometry)
         geometries.append(geometry)
     return geometries
 
 
-def _page_text(box: Box, theme: Theme, pages: Mapping[int, _Page]) -> str:
+def canvas_size(geometry: Geometry) -> tuple[float, float]:
+    """Return width and height of a laid out picture in points."""
+    width, height, *_ = geometry[CANVAS]["viewport"].split(",")
+    return float(width), float(height)
+
+
+def _tries(box: Box) -> tuple[_Try, ...]:
+    """Ways to lay a container out; they differ only for arrows that lead back."""
+    back = [arrow for arrow in box.arrows if arrow.back]
+    if not back:
+        return (_Try(),)
+    if not any(arrow.head.is_open or arrow.tail.is_open for arrow in back):
+        return (_Try(), _Try(back_first=True))
+    return tuple(_Try(*choice) for choice in product("ew", (False, True), (False, True)))
+
+
+def _page_text(box: Box, how: _Try, theme: Theme, pages: Mapping[int, _Page]) -> str:
     dot = graphviz.Digraph(graph_attr={**style.graph(theme), "label": box.attributes["label"]})
     dot.attr("graph", labelloc="t", pad="0")
     dot.attr("node", **style.node_defaults(theme))
@@ -102,8 +146,8 @@ def _page_text(box: Box, theme: Theme, pages: Mapping[int, _Page]) -> str:
             bottom.attr(rank="sink")
             for vertex in box.pills:
                 bottom.node(vertex.name, **vertex.attributes)
-    for arrow in box.arrows:
-        _write_arrow(dot, box, arrow)
+    for arrow in sorted(box.arrows, key=lambda arrow: how.back_first and not arrow.back):
+        _write_arrow(dot, box, arrow, how)
     return str(dot.source)
 
 
@@ -144,8 +188,9 @@ def _cell(width: int, port: str = "") -> str:
     return f'<td fixedsize="true" width="{width}" height="2"{port}></td>'
 
 
-def _write_arrow(dot: graphviz.Digraph, box: Box, arrow: Arrow) -> None:
-    tail, head = _end(arrow.tail, box), _end(arrow.head, box)
+def _write_arrow(dot: graphviz.Digraph, box: Box, arrow: Arrow, how: _Try) -> None:
+    towards = how.side if arrow.back and how.corner else ""
+    tail, head = _end(arrow.tail, box, f"s{towards}"), _end(arrow.head, box, how.side)
     attributes = {**arrow.attributes, "id": arrow.name}
     if arrow.back:
         dot.edge(head, tail, dir="back", **attributes)
@@ -153,12 +198,12 @@ def _write_arrow(dot: graphviz.Digraph, box: Box, arrow: Arrow) -> None:
         dot.edge(tail, head, **attributes)
 
 
-def _end(anchor: Anchor, box: Box) -> str:
+def _end(anchor: Anchor, box: Box, side: str) -> str:
     if anchor.box == box.name:
         return f"{anchor.box}_{anchor.part}"
     if anchor.is_open and anchor.part:
-        return f"{anchor.box}:{anchor.part}:{'n' if anchor.part == 'in' else 's'}"
-    return f"{anchor.box}:e" if anchor.is_open else anchor.box
+        return f"{anchor.box}:{anchor.part}:{'n' if anchor.part == 'in' else side}"
+    return f"{anchor.box}:{side}" if anchor.is_open else anchor.box
 
 
 def _page(box: Box, result: Mapping[str, Any]) -> _Page:
@@ -167,33 +212,61 @@ def _page(box: Box, result: Mapping[str, Any]) -> _Page:
         edge["id"]: {key: edge[key] for key in ("pos", "lp") if key in edge}
         for edge in result.get("edges", ())
     }
-    _, _, right, top = map(float, result["bb"].split(","))
+    left, right, top = _extent(result, curves)
     spots = {name: _xy(item["pos"]) for name, item in found.items()}
     assert box.entry is not None
     entry_x, _ = spots[box.entry.name]
-    for arrow in box.arrows:
-        if arrow.tail.box == box.name and arrow.tail.part == "in":
-            curves[arrow.name]["pos"] = _with_stem(curves[arrow.name]["pos"], entry_x, top)
+    first = next((arrow.name for arrow in box.arrows if arrow.tail.part == "in"), None)
+    if first is not None:
+        curves[first]["pos"] = _with_stem(curves[first]["pos"], entry_x, top)
     spots[box.entry.name] = (entry_x, top)
     title_x, right = _title(result, entry_x, right)
-    dy, floor = float(MARGIN), 0.0
-    ports = {"in": (entry_x + MARGIN, float(PORT))}
+    dx, dy, floor = MARGIN - left, float(MARGIN), 0.0
+    ports = {"in": (entry_x + dx, float(PORT))}
     if box.pills:
         dy = -min(spots[p.name][1] - _size(found[p.name], "height") / 2 for p in box.pills)
         floor = spots[box.pills[0].name][1] + dy
         for i, vertex in enumerate(box.pills):
-            ports[f"o{i}"] = (spots[vertex.name][0] + MARGIN, _size(found[vertex.name], "width"))
+            ports[f"o{i}"] = (spots[vertex.name][0] + dx, _size(found[vertex.name], "width"))
     return _Page(
-        width=ceil(right + 2 * MARGIN),
+        width=ceil(right + dx + MARGIN),
         height=ceil(top + dy + DOT_RADIUS),
-        dx=MARGIN,
+        dx=dx,
         dy=dy,
         floor=floor,
+        ink=sum(_length(attributes["pos"]) for attributes in curves.values()),
         title=(title_x, _xy(result["lp"])[1]),
         ports=ports,
         spots=spots,
         curves=curves,
     )
+
+
+def _extent(
+    result: Mapping[str, Any], curves: Mapping[str, Mapping[str, str]]
+) -> tuple[float, float, float]:
+    """Left, right and upper end of a page; loops may leave the box that Graphviz reports."""
+    left, _, right, top = map(float, result["bb"].split(","))
+    for attributes in curves.values():
+        for x, _ in _samples(attributes["pos"]):
+            left, right = min(left, x), max(right, x)
+    return left, right, top
+
+
+def _length(curve: str) -> float:
+    samples = list(_samples(curve))
+    return sum(dist(a, b) for a, b in pairwise(samples))
+
+
+def _samples(curve: str) -> Iterator[tuple[float, float]]:
+    """Yield points along a chain of cubic Bezier curves."""
+    points = [_xy(point) for point in curve.split() if point[0] not in "es"]
+    yield points[0]
+    for i in range(0, len(points) - 3, 3):
+        (ax, ay), (bx, by), (cx, cy), (dx, dy) = points[i : i + 4]
+        for at in (0.25, 0.5, 0.75, 1.0):
+            a, b, c, d = (1 - at) ** 3, 3 * (1 - at) ** 2 * at, 3 * (1 - at) * at**2, at**3
+            yield a * ax + b * bx + c * cx + d * dx, a * ay + b * by + c * cy + d * dy
 
 
 def _title(result: Mapping[str, Any], entry_x: float, right: float) -> tuple[float, float]:

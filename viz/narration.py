@@ -88,15 +88,17 @@ class Narrator:
         words = outcome_text(event.outcome)
         edge = self._targets.get((event.path, event.outcome))
         if edge is not None and not edge.target_is_outcome:
-            words = words + Text(f" \u2192 {shorten(edge.target)}")
-        return self._line(event, words + self._duration(event))
+            words = Text.assemble(words, f" \u2192 {shorten(edge.target)}")
+        return self._line(event, Text.assemble(words, self._duration(event)))
 
     def _failed(self, event: ev.Failed) -> Text:
-        return self._line(event, Text(_error(event.error), "bold red") + self._duration(event))
+        return self._line(
+            event, Text.assemble((_error(event.error), "bold red"), self._duration(event))
+        )
 
     def _finished(self, event: ev.Finished) -> Text:
-        words = Text("ended: ") + outcome_text(event.outcome or RAISED)
-        return self._line(event, words + self._duration(event))
+        words = Text.assemble("ended: ", outcome_text(event.outcome or RAISED))
+        return self._line(event, Text.assemble(words, self._duration(event)))
 
     def _goal_feedback(self, event: ev.GoalFeedback) -> Text | None:
         if not self._feedback or event.t - self._told.get(event.goal_id, -1e9) < FEEDBACK_PERIOD:

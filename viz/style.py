@@ -34,8 +34,8 @@ def markup(text: str) -> str:
 def plain(text: str, length: int = TOOLTIP_LENGTH) -> str:
     """Return `text` safe as the value of an ordinary attribute."""
     lines = [shorten(line, length) for line in text[: 4 * length].splitlines()[:12]]
-    value = "\n".join(lines).replace("&", "&amp;")
-    safe: str = graphviz.escape(value)
+    escaped = [graphviz.escape(line.replace("&", "&amp;")) for line in lines]
+    safe: str = graphviz.nohtml("\\n".join(escaped))
     return safe
 
 
@@ -212,31 +212,24 @@ def transition(
     if taken:
         attributes |= {"penwidth": "2.6"}
     if labelled or taken > 1:
-        ink = theme.muted if stands_back or kind == "other" else swatch.text
-        names = outcomes if labelled else [""]
-        rows = "".join(
-            f'<tr><td align="left"><font color="{ink}">{markup(name)}'
-            f"{_times(counts.get(name or outcomes[0], 0))}</font></td></tr>"
-            for name in names
-        )
+        lines = [_outcome_line(o, theme, marks, counts, labelled=labelled) for o in outcomes]
+        rows = "".join(f'<tr><td align="left">{line}</td></tr>' for line in lines)
         attributes["label"] = (
             f'<<table border="0" cellborder="0" cellspacing="0" cellpadding="2">{rows}</table>>'
         )
     return attributes
 
 
-def decision(outcome: str, theme: Theme, marks: Marks, *, label: str) -> Attributes:
-    """An arrow of a rule: from a state's outcome towards the container's."""
-    return dict(transition([outcome], theme, marks, counts={}, labelled=False, implicit=False)) | (
-        {"label": _small(label, theme.muted)} if label else {}
-    )
-
-
-def _small(text: str, ink: str) -> str:
-    return (
-        f'<<table border="0" cellborder="0" cellspacing="0" cellpadding="2">'
-        f'<tr><td><font color="{ink}">{markup(text)}</font></td></tr></table>>'
-    )
+def _outcome_line(
+    outcome: str, theme: Theme, marks: Marks, counts: Mapping[str, int], *, labelled: bool
+) -> str:
+    """One line of an arrow's label: the outcome and how often it was taken."""
+    count = counts.get(outcome, 0)
+    kind = outcome_class(outcome)
+    plain_ink = kind == "other" or (marks.has_run and not count)
+    ink = theme.muted if plain_ink else theme.outcome(kind).text
+    name = markup(outcome) if labelled else ""
+    return f'<font color="{ink}">{name}{_times(count)}</font>'
 
 
 def _identity(node: Node, diagram: Diagram) -> dict[str, str]:

@@ -63,7 +63,7 @@ def _outcomes(visits: Visits) -> Text:
     if len(visits.outcomes) == 1:
         return outcome_text(visits.outcome or "")
     return Text(", ").join(
-        outcome_text(outcome) + Text(f" \u00d7{count}" if count > 1 else "", "dim")
+        Text.assemble(outcome_text(outcome), (f" \u00d7{count}" if count > 1 else "", "dim"))
         for outcome, count in visits.outcomes.items()
     )
 

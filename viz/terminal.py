@@ -216,7 +216,7 @@ class TerminalView:
                 cells.append(
                     Text("")
                     if fraction is None
-                    else ProgressBar(total=1.0, completed=fraction, width=20)
+                    else ProgressBar(total=1.0, completed=fraction, width=20, complete_style="blue")
                 )
                 cells.append(Text("" if fraction is None else f"{fraction:4.0%}"))
             left = "" if progress.distance is None else f"{progress.distance:.2f} m left"
