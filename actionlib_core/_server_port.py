@@ -89,6 +89,7 @@ class ServerPort:
         self._lock = threading.Lock()
         self._declared: list[Closable] = []
         self._publishers: dict[str, PublisherPort] = {}
+        self._token: Closable | None = None
         self._clients: dict[str, Endpoint] = {}
         self._wrong: set[str] = set()
         self._closed = False
@@ -122,7 +123,10 @@ class ServerPort:
             transport.subscribe(self.keys.cancel, self._on_cancel),
             transport.subscribe(self.keys.ack, self._on_ack),
             transport.queryable(self.keys.result, self._on_query),
-            transport.declare_alive(token_key(self.endpoint)),
+        ]
+        self._token = transport.declare_alive(token_key(self.endpoint))
+        self._declared += [
+            self._token,
             transport.watch_alive(token_pattern(None, self.name), self._on_presence),
         ]
 
@@ -133,7 +137,10 @@ class ServerPort:
             declared, self._declared = self._declared, []
             declared.extend(self._publishers.values())
             self._publishers = {}
-        for entry in reversed(declared):
+            token, self._token = self._token, None
+        # The token goes last: while it shows, a client that is not heard knows that it is not.
+        declared.sort(key=lambda entry: entry is token)
+        for entry in declared:
             entry.close()
 
     def send_result(self, payload: bytes) -> None:

@@ -501,11 +501,12 @@ class GoalManager:
         if Duty.CANCEL in duty:
             self._port.send_cancel(goal.id, 0)
         if Duty.GOAL in duty:
-            with self._lock:
-                server = self._server()
-                if server is not None or self._port.is_heard():
+            # Sent only when somebody listens: a goal that was not sent cannot run twice.
+            heard = self._port.is_heard()
+            if heard:
+                with self._lock:
+                    server = self._server()
                     goal.on_offered(server.session if server is not None else "")
-            if goal.offered:
                 self._port.send_goal(machine.payload)
         if Duty.ASK in duty and not machine.asking:
             machine.asking = True
