@@ -7,6 +7,11 @@ Exception
       +-- ConfigError           a configuration has errors, all at once
       +-- NodeError             a node is closed, missing or made twice
       +-- TransportError        the network session is closed or could not be opened
+      +-- WaitTimeoutError      what was waited for did not come in time
+      +-- ServiceException      a service call failed, or its handler raised
+      |    +-- ServiceUnavailableError there is no server
+      |    +-- ServiceTimeoutError     no answer in time
+      |    +-- ServiceLostError        the server died during the call
       +-- TypeMismatchError     two ends of a name disagree on the type
       +-- InterfaceError        a .msg/.srv/.action file or an interface name cannot be used
       |    +-- FieldError       a value does not fit the field of a message
@@ -75,6 +80,42 @@ class NodeError(ActionlibError, RuntimeError):
 
 class TransportError(ActionlibError, ConnectionError):
     """The network session is closed, or could not be opened."""
+
+
+class WaitTimeoutError(ActionlibError, TimeoutError):
+    """What was waited for did not come in time."""
+
+
+class ServiceException(ActionlibError):  # noqa: N818  rospy's name
+    """A service call failed.
+
+    Attributes:
+        name: The service.
+        reason: What happened.
+        remote_type: Name of the exception that the handler raised; "" when it was not that.
+        remote_text: Its text.
+    """
+
+    def __init__(
+        self, name: str, reason: str, *, remote_type: str = "", remote_text: str = ""
+    ) -> None:
+        self.name = name
+        self.reason = reason
+        self.remote_type = remote_type
+        self.remote_text = remote_text
+        super().__init__(f"service /{name}: {reason}")
+
+
+class ServiceUnavailableError(ServiceException):
+    """There is no server."""
+
+
+class ServiceTimeoutError(ServiceException, TimeoutError):
+    """The server did not answer in time."""
+
+
+class ServiceLostError(ServiceException):
+    """The server died or left during the call."""
 
 
 class TypeMismatchError(ActionlibError, TypeError):

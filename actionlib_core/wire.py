@@ -35,15 +35,15 @@ class Encoding(NamedTuple):
     md5: str
 
 
+@lru_cache(maxsize=4096)
 def make_encoding(type_name: str, md5: str) -> str:
     """Return the encoding of a type."""
     return f"{ROS1}/{type_name};md5={md5}"
 
 
-@lru_cache(maxsize=4096)
 def encoding_of(message_class: type[Typed]) -> str:
     """Return the encoding of the messages of a class."""
-    return make_encoding(message_class._type, message_class._md5sum)  # noqa: SLF001  ROS's names
+    return make_encoding(message_class._type, message_class._md5sum)
 
 
 def parse_encoding(encoding: str) -> Encoding:
@@ -73,7 +73,7 @@ def check_encoding(
     found_type = found.type if found.format == ROS1 else encoding
     raise TypeMismatchError(
         name,
-        (message_class._type, message_class._md5sum),  # noqa: SLF001
+        (message_class._type, message_class._md5sum),
         (found_type, found.md5),
         by=sender,
     )

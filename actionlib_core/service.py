@@ -1,0 +1,417 @@
+"""Services: call a function in another program and get its answer, in rospy's shape.
+
+A handler's exception travels to the caller as a `ServiceException`; a server that dies, is absent
+or does not answer in time ends the call with an error of its own. No call waits for ever by
+default.
+
+Source:
+    rospy.Service, rospy.ServiceProxy and rospy.wait_for_service for names, arguments and meaning.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core._callbacks import CallbackQueue
+from actionlib_core._name_watch import NameWatch
+from actionlib_core.clock._serial import report_thread_exception
+from actionlib_core.exceptions import (
+    ActionlibError,
+    NodeError,
+    ServiceException,
+    ServiceLostError,
+    ServiceTimeoutError,
+    ServiceUnavailableError,
+    TypeMismatchError,
+    WaitTimeoutError,
+)
+from actionlib_core.node import get_node
+from actionlib_core.presence import Endpoint, Kind, token_key
+from actionlib_core.shutdown import current_shutdown, requested
+from actionlib_core.time import to_seconds
+from actionlib_core.wire import check_encoding, encoding_of, parse_encoding
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import TracebackType
+    from typing import Self
+
+    from actionlib_core.interfaces import Message, ServiceType
+    from actionlib_core.node import Node
+    from actionlib_core.time import Duration
+    from actionlib_core.transport import Closable, Query, Reply
+
+logger = logging.getLogger("actionlib_core")
+
+NAME_KIND = "service name"
+CALL_TIMEOUT_S = 60.0  # default limit of a call
+APPEAR_S = 2.0  # how much of it a call gives a server to appear
+FOREVER_S = 1e8  # for the network, which wants a number: three years
+MARGIN_S = 1.0  # the network gives up after the call itself has
+
+
+class _ServiceEnd:
+    """What server and proxy share."""
+
+    def __init__(self, name: str, service_class: type[ServiceType], node: Node | None) -> None:
+        self.node = get_node() if node is None else node
+        self.resolved_name = self.node.resolve(name, NAME_KIND)
+        self.service_class = service_class
+        self.request_class = service_class._request_class
+        self.response_class = service_class._response_class
+        self.type = service_class._type
+        self.md5sum = service_class._md5sum
+        self._own = self.node.endpoint(Kind.SERVICE, self.resolved_name, self.type, self.md5sum)
+        self._servers = NameWatch(self.node, self._own, {Kind.SERVICE})
+        self._parts: list[Closable] = [self._servers]
+        self._closed = False
+        self._forget = self.node.on_close(self.close)
+
+    @property
+    def mismatches(self) -> list[TypeMismatchError]:
+        """The ends of this service that have another type, as errors; each was logged once."""
+        return self._servers.mismatches
+
+    def close(self) -> None:
+        """Leave the service; a second call does nothing."""
+        if self._closed:
+            return
+        self._closed = True
+        self._forget()
+        for part in reversed(self._parts):
+            part.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} /{self.resolved_name} [{self.type}]>"
+
+
+class Service(_ServiceEnd):
+    """Answers the calls of a service.
+
+    Args:
+        name: Service name, relative, absolute or private.
+        service_class: The service's class, `SetBool` for example.
+        handler: Gets the request; returns the response, or what makes one: a dict of its fields, a
+            tuple or list of all of them, or the value of its only field.
+        node: Where it lives; the node in force when None.
+
+    Raises:
+        InvalidNameError: the name breaks the ROS rules.
+        NodeError: the node is closed.
+
+    Threads: each call of the handler has a thread of the node's clock, so calls may overlap, block,
+        and call services themselves. An exception goes to the caller, and to
+        `threading.excepthook`.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        service_class: type[ServiceType],
+        handler: Callable[[Any], Any],
+        *,
+        node: Node | None = None,
+    ) -> None:
+        super().__init__(name, service_class, node)
+        self.handler = handler
+        self._calls = CallbackQueue(self.node, f"service /{self.resolved_name}")
+        transport = self.node.transport
+        self._parts.append(transport.queryable(self.resolved_name, self._on_query))
+        self._parts.append(transport.declare_alive(token_key(self._own)))
+
+    def shutdown(self, reason: str = "") -> None:
+        """Stop answering; as `close`.
+
+        Args:
+            reason: For the log.
+        """
+        logger.info("service /%s is shut down: %s", self.resolved_name, reason or "requested")
+        self.close()
+
+    def spin(self) -> None:
+        """Answer until the program is to end.
+
+        Blocks: until then.
+        """
+        current_shutdown().event(self.node.clock).wait()
+
+    def _on_query(self, query: Query) -> None:
+        try:
+            check_encoding(query.encoding, self.service_class, name=self.resolved_name)
+        except TypeMismatchError as error:
+            self._servers.note(error, _caller_of(query))
+            _fail(query, error)
+            return
+        self._calls.spawn(partial(self._answer, query), f"service /{self.resolved_name}")
+
+    def _answer(self, query: Query) -> None:
+        try:
+            response = self._respond(self.handler(self.request_class.from_bytes(query.payload)))
+            query.reply(response.to_bytes(), encoding_of(self.service_class))
+        except Exception as error:  # noqa: BLE001  a border: told to the caller, and reported here
+            _fail(query, error)
+            report_thread_exception()
+        finally:
+            query.finish()
+
+    def _respond(self, result: object) -> Message:
+        if isinstance(result, self.response_class):
+            return result
+        make: Callable[..., Message] = self.response_class
+        if isinstance(result, dict):
+            return make(**result)
+        if isinstance(result, (tuple, list)):
+            return make(*result)
+        if result is None and self.response_class.__slots__:
+            name = self.response_class.__name__
+            raise ServiceException(
+                self.resolved_name,
+                f"the handler returned None; expected {name}, a dict or its field values",
+            )
+        return make() if result is None else make(result)
+
+
+def _fail(query: Query, error: Exception) -> None:
+    text = json.dumps({"type": type(error).__name__, "text": str(error)})
+    query.reply_error(text)
+    query.finish()
+
+
+def _caller_of(query: Query) -> Endpoint:
+    """Return the end that a call of another type came from; callers have no token."""
+    encoding = parse_encoding(query.encoding)
+    return Endpoint(Kind.SERVICE, query.key, encoding.type, encoding.md5, "", "", 0)
+
+
+class ServiceProxy(_ServiceEnd):
+    """Calls a service: `proxy(request)`, `proxy(data=True)`, `proxy(True)`.
+
+    Args:
+        name: Service name, relative, absolute or private.
+        service_class: The service's class, `SetBool` for example.
+        persistent: As rospy takes it; there is no connection to keep here.
+        headers: As rospy takes it; not sent.
+        timeout: Longest time of a call [s], waiting for the server to appear included; None waits
+            until the server has answered or died.
+        node: Where it lives; the node in force when None.
+
+    Raises:
+        InvalidNameError: the name breaks the ROS rules.
+        NodeError: the node is closed.
+
+    Threads: any number of threads may call at the same time; a transport callback may not.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        service_class: type[ServiceType],
+        persistent: bool = False,
+        headers: dict[str, str] | None = None,
+        *,
+        timeout: float | Duration | None = CALL_TIMEOUT_S,
+        node: Node | None = None,
+    ) -> None:
+        super().__init__(name, service_class, node)
+        self.persistent = persistent
+        self.headers = headers
+        self.timeout = to_seconds(timeout)
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Call the service; see `call`."""
+        return self.call(*args, **kwargs)
+
+    def call(self, *args: Any, **kwargs: Any) -> Any:
+        """Send a request, or one made from the arguments, and return the response.
+
+        Raises:
+            FieldError: a value does not fit its field of the request.
+            ServiceException: the handler raised; type and text are on the error.
+            ServiceUnavailableError: there is no server.
+            ServiceTimeoutError: the server did not answer in time.
+            ServiceLostError: the server died or left during the call.
+            TypeMismatchError: the server has another type.
+            NodeError: the node is closed, or the program is to end.
+
+        Blocks: until the answer, `timeout` at most.
+        """
+        if len(args) == 1 and not kwargs and isinstance(args[0], self.request_class):
+            request = args[0]
+        else:
+            request = self.request_class(*args, **kwargs)
+        clock = self.node.clock
+        start = clock.now()
+        self._find_server()
+        left = None if self.timeout is None else max(self.timeout - (clock.now() - start), 0.0)
+        return self._read(self._ask(request.to_bytes(), left))
+
+    def wait_for_service(self, timeout: float | Duration | None = None) -> None:
+        """Wait until there is a server.
+
+        Args:
+            timeout: Longest wait [s]; None waits until the node closes or the program is to end.
+
+        Raises:
+            WaitTimeoutError: there is none in time.
+            TypeMismatchError: there is one, but of another type.
+            NodeError: the node was closed, or the program is to end.
+
+        Blocks: see `timeout`.
+        """
+        seconds = to_seconds(timeout)
+        if not self._wait_for_server(seconds):
+            raise WaitTimeoutError(
+                f"/{self.resolved_name}: no server: got none in {seconds} s; expected one of type "
+                f"{self.type}. Try 'actionlib service list'."
+            )
+
+    def _wait_for_server(self, timeout: float | None) -> bool:
+        self._servers.wait(lambda: bool(self._servers.ends(any_type=True)), timeout)
+        if self._servers.ends():
+            return True
+        if self.mismatches:
+            raise self.mismatches[0]
+        if self._closed or self.node.closed or (timeout is None and requested()):
+            raise NodeError(
+                f"/{self.resolved_name}: not called: the node was closed or the program is to end."
+            )
+        return False
+
+    def _find_server(self) -> None:
+        longest = APPEAR_S if self.timeout is None else min(self.timeout, APPEAR_S)
+        if not self._wait_for_server(longest):
+            raise ServiceUnavailableError(
+                self.resolved_name,
+                f"no server: got none in {longest:g} s; expected one of type {self.type}. Try "
+                "starting it, or wait_for_service() first.",
+            )
+
+    def _ask(self, payload: bytes, timeout: float | None) -> Reply:
+        """Return the first reply.
+
+        Blocks: until the first, or until none can come any more.
+        """
+        replies: list[Reply] = []
+        done: list[bool] = []
+
+        def on_reply(reply: Reply) -> None:
+            replies.append(reply)
+            self._servers.wake()
+
+        def on_done() -> None:
+            done.append(True)
+            self._servers.wake()
+
+        query = self.node.transport.query(
+            self.resolved_name,
+            payload,
+            encoding=encoding_of(self.service_class),
+            timeout=FOREVER_S if timeout is None else timeout + MARGIN_S,
+            on_reply=on_reply,
+            on_done=on_done,
+        )
+        asked = set(self._servers.ends())
+
+        def over() -> bool:
+            return bool(replies or done) or asked.isdisjoint(self._servers.ends())
+
+        try:
+            in_time = self._servers.wait(over, timeout)
+        finally:
+            query.close()
+        if replies:
+            return replies[0]
+        raise self._explain_silence(timeout, in_time=in_time)
+
+    def _explain_silence(self, timeout: float | None, *, in_time: bool) -> ActionlibError:
+        if in_time:
+            return ServiceLostError(
+                self.resolved_name, "the server died or left before it answered."
+            )
+        if self._closed or self.node.closed or timeout is None:
+            return NodeError(
+                f"/{self.resolved_name}: no answer: the node was closed or the program is to end."
+            )
+        return ServiceTimeoutError(
+            self.resolved_name,
+            f"no answer: got none in {self.timeout:g} s; expected one from the server that is "
+            "there. Try a longer timeout.",
+        )
+
+    def _read(self, reply: Reply) -> Message:
+        if not reply.error:
+            check_encoding(reply.encoding, self.service_class, name=self.resolved_name)
+            return self.response_class.from_bytes(reply.payload)
+        text = reply.payload.decode(errors="replace")
+        try:
+            told = json.loads(text)
+            remote_type, remote_text = str(told["type"]), str(told["text"])
+        except (ValueError, TypeError, KeyError):  # a server that is not ours says it its own way
+            remote_type, remote_text = "", text
+        if remote_type == TypeMismatchError.__name__:
+            self._raise_mismatch(remote_text)
+        raise ServiceException(
+            self.resolved_name,
+            f"the handler raised {remote_type or 'an error'}: {remote_text}",
+            remote_type=remote_type,
+            remote_text=remote_text,
+        )
+
+    def _raise_mismatch(self, remote_text: str) -> None:
+        """Raise the mismatch that the tokens show, rather than the server's words."""
+        if self.mismatches:
+            raise self.mismatches[0]
+        raise ServiceException(
+            self.resolved_name,
+            f"the server has another type: {remote_text}",
+            remote_type=TypeMismatchError.__name__,
+            remote_text=remote_text,
+        )
+
+
+def wait_for_service(
+    service: str, timeout: float | Duration | None = None, *, node: Node | None = None
+) -> None:
+    """Wait until a service of that name has a server, of whatever type.
+
+    Args:
+        service: Service name, relative, absolute or private.
+        timeout: Longest wait [s]; None waits until the node closes or the program is to end.
+        node: Where to look; the node in force when None.
+
+    Raises:
+        WaitTimeoutError: there is none in time.
+        NodeError: the node was closed, or the program is to end.
+
+    Blocks: see `timeout`.
+    """
+    node = get_node() if node is None else node
+    name = node.resolve(service, NAME_KIND)
+    seconds = to_seconds(timeout)
+    anybody = node.endpoint(Kind.SERVICE, name, "", "")
+    watch = NameWatch(node, anybody, {Kind.SERVICE}, any_type=True)
+    try:
+        if watch.wait(lambda: bool(watch.ends(any_type=True)), seconds):
+            return
+    finally:
+        watch.close()
+    if seconds is None or node.closed:
+        raise NodeError(f"/{name}: not there: the node was closed or the program is to end.")
+    raise WaitTimeoutError(
+        f"/{name}: no server: got none in {seconds:g} s; expected one. "
+        "Try 'actionlib service list'."
+    )

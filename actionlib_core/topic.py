@@ -1,0 +1,320 @@
+"""Topics: publish messages to whoever subscribes, in rospy's shape.
+
+Nothing is dropped on the way unless it is said here: a publisher waits when the network has no
+room, a subscriber keeps everything until its callback has run, or the newest `queue_size` messages,
+and counts what it dropped.
+
+Source:
+    rospy.Publisher, rospy.Subscriber and rospy.wait_for_message for names, arguments and meaning.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from actionlib_core._callbacks import CallbackQueue
+from actionlib_core._name_watch import TOPIC_KINDS, NameWatch
+from actionlib_core.exceptions import NodeError, TypeMismatchError, WaitTimeoutError
+from actionlib_core.node import get_node
+from actionlib_core.presence import Endpoint, Kind, token_key
+from actionlib_core.shutdown import requested
+from actionlib_core.time import to_seconds
+from actionlib_core.transport import Quality
+from actionlib_core.wire import check_encoding, encoding_of, parse_encoding
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import TracebackType
+    from typing import Self
+
+    from actionlib_core.interfaces import Message
+    from actionlib_core.node import Node
+    from actionlib_core.time import Duration
+    from actionlib_core.transport import Closable, Sample
+
+M = TypeVar("M", bound="Message")
+
+NAME_KIND = "topic name"
+
+
+class _TopicEnd:
+    """What publisher and subscriber share: a name, a token, and an eye on the other ends."""
+
+    _kind: Kind
+    _counterpart: Kind
+
+    def __init__(self, name: str, data_class: type[Message], node: Node | None) -> None:
+        self.node = get_node() if node is None else node
+        self.resolved_name = self.node.resolve(name, NAME_KIND)
+        self.data_class = data_class
+        self.type = data_class._type
+        self.md5sum = data_class._md5sum
+        self._own = self.node.endpoint(self._kind, self.resolved_name, self.type, self.md5sum)
+        self._ends = NameWatch(self.node, self._own, TOPIC_KINDS)
+        self._parts: list[Closable] = [self._ends]
+        self._closed = False
+        self._forget = self.node.on_close(self.unregister)
+
+    @property
+    def name(self) -> str:
+        """The topic as rospy prints it, with a slash in front."""
+        return f"/{self.resolved_name}"
+
+    @property
+    def mismatches(self) -> list[TypeMismatchError]:
+        """The ends of this topic that have another type, as errors; each was logged once."""
+        return self._ends.mismatches
+
+    def get_num_connections(self) -> int:
+        """Return how many ends of the other kind, of our type, there are."""
+        return len(self._ends.ends(self._counterpart))
+
+    def wait_for_connections(self, count: int = 1, timeout: float | Duration | None = None) -> bool:
+        """Wait until at least `count` ends of the other kind are there.
+
+        Args:
+            count: How many.
+            timeout: Longest wait [s]; None waits until the node closes or the program is to end.
+
+        Returns:
+            Whether they are.
+
+        Blocks: see `timeout`.
+        """
+        return self._ends.wait(lambda: self.get_num_connections() >= count, to_seconds(timeout))
+
+    def unregister(self) -> None:
+        """Leave the topic; a second call does nothing. No callback starts after it returned."""
+        if self._closed:
+            return
+        self._closed = True
+        self._forget()
+        for part in reversed(self._parts):
+            part.close()
+
+    def _announce(self) -> None:
+        self._parts.append(self.node.transport.declare_alive(token_key(self._own)))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.unregister()
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name} [{self.type}]>"
+
+
+class Publisher(_TopicEnd):
+    """Sends messages of one class to a topic.
+
+    Args:
+        name: Topic name, relative, absolute or private.
+        data_class: Class of the messages.
+        latch: Keep the last message and give it to every subscriber that comes later.
+        queue_size: As rospy takes it; nothing is queued here: `publish` hands the message to the
+            network and waits while that has no room.
+        node: Where it lives; the node in force when None.
+
+    Raises:
+        InvalidNameError: the name breaks the ROS rules.
+        NodeError: the node is closed.
+
+    Threads: every method may be called from any thread; a callback may publish.
+    """
+
+    _kind = Kind.PUBLISHER
+    _counterpart = Kind.SUBSCRIBER
+
+    def __init__(
+        self,
+        name: str,
+        data_class: type[Message],
+        latch: bool = False,
+        queue_size: int | None = None,
+        *,
+        node: Node | None = None,
+    ) -> None:
+        super().__init__(name, data_class, node)
+        self.queue_size = queue_size
+        self.latch = latch
+        self._port = self.node.transport.publisher(
+            self.resolved_name, encoding_of(data_class), Quality(express=True, latch=latch)
+        )
+        self._parts.append(self._port)
+        self._announce()
+
+    def publish(self, *args: Any, **kwargs: Any) -> None:
+        """Send a message, or one made from the arguments: `publish("hello")`, `publish(data=1)`.
+
+        Raises:
+            FieldError: a value does not fit its field.
+            TypeMismatchError: there are subscribers, but all of them have another type.
+            TransportError: the publisher or its node is closed.
+
+        Blocks: while the network has no room.
+        """
+        if len(args) == 1 and not kwargs and isinstance(args[0], self.data_class):
+            message = args[0]
+        else:
+            message = self.data_class(*args, **kwargs)
+        self._port.put(message.to_bytes())
+        if self._ends.mismatches:
+            self._raise_if_nobody_fits()
+
+    def _raise_if_nobody_fits(self) -> None:
+        others = set(self._ends.ends(self._counterpart, any_type=True))
+        if others and not self.get_num_connections():
+            raise self._ends.mismatches[0]
+
+
+class Subscriber(_TopicEnd, Generic[M]):
+    """Calls back with every message of a topic, in order, one at a time.
+
+    Args:
+        name: Topic name, relative, absolute or private.
+        data_class: Class of the messages.
+        callback: Gets the message, and `callback_args` when these are given.
+        callback_args: Second argument of the callback; None is none.
+        queue_size: How many messages may wait for the callback: when there are more, the oldest is
+            dropped and counted in `dropped`. None keeps all.
+        node: Where it lives; the node in force when None.
+
+    Raises:
+        InvalidNameError: the name breaks the ROS rules.
+        NodeError: the node is closed.
+
+    Threads: the callback runs in a thread of the node's clock and may block; an exception is given
+        to `threading.excepthook`, and the next message comes.
+    """
+
+    _kind = Kind.SUBSCRIBER
+    _counterpart = Kind.PUBLISHER
+
+    def __init__(
+        self,
+        name: str,
+        data_class: type[M],
+        callback: Callable[..., object] | None = None,
+        callback_args: Any = None,
+        queue_size: int | None = None,
+        *,
+        node: Node | None = None,
+    ) -> None:
+        super().__init__(name, data_class, node)
+        self.callback = callback
+        self.callback_args = callback_args
+        self.queue_size = queue_size
+        self._read = data_class.from_bytes
+        self._lock = threading.Lock()
+        self._waiting: deque[Sample] = deque()
+        self._dropped = 0
+        self._calls = CallbackQueue(self.node, f"topic {self.name}")
+        self._parts.append(self.node.transport.subscribe(self.resolved_name, self._on_sample))
+        self._announce()
+
+    @property
+    def dropped(self) -> int:
+        """How many messages were dropped because `queue_size` others waited."""
+        return self._dropped
+
+    def _on_sample(self, sample: Sample) -> None:
+        with self._lock:
+            if self.queue_size and len(self._waiting) >= self.queue_size:
+                self._waiting.popleft()
+                self._dropped += 1
+                self._waiting.append(sample)
+                return  # the call for the dropped one takes this one
+            self._waiting.append(sample)
+        self._calls.call(self._deliver)
+
+    def _deliver(self) -> None:
+        with self._lock:
+            sample = self._waiting.popleft()
+        if self._closed or self.callback is None:
+            return
+        try:
+            check_encoding(sample.encoding, self.data_class, name=self.resolved_name)
+        except TypeMismatchError as error:
+            self._ends.note(error, _sender_of(sample))
+            return
+        message = self._read(sample.payload)
+        if self.callback_args is None:
+            self.callback(message)
+        else:
+            self.callback(message, self.callback_args)
+
+
+def _sender_of(sample: Sample) -> Endpoint:
+    """Return the end that a message without a token of its type came from."""
+    encoding = parse_encoding(sample.encoding)
+    return Endpoint(Kind.PUBLISHER, sample.key, encoding.type, encoding.md5, sample.source, "", 0)
+
+
+def wait_for_message(
+    topic: str,
+    topic_type: type[M],
+    timeout: float | Duration | None = None,
+    *,
+    node: Node | None = None,
+) -> M:
+    """Return the next message of a topic, or its latched one.
+
+    Args:
+        topic: Topic name, relative, absolute or private.
+        topic_type: Class of the message.
+        timeout: Longest wait [s]; None waits until the node closes or the program is to end.
+        node: Where to listen; the node in force when None.
+
+    Raises:
+        WaitTimeoutError: no message came in time.
+        TypeMismatchError: somebody publishes another type there, and nobody ours.
+        NodeError: the node was closed, or the program is to end.
+
+    Blocks: see `timeout`.
+    """
+    found: list[M] = []
+
+    def keep(message: M) -> None:
+        found.append(message)
+        subscriber.wake()
+
+    subscriber = _OneMessage(topic, topic_type, keep, node=node)
+    with subscriber:
+        return subscriber.take(found, to_seconds(timeout))
+
+
+class _OneMessage(Subscriber[M]):
+    """A subscriber that is waited for."""
+
+    def wake(self) -> None:
+        self._ends.wake()
+
+    def take(self, found: list[M], timeout: float | None) -> M:
+        self._ends.wait(lambda: bool(found) or self._mismatch() is not None, timeout)
+        if found:
+            return found[0]
+        mismatch = self._mismatch()
+        if mismatch is not None:
+            raise mismatch
+        if self._closed or self.node.closed or (timeout is None and requested()):
+            raise NodeError(
+                f"{self.name}: no message: the node was closed or the program is to end."
+            )
+        raise WaitTimeoutError(
+            f"{self.name}: no message: got none in {timeout:g} s, "
+            f"{self.get_num_connections()} publishers there; expected a {self.type}. "
+            f"Try 'actionlib topic info {self.name}'."
+        )
+
+    def _mismatch(self) -> TypeMismatchError | None:
+        if self.get_num_connections() or not self.mismatches:
+            return None
+        return self.mismatches[0]

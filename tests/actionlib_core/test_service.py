@@ -1,0 +1,289 @@
+"""Services over the network in memory, and over zenoh."""
+
+from __future__ import annotations
+
+import logging
+import threading
+
+import pytest
+
+from actionlib_core.clock import RealClock
+from actionlib_core.exceptions import (
+    NodeError,
+    ServiceException,
+    ServiceLostError,
+    ServiceTimeoutError,
+    ServiceUnavailableError,
+    TypeMismatchError,
+    WaitTimeoutError,
+)
+from actionlib_core.interfaces import define_service
+from actionlib_core.interfaces.std_srvs.srv import Empty, SetBool, SetBoolResponse, Trigger
+from actionlib_core.node import Node
+from actionlib_core.service import Service, ServiceProxy, wait_for_service
+from actionlib_core.transport.memory import MemoryNetwork
+
+AddTwoInts = define_service("test_pkg/AddTwoInts", "int64 a\nint64 b\n---\nint64 sum\n")
+
+
+@pytest.fixture
+def network(clock):
+    return MemoryNetwork(clock)
+
+
+@pytest.fixture
+def nodes(clock, network):
+    made = [Node(name, transport=network.session(), clock=clock) for name in ("server", "caller")]
+    yield made
+    for node in made:
+        node.close()
+        node.transport.close()
+
+
+@pytest.fixture
+def silent(monkeypatch):
+    """What goes to threading.excepthook."""
+    reported = []
+    monkeypatch.setattr(threading, "excepthook", lambda args: reported.append(args.exc_value))
+    return reported
+
+
+@pytest.mark.parametrize(
+    "result",
+    [
+        lambda q: AddTwoInts._response_class(q.a + q.b),
+        lambda q: {"sum": q.a + q.b},
+        lambda q: (q.a + q.b,),
+        lambda q: [q.a + q.b],
+        lambda q: q.a + q.b,
+    ],
+)
+def test_call_returns_what_the_handler_returns(nodes, result):
+    server, caller = nodes
+    Service("add", AddTwoInts, result, node=server)
+    add = ServiceProxy("add", AddTwoInts, node=caller)
+    assert add(1, 2).sum == 3
+    assert add(a=20, b=22).sum == 42
+    assert add.call(AddTwoInts._request_class(a=5)).sum == 5
+
+
+def test_empty_service_needs_no_result(nodes):
+    server, caller = nodes
+    calls = []
+    Service("reset", Empty, calls.append, node=server)
+    ServiceProxy("reset", Empty, node=caller)()
+    assert len(calls) == 1
+
+
+def test_handlers_error_reaches_the_caller_with_type_and_text(nodes, silent):
+    server, caller = nodes
+
+    def handler(request):
+        raise ValueError("the gripper is open")
+
+    Service("grip", SetBool, handler, node=server)
+    with pytest.raises(ServiceException) as caught:
+        ServiceProxy("grip", SetBool, node=caller)(True)
+    error = caught.value
+    assert (error.name, error.remote_type, error.remote_text) == (
+        "grip", "ValueError", "the gripper is open",
+    )  # fmt: skip
+    assert "service /grip: the handler raised ValueError: the gripper is open" in str(error)
+    assert [str(e) for e in silent] == ["the gripper is open"]
+
+
+def test_handler_that_returns_none_is_an_error(nodes, silent):
+    server, caller = nodes
+    Service("grip", SetBool, lambda _: None, node=server)
+    with pytest.raises(ServiceException, match="returned None; expected SetBoolResponse"):
+        ServiceProxy("grip", SetBool, node=caller)(True)
+    assert len(silent) == 1
+
+
+def test_call_without_server_says_so_after_a_moment(nodes, clock):
+    with pytest.raises(ServiceUnavailableError, match="no server: got none in 2 s"):
+        ServiceProxy("grip", SetBool, node=nodes[1])(True)
+    assert clock.now() == pytest.approx(2.0)
+
+
+def test_call_waits_for_a_server_that_appears(nodes, clock):
+    server, caller = nodes
+    clock.call_later(1.0, lambda: Service("grip", SetBool, lambda r: (r.data, "ok"), node=server))
+    assert ServiceProxy("grip", SetBool, node=caller)(True) == SetBoolResponse(True, "ok")
+
+
+def test_call_times_out(nodes, clock):
+    server, caller = nodes
+    Service("grip", SetBool, lambda _: clock.sleep(100), node=server)
+    proxy = ServiceProxy("grip", SetBool, timeout=3, node=caller)
+    with pytest.raises(ServiceTimeoutError, match="no answer: got none in 3 s"):
+        proxy(True)
+    assert clock.now() == pytest.approx(3.0)
+
+
+def test_dead_server_ends_the_call_at_once(nodes, clock):
+    server, caller = nodes
+    Service("grip", SetBool, lambda _: clock.sleep(100), node=server)
+    proxy = ServiceProxy("grip", SetBool, node=caller)
+    clock.call_later(5.0, server.transport.kill)
+    with pytest.raises(ServiceLostError, match="died or left"):
+        proxy(True)
+    assert clock.now() == pytest.approx(5.0)
+
+
+def test_server_that_leaves_ends_the_call_at_once(nodes, clock):
+    server, caller = nodes
+    service = Service("grip", SetBool, lambda _: clock.sleep(100), node=server)
+    proxy = ServiceProxy("grip", SetBool, node=caller)
+    clock.call_later(5.0, service.shutdown)
+    with pytest.raises(ServiceLostError):
+        proxy(True)
+    assert clock.now() == pytest.approx(5.0)
+
+
+def test_without_limit_a_call_ends_with_the_server(nodes, clock):
+    server, caller = nodes
+    Service("grip", SetBool, lambda _: clock.sleep(1e6), node=server)
+    proxy = ServiceProxy("grip", SetBool, timeout=None, node=caller)
+    clock.call_later(1e5, server.transport.kill)
+    with pytest.raises(ServiceLostError):
+        proxy(True)
+    assert clock.now() == pytest.approx(1e5)
+
+
+def test_slow_calls_do_not_hold_up_others(nodes, clock):
+    server, caller = nodes
+
+    def handler(request):
+        clock.sleep(10 if request.data else 0)
+        return True, "done"
+
+    Service("grip", SetBool, handler, node=server)
+    ends = []
+    for slow in (True, False, True):
+
+        def call(slow=slow):
+            ServiceProxy("grip", SetBool, node=caller)(slow)
+            ends.append((slow, round(clock.now(), 3)))
+
+        clock.spawn(call, name=f"caller {slow}")
+    clock.sleep(20)
+    assert sorted(ends) == [(False, 0.0), (True, 10.0), (True, 10.0)]
+
+
+def test_handler_may_call_a_service_of_its_own_node(nodes):
+    server, caller = nodes
+    inner = ServiceProxy("inner", Trigger, node=server)
+    Service("inner", Trigger, lambda _: (True, "inner"), node=server)
+    Service("outer", Trigger, lambda _: inner(), node=server)
+    assert ServiceProxy("outer", Trigger, node=caller)().message == "inner"
+
+
+def test_wrong_type_is_told_on_both_sides(nodes, clock, caplog):
+    server, caller = nodes
+    with caplog.at_level(logging.ERROR, "actionlib_core"):
+        service = Service("grip", SetBool, lambda _: (True, ""), node=server)
+        proxy = ServiceProxy("grip", Trigger, node=caller)
+        with pytest.raises(TypeMismatchError) as caught:
+            proxy()
+    for text in ("std_srvs/SetBool", "std_srvs/Trigger", SetBool._md5sum, Trigger._md5sum):
+        assert text in str(caught.value)
+    assert len(proxy.mismatches) == 1
+    # A caller has no token; the server hears of it from the call itself.
+    replies = []
+    caller.transport.query(
+        "grip", b"", encoding="ros1/std_srvs/Trigger;md5=1", timeout=5,
+        on_reply=replies.append, on_done=lambda: None,
+    )  # fmt: skip
+    clock.sleep(1)
+    assert replies[0].error
+    (error,) = service.mismatches
+    assert (error.expected_type, error.found_type) == ("std_srvs/SetBool", "std_srvs/Trigger")
+
+
+def test_two_servers_answer_once(nodes, network, clock):
+    server, caller = nodes
+    third = Node("second", transport=network.session(), clock=clock)
+    Service("who", Trigger, lambda _: (True, "first"), node=server)
+    Service("who", Trigger, lambda _: (True, "second"), node=third)
+    assert ServiceProxy("who", Trigger, node=caller)().message in {"first", "second"}
+
+
+def test_answer_of_a_foreign_server_with_a_plain_error(nodes, clock):
+    server, caller = nodes
+    Service("grip", SetBool, print, node=server).close()
+    server.announce(ServiceProxy("grip", SetBool, node=server)._own.kind, "grip", "std_srvs/SetBool",
+                    SetBool._md5sum)  # fmt: skip
+    server.transport.queryable("grip", lambda q: (q.reply_error("plain words"), q.finish()))
+    with pytest.raises(ServiceException, match="plain words") as caught:
+        ServiceProxy("grip", SetBool, node=caller)(True)
+    assert caught.value.remote_text == "plain words"
+
+
+def test_wait_for_service(nodes, clock):
+    server, caller = nodes
+    with pytest.raises(WaitTimeoutError, match="no server: got none in 1 s"):
+        wait_for_service("grip", 1, node=caller)
+    clock.call_later(3.0, lambda: Service("grip", SetBool, print, node=server))
+    wait_for_service("grip", node=caller)
+    assert clock.now() == pytest.approx(4.0)
+    proxy = ServiceProxy("grip", SetBool, node=caller)
+    proxy.wait_for_service(1)
+    other = ServiceProxy("grip", Trigger, node=caller)
+    with pytest.raises(TypeMismatchError):
+        other.wait_for_service(1)
+
+
+def test_closed_node_ends_the_call(nodes, clock):
+    server, caller = nodes
+    Service("grip", SetBool, lambda _: clock.sleep(100), node=server)
+    proxy = ServiceProxy("grip", SetBool, node=caller)
+    clock.call_later(5.0, caller.close)
+    with pytest.raises(NodeError):
+        proxy(True)
+    assert clock.now() == pytest.approx(5.0)
+
+
+@pytest.mark.zenoh
+def test_services_over_zenoh(silent):
+    def handler(request):
+        if request.a < 0:
+            raise ValueError("negative")
+        return request.a + request.b
+
+    with Node("server") as server, Node("caller") as caller:
+        Service("add", AddTwoInts, handler, node=server)
+        add = ServiceProxy("add", AddTwoInts, node=caller)
+        assert [add(n, 1).sum for n in range(20)] == list(range(1, 21))
+        with pytest.raises(ServiceException, match="ValueError: negative"):
+            add(-1, 0)
+        local = ServiceProxy("add", AddTwoInts, node=server)
+        assert local(2, 2).sum == 4
+
+
+@pytest.mark.zenoh
+def test_server_that_leaves_ends_a_call_over_zenoh():
+    clock = RealClock()
+    release = clock.event()
+    with Node("server") as server, Node("caller") as caller:
+        started = clock.event()
+
+        def handler(request):
+            started.set()
+            release.wait(20)
+            return True, ""
+
+        Service("grip", SetBool, handler, node=server)
+        proxy = ServiceProxy("grip", SetBool, timeout=20, node=caller)
+
+        def leave():
+            started.wait(10)
+            server.close()
+
+        task = clock.spawn(leave, name="leave")
+        start = clock.now()
+        with pytest.raises(ServiceLostError):
+            proxy(True)
+        assert clock.now() - start < 5
+        release.set()
+        assert task.join(10)
