@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from actionlib_core.action_server import nop_cb as nop_cb
     from actionlib_core.exceptions import ActionException as ActionException
     from actionlib_core.exceptions import ActionlibError as ActionlibError
+    from actionlib_core.exceptions import ServiceException as ServiceException
     from actionlib_core.goal_id_generator import GoalIDGenerator as GoalIDGenerator
     from actionlib_core.handle_tracker_deleter import HandleTrackerDeleter as HandleTrackerDeleter
     from actionlib_core.node import Node as Node
@@ -28,12 +29,18 @@ if TYPE_CHECKING:
     from actionlib_core.node import init as init
     from actionlib_core.node import use_node as use_node
     from actionlib_core.server_goal_handle import ServerGoalHandle as ServerGoalHandle
+    from actionlib_core.service import Service as Service
+    from actionlib_core.service import ServiceProxy as ServiceProxy
+    from actionlib_core.service import wait_for_service as wait_for_service
     from actionlib_core.simple_action_client import SimpleActionClient as SimpleActionClient
     from actionlib_core.simple_action_client import SimpleGoalState as SimpleGoalState
     from actionlib_core.simple_action_server import SimpleActionServer as SimpleActionServer
     from actionlib_core.status_tracker import StatusTracker as StatusTracker
     from actionlib_core.time import Duration as Duration
     from actionlib_core.time import Time as Time
+    from actionlib_core.topic import Publisher as Publisher
+    from actionlib_core.topic import Subscriber as Subscriber
+    from actionlib_core.topic import wait_for_message as wait_for_message
 
 # Module -> the names that are taken from it. The modules are attributes too, as in ROS 1.
 _NAMES = {
@@ -47,15 +54,17 @@ _NAMES = {
         "get_name_of_constant",
     ),
     "action_server": ("ActionServer", "nop_cb"),
-    "exceptions": ("ActionException", "ActionlibError"),
+    "exceptions": ("ActionException", "ActionlibError", "ServiceException"),
     "goal_id_generator": ("GoalIDGenerator",),
     "handle_tracker_deleter": ("HandleTrackerDeleter",),
     "node": ("Node", "get_node", "init", "use_node"),
     "server_goal_handle": ("ServerGoalHandle",),
+    "service": ("Service", "ServiceProxy", "wait_for_service"),
     "simple_action_client": ("SimpleActionClient", "SimpleGoalState"),
     "simple_action_server": ("SimpleActionServer",),
     "status_tracker": ("StatusTracker",),
     "time": ("Duration", "Time"),
+    "topic": ("Publisher", "Subscriber", "wait_for_message"),
 }
 _MODULE_OF = {name: module for module, names in _NAMES.items() for name in names}
 
