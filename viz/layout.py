@@ -9,18 +9,18 @@ one run of `dot`. Lengths are points (1/72 inch), y points up.
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
-from itertools import pairwise, product
-from math import ceil, dist
+from itertools import product
+from math import ceil
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import graphviz
 
 from viz import style
+from viz.curves import crossings, length, point, shift, trace, with_stem
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from viz.graph import Anchor, Arrow, Box
     from viz.theme import Theme
@@ -36,7 +36,8 @@ MARGIN = 12
 DOT_RADIUS = 4
 PORT = 8
 INCH = 72.0
-_POINT = re.compile(r"(-?[\d.]+(?:e[+-]?\d+)?),(-?[\d.]+(?:e[+-]?\d+)?)")
+DETOUR = 250.0
+"""How much longer arrows may be to avoid one crossing [points]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +63,6 @@ class _Page:
         width, height: Outer size with the dot and the pills that stand over the border.
         dx, dy: From coordinates of the page to coordinates of the outer box.
         floor: Height of the lower border in the outer box.
-        ink: Length of all arrows; the smaller, the tidier.
         ports: Centre and width along x in the outer box, by part.
     """
 
@@ -71,7 +71,6 @@ class _Page:
     dx: float
     dy: float
     floor: float
-    ink: float
     title: tuple[float, float]
     ports: dict[str, tuple[float, float]]
     spots: dict[str, tuple[float, float]]
@@ -99,10 +98,9 @@ def compose_all(roots: Sequence[Box], theme: Theme, run: Engine) -> list[Geometr
         level = [box for box in containers if box.height() == height]
         tries = [(box, how) for box in level for how in _tries(box)]
         results = run([_page_text(box, how, theme, pages) for box, how in tries])
-        for (box, _), result in zip(tries, results, strict=True):
-            page = _page(box, result)
-            if id(box) not in pages or page.ink < pages[id(box)].ink:
-                pages[id(box)] = page
+        for box in level:
+            mine = [r for (b, _), r in zip(tries, results, strict=True) if b is box]
+            pages[id(box)] = _page(box, mine[0] if len(mine) == 1 else min(mine, key=_untidiness))
     geometries = []
     for root in roots:
         page = pages[id(root)]
@@ -213,12 +211,12 @@ def _page(box: Box, result: Mapping[str, Any]) -> _Page:
         for edge in result.get("edges", ())
     }
     left, right, top = _extent(result, curves)
-    spots = {name: _xy(item["pos"]) for name, item in found.items()}
+    spots = {name: point(item["pos"]) for name, item in found.items()}
     assert box.entry is not None
     entry_x, _ = spots[box.entry.name]
     first = next((arrow.name for arrow in box.arrows if arrow.tail.part == "in"), None)
     if first is not None:
-        curves[first]["pos"] = _with_stem(curves[first]["pos"], entry_x, top)
+        curves[first]["pos"] = with_stem(curves[first]["pos"], entry_x, top)
     spots[box.entry.name] = (entry_x, top)
     title_x, right = _title(result, entry_x, right)
     dx, dy, floor = MARGIN - left, float(MARGIN), 0.0
@@ -234,8 +232,7 @@ def _page(box: Box, result: Mapping[str, Any]) -> _Page:
         dx=dx,
         dy=dy,
         floor=floor,
-        ink=sum(_length(attributes["pos"]) for attributes in curves.values()),
-        title=(title_x, _xy(result["lp"])[1]),
+        title=(title_x, point(result["lp"])[1]),
         ports=ports,
         spots=spots,
         curves=curves,
@@ -248,25 +245,15 @@ def _extent(
     """Left, right and upper end of a page; loops may leave the box that Graphviz reports."""
     left, _, right, top = map(float, result["bb"].split(","))
     for attributes in curves.values():
-        for x, _ in _samples(attributes["pos"]):
+        for x, _ in trace(attributes["pos"]):
             left, right = min(left, x), max(right, x)
     return left, right, top
 
 
-def _length(curve: str) -> float:
-    samples = list(_samples(curve))
-    return sum(dist(a, b) for a, b in pairwise(samples))
-
-
-def _samples(curve: str) -> Iterator[tuple[float, float]]:
-    """Yield points along a chain of cubic Bezier curves."""
-    points = [_xy(point) for point in curve.split() if point[0] not in "es"]
-    yield points[0]
-    for i in range(0, len(points) - 3, 3):
-        (ax, ay), (bx, by), (cx, cy), (dx, dy) = points[i : i + 4]
-        for at in (0.25, 0.5, 0.75, 1.0):
-            a, b, c, d = (1 - at) ** 3, 3 * (1 - at) ** 2 * at, 3 * (1 - at) * at**2, at**3
-            yield a * ax + b * bx + c * cx + d * dx, a * ay + b * by + c * cy + d * dy
+def _untidiness(result: Mapping[str, Any]) -> float:
+    """Length of all arrows [points]; a crossing counts as much as a long way round."""
+    traces = [trace(edge["pos"]) for edge in result.get("edges", ())]
+    return sum(map(length, traces)) + DETOUR * crossings([line[::2] for line in traces])
 
 
 def _title(result: Mapping[str, Any], entry_x: float, right: float) -> tuple[float, float]:
@@ -276,16 +263,6 @@ def _title(result: Mapping[str, Any], entry_x: float, right: float) -> tuple[flo
         return width / 2 - 2, right
     left = entry_x + DOT_RADIUS + 2
     return left + width / 2, max(right, left + width - DOT_RADIUS)
-
-
-def _with_stem(curve: str, x: float, top: float) -> str:
-    """Let a curve begin on the upper border."""
-    head, _, rest = curve.rpartition("e,")
-    arrow, _, points = rest.partition(" ")
-    first_x, first_y = _xy(points.split(" ", 1)[0])
-    stem = [(x + (first_x - x) * part, top + (first_y - top) * part) for part in (0, 1 / 3, 2 / 3)]
-    text = " ".join(f"{px:.2f},{py:.2f}" for px, py in stem)
-    return f"{head}e,{arrow} {text} {points}"
 
 
 def _place(
@@ -303,22 +280,13 @@ def _place(
     for name, (x, y) in page.spots.items():
         geometry.setdefault(name, {})["pos"] = f"{sx + x:.2f},{sy + y:.2f}"
     for name, attributes in page.curves.items():
-        geometry[name] = {key: _shift(value, sx, sy) for key, value in attributes.items()}
+        geometry[name] = {key: shift(value, sx, sy) for key, value in attributes.items()}
     for child in box.boxes:
         inner = pages.get(id(child))
         if inner is not None:
             x, y = page.spots[child.name]
             corner = (sx + x - inner.width / 2, sy + y - inner.height / 2)
             _place(child, pages, corner, geometry)
-
-
-def _shift(value: str, dx: float, dy: float) -> str:
-    return _POINT.sub(lambda m: f"{float(m[1]) + dx:.2f},{float(m[2]) + dy:.2f}", value)
-
-
-def _xy(text: str) -> tuple[float, float]:
-    x, y = text.split(",")
-    return float(x), float(y)
 
 
 def _size(item: Mapping[str, Any], side: str) -> float:
