@@ -15,7 +15,7 @@ from viz import style
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from viz.model import Diagram, Edge, Node
+    from viz.model import Diagram, Edge, Node, Rule
     from viz.theme import Theme
 
 
@@ -181,7 +181,7 @@ class _Interior:
             head = (
                 self._outcome(edge.target)
                 if edge.to_outcome
-                else self._entrance(edge.target, back=edge.back and edge.source != edge.target)
+                else self._entrance(edge.target, back=edge.back)
             )
             self._arrow(self._exit(edge.source, outcomes[0]), head, attributes, back=edge.back)
 
@@ -189,21 +189,35 @@ class _Interior:
         """Rules over several states meet in a bar; one over a single state is a plain arrow."""
         for rule in self._node.rules:
             conditions = [pair for pair in rule.conditions if pair[0] in self._boxes]
-            if rule.outcome not in self._pills or not conditions:
+            if rule.outcome not in self._pills:
                 continue
-            if len(conditions) == 1 or rule.text.startswith("any of"):
+            if not conditions:
+                self._by_itself(rule)
+            elif len({label for label, _ in conditions}) == 1 or rule.text.startswith("any of"):
                 for label, outcome in conditions:
                     self._decide(label, outcome, self._outcome(rule.outcome), rule.outcome)
             else:
-                self._join(rule.outcome, conditions, rule.text)
+                self._join(rule, conditions)
 
-    def _join(self, outcome: str, conditions: list[tuple[str, str]], text: str) -> None:
+    def _by_itself(self, rule: Rule) -> None:
+        """An outcome that no child decides, such as that of an iterator without items."""
+        self._arrow(
+            Anchor(self._name, "in", is_open=True),
+            self._outcome(rule.outcome),
+            style.start(self._theme, fork=False) | {"label": style.note(rule.text, self._theme)},
+        )
+
+    def _join(self, rule: Rule, conditions: list[tuple[str, str]]) -> None:
         part = f"j{len(self._joins)}"
-        self._joins.append(Vertex(f"{self._name}_{part}", style.join(text, self._theme)))
+        self._joins.append(Vertex(f"{self._name}_{part}", style.join(rule.text, self._theme)))
         bar = Anchor(self._name, part, is_open=True)
-        for label, child_outcome in conditions:
-            self._decide(label, child_outcome, bar, outcome)
-        self._arrow(bar, self._outcome(outcome), self._deciding(self._node, outcome, named=False))
+        for label, outcome in conditions:
+            self._decide(label, outcome, bar, rule.outcome)
+        decision = dict(self._deciding(self._node, rule.outcome, named=False))
+        quorum = rule.text.partition(" of ")[0]
+        if quorum.isdigit():
+            decision["label"] = style.note(f"{quorum} of {len(conditions)}", self._theme)
+        self._arrow(bar, self._outcome(rule.outcome), decision)
 
     def _decide(self, label: str, child_outcome: str, head: Anchor, outcome: str) -> None:
         named = self._boxes[label].entry is None and child_outcome != outcome

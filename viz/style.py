@@ -213,11 +213,19 @@ def transition(
         attributes |= {"penwidth": "2.6"}
     if labelled or taken > 1:
         lines = [_outcome_line(o, theme, marks, counts, labelled=labelled) for o in outcomes]
-        rows = "".join(f'<tr><td align="left">{line}</td></tr>' for line in lines)
-        attributes["label"] = (
-            f'<<table border="0" cellborder="0" cellspacing="0" cellpadding="2">{rows}</table>>'
-        )
+        attributes["label"] = _beside(lines)
     return attributes
+
+
+def note(text: str, theme: Theme) -> str:
+    """The label of an arrow that needs words of its own."""
+    return _beside([f'<font color="{theme.muted}">{markup(text)}</font>'])
+
+
+def _beside(lines: Sequence[str]) -> str:
+    """A label that keeps off its arrow."""
+    rows = "".join(f'<tr><td align="left">{line}</td></tr>' for line in lines)
+    return f'<<table border="0" cellborder="0" cellspacing="0" cellpadding="2">{rows}</table>>'
 
 
 def _outcome_line(
