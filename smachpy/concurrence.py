@@ -256,6 +256,13 @@ class Concurrence(Container):
         if self._transition_cbs:
             for _ in group.branches:
                 self.call_transition_cbs()
+        try:
+            self._see_them_end(group)
+        except BaseException:
+            self._preempt_branches(group, group.running())
+            raise
+
+    def _see_them_end(self, group: Group) -> None:
         failure: BaseException | None = None
         running = True
         while running or group.reports:
@@ -313,6 +320,10 @@ class Concurrence(Container):
         if group is not None and group.frame is frame:
             group.tell(group.branches)
 
+    def _running_frames(self, frame: Frame) -> list[Frame]:
+        group = self._group
+        return [] if group is None or group.frame is not frame else [*group.running()]
+
     def _outcome(self, frame: Frame, group: Group) -> str:
         """Return the outcome that the callback, the rules or the default give."""
         outcomes = group.outcomes()
@@ -329,7 +340,7 @@ class Concurrence(Container):
         ruled = decide(self._rules, outcomes)
         if ruled is not None:
             return ruled
-        cut = any(branch.told is not None for branch in group.branches)
+        cut = any(branch.cut for branch in group.branches)
         if self._preempt_requested and cut and self._may_end_preempted():
             frame.emit_own(Preempted, "")
             return "preempted"

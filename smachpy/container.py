@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
 
 from smachpy import log
 from smachpy._construction import OPEN, innermost
 from smachpy._runtime.frame import FRAME, Frame
 from smachpy._runtime.root import execute_root
 from smachpy._runtime.step import Step
+from smachpy._runtime.watch import arm, disarm
+from smachpy.events import PreemptRequested
 from smachpy.exceptions import (
     InconsistentMachineError,
     InvalidConstructionError,
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from types import TracebackType
     from typing import Self, Unpack
 
+    from smachpy.control import Control
     from smachpy.events import Event
     from smachpy.state import StateOptions
     from smachpy.user_data import Remapper
@@ -49,6 +52,7 @@ class Container(State):
         name: See above.
     """
 
+    is_container: ClassVar[bool] = True
     name: str | None = None
 
     def __init__(
@@ -74,6 +78,7 @@ class Container(State):
         self._open_tokens: list[Any] = []
         self._context_kwargs: dict[str, Any] = {}
         self._plan: Any = None
+        self._control: Control | None = None
         # Held while a preempt is passed on, and by the runner when it ends a child: re-entrant,
         # because a signal handler may come in between.
         self._lock = threading.RLock()
@@ -234,9 +239,9 @@ class Container(State):
             if self._frame is frame:
                 self._frame = None
                 self._preempt_requested = False
-            told, frame.told = frame.told, None
-            frame.step = None
-            if told is not None:
+            told = frame.told
+            if told is not None and not frame.dead:
+                disarm(frame)
                 told.state.recall_preempt()
 
     def request_preempt(self) -> None:
@@ -257,8 +262,28 @@ class Container(State):
         """Pass the preempt on to what runs; called with the lock held."""
         step = frame.step
         if step is not None:
-            frame.told = step
-            step.state.request_preempt()
+            self._tell(frame, step)
+
+    def _tell(self, frame: Frame, step: Step) -> None:
+        """Ask one child to stop and see that it does; called with the lock held."""
+        frame.told = step
+        if frame.run.watched:
+            frame.emit(PreemptRequested)
+        step.state.request_preempt()
+        arm(frame, step)
+
+    def _stop_child(self, frame: Frame, step: Step, override: Any = None) -> bool:
+        """Ask the child of `step` to stop, but not this container; tell whether it ran."""
+        with self._lock:
+            if frame.step is not step or frame.dead:
+                return False
+            frame.override = override
+            self._tell(frame, step)
+            return True
+
+    def _running_frames(self, frame: Frame) -> list[Frame]:
+        """Return the frames that have a running child each: one, or the concurrence's branches."""
+        return [frame]
 
     def _copy_input_keys(self, parent_ud: UserData | Remapper, ud: UserData) -> None:
         for key in self._input_keys:
@@ -335,6 +360,15 @@ class Container(State):
             self._listeners = tuple(item for item in self._listeners if item is not listener)
 
         return unsubscribe
+
+    @property
+    def control(self) -> Control:
+        """The operator's control of this machine: pause, step, jump and so on; see `Control`."""
+        if self._control is None:
+            from smachpy.control import Control
+
+            self._control = Control(self)
+        return self._control
 
     # -- construction --------------------------------------------------------------------------
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from smachpy import log
 from smachpy._construction import construction_method
 from smachpy._core.names import unique_names
 from smachpy._core.spec import ChildSpec, LoopSpec
 from smachpy._core.validate import loop_problems
-from smachpy._runtime.step import Step
+from smachpy._runtime.interrupt import Interruption
+from smachpy._runtime.step import run_watched
+from smachpy._runtime.watch import disarm
 from smachpy.container import Container
-from smachpy.events import Entered, Failed, Iterated, Left, Preempted
+from smachpy.events import Iterated, OutcomeForced, Preempted
 from smachpy.exceptions import (
     InconsistentMachineError,
     InvalidStateError,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from typing import Unpack
 
     from smachpy._runtime.frame import Frame
+    from smachpy._runtime.step import Step
     from smachpy.introspection import Kind
     from smachpy.state import State, StateOptions
     from smachpy.user_data import UserData
@@ -256,26 +258,27 @@ class Iterator(Container):
         """Run the child for item after item; return its last outcome, or that of the end."""
         step = plan.step
         data = self.userdata._data  # noqa: SLF001  ours
-        key = self._items_label
-        run = frame.run
         for index, item in enumerate(self._iterate(frame)):
-            data[key] = item
+            data[self._items_label] = item
             frame.step = step
             if self._preempt_requested:
                 return self._preempted(frame, step)
-            if run.watched:
+            if frame.run.watched:
                 frame.emit_own(Iterated, index)
             outcome = self._run_child(frame, step)
-            if outcome not in plan.outcomes and outcome != "preempted":
-                outcomes = sorted(plan.outcomes)
+            if (
+                self._preempt_requested
+                or frame.told is not None
+                or step.state._preempt_requested  # noqa: SLF001
+            ):
+                outcome, ends = self._after_preempt(frame, plan, outcome)
+                if ends:
+                    return outcome
+            if outcome not in plan.outcomes:
                 raise InvalidTransitionError(
                     f"{frame.path}/{step.label}: unknown outcome: got {outcome!r}; expected one of "
-                    f"{outcomes}.{did_you_mean(outcome, outcomes)}"
+                    f"{sorted(plan.outcomes)}.{did_you_mean(outcome, plan.outcomes)}"
                 )
-            if self._preempt_requested or step.state._preempt_requested:  # noqa: SLF001
-                end = self._after_preempt(frame, plan, outcome)
-                if end is not None:
-                    return end
             if outcome in plan.breaks:
                 return outcome
             if self._transition_cbs:
@@ -284,38 +287,47 @@ class Iterator(Container):
 
     def _run_child(self, frame: Frame, step: Step) -> str:
         """Run the child once."""
-        watched = frame.run.watched
-        if watched:
-            frame.emit(Entered)
+        run = frame.run
+        if run.control is not None:
+            run.control.pass_gate(frame, step)
+            if self._preempt_requested:
+                return "preempted"
         try:
-            outcome: str = step.execute(step.watched_userdata(frame) if watched else step.userdata)
-        except SmachError as error:
-            frame.emit(Failed, f"{type(error).__name__}: {error}")
+            outcome: str
+            if run.watched:
+                outcome = run_watched(frame, step)
+            else:
+                outcome = step.execute(step.userdata)
+        except SmachError:
             raise
+        except Interruption:
+            if frame.dead:
+                raise
+            return "preempted"
         except Exception as error:
-            frame.emit(Failed, f"{type(error).__name__}: {error}")
             path = f"{frame.path}/{step.label}"
             raise InvalidUserCodeError(
                 f"{path}: {type(step.state).__name__} raised {type(error).__name__}: {error}",
                 path=path,
             ) from error
-        if watched:
-            frame.emit(Left, outcome)
-            log.loginfo(f"{frame.path}: {step.label!r} returned {outcome!r}")
         return outcome
 
-    def _after_preempt(self, frame: Frame, plan: _Plan, outcome: str) -> str | None:
-        """Return the outcome to end with after a preempt, or None to go on."""
+    def _after_preempt(self, frame: Frame, plan: _Plan, outcome: str) -> tuple[str, bool]:
+        """Return the outcome after a preempt, and whether it ends the iterator."""
         step = plan.step
-        with self._lock:  # whoever passes the preempt on is done after this
+        with self._lock:  # whoever passes a preempt on is done after this
             served = frame.told is step and not step.state.preempt_requested()
+            disarm(frame)
             step.state.recall_preempt()
-            frame.told = None
+            override, frame.override = frame.override, None
         if not self._preempt_requested:
-            return None
+            if override is not None and override.outcome is not None:
+                frame.emit(OutcomeForced, override.outcome)
+                return override.outcome, False
+            return outcome, False
         if outcome in plan.breaks or outcome == "preempted" or served:
-            return outcome
-        return self._preempted(frame, step)
+            return outcome, True
+        return self._preempted(frame, step), True
 
     def _preempted(self, frame: Frame, step: Step) -> str:
         frame.emit_own(Preempted, step.label)

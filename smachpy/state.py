@@ -77,6 +77,7 @@ class State:
     _preempt_callbacks: list[Callable[[], object]]
     _interface: int = 0
     kind: ClassVar[Kind] = "state"
+    is_container: ClassVar[bool] = False
 
     timeout: float | None = None
     timeout_outcome: str = "aborted"

@@ -9,9 +9,11 @@ from smachpy._construction import construction_method
 from smachpy._core.names import unique_names
 from smachpy._core.spec import ChildSpec, MachineSpec
 from smachpy._core.validate import machine_problems
-from smachpy._runtime.step import End, Step
+from smachpy._runtime.interrupt import Interruption
+from smachpy._runtime.step import End, Step, run_watched
+from smachpy._runtime.watch import disarm
 from smachpy.container import Container
-from smachpy.events import Entered, Failed, Left, Preempted
+from smachpy.events import Jumped, OutcomeForced, Preempted
 from smachpy.exceptions import (
     InconsistentMachineError,
     InvalidConstructionError,
@@ -22,12 +24,13 @@ from smachpy.exceptions import (
     did_you_mean,
 )
 from smachpy.introspection import Structure, TransitionRecord
+from smachpy.util import is_shutdown
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from typing import Unpack
 
-    from smachpy._runtime.frame import Frame
+    from smachpy._runtime.frame import Frame, Override
     from smachpy._runtime.step import Following
     from smachpy.introspection import Kind
     from smachpy.state import State, StateOptions
@@ -39,7 +42,7 @@ __all__ = ["StateMachine"]
 class _Plan:
     """A state machine, compiled."""
 
-    __slots__ = ("steps", "userdata")
+    __slots__ = ("all_steps", "steps", "userdata")
 
     def __init__(self, machine: StateMachine) -> None:
         self.userdata = machine.userdata
@@ -55,14 +58,15 @@ class _Plan:
                 elif where in ends:
                     following[outcome] = ends[where]
             self.steps[child.label].next = following
+        self.all_steps = tuple(self.steps.values())
 
     def is_stale(self, machine: StateMachine) -> bool:
         if self.userdata is not machine.userdata:
             return True
-        return any(
-            step.interface != step.state._interface  # noqa: SLF001
-            for step in self.steps.values()
-        )
+        for step in self.all_steps:  # noqa: SIM110  any() costs twice as much here
+            if step.interface != step.state._interface:  # noqa: SLF001
+                return True
+        return False
 
 
 class StateMachine(Container):
@@ -290,16 +294,30 @@ class StateMachine(Container):
         if self._start_cbs:
             self.call_start_cbs()
         label, self._next_initial = self._next_initial or self._initial_state_label, None
-        if frame.run.watched:
+        if frame.run.logged:
             log.loginfo(f"{frame.path}: starting in {label!r}, keys {self.userdata.keys()}")
         assert label is not None
-        last, outcome = self._loop(frame, plan.steps[label])
-        if frame.run.watched:
+        last, outcome = self._run_steps(frame, plan.steps[label])
+        if frame.run.logged:
             log.loginfo(f"{frame.path}: {last!r} ended it with {outcome!r}")
         if self._termination_cbs:
             frame.step = None
             self.call_termination_cbs([last], outcome)
         return outcome
+
+    def _run_steps(self, frame: Frame, step: Step) -> tuple[str, str]:
+        """Run from `step` on; return the last label and the machine's outcome."""
+        while True:
+            try:
+                return self._loop(frame, step)
+            except Interruption:
+                if frame.dead:
+                    raise
+                last: Step = frame.step
+                following = self._follow(frame, last, "preempted")
+                if following.final:
+                    return last.label, following.outcome
+                step = following
 
     def _loop(self, frame: Frame, step: Step) -> tuple[str, str]:
         """Run step after step; return the last label and the machine's outcome.
@@ -315,8 +333,12 @@ class StateMachine(Container):
                     following = self._careful(frame, step)
                 else:
                     outcome = step.execute(step.userdata)
-                    if self._preempt_requested or step.state._preempt_requested:  # noqa: SLF001
-                        following = self._after_preempt(frame, step, outcome)
+                    if (
+                        self._preempt_requested
+                        or frame.told is not None
+                        or step.state._preempt_requested  # noqa: SLF001
+                    ):
+                        following = self._follow(frame, step, outcome)
                     else:
                         following = step.next[outcome]
                 if following.final:
@@ -330,33 +352,31 @@ class StateMachine(Container):
     def _careful(self, frame: Frame, step: Step) -> Following:
         """Run one step with everything that may want to know of it."""
         run = frame.run
+        if run.control is not None:
+            run.control.pass_gate(frame, step)
+        if run.has_shutdown_check and is_shutdown():
+            self.request_preempt()
         if self._preempt_requested:
             return self._preempted(frame, step)
-        watched = run.watched
-        if watched:
-            frame.emit(Entered)
-        try:
-            outcome = step.execute(step.watched_userdata(frame) if watched else step.userdata)
-        except Exception as error:
-            frame.emit(Failed, f"{type(error).__name__}: {error}")
-            raise
-        if watched:
-            frame.emit(Left, outcome)
-        following = self._after_preempt(frame, step, outcome)
+        if run.watched:
+            outcome = run_watched(frame, step)
+        else:
+            outcome = step.execute(step.userdata)
+        following = self._follow(frame, step, outcome)
         if not following.final:
             frame.step = following
-            if watched:
+            if run.logged:
                 log.loginfo(f"{frame.path}: {step.label!r} -{outcome}-> {following.label!r}")
             if self._transition_cbs:
                 self.call_transition_cbs()
         return following
 
     def _preempted(self, frame: Frame, step: Step) -> End:
-        """End because of a preempt, before `step` has begun."""
+        """End because of a preempt; `step` was not started, or finished in vain."""
         frame.emit_own(Preempted, step.label)
         return End("preempted")
 
-    def _after_preempt(self, frame: Frame, step: Step, outcome: str) -> Following:
+    def _follow(self, frame: Frame, step: Step, outcome: str) -> Following:
         """Follow `outcome` when there may have been a preempt meanwhile.
 
         A child that ended 'preempted', or said that it served the preempt, has taken it up: the
@@ -364,11 +384,11 @@ class StateMachine(Container):
         ends the machine; else the machine ends 'preempted', and nothing more is started.
         """
         state = step.state
-        with self._lock:  # whoever passes the preempt on is done after this
+        with self._lock:  # whoever passes a preempt on is done after this
             served = frame.told is step and not state.preempt_requested()
-            if state.preempt_requested():
-                state.recall_preempt()
-            frame.told = None
+            disarm(frame)
+            state.recall_preempt()
+            override, frame.override = frame.override, None
             if self._preempt_requested:
                 if outcome == "preempted" and outcome not in step.next:
                     return self._preempted(frame, step)
@@ -379,7 +399,17 @@ class StateMachine(Container):
                     self._preempt_requested = False
                     return following
                 return self._preempted(frame, step)
+        if override is not None:
+            return self._overridden(frame, step, override)
         return self._following(frame, step, outcome)
+
+    def _overridden(self, frame: Frame, step: Step, override: Override) -> Following:
+        """Follow what an operator asked for."""
+        if override.outcome is not None:
+            frame.emit(OutcomeForced, override.outcome)
+            return self._following(frame, step, override.outcome)
+        frame.emit_own(Jumped, override.label)
+        return step if override.label == step.label else self._plan.steps[override.label]
 
     def _following(self, frame: Frame, step: Step, outcome: str) -> Following:
         try:

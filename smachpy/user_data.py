@@ -200,6 +200,10 @@ class Remapper:
         values = ", ".join(f"{key}={data[self._input[key]]!r}" for key in self.keys())
         return f"Remapper({values})"
 
+    def _revoke(self) -> None:
+        """Cut the window off: its state was left behind and may not write any more."""
+        object.__setattr__(self, "_data", dict(self._data) if type(self._data) is dict else {})
+
     def _unreadable(self, key: str) -> NoReturn:
         if key[:1] == "_":
             raise AttributeError(key) from None

@@ -21,15 +21,20 @@ P = ParamSpec("P")
 R_co = TypeVar("R_co", covariant=True)
 
 
-def _never() -> bool:
-    return False
+def _program_ends() -> bool:
+    from actionlib_core import shutdown
+
+    return shutdown.requested()
 
 
-_check: list[Callable[[], bool]] = [_never]
+_check: list[Callable[[], bool]] = [_program_ends]
 
 
 def is_shutdown() -> bool:
-    """Tell whether the program is shutting down, by the check of `set_shutdown_check`."""
+    """Tell whether the program is shutting down.
+
+    By the check of `set_shutdown_check`, else by `actionlib_core.shutdown`.
+    """
     return _check[0]()
 
 
@@ -40,7 +45,7 @@ def set_shutdown_check(cb: Callable[[], bool]) -> None:
 
 def has_shutdown_check() -> bool:
     """Tell whether `set_shutdown_check` was called."""
-    return _check[0] is not _never
+    return _check[0] is not _program_ends
 
 
 def has_smach_interface(obj: object) -> bool:

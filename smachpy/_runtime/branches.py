@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import threading
 from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from smachpy._runtime.frame import FRAME, Frame
-from smachpy.events import Entered, Failed, Left
+from smachpy._runtime.interrupt import Interruption
+from smachpy._runtime.step import run_watched
+from smachpy._runtime.watch import disarm
+from smachpy.events import OutcomeForced
 from smachpy.exceptions import InvalidTransitionError, InvalidUserCodeError, did_you_mean
 
 if TYPE_CHECKING:
@@ -23,10 +27,11 @@ class Branch(Frame):
         outcome: What it ended with; None while it runs, or when it raised.
         error: What it raised.
         ended: It has ended, or was abandoned.
+        cut: It had been asked to stop when it ended.
         task: The task that runs it.
     """
 
-    __slots__ = ("ended", "error", "group", "outcome", "task")
+    __slots__ = ("cut", "ended", "error", "group", "outcome", "task")
 
     def __init__(self, group: Group, step: Step) -> None:
         frame = group.frame
@@ -36,28 +41,42 @@ class Branch(Frame):
         self.outcome: str | None = None
         self.error: BaseException | None = None
         self.ended = False
+        self.cut = False
         self.task: Task | None = None
 
     def run_child(self) -> None:
         """Run the child; the task's whole work."""
         FRAME.set(self)
+        self.thread = threading.get_ident()
+        outcome, failure = None, None
         try:
             outcome = self._execute()
+        except Interruption:
+            outcome = "preempted"
         except BaseException as error:  # noqa: BLE001  handed to the container's thread
-            self.group.end(self, None, error)
-        else:
-            self.group.end(self, outcome, None)
+            failure = error
+        self.group.end(self, outcome, failure)
+
+    def abandon(self) -> None:
+        """Go on without the child; its thread is left behind."""
+        self.dead = True
+        self.group.end(self, "preempted", None)
 
     def _execute(self) -> str:
         step = self.step
         if self.told is not None:  # asked to stop before it began
             return "preempted"
-        if not self.run.watched:
-            outcome = step.execute(step.userdata)
-            if outcome in step.next:
-                return outcome
+        if self.run.watched:
+            if self.run.control is not None:
+                self.run.control.pass_gate(self, step)
+                if self.told is not None:
+                    return "preempted"
+            outcome = run_watched(self, step)
         else:
-            outcome = self._execute_watched(step)
+            outcome = step.execute(step.userdata)
+        if self.override is not None and self.override.outcome is not None:
+            outcome = self.override.outcome
+            self.emit(OutcomeForced, outcome)
         if outcome in step.next or (outcome == "preempted" and self.told is not None):
             return outcome
         outcomes = step.state.get_registered_outcomes()
@@ -65,16 +84,6 @@ class Branch(Frame):
             f"{self.here()}: unknown outcome: got {outcome!r}; expected one of "
             f"{sorted(outcomes)}.{did_you_mean(outcome, outcomes)}"
         )
-
-    def _execute_watched(self, step: Step) -> Any:
-        self.emit(Entered)
-        try:
-            outcome = step.execute(step.watched_userdata(self))
-        except Exception as error:
-            self.emit(Failed, f"{type(error).__name__}: {error}")
-            raise
-        self.emit(Left, outcome)
-        return outcome
 
 
 class Group:
@@ -106,8 +115,7 @@ class Group:
         """Ask the children of `branches` to stop; with the container's lock held."""
         for branch in branches:
             if not branch.ended:
-                branch.told = branch.step
-                branch.step.state.request_preempt()
+                self.container._tell(branch, branch.step)  # noqa: SLF001
 
     def end(self, branch: Branch, outcome: str | None, error: BaseException | None) -> None:
         """Note how a branch ended; the first report of a branch counts."""
@@ -116,7 +124,9 @@ class Group:
                 return
             branch.ended = True
             branch.outcome, branch.error = outcome, error
-            if branch.step.state.preempt_requested():
+            branch.cut = branch.told is not None
+            disarm(branch)
+            if not branch.dead:
                 branch.step.state.recall_preempt()
             self._left -= 1
             last = self._left == 0

@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import threading
 from contextvars import ContextVar
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from smachpy import log
 from smachpy.events import CallbackFailed
+from smachpy.util import has_shutdown_check
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from actionlib_core.clock import Clock
     from smachpy.container import Container
+    from smachpy.control import Control
     from smachpy.events import Event
     from smachpy.state import State
 
@@ -29,15 +31,26 @@ class Run:
         clock: The clock of the run.
         watched: Somebody wants to see or to control each transition. The inner loops look at this
             and nothing else.
+        logged: Transitions go to the log.
+        has_shutdown_check: `set_shutdown_check` was called.
         control: The operator's control, once somebody asked for it.
     """
 
-    __slots__ = ("clock", "control", "watched")
+    __slots__ = ("clock", "control", "has_shutdown_check", "logged", "watched")
 
     def __init__(self, clock: Clock) -> None:
         self.clock = clock
-        self.watched = False
-        self.control: Any = None
+        self.logged = log.is_info_wanted()
+        self.has_shutdown_check = has_shutdown_check()
+        self.watched = self.logged or self.has_shutdown_check
+        self.control: Control | None = None
+
+
+class Override(NamedTuple):
+    """What an operator wants instead of a child's own outcome: another one, or a jump."""
+
+    outcome: str | None = None
+    label: str | None = None
 
 
 class Frame:
@@ -47,10 +60,28 @@ class Frame:
         path: Path of the container.
         step: What runs now: anything with `label` and `state`; None between runs.
         told: The step whose state was asked to stop.
+        watch: What sees to it that the told step stops.
+        override: What an operator wants instead of the told step's outcome.
         boundary: The task that can be left behind when a state below ignores its preempt.
+        thread: Identifier of the thread it runs in.
+        injected: An interruption is on its way to that thread.
+        dead: The thread was left behind.
     """
 
-    __slots__ = ("boundary", "container", "parent", "path", "run", "step", "thread", "told")
+    __slots__ = (
+        "boundary",
+        "container",
+        "dead",
+        "injected",
+        "override",
+        "parent",
+        "path",
+        "run",
+        "step",
+        "thread",
+        "told",
+        "watch",
+    )
 
     def __init__(
         self, container: Container, path: str, run: Run, parent: Frame | None, step: Any = None
@@ -61,6 +92,10 @@ class Frame:
         self.parent = parent
         self.step = step
         self.told: Any = None
+        self.watch: Any = None
+        self.override: Override | None = None
+        self.injected = False
+        self.dead = False
         self.boundary: Any = None if parent is None else parent.boundary
         self.thread = threading.get_ident()
 

@@ -5,12 +5,176 @@ from __future__ import annotations
 import inspect
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+from smachpy._runtime.frame import FRAME
+from smachpy._runtime.interrupt import Interruption
+from smachpy.events import Retried, TimedOut
+from smachpy.exceptions import InvalidUserCodeError
 
+if TYPE_CHECKING:
+    import asyncio
+    from collections.abc import Callable, Coroutine
+
+    from smachpy._runtime.frame import Frame
     from smachpy.state import State
 
 
 def runner_of(state: State) -> Callable[[Any], Any]:
     """Return what runs `state` once: its `execute` itself when it asks for nothing more."""
-    return state.execute
+    execute: Callable[[Any], Any] = state.execute
+    callback = getattr(state, "_cb", None)  # a CBState whose function is a coroutine function
+    if inspect.iscoroutinefunction(execute) or inspect.iscoroutinefunction(callback):
+        execute = _Async(state, execute)
+    return guarded(state, execute)
+
+
+def guarded(state: State, execute: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Return `execute` with the options of `state` around it; itself when there are none."""
+    if (
+        state.timeout is None
+        and state.retry is None
+        and state.on_enter is None
+        and state.on_exit is None
+        and not state.on_exception
+    ):
+        return execute
+    return _Guarded(state, execute)
+
+
+class _Async:
+    """Runs a state's coroutine; a preempt cancels it."""
+
+    def __init__(self, state: State, execute: Callable[[Any], Coroutine[Any, Any, Any]]) -> None:
+        self._state = state
+        self._execute = execute
+
+    def __call__(self, userdata: Any) -> Any:
+        return self._state._clock().run_async(self._main(userdata))  # noqa: SLF001  one machinery
+
+    async def _main(self, userdata: Any) -> Any:
+        import asyncio
+
+        loop = asyncio.get_running_loop()
+        task = asyncio.ensure_future(self._execute(userdata))
+
+        def cancel() -> None:
+            loop.call_soon_threadsafe(_cancel, task)
+
+        forget = self._state._on_preempt(cancel)  # noqa: SLF001  one machinery
+        try:
+            return await task
+        except asyncio.CancelledError:
+            if not self._state.preempt_requested():
+                raise
+            self._state.service_preempt()
+            return "preempted"
+        finally:
+            forget()
+
+
+def _cancel(task: asyncio.Task[Any]) -> None:
+    task.cancel()
+
+
+class _Guarded:
+    """Runs a state with its options around it."""
+
+    def __init__(self, state: State, execute: Callable[[Any], Any]) -> None:
+        self._state = state
+        self._execute = execute
+
+    def __call__(self, userdata: Any) -> Any:
+        state = self._state
+        frame = FRAME.get()
+        if state.on_enter is not None:
+            self._hook(frame, state.on_enter, userdata)
+        outcome = self._attempts(frame, userdata)
+        if state.on_exit is not None:
+            self._hook(frame, state.on_exit, userdata, outcome)
+        return outcome
+
+    def _hook(self, frame: Frame | None, hook: Callable[..., object], *arguments: Any) -> None:
+        try:
+            hook(*arguments)
+        except Exception as error:
+            where = "" if frame is None else frame.here()
+            name = getattr(hook, "__name__", repr(hook))
+            raise InvalidUserCodeError(
+                f"{where}: hook {name} raised {type(error).__name__}: {error}", path=where
+            ) from error
+
+    def _attempts(self, frame: Frame | None, userdata: Any) -> Any:
+        """Run until an attempt is good, or the last one was made, or a preempt came."""
+        state = self._state
+        attempt = 1
+        while True:
+            result: Any
+            try:
+                result = self._once(frame, userdata)
+            except Exception as error:  # noqa: BLE001  raised again unless somebody wants it
+                result = error
+            retry = state.retry
+            if retry is None or state.preempt_requested() or not retry.wants(attempt, result):
+                return self._conclude(result)
+            if frame is not None:
+                frame.emit(Retried, attempt, _reason(result))
+            if retry.backoff and state.sleep(retry.wait_s(attempt)):
+                return self._conclude(result)
+            attempt += 1
+
+    def _conclude(self, result: Any) -> Any:
+        """Return the outcome, or raise what no `on_exception` entry wants."""
+        if not isinstance(result, Exception):
+            return result
+        cause = result
+        if isinstance(result, InvalidUserCodeError) and isinstance(result.__cause__, Exception):
+            cause = result.__cause__  # a container's child raised it
+        for kind, outcome in (self._state.on_exception or {}).items():
+            if isinstance(result, kind) or isinstance(cause, kind):
+                return outcome
+        raise result
+
+    def _once(self, frame: Frame | None, userdata: Any) -> Any:
+        """Run the state, at most for its timeout."""
+        timeout = self._state.timeout
+        if timeout is None:
+            return self._execute(userdata)
+        timeout_guard = _Timeout(self._state, frame, timeout)
+        try:
+            outcome = self._execute(userdata)
+        except Interruption:
+            if timeout_guard.passed and frame is not None and not frame.dead:
+                return self._state.timeout_outcome
+            raise
+        finally:
+            timeout_guard.cancel()
+        if timeout_guard.passed and outcome == "preempted":
+            return self._state.timeout_outcome
+        return outcome
+
+
+class _Timeout:
+    """Preempts a state when its time is over."""
+
+    def __init__(self, state: State, frame: Frame | None, timeout: float) -> None:
+        self._state = state
+        self._frame = frame
+        self._timeout = timeout
+        self._step = None if frame is None else frame.step
+        self.passed = False
+        self._timer = state._clock().call_later(timeout, self._over)  # noqa: SLF001  one machinery
+
+    def cancel(self) -> None:
+        self._timer.cancel()
+
+    def _over(self) -> None:
+        self.passed = True
+        frame = self._frame
+        if frame is None or frame.step is None or frame.step.state is not self._state:
+            self._state.request_preempt()
+            return
+        frame.emit(TimedOut, self._timeout)
+        frame.container._stop_child(frame, self._step)  # noqa: SLF001  one machinery
+
+
+def _reason(result: Any) -> str:
+    return f"{type(result).__name__}: {result}" if isinstance(result, Exception) else str(result)

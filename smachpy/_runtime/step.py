@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 from smachpy._runtime.guarded import runner_of
-from smachpy.events import UserdataWritten
+from smachpy._runtime.interrupt import Interruption
+from smachpy.events import Entered, Failed, Left, UserdataWritten
 from smachpy.user_data import Remapper
 
 if TYPE_CHECKING:
@@ -88,3 +89,18 @@ class _WatchedRemapper(Remapper):
 
     def __setattr__(self, name: str, value: Any) -> None:
         self[name] = value
+
+
+def run_watched(frame: Frame, step: Step) -> Any:
+    """Run a step and publish that it was entered and left."""
+    frame.emit(Entered)
+    try:
+        outcome = step.execute(step.watched_userdata(frame))
+    except Exception as error:
+        frame.emit(Failed, f"{type(error).__name__}: {error}")
+        raise
+    except Interruption:
+        frame.emit(Left, "preempted")
+        raise
+    frame.emit(Left, outcome)
+    return outcome

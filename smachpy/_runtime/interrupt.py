@@ -1,0 +1,97 @@
+"""Break into a thread that does not listen: the last resort of the preemption contract.
+
+Python offers two ways, and each reaches what the other does not:
+
+- a signal to the main thread wakes blocking calls too (`Lock.acquire`, `socket.recv`,
+  `time.sleep`): they return, the handler runs, and what it raises goes through the state;
+- an exception set for another thread is raised there at the next bytecode, so it ends loops but
+  no call that blocks in C. Such a thread can only be left behind.
+
+A virtual clock interrupts what waits on it by itself, so that tests stay deterministic.
+
+Source: CPython's `PyThreadState_SetAsyncExc` and the `signal` module's documentation, "Execution
+of Python signal handlers".
+"""
+
+from __future__ import annotations
+
+import ctypes
+import signal
+import threading
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
+
+if TYPE_CHECKING:
+    from types import FrameType
+
+    from smachpy._runtime.frame import Frame
+
+SIGNAL = signal.SIGURG  # ignored by default, so a late one does no harm
+
+
+class Interruption(BaseException):
+    """Raised inside a state that ignored its preempt; never seen outside its container."""
+
+
+@runtime_checkable
+class InterruptingClock(Protocol):
+    """A clock that can end a wait with an exception."""
+
+    def interrupt(self, ident: int, error: BaseException) -> bool:
+        """Raise `error` in the thread `ident` if it waits on this clock; tell whether it did."""
+        ...
+
+
+class _Target:
+    """What the signal handler shall break: the frame whose child is overdue."""
+
+    def __init__(self) -> None:
+        self.frame: Frame | None = None
+        self.installed = False
+
+    def __call__(self, _number: int, _stack: FrameType | None) -> None:
+        frame, self.frame = self.frame, None
+        if frame is not None and frame.told is not None and frame.told is frame.step:
+            raise Interruption
+
+
+_target = _Target()
+
+
+def interrupt(frame: Frame) -> None:
+    """Raise `Interruption` in the child that runs in `frame`; with the container's lock held.
+
+    The runner closes the window with `close`, so it is never raised after the child has ended.
+    """
+    clock = frame.run.clock
+    if isinstance(clock, InterruptingClock) and clock.interrupt(frame.thread, Interruption()):
+        return
+    in_main = frame.thread == threading.main_thread().ident
+    if in_main and signal.getsignal(SIGNAL) is _target:
+        _target.frame = frame
+        signal.pthread_kill(frame.thread, SIGNAL)
+        return
+    frame.injected = True
+    _set_exception(frame.thread, Interruption)
+
+
+def close(frame: Frame) -> None:
+    """Take back an interruption that has not arrived; with the container's lock held."""
+    if frame.injected:
+        frame.injected = False
+        _set_exception(frame.thread, None)
+
+
+def _set_exception(ident: int, kind: type[BaseException] | None) -> None:
+    pointer = None if kind is None else ctypes.py_object(kind)
+    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(ident), pointer)
+
+
+def use_signals() -> None:
+    """Let a signal break into states in the main thread; call it there.
+
+    The handler stays, as it does nothing unless a state is overdue. A program that handles the
+    signal itself keeps its handler.
+    """
+    if not _target.installed and signal.getsignal(SIGNAL) is signal.SIG_DFL:
+        signal.signal(SIGNAL, _target)
+    _target.installed = True
