@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TypeVar, cast
 
+from actionlib_core.exceptions import DeserializationError, FieldError, InterfaceError
 from actionlib_core.interfaces._message import Message
 from actionlib_core.interfaces._modules import install as _install
 from actionlib_core.interfaces._modules import install_ros_names
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
     import os
 
 __all__ = [
+    "DeserializationError",
+    "FieldError",
+    "InterfaceError",
     "Message",
     "ServiceType",
     "add_path",

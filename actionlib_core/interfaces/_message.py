@@ -197,9 +197,24 @@ def make_class(
     namespace |= {constant.attribute: constant.value for constant in definition.constants}
     namespace["__init__"] = _make_init(definition, resolve)
     cls: Any = type(definition.short_name, (Message,), namespace)
-    write, read = make_codecs(cls, definition, resolve)
-    cls._write = staticmethod(write)
-    cls._read = staticmethod(read)
+
+    def compile_codecs() -> None:
+        # On first use: most classes are only ever parts of others, which have them unrolled. Two
+        # threads here at once do the same work twice, nothing worse.
+        write, read = make_codecs(cls, definition, resolve)
+        cls._write = staticmethod(write)
+        cls._read = staticmethod(read)
+
+    def first_write(message: Any) -> bytes:
+        compile_codecs()
+        return cast("bytes", cls._write(message))
+
+    def first_read(data: bytes) -> Any:
+        compile_codecs()
+        return cls._read(data)
+
+    cls._write = staticmethod(first_write)
+    cls._read = staticmethod(first_read)
     for field in definition.fields:
         if field.name != field.attribute and not hasattr(Message, field.name):
             # `getattr(message, "in")` works too, under the field's own name.

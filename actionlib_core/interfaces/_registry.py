@@ -38,6 +38,14 @@ class ServiceType:
     _response_class: ClassVar[type[Message]]
 
 
+class _UnknownTypeError(InterfaceError):
+    """No place defines the type `name`."""
+
+    def __init__(self, text: str, name: str) -> None:
+        self.name = name
+        super().__init__(text)
+
+
 class Registry:
     """Makes classes from definitions, each once.
 
@@ -106,6 +114,11 @@ class Registry:
                     f"define: got {name!r}, which {before.origin} defines differently; expected a "
                     "new name or the same text"
                 )
+            made = [f"{package}/{short}{end}" for end in _ENDS[kind]]
+            if before is None and (taken := [n for n in made if n in self._messages]):
+                raise InterfaceError(
+                    f"define: got {name!r}, but there is {taken[0]!r} already; expected a new name"
+                )
             if before is None:
                 self.sources.define(kind, package, short, text)
             try:
@@ -114,8 +127,8 @@ class Registry:
                 if before is None:
                     self.sources.forget(kind, package, short)
                     # Parts that were fine must not meet the next definition of this name.
-                    for end in ("", *_ACTION_ENDS, "Request", "Response"):
-                        self._messages.pop(f"{package}/{short}{end}", None)
+                    for full in made:
+                        self._messages.pop(full, None)
                 raise
 
     def add_path(self, folder: str | os.PathLike[str]) -> None:
@@ -156,7 +169,7 @@ class Registry:
         if found is None:
             section, found = "srv", self.sources.service_part(package, short)
         if found is None:
-            raise InterfaceError(self._unknown("message", full))
+            raise _UnknownTypeError(self._unknown("message", full), full)
         source, first_line = found
         self._building.append(full)
         try:
@@ -180,21 +193,14 @@ class Registry:
         for field in definition.fields:
             if field.type.is_builtin or field.type.base in self._messages:
                 continue
-            package, short = field.type.base.split("/")
-            if not self._exists(package, short):
-                what = self._unknown("type", field.type.base)
-                problems.append(field.position.problem(what))
-                continue
             try:
                 self.message(field.type.base)
+            except _UnknownTypeError as error:
+                problems.append(field.position.problem(self._unknown("type", error.name)))
             except InterfaceError as error:
                 problems += error.problems
         if problems:
             raise InterfaceError(*dict.fromkeys(problems))
-
-    def _exists(self, package: str, short: str) -> bool:
-        found = self.sources.message_source(package, short)
-        return (found or self.sources.service_part(package, short)) is not None
 
     def _unknown(self, what: str, full: str) -> str:
         short = full.partition("/")[2]
@@ -276,6 +282,12 @@ _ACTION_ENDS = (
     *("Action", "ActionGoal", "ActionResult", "ActionFeedback"),
     *("Goal", "Result", "Feedback"),
 )
+_ENDS: dict[Kind, tuple[str, ...]] = {
+    "msg": ("",),
+    "srv": ("Request", "Response"),
+    "action": _ACTION_ENDS,
+}
+"""What follows the name in the messages that a definition makes."""
 
 
 def parse_name(name: str) -> tuple[str, str | None, str]:

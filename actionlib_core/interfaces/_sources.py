@@ -38,6 +38,8 @@ class Sources:
     The order: inline definitions, `add_path` folders (newest first), the folders in
     `SMACHPY_INTERFACE_PATH`, the bundled ones.
 
+    Threads: reads may happen while another thread defines or adds; those two need a lock around.
+
     Args:
         folders: Search these and nothing else, neither the environment's nor the bundled ones.
     """
@@ -57,13 +59,15 @@ class Sources:
                 "ROS layout: my_pkg/msg/Name.msg, my_pkg/srv/Name.srv, my_pkg/action/Name.action"
             )
         if path not in self._added:
-            self._added.insert(0, path)
+            self._added = [path, *self._added]
 
     def define(self, kind: Kind, package: str, name: str, text: str) -> None:
-        self._inline[kind, package, name] = Source(text, f"{package}/{kind}/{name} (inline)")
+        source = Source(text, f"{package}/{kind}/{name} (inline)")
+        self._inline = {**self._inline, (kind, package, name): source}
 
     def forget(self, kind: Kind, package: str, name: str) -> None:
-        self._inline.pop((kind, package, name), None)
+        gone = (kind, package, name)
+        self._inline = {key: source for key, source in self._inline.items() if key != gone}
 
     def search_path(self) -> list[Path]:
         """Return the folders searched, in order, missing ones included."""

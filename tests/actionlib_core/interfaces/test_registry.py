@@ -180,3 +180,10 @@ def test_full_text_holds_all_nested_definitions() -> None:
     for name in ("std_msgs/Header", "geometry_msgs/Pose", "geometry_msgs/Point"):
         assert f"{'=' * 80}\nMSG: {name}\n" in text
     assert text.count("MSG: ") == 4
+
+
+def test_a_definition_cannot_take_the_name_of_a_part_of_another() -> None:
+    registry = registry_of()
+    registry.define("action", "inline_pkg/Turn", "float32 angle\n---\n---\n")
+    with pytest.raises(InterfaceError, match="there is 'inline_pkg/TurnGoal' already"):
+        registry.define("msg", "inline_pkg/TurnGoal", "int32 other\n")
