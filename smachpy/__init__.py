@@ -58,13 +58,17 @@ from smachpy.util import is_shutdown as is_shutdown
 from smachpy.util import set_shutdown_check as set_shutdown_check
 
 if TYPE_CHECKING:
+    from smachpy.condition_state import ConditionState as ConditionState
     from smachpy.introspection import Kind as Kind
+    from smachpy.monitor_state import MonitorState as MonitorState
+    from smachpy.service_state import ServiceState as ServiceState
     from smachpy.simple_action_state import SimpleActionState as SimpleActionState
 
 __all__ = [
     "CBInterface",
     "CBState",
     "Concurrence",
+    "ConditionState",
     "Container",
     "InconsistentMachineError",
     "InvalidConstructionError",
@@ -72,11 +76,13 @@ __all__ = [
     "InvalidTransitionError",
     "InvalidUserCodeError",
     "Iterator",
+    "MonitorState",
     "ReadOnlyError",
     "Remapper",
     "Retry",
     "Rule",
     "Sequence",
+    "ServiceState",
     "SimpleActionState",
     "SmachError",
     "State",
@@ -101,6 +107,9 @@ __all__ = [
 
 # Names of states that need actionlib_core -> module that defines them; imported on first use.
 _LAZY: dict[str, str] = {
+    "ConditionState": "smachpy.condition_state",
+    "MonitorState": "smachpy.monitor_state",
+    "ServiceState": "smachpy.service_state",
     "SimpleActionState": "smachpy.simple_action_state",
 }
 

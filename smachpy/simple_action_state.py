@@ -12,15 +12,14 @@ from actionlib_core.node import get_node
 from actionlib_core.time import to_seconds
 from smachpy import log
 from smachpy._core.goal_run import ABORTED, OUTCOMES, PREEMPTED, GoalRun
-from smachpy._core.readonly import writable
 from smachpy._runtime.goal_exchange import GoalExchange
 from smachpy._runtime.interface import adopt_interface
+from smachpy._runtime.messages import Incoming, Outgoing, UserCallback, raise_problems
 from smachpy._runtime.wakeup import Wakeup
-from smachpy.exceptions import InvalidStateError, did_you_mean
 from smachpy.state import State
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
     from typing import Unpack
 
     from actionlib_core.node import Node
@@ -134,17 +133,21 @@ class SimpleActionState(State):
         super().__init__((*OUTCOMES, *outcomes), input_keys, output_keys, **options)
         self._action_name = action_name
         self._types = ActionTypes.of(action_spec)
-        self._goal = copy.deepcopy(goal)
-        self._goal_key = goal_key
-        self._goal_slots = tuple(goal_slots)
-        self._goal_cb = goal_cb
-        self._goal_cb_args = tuple(goal_cb_args)
-        self._goal_cb_kwargs = dict(goal_cb_kwargs or {})
-        self._result_key = result_key
-        self._result_slots = tuple(result_slots)
-        self._result_cb = result_cb
-        self._result_cb_args = tuple(result_cb_args)
-        self._result_cb_kwargs = dict(result_cb_kwargs or {})
+        self._goal = Outgoing(
+            "goal",
+            self._types.goal,
+            copy.deepcopy(goal),
+            goal_key,
+            tuple(goal_slots),
+            UserCallback.of(goal_cb, goal_cb_args, goal_cb_kwargs),
+        )
+        self._result = Incoming(
+            "result",
+            self._types.result,
+            result_key,
+            tuple(result_slots),
+            UserCallback.of(result_cb, result_cb_args, result_cb_kwargs),
+        )
         self._feedback_cb = feedback_cb
         self._feedback_key = feedback_key
         self._exec_s = to_seconds(exec_timeout)
@@ -154,41 +157,19 @@ class SimpleActionState(State):
         self._node = node
         self._client: ActionClient[Any] | None = None
         self._exchange: GoalExchange | None = None
-        self._check_arguments()
-        self._declare_keys()
+        raise_problems(self, action_name, [*self._problems()])
+        self._goal.declare(self)
+        self._result.declare(self)
+        self.register_output_keys([] if feedback_key is None else [feedback_key])
+        adopt_interface(self, feedback_cb, "feedback_cb", outcomes=False)
 
-    def _check_arguments(self) -> None:
-        types, problems = self._types, []
-        if self._goal is not None and not isinstance(self._goal, types.goal):
-            problems.append(
-                f"goal: got {self._goal!r}; expected a message of type {types.goal._type}."
-            )
-        for name, slots, message in (
-            ("goal_slots", self._goal_slots, types.goal),
-            ("result_slots", self._result_slots, types.result),
-        ):
-            known = list(message.__slots__)
-            problems += [
-                f"{name}: got {slot!r}; expected fields of {message._type}: {known}."
-                f"{did_you_mean(slot, known)}"
-                for slot in slots
-                if slot not in known
-            ]
+    def _problems(self) -> Iterator[str]:
+        yield from self._goal.problems()
+        yield from self._result.problems()
         for name in ("exec", "preempt", "server_wait"):
             seconds = getattr(self, f"_{name}_s")
             if seconds is not None and seconds < 0:
-                problems.append(f"{name}_timeout: got {seconds!r}; expected seconds >= 0, or None.")
-        if problems:
-            where = f"{type(self).__name__} {self._action_name!r}"
-            raise InvalidStateError("\n".join(f"{where}: {problem}" for problem in problems))
-
-    def _declare_keys(self) -> None:
-        self.register_input_keys([*filter(None, [self._goal_key]), *self._goal_slots])
-        self.register_output_keys([*filter(None, [self._result_key]), *self._result_slots])
-        self.register_output_keys(filter(None, [self._feedback_key]))
-        adopt_interface(self, self._goal_cb, "goal_cb", outcomes=False)
-        adopt_interface(self, self._result_cb, "result_cb")
-        adopt_interface(self, self._feedback_cb, "feedback_cb", outcomes=False)
+                yield f"{name}_timeout: got {seconds!r}; expected seconds >= 0, or None."
 
     # -- running -------------------------------------------------------------------------------
 
@@ -207,7 +188,7 @@ class SimpleActionState(State):
         with Wakeup(self) as wake:
             if self._is_preempted():
                 return PREEMPTED
-            goal = self._make_goal(ud)
+            goal = self._goal.build(ud)
             client = self._get_client()
             if self._is_preempted():
                 return PREEMPTED
@@ -228,21 +209,6 @@ class SimpleActionState(State):
             return False
         self.service_preempt()
         return True
-
-    def _make_goal(self, ud: Any) -> Any:
-        """Return the goal of this run; nothing in it is shared with userdata or other runs."""
-        if self._goal_key is not None:
-            goal = copy.deepcopy(writable(ud[self._goal_key]))
-        elif self._goal is not None:
-            goal = copy.deepcopy(self._goal)
-        else:
-            goal = self._types.goal()
-        for slot in self._goal_slots:
-            setattr(goal, slot, copy.deepcopy(writable(ud[slot])))
-        if self._goal_cb is not None:
-            made = self._goal_cb(ud, goal, *self._goal_cb_args, **self._goal_cb_kwargs)
-            goal = copy.deepcopy(writable(goal if made is None else made))
-        return goal
 
     def _get_client(self) -> ActionClient[Any]:
         """Return the client on the node in force, made when there is none yet."""
@@ -265,23 +231,14 @@ class SimpleActionState(State):
         if run.preempted:
             self.service_preempt()
         if result is not None:
-            if self._result_key is not None:
-                ud[self._result_key] = result
-            for slot in self._result_slots:
-                ud[slot] = getattr(result, slot)
+            self._result.store(ud, result)
         if run.outcome == ABORTED or run.abandoned:
             log.logwarn(self._explain(exchange))
-        if self._result_cb is not None:
-            chosen = self._result_cb(
-                ud,
-                getattr(GoalStatus, run.status),
-                self._types.result() if result is None else result,
-                *self._result_cb_args,
-                **self._result_cb_kwargs,
-            )
-            if chosen is not None:
-                return chosen
-        return run.outcome
+        status = getattr(GoalStatus, run.status)
+        chosen = self._result.callback(
+            ud, status, self._types.result() if result is None else result
+        )
+        return run.outcome if chosen is None else chosen
 
     def _explain(self, exchange: GoalExchange) -> str:
         run, scope = exchange.run, self._scope()

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from actionlib_core.action_client import ActionClient
-    from actionlib_core.goal_manager import CommStateMachine
+    from actionlib_core.comm_state_machine import CommStateMachine
     from smachpy._runtime.frame import Scope
     from smachpy._runtime.wakeup import Wakeup
 

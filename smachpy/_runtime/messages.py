@@ -1,0 +1,144 @@
+"""Messages made from userdata, and messages handed on to it: what the talking states share."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from smachpy._core.readonly import writable
+from smachpy._runtime.interface import adopt_interface
+from smachpy.exceptions import InvalidStateError, did_you_mean
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+    from smachpy.state import State
+
+
+@dataclass(frozen=True, slots=True)
+class UserCallback:
+    """A function of the user's with the arguments that follow ours."""
+
+    function: Callable[..., Any] | None
+    args: tuple[Any, ...]
+    kwargs: dict[str, Any]
+
+    @classmethod
+    def of(
+        cls,
+        function: Callable[..., Any] | None,
+        args: Iterable[Any],
+        kwargs: Mapping[str, Any] | None,
+    ) -> UserCallback:
+        """Take over the arguments; later changes of the caller's do not matter."""
+        return cls(function, tuple(args), dict(kwargs or {}))
+
+    def __call__(self, *ours: Any) -> Any:
+        """Call it; None when there is none."""
+        if self.function is None:
+            return None
+        return self.function(*ours, *self.args, **self.kwargs)
+
+
+@dataclass(frozen=True, slots=True)
+class Outgoing:
+    """What a state sends: a given message or that of a key, then fields, then a callback.
+
+    Attributes:
+        name: What it is, for names of arguments: "goal", "request".
+        message_class: Its class.
+        given: The message to begin with, or None.
+        key: Userdata key of the message to begin with, or None.
+        slots: Fields that are set from userdata keys of the same name.
+        callback: Called with userdata and message; may return another message.
+    """
+
+    name: str
+    message_class: Any
+    given: Any
+    key: str | None
+    slots: tuple[str, ...]
+    callback: UserCallback
+
+    def problems(self) -> list[str]:
+        """Return what is wrong with the arguments."""
+        problems = _slot_problems(self.name, self.slots, self.message_class)
+        if self.given is not None and not isinstance(self.given, self.message_class):
+            expected = self.message_class._type
+            problems.append(
+                f"{self.name}: got {self.given!r}; expected a message of type {expected}."
+            )
+        return problems
+
+    def declare(self, state: State) -> None:
+        """Register the keys that are read."""
+        state.register_input_keys([*([] if self.key is None else [self.key]), *self.slots])
+        adopt_interface(state, self.callback.function, f"{self.name}_cb", outcomes=False)
+
+    def build(self, ud: Any) -> Any:
+        """Return the message of this run; nothing in it is shared with userdata or other runs."""
+        if self.key is not None:
+            message = copy.deepcopy(writable(ud[self.key]))
+        elif self.given is not None:
+            message = copy.deepcopy(self.given)
+        else:
+            message = self.message_class()
+        for slot in self.slots:
+            setattr(message, slot, copy.deepcopy(writable(ud[slot])))
+        if self.callback.function is not None:
+            made = self.callback(ud, message)
+            message = copy.deepcopy(writable(message if made is None else made))
+        return message
+
+
+@dataclass(frozen=True, slots=True)
+class Incoming:
+    """What a state receives: into a key, fields into keys of the same name, to a callback.
+
+    Attributes:
+        name: What it is, for names of arguments: "result", "response".
+        message_class: Its class.
+        key: Userdata key that gets the message, or None.
+        slots: Fields that are written to userdata keys of the same name.
+        callback: Chooses the outcome, maybe.
+    """
+
+    name: str
+    message_class: Any
+    key: str | None
+    slots: tuple[str, ...]
+    callback: UserCallback
+
+    def problems(self) -> list[str]:
+        """Return what is wrong with the arguments."""
+        return _slot_problems(self.name, self.slots, self.message_class)
+
+    def declare(self, state: State) -> None:
+        """Register the keys that are written, and what the callback declared."""
+        state.register_output_keys([*([] if self.key is None else [self.key]), *self.slots])
+        adopt_interface(state, self.callback.function, f"{self.name}_cb")
+
+    def store(self, ud: Any, message: Any) -> None:
+        """Write the message to userdata."""
+        if self.key is not None:
+            ud[self.key] = message
+        for slot in self.slots:
+            ud[slot] = getattr(message, slot)
+
+
+def raise_problems(state: State, what: str, problems: list[str]) -> None:
+    """Raise `InvalidStateError` with all problems, if there are any."""
+    if problems:
+        where = f"{type(state).__name__} {what!r}"
+        raise InvalidStateError("\n".join(f"{where}: {problem}" for problem in problems))
+
+
+def _slot_problems(name: str, slots: tuple[str, ...], message_class: Any) -> list[str]:
+    known = list(message_class.__slots__)
+    return [
+        f"{name}_slots: got {slot!r}; expected fields of {message_class._type}: {known}."
+        f"{did_you_mean(slot, known)}"
+        for slot in slots
+        if slot not in known
+    ]

@@ -1,0 +1,138 @@
+"""`MonitorState`: check every message of a topic."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from actionlib_core.time import to_seconds
+from actionlib_core.topic import Subscriber
+from smachpy import log
+from smachpy._runtime.interface import adopt_interface, name_of
+from smachpy._runtime.wakeup import Wakeup
+from smachpy.events import CallbackFailed
+from smachpy.state import State
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+    from typing import Unpack
+
+    from actionlib_core.node import Node
+    from actionlib_core.time import Duration
+    from smachpy._runtime.interface import UntimedOptions
+    from smachpy.introspection import Kind
+
+__all__ = ["MonitorState"]
+
+
+class MonitorState(State):
+    """Checks the messages of a topic. Outcomes: 'valid', 'invalid', 'preempted'.
+
+    The condition runs in the thread that runs the state, once per message, in order.
+
+    Args:
+        topic: Name of the topic.
+        msg_type: Class of its messages.
+        cond_cb: Called as `cond_cb(userdata, message)`. The first false answer ends the state with
+            'invalid'; so does an exception, which is logged and reported as `CallbackFailed`. Its
+            `cb_interface` is added.
+        max_checks: 'valid' after so many true answers; -1: no limit.
+        input_keys: Userdata keys that it reads.
+        output_keys: Userdata keys that it writes.
+        timeout: `timeout_outcome` after so long [s]; None: no limit.
+        timeout_outcome: Outcome then; registered if there is a timeout.
+        latest: Of several messages that wait, check only the newest.
+        node: Where to listen; the current node when None.
+        **options: See `smachpy.state.StateOptions`.
+    """
+
+    kind: ClassVar[Kind] = "monitor"
+
+    def __init__(
+        self,
+        topic: str,
+        msg_type: Any,
+        cond_cb: Callable[[Any, Any], object],
+        max_checks: int = -1,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        *,
+        timeout: float | Duration | None = None,
+        timeout_outcome: str = "aborted",
+        latest: bool = False,
+        node: Node | None = None,
+        **options: Unpack[UntimedOptions],
+    ) -> None:
+        super().__init__(("valid", "invalid", "preempted"), input_keys, output_keys, **options)
+        self._topic = topic
+        self._msg_type = msg_type
+        self._cond_cb = cond_cb
+        self._max_checks = max_checks
+        self._timeout_s = to_seconds(timeout)
+        self.timeout_outcome = timeout_outcome
+        if self._timeout_s is not None:
+            self.register_outcomes([timeout_outcome])
+        self._latest = latest
+        self._node = node
+        adopt_interface(self, cond_cb, "cond_cb", outcomes=False)
+
+    def execute(self, ud: Any) -> str:
+        """Check messages until one is bad, enough are good, time is up, or a preempt.
+
+        Blocks: see above.
+        """
+        inbox: deque[Any] = deque(maxlen=1 if self._latest else None)
+        with Wakeup(self) as wake:
+
+            def note(message: Any) -> None:
+                inbox.append(message)
+                wake.set()
+
+            with Subscriber(self._topic, self._msg_type, note, node=self._node):
+                return self._watch(ud, wake, inbox)
+
+    def _watch(self, ud: Any, wake: Wakeup, inbox: deque[Any]) -> str:
+        clock = wake.clock
+        until = None if self._timeout_s is None else clock.now() + self._timeout_s
+        checks = 0
+        while True:
+            wake.clear()
+            if self.preempt_requested():
+                self.service_preempt()
+                return "preempted"
+            if until is not None and clock.now() >= until:
+                return self.timeout_outcome
+            if inbox:
+                if not self._check(ud, inbox.popleft()):
+                    return "invalid"
+                checks += 1
+                if 0 < self._max_checks <= checks:
+                    return "valid"
+                continue
+            wake.wait_until(until)
+
+    def _check(self, ud: Any, message: Any) -> bool:
+        try:
+            return bool(self._cond_cb(ud, message))
+        except Exception as error:  # noqa: BLE001  SMACH's rule: a broken check is not passed
+            text = f"{type(error).__name__}: {error}"
+            scope = self._scope()
+            where = f"MonitorState {self._topic!r}" if scope is None else scope.path
+            log.log_exception(f"{where}: condition {name_of(self._cond_cb)} raised {text}", error)
+            if scope is not None:
+                scope.emit(CallbackFailed, name_of(self._cond_cb), text)
+            return False
+
+    def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
+        """Add the topic, the condition and the limits."""
+        kind, details = super().describe_details()
+        own = [
+            ("topic", self._topic),
+            ("type", str(self._msg_type._type)),
+            ("condition", name_of(self._cond_cb)),
+        ]
+        if self._max_checks > 0:
+            own.append(("checks", str(self._max_checks)))
+        if self._timeout_s is not None:
+            own.append(("timeout", f"{self._timeout_s:g} s -> {self.timeout_outcome}"))
+        return kind, (*own, *details)
