@@ -302,7 +302,7 @@ def _read_source(
     cls: type[Message], definition: Definition, resolve: Resolve, scope: dict[str, Any]
 ) -> str:
     source = _Source(scope)
-    source.add("if d.__class__ is not bytes: d = bytes(d)")
+    source.add("if d.__class__ is not bytes: d = bytes(memoryview(d))")
     source.add("try:")
     source.indent += 1
     cursor = _Cursor(source, "0")

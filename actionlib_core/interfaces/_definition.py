@@ -139,6 +139,12 @@ class Definition:
         return self.name.partition("/")[0]
 
     @property
+    def has_header(self) -> bool:
+        """Whether it begins with `Header header`, so that a publisher may number the messages."""
+        first = self.fields[0] if self.fields else None
+        return first is not None and (first.name, str(first.type)) == ("header", "std_msgs/Header")
+
+    @property
     def short_name(self) -> str:
         """The name without its package."""
         return self.name.partition("/")[2]

@@ -178,8 +178,9 @@ def make_class(
         full_text: Value of `_full_text`.
     """
     slots = [field.attribute for field in definition.fields]
-    if clash := set(slots) & {constant.attribute for constant in definition.constants}:
-        raise InterfaceError(f"{definition.source}: names used twice: {sorted(clash)}")
+    names = [*slots, *(constant.attribute for constant in definition.constants)]
+    if twice := {name for name in names if names.count(name) > 1}:
+        raise InterfaceError(f"{definition.source}: Python names used twice: {sorted(twice)}")
     namespace: dict[str, Any] = {
         "__slots__": slots,
         "__module__": module,
@@ -188,7 +189,7 @@ def make_class(
         "_md5sum": md5,
         "_slot_types": [str(field.type) for field in definition.fields],
         "_full_text": full_text,
-        "_has_header": bool(slots) and str(definition.fields[0].type) == "std_msgs/Header",
+        "_has_header": definition.has_header,
         "_definition": definition,
         "_nested": {
             f.type.base: resolve(f.type.base) for f in definition.fields if not f.type.is_builtin
@@ -230,24 +231,25 @@ def _documentation(definition: Definition) -> str:
 
 def _make_init(definition: Definition, resolve: Callable[[str], type[Message]]) -> Any:
     """Make `__init__`: one argument per field, None (or nothing) for the default."""
+    # Names with an underscore in front, which no field has.
     scope: dict[str, Any] = {
-        "Time": Time,
-        "Duration": Duration,
-        "to_time": to_time,
-        "take_extra": _take_extra,
+        "_Time": Time,
+        "_Duration": Duration,
+        "_to_time": to_time,
+        "_take_extra": _take_extra,
     }
     names = [field.attribute for field in definition.fields]
-    lines = [f"def __init__({', '.join(['self', *(f'{n}=None' for n in names), '**extra'])}):"]
+    lines = [f"def __init__({', '.join(['self', *(f'{n}=None' for n in names), '**_extra'])}):"]
     for field in definition.fields:
         name = field.attribute
         default = default_source(field.type, resolve, scope)
         given = name
         if not field.type.is_array and field.type.base in {"time", "duration"}:
-            cls = "Time" if field.type.base == "time" else "Duration"
-            given = f"{name} if {name}.__class__ is {cls} else to_time({cls}, {name})"
+            cls = "_Time" if field.type.base == "time" else "_Duration"
+            given = f"{name} if {name}.__class__ is {cls} else _to_time({cls}, {name})"
             given = f"({given})"
         lines.append(f"    self.{name} = {default} if {name} is None else {given}")
-    lines.append("    if extra: take_extra(self, extra)")
+    lines.append("    if _extra: _take_extra(self, _extra)")
     # The text holds only names checked by the parser.
     exec(compile("\n".join(lines), f"<__init__ of {definition.name}>", "exec"), scope)  # noqa: S102
     return scope["__init__"]

@@ -80,7 +80,7 @@ class _Finder(MetaPathFinder, Loader):
     def find_spec(
         self,
         fullname: str,
-        path: Sequence[str] | None,  # noqa: ARG002 # the protocol's
+        path: Sequence[str] | None,
         target: types.ModuleType | None = None,  # noqa: ARG002 # the protocol's
     ) -> ModuleSpec | None:
         if not fullname.startswith(self.prefix):
@@ -88,9 +88,19 @@ class _Finder(MetaPathFinder, Loader):
         package, _, section = fullname.removeprefix(self.prefix).partition(".")
         if package.startswith("_") or section not in {"", *_SECTIONS}:
             return None
-        if not self._registry.sources.has_package(package):
+        if not self._registry.sources.has_package(package) or self._is_found_elsewhere(
+            fullname, path
+        ):
             return None
         return ModuleSpec(fullname, self, is_package=not section)
+
+    def _is_found_elsewhere(self, fullname: str, path: Sequence[str] | None) -> bool:
+        """Tell whether a plain name has a module of another origin; a mere folder is none."""
+        if self.prefix:
+            return False
+        others = [finder for finder in sys.meta_path if not isinstance(finder, _Finder)]
+        specs = [finder.find_spec(fullname, path) for finder in others]
+        return any(spec is not None and spec.loader is not None for spec in specs)
 
     def create_module(self, spec: ModuleSpec) -> types.ModuleType:
         package, _, section = spec.name.removeprefix(self.prefix).partition(".")
@@ -104,8 +114,7 @@ class _Finder(MetaPathFinder, Loader):
 
 def install() -> None:
     """Make `actionlib_core.interfaces.<pkg>` importable; called by the package itself, once."""
-    # First, so that the folder of a package's stubs is not taken for a namespace package.
-    _install(f"{ROOT}.", first=True)
+    _install(f"{ROOT}.")
 
 
 def install_ros_names() -> None:
@@ -123,10 +132,10 @@ def install_ros_names() -> None:
             f"install_ros_names: got geometry_msgs from {getattr(taken, '__file__', '?')} imported "
             "already; expected none. Try calling it first, or use the other installation"
         )
-    _install("", first=False)
+    _install("")
 
 
-def _install(prefix: str, *, first: bool) -> None:
-    present = [f for f in sys.meta_path if isinstance(f, _Finder) and f.prefix == prefix]
-    if not present:
-        sys.meta_path.insert(0 if first else len(sys.meta_path), _Finder(prefix, registry))
+def _install(prefix: str) -> None:
+    # First, so that no folder (of stubs, of definitions) is taken for a namespace package.
+    if not any(isinstance(f, _Finder) and f.prefix == prefix for f in sys.meta_path):
+        sys.meta_path.insert(0, _Finder(prefix, registry))

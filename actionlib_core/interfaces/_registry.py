@@ -147,7 +147,8 @@ class Registry:
                 for name in self.sources.names("action", package)
                 for end in _ACTION_ENDS
             ]
-            return [*self.sources.names("msg", package), *actions]
+            # A build folder of ROS holds the parts of actions as files too.
+            return list(dict.fromkeys([*self.sources.names("msg", package), *actions]))
 
     def attribute(self, package: str, kind: Kind, name: str) -> type:
         """Return what `pkg.msg.name` or `pkg.srv.name` is; raises as `message`."""

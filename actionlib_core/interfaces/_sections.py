@@ -15,6 +15,7 @@ _LOOKS_LIKE_SEPARATOR = re.compile(r"\s*(-{2,}|[\u2012-\u2015]+|-[\u2012-\u2015]
 
 SERVICE_PARTS = ("request", "response")
 ACTION_PARTS = ("goal", "result", "feedback")
+_warned: dict[str | tuple[str, type[Warning], int], int] = {}  # so that each is shown once
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +54,8 @@ def split(text: str, parts: tuple[str, ...], source: str) -> tuple[Section, ...]
         if len(starts) > wanted:
             raise InterfaceError(at.problem(f"one separator too many; {expected}"))
         if match[1] != _SEPARATOR:
-            text = at.problem(f"separator {match[1]!r} taken for '---'. Try writing '---'")
-            warnings.warn(text, InterfaceWarning, stacklevel=2)
+            what = f"separator {match[1]!r} taken for '---'. Try writing '---'"
+            warnings.warn_explicit(what, InterfaceWarning, source, number, registry=_warned)
         sections.append([])
         starts.append(number + 1)
     if len(starts) <= wanted:

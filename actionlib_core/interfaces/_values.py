@@ -29,8 +29,8 @@ _DEFAULTS = {
     **dict.fromkeys(FLOATS, "0.0"),
     "bool": "False",
     "string": '""',
-    "time": "Time()",
-    "duration": "Duration()",
+    "time": "_Time()",
+    "duration": "_Duration()",
 }
 _OCTETS = ("uint8", "char")
 
@@ -50,7 +50,7 @@ def default_source(
         return f"[{element} for _ in range({kind.length})]"
     if kind.is_builtin:
         return _DEFAULTS[kind.base]
-    name = "M_" + kind.base.replace("/", "_")
+    name = "_M_" + kind.base.replace("/", "_")
     scope[name] = resolve(kind.base)
     return f"{name}()"
 

@@ -342,6 +342,23 @@ def test_fields_named_as_methods() -> None:
     assert message.to_dict() == {"serialize": 1, "lambda": 2, "x_1": 3}
 
 
+def test_fields_named_as_what_the_generated_code_uses() -> None:
+    text = (
+        "time Time\nduration Duration\nint32 extra\nint32 to_time\nstd_msgs/Header d\nint32 self\n"
+    )
+    cls: Any = interfaces.define_message("test_message_pkg/Names", text)
+    message = cls(Time=1.5, Duration=2, extra=3, to_time=4, self_=5)
+    assert cls.from_bytes(message.to_bytes()) == message
+    assert message.Duration == Duration(2)
+    with pytest.raises(InterfaceError, match="used twice: \\['in_'\\]"):
+        interfaces.define_message("test_message_pkg/In", "int32 in\nint32 in_\n")
+
+
+def test_numbers_are_no_payload() -> None:
+    with pytest.raises(TypeError):
+        Empty.from_bytes(0)  # type: ignore[arg-type]
+
+
 def test_a_field_and_a_constant_cannot_share_a_name() -> None:
     with pytest.raises(InterfaceError, match="duplicate"):
         interfaces.define_message("test_message_pkg/Twice", "int32 a=1\nint32 a\n")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -81,6 +82,25 @@ def test_plain_ros_names_run_old_programs() -> None:
         "print(std_msgs.msg.String('hi').data, TestAction._type, actionlib.__name__)"
     )
     assert printed == "hi actionlib/TestAction actionlib"
+
+
+def test_folders_of_definitions_do_not_hide_their_classes(tmp_path: Path) -> None:
+    (tmp_path / "my_pkg" / "msg").mkdir(parents=True)
+    (tmp_path / "my_pkg" / "msg" / "Age.msg").write_text("float32 years\n")
+    (tmp_path / "real_pkg" / "msg").mkdir(parents=True)
+    (tmp_path / "real_pkg" / "msg" / "Age.msg").write_text("float32 years\n")
+    (tmp_path / "real_pkg" / "__init__.py").write_text("REAL = True\n")
+    printed = run(
+        "import os, sys\n"
+        f"os.chdir({str(tmp_path)!r}); sys.path.insert(0, '')\n"
+        "from actionlib_core import interfaces\n"
+        "interfaces.add_path('.'); interfaces.install_ros_names()\n"
+        "from my_pkg.msg import Age\n"
+        "import real_pkg\n"
+        "from real_pkg.msg import Age as Other\n"
+        "print(Age._type, Other._type, real_pkg.REAL)"
+    )
+    assert printed == "my_pkg/Age real_pkg/Age True"
 
 
 def test_plain_names_of_another_installation_are_not_mixed(monkeypatch: pytest.MonkeyPatch) -> None:
