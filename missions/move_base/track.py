@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Colour = tuple[int, int, int]
 
 WIDTH: Final = 1600  # [pixels] of the finished picture, the longer side
-_SMOOTH: Final = 3  # drawn this many times larger, then scaled down
+_SMOOTH: Final = 2  # drawn this many times larger, then scaled down
 _FLOOR: Final[Colour] = (250, 249, 246)
 _WALL: Final[Colour] = (52, 58, 70)
 _OUTSIDE: Final[Colour] = (226, 228, 232)
@@ -159,7 +159,7 @@ class _Canvas:
         """Scale down and add the line below."""
         size = (self._image.width // _SMOOTH, self._image.height // _SMOOTH)
         picture = Image.new("RGB", (size[0], size[1] + _LEGEND_PX), _PAPER)
-        picture.paste(self._image.resize(size, Image.Resampling.LANCZOS), (0, 0))
+        picture.paste(self._image.reduce(_SMOOTH), (0, 0))
         draw = ImageDraw.Draw(picture)
         middle = size[1] + _LEGEND_PX // 2
         draw.text((20, middle), title, fill=_INK, font=_font(20), anchor="lm")
