@@ -23,6 +23,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from smachpy._core.retry import Retry as Retry
+from smachpy._decorator import state as state
+from smachpy._runtime.frame import current_state as current_state
 from smachpy.concurrence import Concurrence as Concurrence
 from smachpy.concurrence import Rule as Rule
 from smachpy.concurrence import all_of as all_of
@@ -93,6 +95,7 @@ __all__ = [
     "all_of",
     "any_of",
     "cb_interface",
+    "current_state",
     "describe",
     "has_smach_interface",
     "is_shutdown",
@@ -103,6 +106,7 @@ __all__ = [
     "n_of",
     "set_loggers",
     "set_shutdown_check",
+    "state",
 ]
 
 # Names of states that need actionlib_core -> module that defines them; imported on first use.

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from smachpy import log
 from smachpy._construction import construction_method
-from smachpy._core.names import unique_names
 from smachpy._core.rules import Rule, all_of, any_of, as_rules, decide, n_of
 from smachpy._core.spec import ChildSpec, ConcurrenceSpec
 from smachpy._core.validate import concurrence_problems
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
 
     from smachpy._runtime.branches import Branch
     from smachpy._runtime.frame import Frame
-    from smachpy._runtime.step import Step
     from smachpy.introspection import Kind
     from smachpy.state import State, StateOptions
     from smachpy.user_data import UserData
@@ -47,7 +45,7 @@ class _Plan:
         self.userdata = concurrence.userdata
         self.steps = [concurrence._make_step(label) for label in concurrence._states]  # noqa: SLF001
         for step in self.steps:
-            step.next = dict.fromkeys(step.state.get_registered_outcomes())  # type: ignore[arg-type]
+            step.next = dict.fromkeys(step.state.get_registered_outcomes())
 
     def is_stale(self, concurrence: Concurrence) -> bool:
         return self.userdata is not concurrence.userdata or any(
@@ -112,7 +110,11 @@ class Concurrence(Container):
                 problems.append(
                     f"outcome map: got {outcome!r}; expected one of {sorted(self._outcomes)}.{near}"
                 )
-        for what, cb in (("outcome_cb", outcome_cb), ("child_termination_cb", child_termination_cb)):
+        callbacks: tuple[tuple[str, Any], ...] = (
+            ("outcome_cb", outcome_cb),
+            ("child_termination_cb", child_termination_cb),
+        )
+        for what, cb in callbacks:
             if cb is not None and not callable(cb):
                 problems.append(f"{what}: got {cb!r}; expected a function")
         if problems:

@@ -140,9 +140,7 @@ class Container(State):
             if isinstance(child, Container):
                 child.reset_userdata()
 
-    def _store_child(
-        self, label: str, state: State, remapping: Mapping[str, str] | None
-    ) -> None:
+    def _store_child(self, label: str, state: State, remapping: Mapping[str, str] | None) -> None:
         if not isinstance(label, str) or not label:
             raise InvalidStateError(f"label: got {label!r}; expected a string, not empty.")
         if label in self._states:
@@ -256,7 +254,11 @@ class Container(State):
             super().request_preempt()
             frame = self._frame
             if frame is not None:
+                if frame.parent is None:
+                    frame.note(frame.path, PreemptRequested)
                 self._tell_children(frame)
+        if frame is not None and frame.parent is None:
+            frame.run.flush()
 
     def _tell_children(self, frame: Frame) -> None:
         """Pass the preempt on to what runs; called with the lock held."""
@@ -267,8 +269,7 @@ class Container(State):
     def _tell(self, frame: Frame, step: Step) -> None:
         """Ask one child to stop and see that it does; called with the lock held."""
         frame.told = step
-        if frame.run.watched:
-            frame.emit(PreemptRequested)
+        frame.note(f"{frame.path}/{step.label}", PreemptRequested)
         step.state.request_preempt()
         arm(frame, step)
 
@@ -279,7 +280,8 @@ class Container(State):
                 return False
             frame.override = override
             self._tell(frame, step)
-            return True
+        frame.run.flush()
+        return True
 
     def _running_frames(self, frame: Frame) -> list[Frame]:
         """Return the frames that have a running child each: one, or the concurrence's branches."""

@@ -12,7 +12,7 @@ preempted and runs again after the resume (`cancel`). Costs nothing while it is 
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from smachpy._runtime.frame import Override
 from smachpy.events import Paused, Resumed

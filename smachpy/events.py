@@ -68,8 +68,7 @@ class PreemptRequested(NamedTuple):
 
 
 class Preempted(NamedTuple):
-    """A container ended because of a preempt; `label` is the child that was not started or not
-    followed."""
+    """A container ended because of a preempt; `label`: the child not started or not followed."""
 
     path: str
     t: float
@@ -107,12 +106,12 @@ class Retried(NamedTuple):
 
 
 class Iterated(NamedTuple):
-    """An iterator took item number `index` (from 0)."""
+    """An iterator took item `number` (from 0)."""
 
     path: str
     t: float
     stamp_ns: int
-    index: int
+    number: int
 
 
 class CallbackFailed(NamedTuple):
@@ -136,8 +135,7 @@ class UserdataWritten(NamedTuple):
 
 
 class Paused(NamedTuple):
-    """The machine stands still before the state at `path`; `reason`: "pause", "step" or
-    "breakpoint"."""
+    """The machine stands still before `path`; `reason`: "pause", "step" or "breakpoint"."""
 
     path: str
     t: float

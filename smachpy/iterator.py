@@ -184,7 +184,8 @@ class Iterator(Container):
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
         """Return the edges as (outcome, from label, to label or container outcome)."""
         return [
-            (edge.outcome, edge.source, edge.target) for edge in self.describe_structure().transitions
+            (edge.outcome, edge.source, edge.target)
+            for edge in self.describe_structure().transitions
         ]
 
     def find_problems(self, where: str) -> tuple[str, ...]:
@@ -219,7 +220,9 @@ class Iterator(Container):
         breaks = self._breaks()
         final = self._final_outcome_map
         edges = tuple(
-            TransitionRecord(label, o, final.get(o, o), target_is_outcome=True, implicit=o not in final)
+            TransitionRecord(
+                label, o, final.get(o, o), target_is_outcome=True, implicit=o not in final
+            )
             if o in breaks
             else TransitionRecord(label, o, label)
             for o in state.get_registered_outcomes()
@@ -267,9 +270,7 @@ class Iterator(Container):
                 frame.emit_own(Iterated, index)
             outcome = self._run_child(frame, step)
             if (
-                self._preempt_requested
-                or frame.told is not None
-                or step.state._preempt_requested  # noqa: SLF001
+                self._preempt_requested or frame.told is not None or step.state._preempt_requested  # noqa: SLF001
             ):
                 outcome, ends = self._after_preempt(frame, plan, outcome)
                 if ends:
@@ -293,11 +294,7 @@ class Iterator(Container):
             if self._preempt_requested:
                 return "preempted"
         try:
-            outcome: str
-            if run.watched:
-                outcome = run_watched(frame, step)
-            else:
-                outcome = step.execute(step.userdata)
+            outcome: str = run_watched(frame, step) if run.watched else step.execute(step.userdata)
         except SmachError:
             raise
         except Interruption:

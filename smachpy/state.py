@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CBState", "Retry", "State", "StateOptions"]
 
-Grace: TypeAlias = float | None | Literal["inherit"]
+Grace: TypeAlias = float | Literal["inherit"] | None
 RetrySpec: TypeAlias = "Retry | tuple[int, float, Iterable[str | type[BaseException]]] | int"
 
 

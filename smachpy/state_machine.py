@@ -346,7 +346,7 @@ class StateMachine(Container):
                 step = following
         except SmachError:
             raise
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001  raised again, as what it means
             self._raise_user_error(frame, step, error)
 
     def _careful(self, frame: Frame, step: Step) -> Following:
@@ -358,10 +358,7 @@ class StateMachine(Container):
             self.request_preempt()
         if self._preempt_requested:
             return self._preempted(frame, step)
-        if run.watched:
-            outcome = run_watched(frame, step)
-        else:
-            outcome = step.execute(step.userdata)
+        outcome = run_watched(frame, step) if run.watched else step.execute(step.userdata)
         following = self._follow(frame, step, outcome)
         if not following.final:
             frame.step = following
@@ -413,9 +410,10 @@ class StateMachine(Container):
 
     def _following(self, frame: Frame, step: Step, outcome: str) -> Following:
         try:
-            return step.next[outcome]
+            following: Following = step.next[outcome]
         except (KeyError, TypeError):
             self._raise_bad_outcome(frame, step, outcome)
+        return following
 
     def _raise_user_error(self, frame: Frame, step: Step, error: Exception) -> NoReturn:
         """Raise what a step's failure means: a bad outcome, or code that raised."""

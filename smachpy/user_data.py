@@ -122,7 +122,7 @@ class UserData:
 
 def _rebuild(data: dict[str, Any]) -> UserData:
     made = UserData()
-    made._data.update(data)
+    made._data.update(data)  # noqa: SLF001  its own module
     return made
 
 
@@ -151,7 +151,7 @@ class Remapper:
     ) -> None:
         names = dict(remapping)
         set_slot = object.__setattr__
-        set_slot(self, "_data", ud._data if isinstance(ud, UserData) else ud)
+        set_slot(self, "_data", ud._data if isinstance(ud, UserData) else ud)  # noqa: SLF001
         set_slot(self, "_input", {key: names.get(key, key) for key in input_keys})
         set_slot(self, "_output", {key: names.get(key, key) for key in output_keys})
 

@@ -34,7 +34,7 @@ def read_only(value: Any) -> Any:
     kind = type(value)
     if kind in ATOMS:
         return value
-    maker = _maker(kind)
+    maker = _maker(kind)  # type: ignore[arg-type]  # a type is hashable
     return value if maker is None else maker(value)
 
 
@@ -80,23 +80,22 @@ def _refuse(self: Any, *_args: Any, **_kwargs: Any) -> NoReturn:
     )
 
 
+_SEQUENCE = (
+    *("append", "extend", "insert", "remove", "pop", "clear", "reverse"),
+    *("__setitem__", "__delitem__", "__iadd__", "__imul__"),
+)
 _CHANGES: dict[type, tuple[str, ...]] = {
-    list: tuple(
-        "append extend insert remove pop clear sort reverse "
-        "__setitem__ __delitem__ __iadd__ __imul__".split()
+    list: (*_SEQUENCE, "sort"),
+    bytearray: _SEQUENCE,
+    deque: (*_SEQUENCE, "appendleft", "extendleft", "popleft", "rotate"),
+    dict: (
+        *("update", "clear", "pop", "popitem", "setdefault"),
+        *("__setitem__", "__delitem__", "__ior__"),
     ),
-    dict: tuple("update clear pop popitem setdefault __setitem__ __delitem__ __ior__".split()),
-    set: tuple(
-        "add discard remove pop clear update difference_update intersection_update "
-        "symmetric_difference_update __iand__ __ior__ __isub__ __ixor__".split()
-    ),
-    bytearray: tuple(
-        "append extend insert remove pop clear reverse "
-        "__setitem__ __delitem__ __iadd__ __imul__".split()
-    ),
-    deque: tuple(
-        "append appendleft extend extendleft insert remove pop popleft rotate clear reverse "
-        "__setitem__ __delitem__ __iadd__ __imul__".split()
+    set: (
+        *("add", "discard", "remove", "pop", "clear", "update", "difference_update"),
+        *("intersection_update", "symmetric_difference_update"),
+        *("__iand__", "__ior__", "__isub__", "__ixor__"),
     ),
 }
 
@@ -140,7 +139,7 @@ def _view_maker(kind: type, base: type | None) -> Callable[[Any], Any] | None:
     view_class = _view_class(kind, base)
     if view_class is None:
         return None
-    new = object.__new__ if base is None else base.__new__
+    new: Any = object.__new__ if base is None else base.__new__
     try:
         new(view_class)
     except TypeError:  # made in C: only its own constructor makes instances

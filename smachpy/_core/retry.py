@@ -58,8 +58,9 @@ def as_retry(value: Any) -> Retry | None:
     if isinstance(value, int):
         return Retry(value)
     if isinstance(value, tuple) and 1 <= len(value) <= 3:  # noqa: PLR2004  the three fields
-        attempts, backoff, on = (*value, *(0.0, ("aborted",))[len(value) - 1 :])
-        return Retry(attempts, backoff, _as_on(on))
+        backoff = value[1] if len(value) > 1 else 0.0
+        on = value[2] if len(value) > 2 else ("aborted",)  # noqa: PLR2004
+        return Retry(value[0], backoff, _as_on(on))
     raise InvalidStateError(
         f"retry: got {value!r}; expected Retry(attempts, backoff, on), that as a tuple, or a "
         "number of attempts."

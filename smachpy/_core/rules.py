@@ -67,9 +67,7 @@ def as_rules(outcome_map: Mapping[str, Any]) -> tuple[tuple[str, Rule], ...]:
     )
 
 
-def decide(
-    rules: Iterable[tuple[str, Rule]], outcomes: Mapping[str, str | None]
-) -> str | None:
+def decide(rules: Iterable[tuple[str, Rule]], outcomes: Mapping[str, str | None]) -> str | None:
     """Return the outcome of the rule that holds and asks for most; None when none holds.
 
     Among rules that ask for equally much the last one wins, as in SMACH.

@@ -16,6 +16,7 @@ from smachpy.exceptions import InvalidTransitionError, InvalidUserCodeError, did
 if TYPE_CHECKING:
     from actionlib_core.clock import Event as ClockEvent
     from actionlib_core.clock import Task
+    from smachpy._runtime.frame import Override
     from smachpy._runtime.step import Step
     from smachpy.container import Container
 
@@ -63,27 +64,49 @@ class Branch(Frame):
         self.group.end(self, "preempted", None)
 
     def _execute(self) -> str:
+        """Run the child, again when an operator wants it so, and check its outcome."""
+        again = True
+        outcome: Any = None
+        while again:
+            outcome = self._attempt()
+            override = self._take_override()
+            again = override is not None and override.label is not None
+            if override is not None and override.outcome is not None:
+                outcome = override.outcome
+                self.emit(OutcomeForced, outcome)
         step = self.step
-        if self.told is not None:  # asked to stop before it began
-            return "preempted"
-        if self.run.watched:
-            if self.run.control is not None:
-                self.run.control.pass_gate(self, step)
-                if self.told is not None:
-                    return "preempted"
-            outcome = run_watched(self, step)
-        else:
-            outcome = step.execute(step.userdata)
-        if self.override is not None and self.override.outcome is not None:
-            outcome = self.override.outcome
-            self.emit(OutcomeForced, outcome)
-        if outcome in step.next or (outcome == "preempted" and self.told is not None):
-            return outcome
+        if outcome in step.next or (outcome == "preempted" and self._is_told()):
+            return str(outcome)
         outcomes = step.state.get_registered_outcomes()
         raise InvalidTransitionError(
             f"{self.here()}: unknown outcome: got {outcome!r}; expected one of "
             f"{sorted(outcomes)}.{did_you_mean(outcome, outcomes)}"
         )
+
+    def _attempt(self) -> Any:
+        """Run the child once, unless it was asked to stop before it began."""
+        step = self.step
+        if self.run.control is not None and not self._is_told():
+            self.run.control.pass_gate(self, step)
+        if self._is_told():
+            return "preempted"
+        if self.run.watched:
+            return run_watched(self, step)
+        return step.execute(step.userdata)
+
+    def _take_override(self) -> Override | None:
+        container = self.container
+        with container._lock:  # noqa: SLF001  one machinery
+            override, self.override = self.override, None
+            if override is None or container.preempt_requested():
+                return None
+            if override.label is not None:
+                disarm(self)
+                self.step.state.recall_preempt()
+            return override
+
+    def _is_told(self) -> bool:
+        return self.told is not None
 
 
 class Group:
@@ -96,7 +119,9 @@ class Group:
 
     __slots__ = ("_left", "_wake", "branches", "container", "each", "frame", "reports")
 
-    def __init__(self, container: Container, frame: Frame, steps: list[Step], *, each: bool) -> None:
+    def __init__(
+        self, container: Container, frame: Frame, steps: list[Step], *, each: bool
+    ) -> None:
         self.container = container
         self.frame = frame
         self.each = each

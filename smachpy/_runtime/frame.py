@@ -7,6 +7,7 @@ know the path and the listeners, so that states need to know neither.
 from __future__ import annotations
 
 import threading
+from collections import deque
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -34,9 +35,10 @@ class Run:
         logged: Transitions go to the log.
         has_shutdown_check: `set_shutdown_check` was called.
         control: The operator's control, once somebody asked for it.
+        pending: Events that were noted while a lock was held, to be published without it.
     """
 
-    __slots__ = ("clock", "control", "has_shutdown_check", "logged", "watched")
+    __slots__ = ("clock", "control", "has_shutdown_check", "logged", "pending", "watched")
 
     def __init__(self, clock: Clock) -> None:
         self.clock = clock
@@ -44,6 +46,16 @@ class Run:
         self.has_shutdown_check = has_shutdown_check()
         self.watched = self.logged or self.has_shutdown_check
         self.control: Control | None = None
+        self.pending: deque[tuple[Frame, Event]] = deque()
+
+    def flush(self) -> None:
+        """Publish the events that were noted; never with a lock held."""
+        while self.pending:
+            try:
+                frame, event = self.pending.popleft()
+            except IndexError:  # another thread took the last one
+                return
+            frame.publish(event)
 
 
 class Override(NamedTuple):
@@ -120,15 +132,28 @@ class Frame:
 
     def emit(self, kind: Callable[..., Event], *fields: Any) -> None:
         """Publish an event about the state that runs now."""
-        if self.run.watched:
-            clock = self.run.clock
+        run = self.run
+        if run.watched:
+            if run.pending:
+                run.flush()
+            clock = run.clock
             self.publish(kind(self.here(), clock.now(), clock.time_ns(), *fields))
 
     def emit_own(self, kind: Callable[..., Event], *fields: Any) -> None:
         """Publish an event about the container itself."""
-        if self.run.watched:
-            clock = self.run.clock
+        run = self.run
+        if run.watched:
+            if run.pending:
+                run.flush()
+            clock = run.clock
             self.publish(kind(self.path, clock.now(), clock.time_ns(), *fields))
+
+    def note(self, path: str, kind: Callable[..., Event], *fields: Any) -> None:
+        """Note an event while a lock is held; the next `Run.flush` or event publishes it."""
+        run = self.run
+        if run.watched:
+            clock = run.clock
+            run.pending.append((self, kind(path, clock.now(), clock.time_ns(), *fields)))
 
     def callback_failed(self, callback: object, error: BaseException) -> None:
         """Report a raising callback: to the log and to the listeners."""

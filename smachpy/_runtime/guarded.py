@@ -159,7 +159,7 @@ class _Timeout:
         self._state = state
         self._frame = frame
         self._timeout = timeout
-        self._step = None if frame is None else frame.step
+        self._step: Any = None if frame is None else frame.step
         self.passed = False
         self._timer = state._clock().call_later(timeout, self._over)  # noqa: SLF001  one machinery
 

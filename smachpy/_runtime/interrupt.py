@@ -18,7 +18,7 @@ from __future__ import annotations
 import ctypes
 import signal
 import threading
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 if TYPE_CHECKING:
     from types import FrameType
@@ -41,7 +41,7 @@ class InterruptingClock(Protocol):
         ...
 
 
-class _Target:
+class _Breaker:
     """What the signal handler shall break: the frame whose child is overdue."""
 
     def __init__(self) -> None:
@@ -49,12 +49,13 @@ class _Target:
         self.installed = False
 
     def __call__(self, _number: int, _stack: FrameType | None) -> None:
-        frame, self.frame = self.frame, None
+        frame = self.frame
+        self.frame = None
         if frame is not None and frame.told is not None and frame.told is frame.step:
             raise Interruption
 
 
-_target = _Target()
+_target: Any = _Breaker()
 
 
 def interrupt(frame: Frame) -> None:
@@ -65,8 +66,8 @@ def interrupt(frame: Frame) -> None:
     clock = frame.run.clock
     if isinstance(clock, InterruptingClock) and clock.interrupt(frame.thread, Interruption()):
         return
-    in_main = frame.thread == threading.main_thread().ident
-    if in_main and signal.getsignal(SIGNAL) is _target:
+    handler: Any = signal.getsignal(SIGNAL)
+    if frame.thread == threading.main_thread().ident and handler is _target:
         _target.frame = frame
         signal.pthread_kill(frame.thread, SIGNAL)
         return

@@ -134,9 +134,12 @@ class _Stop:
         self._over = False
 
     def __call__(self) -> None:
-        with self._root._lock:  # noqa: SLF001  one machinery
-            if not self._over:
-                self._root.request_preempt()
+        root = self._root
+        with root._lock:  # noqa: SLF001  one machinery
+            if self._over:
+                return
+            self._over = True
+            root.request_preempt()
 
     def end(self) -> None:
         with self._root._lock:  # noqa: SLF001  one machinery

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
 
 from smachpy._runtime.guarded import runner_of
 from smachpy._runtime.interrupt import Interruption
@@ -21,7 +21,7 @@ class End:
     """The container ends with this outcome."""
 
     __slots__ = ("outcome",)
-    final: ClassVar[bool] = True
+    final: ClassVar[Literal[True]] = True
 
     def __init__(self, outcome: str) -> None:
         self.outcome = outcome
@@ -40,7 +40,7 @@ class Step:
     """
 
     __slots__ = ("execute", "interface", "label", "names", "next", "state", "userdata")
-    final: ClassVar[bool] = False
+    final: ClassVar[Literal[False]] = False
 
     def __init__(
         self, label: str, state: State, userdata: UserData, remapping: Mapping[str, str]
@@ -56,7 +56,7 @@ class Step:
             remapping,
         )
         self.execute: Callable[[Any], Any] = runner_of(state)
-        self.next: dict[str, Following] = {}
+        self.next: dict[str, Any] = {}
 
     def watched_userdata(self, frame: Frame) -> Remapper:
         """Return a window that reports each write."""
@@ -74,9 +74,9 @@ class _WatchedRemapper(Remapper):
 
     def __init__(self, original: Remapper, frame: Frame) -> None:
         set_slot = object.__setattr__
-        set_slot(self, "_data", original._data)
-        set_slot(self, "_input", original._input)
-        set_slot(self, "_output", original._output)
+        set_slot(self, "_data", original._data)  # noqa: SLF001  one class
+        set_slot(self, "_input", original._input)  # noqa: SLF001  one class
+        set_slot(self, "_output", original._output)  # noqa: SLF001  one class
         set_slot(self, "_scope_of", (frame, frame.here()))
 
     def __setitem__(self, key: str, item: Any) -> None:
