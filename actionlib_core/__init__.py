@@ -21,13 +21,21 @@ if TYPE_CHECKING:
     from actionlib_core.action_server import nop_cb as nop_cb
     from actionlib_core.exceptions import ActionException as ActionException
     from actionlib_core.exceptions import ActionlibError as ActionlibError
+    from actionlib_core.exceptions import GoalFailedError as GoalFailedError
+    from actionlib_core.exceptions import GoalTimeoutError as GoalTimeoutError
     from actionlib_core.exceptions import ServiceException as ServiceException
     from actionlib_core.goal_id_generator import GoalIDGenerator as GoalIDGenerator
+    from actionlib_core.goal_server import Abort as Abort
+    from actionlib_core.goal_server import GoalContext as GoalContext
+    from actionlib_core.goal_server import Preempted as Preempted
+    from actionlib_core.goal_server import Reject as Reject
+    from actionlib_core.goal_server import server as server
     from actionlib_core.handle_tracker_deleter import HandleTrackerDeleter as HandleTrackerDeleter
     from actionlib_core.node import Node as Node
     from actionlib_core.node import get_node as get_node
     from actionlib_core.node import init as init
     from actionlib_core.node import use_node as use_node
+    from actionlib_core.sent_goal import SentGoal as SentGoal
     from actionlib_core.server_goal_handle import ServerGoalHandle as ServerGoalHandle
     from actionlib_core.service import Service as Service
     from actionlib_core.service import ServiceProxy as ServiceProxy
@@ -54,10 +62,18 @@ _NAMES = {
         "get_name_of_constant",
     ),
     "action_server": ("ActionServer", "nop_cb"),
-    "exceptions": ("ActionException", "ActionlibError", "ServiceException"),
+    "exceptions": (
+        "ActionException",
+        "ActionlibError",
+        "GoalFailedError",
+        "GoalTimeoutError",
+        "ServiceException",
+    ),
     "goal_id_generator": ("GoalIDGenerator",),
+    "goal_server": ("Abort", "GoalContext", "Preempted", "Reject", "server"),
     "handle_tracker_deleter": ("HandleTrackerDeleter",),
     "node": ("Node", "get_node", "init", "use_node"),
+    "sent_goal": ("SentGoal",),
     "server_goal_handle": ("ServerGoalHandle",),
     "service": ("Service", "ServiceProxy", "wait_for_service"),
     "simple_action_client": ("SimpleActionClient", "SimpleGoalState"),

@@ -118,6 +118,14 @@ class ServerPort:
         )
         if there:
             raise self._conflict(there[0])
+        try:
+            self._declare()
+        except BaseException:
+            self.close()
+            raise
+
+    def _declare(self) -> None:
+        transport = self._node.transport
         self._declared = [
             transport.subscribe(self.keys.goal, self._on_goal),
             transport.subscribe(self.keys.cancel, self._on_cancel),

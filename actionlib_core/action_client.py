@@ -7,15 +7,18 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from actionlib_core._action_wire import ActionTypes
 from actionlib_core._core.states import CommState, TerminalState
+from actionlib_core.comm_state_machine import CommStateMachine
 from actionlib_core.exceptions import ActionException
 from actionlib_core.goal_id_generator import GoalIDGenerator
-from actionlib_core.goal_manager import CommStateMachine, GoalManager
+from actionlib_core.goal_manager import GoalManager
 from actionlib_core.node import get_node
+from actionlib_core.sent_goal import SentGoal
 from actionlib_core.time import Time, to_seconds
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from actionlib_core._action_spec import ActionSpec as Spec
     from actionlib_core.node import Node
     from actionlib_core.time import Duration
 
@@ -31,7 +34,10 @@ __all__ = [
     "to_timeout",
 ]
 
-A = TypeVar("A")
+A_co = TypeVar("A_co", covariant=True)
+G = TypeVar("G")
+R = TypeVar("R")
+F = TypeVar("F")
 
 FOR_EVER = 0.0
 """What actionlib's timeouts mean by zero."""
@@ -136,7 +142,7 @@ class ClientGoalHandle:
         return f"<ClientGoalHandle {goal.id} {goal.comm.name} {goal.status.name}>"
 
 
-class ActionClient(Generic[A]):
+class ActionClient(Generic[A_co]):
     """Sends goals to an action server and follows each of them to its end.
 
     Args:
@@ -158,7 +164,7 @@ class ActionClient(Generic[A]):
     def __init__(
         self,
         ns: str,
-        ActionSpec: type[A],  # noqa: N803  actionlib's name
+        ActionSpec: type[A_co],  # noqa: N803  actionlib's name
         *,
         node: Node | None = None,
         server_lost_timeout: float | Duration = 0.0,
@@ -256,6 +262,43 @@ class ActionClient(Generic[A]):
             ack_timeout=to_seconds(ack_timeout),
         )
         return ClientGoalHandle(machine)
+
+    def send(
+        self: ActionClient[Spec[G, R, F]], goal: G, *, timeout: float | Duration | None = None
+    ) -> SentGoal[R, F]:
+        """Send a goal for use in a `with` or `async with` block, which cancels it when left early.
+
+        Args:
+            goal: The goal message (XGoal).
+            timeout: Longest time to its end [s], the wait for a server included; None: no limit.
+
+        Raises:
+            ActionException: `goal` is not of the action's type.
+            MessageError: a field of `goal` has a wrong type.
+            TypeMismatchError: the action's server has another type.
+            TransportError: the client is stopped.
+        """
+        sent: SentGoal[R, F] = SentGoal(self.node, self.ns, to_seconds(timeout))
+        self.manager.send(
+            *self.pack(goal),
+            on_transition=sent.on_transition,
+            on_feedback=sent.on_feedback,
+            created=sent.on_created,
+        )
+        return sent
+
+    def follow(
+        self: ActionClient[Spec[G, R, F]], goal_id: str, *, timeout: float | Duration | None = None
+    ) -> SentGoal[R, F]:
+        """Follow a goal sent in an earlier life of this program; as `send`, but by its id."""
+        sent: SentGoal[R, F] = SentGoal(self.node, self.ns, to_seconds(timeout))
+        self.manager.attach(
+            goal_id,
+            on_transition=sent.on_transition,
+            on_feedback=sent.on_feedback,
+            created=sent.on_created,
+        )
+        return sent
 
     def cancel_all_goals(self) -> None:
         """Ask the server to end all goals, also those of other clients."""

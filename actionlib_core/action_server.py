@@ -17,6 +17,7 @@ from actionlib_core._callbacks import CallbackQueue
 from actionlib_core._core.server_goals import RESULT_TIMEOUT_S, Arrival, ServerGoal, ServerGoals
 from actionlib_core._core.states import TERMINAL, Status
 from actionlib_core._server_port import ServerPort
+from actionlib_core._status_publisher import StatusPublisher
 from actionlib_core.exceptions import ActionException, ServerConflictError, TransportError
 from actionlib_core.goal_id_generator import GoalIDGenerator
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus, GoalStatusArray
@@ -28,15 +29,10 @@ from actionlib_core.time import to_seconds
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from actionlib_core.clock import Timer
     from actionlib_core.node import Node
     from actionlib_core.time import Duration
 
 log = logging.getLogger(__name__)
-
-STATUS_PERIOD_S = 1.0  # while goals are tracked
-STATUS_GAP_S = 0.02  # changes that follow each other faster share a message
-STATUS_GAP_PER_GOAL_S = 100e-6  # a long list is sent less often
 
 TEXT_STOPPED = "The action server was stopped"
 TEXT_CLIENT_LOST = "The client that sent this goal is gone"
@@ -108,9 +104,8 @@ class ActionServer:
         self._forget: Callable[[], None] | None = None
         self._started = False
         self._stopped = False
-        self._published = -STATUS_PERIOD_S
-        self._timer: Timer | None = None
-        self._due = 0.0
+        self._left = self._clock.event(f"the end of action server {self.ns}")
+        self._status = StatusPublisher(self._clock, self.lock, self._goals, self._send_status)
         if auto_start:
             self.start()
 
@@ -161,11 +156,27 @@ class ActionServer:
     def _leave(self) -> None:
         with self.lock:
             self._stopped = True
-            if self._timer is not None:
-                self._timer.cancel()
+            self._status.close()
         if self._forget is not None:
             self._forget()
         self._port.close()
+        self._left.set()
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait until the server has stopped; for programs that do nothing else.
+
+        Returns:
+            Whether it has stopped.
+
+        Raises:
+            ServerConflictError: it stopped because an older server has the name.
+
+        Blocks: until then, `timeout` [s] at most; None: no limit.
+        """
+        left = self._left.wait(timeout)
+        if self.error is not None:
+            raise self.error
+        return left
 
     @property
     def stopped(self) -> bool:
@@ -222,14 +233,14 @@ class ActionServer:
         """Accept a goal; see `ServerGoalHandle.set_accepted`."""
         with self.lock:
             self._goals.step(tracker.record, "accept", "set_accepted()", text)
-        self._on_change()
+        self._status.on_change()
 
     def request_cancel(self, tracker: StatusTracker) -> bool:
         """Mark a goal as asked to stop; see `ServerGoalHandle.set_cancel_requested`."""
         with self.lock:
             changed = self._goals.request_cancel(tracker.record)
         if changed:
-            self._on_change()
+            self._status.on_change()
         return changed
 
     def finish(self, tracker: StatusTracker, event: str, call: str, result: Any, text: str) -> None:
@@ -256,13 +267,13 @@ class ActionServer:
             stopped = self._stopped
         if not stopped:
             self._port.send_result(payload)
-            self._on_change()
+            self._status.on_change()
 
     def release(self, tracker: StatusTracker) -> None:
         """Give up a goal that nobody will end; its client learns that it is LOST."""
         with self.lock:
             self._goals.release(tracker.record, self._clock.now())
-        self._on_change()
+        self._status.on_change()
 
     def publish_result(self, status: GoalStatus, result: Any) -> None:
         """Send a result under any status. Handles do it for you.
@@ -299,6 +310,14 @@ class ActionServer:
         body: bytes = message.to_bytes()
         return body
 
+    def _send_status(self, goals: list[ServerGoal]) -> None:
+        entries = [_entry(goal) for goal in goals]
+        try:
+            self._port.send_status(pack_statuses(self._clock.time_ns(), entries))
+        except TransportError:
+            if not self._stopped:  # else `stop` came in between
+                raise
+
     # -- what arrives (on the network's thread) ------------------------------------------------
 
     def on_goal(self, goal_id: str, stamp_ns: int, content: Any, client: str) -> None:
@@ -328,7 +347,7 @@ class ActionServer:
             self._port.send_status(pack_statuses(self._clock.time_ns(), [entry]))
         elif isinstance(goal.result, bytes):
             self._port.send_result(goal.result)
-        self._on_change()
+        self._status.on_change()
 
     def on_cancel(self, goal_id: str, stamp_ns: int) -> None:
         """Take a cancel from the network; not for users."""
@@ -350,7 +369,7 @@ class ActionServer:
         for goal in asked:
             if isinstance(goal.tag, StatusTracker):
                 self._deliver_cancel(ServerGoalHandle(goal.tag, self))
-        self._on_change()
+        self._status.on_change()
 
     def on_acknowledged(self, goal_ids: list[str]) -> None:
         """Take acknowledgements from the network; not for users."""
@@ -384,7 +403,7 @@ class ActionServer:
 
     def _deliver_goal(self, handle: ServerGoalHandle) -> None:
         self.callback_queue.call(self.goal_callback, handle)
-        self._on_change()
+        self._status.on_change()
 
     def _deliver_cancel(self, handle: ServerGoalHandle) -> None:
         self.callback_queue.call(self.cancel_callback, handle)
@@ -393,54 +412,10 @@ class ActionServer:
 
     def publish_status(self) -> None:
         """Send the list of all goals now."""
-        with self.lock:
-            if self._stopped or not self._started:
-                return
-            now = self._clock.now()
-            self._published = now
-            entries = [_entry(goal) for goal in self._goals.listed()]
-            self._arm(now + STATUS_PERIOD_S)
-        try:
-            self._port.send_status(pack_statuses(self._clock.time_ns(), entries))
-        except TransportError:
-            if not self._stopped:  # else `stop` came in between
-                raise
+        self._status.publish()
 
     def publish_status_async(self, event: object = None) -> None:  # noqa: ARG002  actionlib's
         """Send the list of all goals; the form that ROS timers call."""
-        self.publish_status()
-
-    def _on_change(self) -> None:
-        """Publish the status: now, or together with the changes that follow soon."""
-        with self.lock:
-            now = self._clock.now()
-            gap = STATUS_GAP_S + STATUS_GAP_PER_GOAL_S * len(self._goals)
-            due = self._published + gap
-            if due > now:
-                if self._timer is None or due < self._due:
-                    self._arm(due)
-                return
-        self.publish_status()
-
-    def _arm(self, due: float) -> None:
-        """Let the timer run at `due`. Needs the lock."""
-        if self._timer is not None:
-            self._timer.cancel()
-        self._due = due
-        self._timer = self._clock.call_later(due - self._clock.now(), self._on_timer)
-
-    def _on_timer(self) -> None:
-        with self.lock:
-            self._timer = None
-            if self._stopped:
-                return
-            soonest = self._goals.expire(self._clock.now())
-            quiet = not self._goals.listed()
-            since = self._clock.now() - self._published
-            if quiet and since > STATUS_PERIOD_S / 2:
-                if soonest is not None:
-                    self._arm(soonest)
-                return
         self.publish_status()
 
 

@@ -251,3 +251,16 @@ class GoalFailedError(ActionException):
 
 class InterfaceWarning(UserWarning):
     """A definition was read although it is not quite as ROS wants it."""
+
+
+class GoalTimeoutError(GoalFailedError, TimeoutError):
+    """A goal took longer than the caller allowed, and was cancelled.
+
+    Attributes:
+        timeout: What was allowed [s].
+    """
+
+    def __init__(self, name: str, goal_id: str, status: str, timeout: float) -> None:
+        self.timeout = timeout
+        text = f"not over within {timeout:g} s, so it was cancelled"
+        super().__init__(name, goal_id, status, text, None)

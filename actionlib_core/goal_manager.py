@@ -10,13 +10,15 @@ from actionlib_core._action_wire import pack_goal
 from actionlib_core._callbacks import CallbackQueue
 from actionlib_core._client_port import ClientPort, is_status
 from actionlib_core._core.client_goal import ClientGoal, Duty, Path
-from actionlib_core._core.states import TERMINAL, CommState, Status
+from actionlib_core._core.states import TERMINAL, Status
+from actionlib_core.comm_state_machine import CommStateMachine
 from actionlib_core.exceptions import ActionlibError, TransportError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from actionlib_core._action_wire import ActionTypes, StatusEntry
+    from actionlib_core._core.states import CommState
     from actionlib_core.clock import Event, Timer
     from actionlib_core.exceptions import TypeMismatchError
     from actionlib_core.node import Node
@@ -27,73 +29,6 @@ log = logging.getLogger(__name__)
 TICK_S = 0.05  # repetitions and acknowledgements due within this go out together
 ACK_AT = 64  # so many acknowledgements go out at once
 REMEMBERED = 1024  # ids of ended goals whose result may come again
-
-
-class CommStateMachine:
-    """One goal of a client.
-
-    Args:
-        goal: Its life cycle.
-        manager: The client's goals.
-        payload: The XActionGoal as it is sent.
-        on_transition: Called under the manager's lock for each state passed; must only note it.
-        on_feedback: The same, with each XFeedback message; None when nobody wants them.
-
-    Attributes:
-        ended: Set when the goal is over; made when somebody waits for that.
-        settled: Set when the goal is over and its last callback has returned.
-    """
-
-    __slots__ = (
-        "_shown",
-        "_shown_to",
-        "asking",
-        "ended",
-        "goal",
-        "manager",
-        "on_feedback",
-        "on_transition",
-        "payload",
-        "settled",
-    )
-
-    def __init__(
-        self,
-        goal: ClientGoal,
-        manager: GoalManager,
-        payload: bytes,
-        on_transition: Callable[[CommStateMachine, CommState], None] | None,
-        on_feedback: Callable[[CommStateMachine, Any], None] | None,
-    ) -> None:
-        self.goal = goal
-        self.manager = manager
-        self.payload = payload
-        self.on_transition = on_transition
-        self.on_feedback = on_feedback
-        self.asking = False
-        self.ended: Event | None = None
-        self.settled: Event = manager.node.clock.event()
-        self._shown: CommState | None = None
-        self._shown_to = 0
-
-    def on_answered(self) -> None:
-        """Note that a question about the goal was answered, or that its time is over."""
-        self.asking = False
-
-    @property
-    def state(self) -> CommState:
-        """Where the goal stands; inside a transition callback, the state that callback is for."""
-        if self._shown is not None and self._shown_to == threading.get_ident():
-            return self._shown
-        return self.goal.comm
-
-    def show(self, state: CommState, function: Callable[..., object], *args: object) -> None:
-        """Call `function`, to which the goal stands in `state`."""
-        self._shown_to, self._shown = threading.get_ident(), state
-        try:
-            function(*args)
-        finally:
-            self._shown = None
 
 
 class GoalManager:

@@ -13,7 +13,7 @@ from actionlib_core.time import to_seconds
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from actionlib_core.goal_manager import CommStateMachine
+    from actionlib_core.comm_state_machine import CommStateMachine
     from actionlib_core.node import Node
     from actionlib_core.time import Duration, Time
 

@@ -153,6 +153,19 @@ class SimpleActionServer:
             task.join(STOP_GRACE_S)
         self.action_server.stop()
 
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait until the server has stopped; for programs that do nothing else.
+
+        Returns:
+            Whether it has stopped.
+
+        Raises:
+            ServerConflictError: it stopped because an older server has the name.
+
+        Blocks: until then, `timeout` [s] at most; None: no limit.
+        """
+        return self.action_server.wait(timeout)
+
     def _ask_to_stop(self) -> None:
         with self.lock:
             waiting = self._policy.on_stop()
@@ -183,21 +196,28 @@ class SimpleActionServer:
         Returns:
             The goal message; None when no goal waits (check `is_new_goal_available` before).
         """
+        new = self._take_next()
+        if new is None:
+            log.error(
+                "action '%s': accept_new_goal(): no goal waits. Try is_new_goal_available().",
+                self._name,
+            )
+            return None
+        new.set_accepted(TEXT_ACCEPTED)
+        return new.get_goal()
+
+    def _take_next(self) -> ServerGoalHandle | None:
+        """Make the waiting goal the current one, not yet accepted; None when none waits."""
         with self.lock:
             new, pushed = self._policy.accept()
             if new is None:
-                log.error(
-                    "action '%s': accept_new_goal(): no goal waits. Try is_new_goal_available().",
-                    self._name,
-                )
                 return None
             self._preempted.clear()
             if self._policy.preempt_requested:
                 self._preempted.set()
         if pushed is not None and pushed.status_tracker.record.status not in TERMINAL:
             pushed.set_canceled(None, TEXT_NEWER)
-        new.set_accepted(TEXT_ACCEPTED)
-        return new.get_goal()
+        return new
 
     def is_new_goal_available(self) -> bool:
         """Tell whether a goal waits to be accepted."""
@@ -356,9 +376,14 @@ class SimpleActionServer:
                 if not self._policy.waiting:
                     self._task = None
                     return
-            goal = self.accept_new_goal()
-            if self.execute_callback is not None:
-                self._run(partial(self.execute_callback, goal))
+            self._run_next()
+
+    def _run_next(self) -> None:
+        """Accept the goal that waits and run it."""
+        goal = self._take_next()
+        if goal is not None and self.execute_callback is not None:
+            goal.set_accepted(TEXT_ACCEPTED)
+            self._run(partial(self.execute_callback, goal.get_goal()))
 
     def _run(self, execute: Callable[[], object]) -> None:
         """Run one goal and make sure that it ends."""
@@ -368,7 +393,7 @@ class SimpleActionServer:
         try:
             execute()
         except IllegalTransitionError as error:
-            if self.action_server.stopped:  # the goal was ended by `stop`
+            if handle.status_tracker.record.text == TEXT_STOPPED:  # `stop` has ended the goal
                 return
             text = self._report(error)
         except Exception as error:  # noqa: BLE001  a border: told to the client and logged
@@ -387,6 +412,7 @@ class SimpleActionServer:
     def _abort(self, handle: ServerGoalHandle, text: str) -> None:
         """End a goal that its callback has left without an end."""
         with self.lock:
-            running = handle.status_tracker.record.status not in TERMINAL
-            if running and handle is self._policy.current:
-                self._end("the end of execute_cb", "abort", None, text)
+            status = handle.status_tracker.record.status
+            if status not in TERMINAL and handle is self._policy.current:
+                accepted = status in {Status.ACTIVE, Status.PREEMPTING}
+                self._end("the end of execute_cb", "abort" if accepted else "reject", None, text)

@@ -212,7 +212,10 @@ def test_done_callback_sends_the_next_goal_and_waits_for_it(world):
 def test_client_and_server_in_one_node_and_a_client_in_the_execute_callback(world):
     node = world.node("both")
     doubler = SimpleActionServer(
-        "doubler", msg.TestAction, lambda g: doubler.set_succeeded(msg.TestResult(2 * g.goal)), node=node
+        "doubler",
+        msg.TestAction,
+        lambda g: doubler.set_succeeded(msg.TestResult(2 * g.goal)),
+        node=node,
     )
 
     def execute(goal):
@@ -450,7 +453,8 @@ def test_idle_ends_have_no_thread(world):
     before = set(threading.enumerate())
     node = world.node("many")
     servers = [
-        SimpleActionServer(f"idle_{n}", msg.TestAction, lambda _: None, node=node) for n in range(20)
+        SimpleActionServer(f"idle_{n}", msg.TestAction, lambda _: None, node=node)
+        for n in range(20)
     ]
     clients = [SimpleActionClient(f"idle_{n}", msg.TestAction, node=node) for n in range(20)]
     started = [t for t in set(threading.enumerate()) - before if t.name not in {"idle"}]

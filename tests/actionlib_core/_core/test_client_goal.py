@@ -37,7 +37,13 @@ def duties(goal, until):
 
 def test_goal_is_sent_again_until_acknowledged():
     goal = started()
-    assert [when for when, duty in duties(goal, 8.0) if duty is Duty.GOAL] == [0.5, 1.5, 3.5, 5.5, 7.5]
+    assert [when for when, duty in duties(goal, 8.0) if duty is Duty.GOAL] == [
+        0.5,
+        1.5,
+        3.5,
+        5.5,
+        7.5,
+    ]
     goal.on_status(Status.PENDING, "", 8.0)
     assert Duty.GOAL not in goal.tick(goal.due)[1]
 

@@ -1,0 +1,49 @@
+"""The shape of action classes, for type checkers: an action knows its goal, result and feedback."""
+
+from __future__ import annotations
+
+from typing import Protocol, TypeVar
+
+Goal_co = TypeVar("Goal_co", covariant=True)
+Result_co = TypeVar("Result_co", covariant=True)
+Feedback_co = TypeVar("Feedback_co", covariant=True)
+
+
+class HasGoal(Protocol[Goal_co]):
+    """An XActionGoal."""
+
+    @property
+    def goal(self) -> Goal_co:
+        """The XGoal."""
+
+
+class HasResult(Protocol[Result_co]):
+    """An XActionResult."""
+
+    @property
+    def result(self) -> Result_co:
+        """The XResult."""
+
+
+class HasFeedback(Protocol[Feedback_co]):
+    """An XActionFeedback."""
+
+    @property
+    def feedback(self) -> Feedback_co:
+        """The XFeedback."""
+
+
+class ActionSpec(Protocol[Goal_co, Result_co, Feedback_co]):
+    """An XAction. `type[ActionSpec[G, R, F]]` accepts every action class and yields its types."""
+
+    @property
+    def action_goal(self) -> HasGoal[Goal_co]:
+        """The XActionGoal."""
+
+    @property
+    def action_result(self) -> HasResult[Result_co]:
+        """The XActionResult."""
+
+    @property
+    def action_feedback(self) -> HasFeedback[Feedback_co]:
+        """The XActionFeedback."""
