@@ -13,29 +13,34 @@ from __future__ import annotations
 
 import itertools
 import threading
-from collections import deque
-from functools import partial
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from actionlib_core.clock import current_clock
-from actionlib_core.clock._serial import report_thread_exception
 from actionlib_core.exceptions import TransportError
 from actionlib_core.transport import Presence, Quality, Reply, Sample
 from actionlib_core.transport._keys import check_key, compile_pattern
+from actionlib_core.transport._memory_entries import (
+    Entry,
+    Exchange,
+    Inbox,
+    MemoryQuery,
+    Publisher,
+    Queryable,
+    Subscriber,
+    Token,
+    Watcher,
+)
 
 if TYPE_CHECKING:
     import re
     from collections.abc import Callable
 
-    from actionlib_core.clock import Clock, Event, Timer
+    from actionlib_core.clock import Clock
     from actionlib_core.transport import Query
 
-T = TypeVar("T")
-E = TypeVar("E", bound="_Entry")
+E = TypeVar("E", bound=Entry)
 
 DEFAULT_QUALITY = Quality()
-
-CLOSE_WAIT_S = 0.9  # how long `close` waits for a callback that is running in another thread
 
 
 class MemoryNetwork:
@@ -48,10 +53,10 @@ class MemoryNetwork:
     def __init__(self, clock: Clock | None = None) -> None:
         self.clock = clock if clock is not None else current_clock()
         self.lock = threading.Lock()
-        self.subscribers: dict[str, list[_Subscriber]] = {}
-        self.queryables: dict[str, list[_Queryable]] = {}
-        self.latches: dict[str, list[_MemoryPublisher]] = {}
-        self.watchers: list[_Watcher] = []
+        self.subscribers: dict[str, list[Subscriber]] = {}
+        self.queryables: dict[str, list[Queryable]] = {}
+        self.latches: dict[str, list[Publisher]] = {}
+        self.watchers: list[Watcher] = []
         self._tokens: dict[str, int] = {}
         self._ids = itertools.count(1)
 
@@ -75,318 +80,13 @@ class MemoryNetwork:
         return sorted(key for key in self._tokens if pattern.fullmatch(key + "/"))
 
 
-class _Inbox:
-    """What waits for one session, first in, first out."""
-
-    __slots__ = ("_clock", "_deaf", "_idle", "_items", "_lock", "_running")
-
-    def __init__(self, clock: Clock) -> None:
-        self._clock = clock
-        self._lock = threading.Lock()
-        self._items: deque[Callable[[], object]] = deque()
-        self._running: int | None = None
-        self._idle: Event | None = None
-        self._deaf = False
-
-    def post(self, item: Callable[[], object]) -> None:
-        self._items.append(item)
-        self._clock.call_later(0.0, self._deliver)
-
-    def _deliver(self) -> None:
-        with self._lock:
-            item = self._items.popleft()
-            if self._deaf:
-                return
-            self._running = threading.get_ident()
-        try:
-            item()
-        except Exception:  # noqa: BLE001  a border: reported, the next item is delivered
-            report_thread_exception()
-        finally:
-            with self._lock:
-                self._running = None
-                idle = self._idle
-            if idle is not None:
-                idle.set()
-
-    def shut(self, *, wait: bool) -> None:
-        """Deliver nothing more.
-
-        Blocks: if `wait`, until a callback running in another thread has returned, `CLOSE_WAIT_S`
-            at most.
-        """
-        with self._lock:
-            self._deaf = True
-            busy = self._running not in {None, threading.get_ident()}
-            if busy:
-                self._idle = self._clock.event()
-        if busy and wait and self._idle is not None:
-            self._idle.wait(CLOSE_WAIT_S)
-
-
-class _Entry:
-    """Something declared by a session: it is in the tables of the network until closed."""
-
-    __slots__ = ("closed", "network", "session")
-
-    def __init__(self, session: MemoryTransport) -> None:
-        self.session = session
-        self.network = session.network
-        self.closed = False
-
-    def close(self) -> None:
-        with self.network.lock:
-            self.close_locked()
-
-    def close_locked(self) -> None:
-        if not self.closed:
-            self.closed = True
-            self.session.declared.pop(self, None)
-            self.withdraw_locked()
-
-    def withdraw_locked(self) -> None:
-        """Leave the network's tables."""
-        raise NotImplementedError
-
-
-class _Listener(_Entry, Generic[T]):
-    """A callback of a session."""
-
-    __slots__ = ("_callback",)
-
-    def __init__(self, session: MemoryTransport, callback: Callable[[T], None]) -> None:
-        super().__init__(session)
-        self._callback = callback
-
-    def post(self, item: T) -> None:
-        self.session.inbox.post(partial(self.deliver, item))
-
-    def deliver(self, item: T) -> None:
-        if not self.closed:
-            self._callback(item)
-
-
-class _Subscriber(_Listener[Sample]):
-    """Gets the messages of a key."""
-
-    __slots__ = ("_key",)
-
-    def __init__(
-        self,
-        session: MemoryTransport,
-        key: str,
-        callback: Callable[[Sample], None],
-        *,
-        history: bool,
-    ) -> None:
-        super().__init__(session, callback)
-        self._key = key
-        _add(self.network.subscribers, key, self)
-        for publisher in self.network.latches.get(key, ()) if history else ():
-            if publisher.last is not None:
-                self.post(publisher.last)
-
-    def withdraw_locked(self) -> None:
-        _remove(self.network.subscribers, self._key, self)
-
-
-class _Queryable(_Listener["_MemoryQuery"]):
-    """Gets the queries on a key; one that it cannot answer any more is finished for it."""
-
-    __slots__ = ("_key",)
-
-    def __init__(
-        self, session: MemoryTransport, key: str, callback: Callable[[_MemoryQuery], None]
-    ) -> None:
-        super().__init__(session, callback)
-        self._key = key
-        _add(self.network.queryables, key, self)
-
-    def deliver(self, item: _MemoryQuery) -> None:
-        if self.closed:
-            item.finish()
-            return
-        try:
-            self._callback(item)
-        except Exception as error:
-            item.reply_error(f"{type(error).__name__}: {error}")
-            item.finish()
-            raise
-
-    def withdraw_locked(self) -> None:
-        _remove(self.network.queryables, self._key, self)
-
-
-class _Watcher(_Listener[Presence]):
-    """Hears of tokens."""
-
-    __slots__ = ("pattern",)
-
-    def __init__(
-        self, session: MemoryTransport, pattern: str, callback: Callable[[Presence], None]
-    ) -> None:
-        super().__init__(session, callback)
-        self.pattern = compile_pattern(pattern)
-        self.network.watchers.append(self)
-        for key in self.network.match_tokens(self.pattern):
-            self.post(Presence(key, alive=True))
-
-    def withdraw_locked(self) -> None:
-        self.network.watchers.remove(self)
-
-
-class _Token(_Entry):
-    """A liveliness token."""
-
-    __slots__ = ("_key",)
-
-    def __init__(self, session: MemoryTransport, key: str) -> None:
-        super().__init__(session)
-        self._key = key
-        self.network.count_token(key, 1)
-
-    def withdraw_locked(self) -> None:
-        self.network.count_token(self._key, -1)
-
-
-class _MemoryPublisher(_Entry):
-    """The sending end of a key."""
-
-    __slots__ = ("_encoding", "_key", "_latch", "last")
-
-    def __init__(self, session: MemoryTransport, key: str, encoding: str, *, latch: bool) -> None:
-        super().__init__(session)
-        self._key = key
-        self._encoding = encoding
-        self._latch = latch
-        self.last: Sample | None = None
-        if latch:
-            _add(self.network.latches, key, self)
-
-    def put(self, payload: bytes) -> None:
-        sample = Sample(self._key, payload, self._encoding, self.session.session_id)
-        with self.network.lock:
-            if self.closed:
-                if self.session.killed:
-                    return
-                raise TransportError(
-                    f"{self._key}: the publisher is closed. Try sending before the node is closed."
-                )
-            if self._latch:
-                self.last = sample
-            for subscriber in self.network.subscribers.get(self._key, ()):
-                subscriber.post(sample)
-
-    def matching(self) -> bool:
-        return self._key in self.network.subscribers
-
-    def withdraw_locked(self) -> None:
-        if self._latch:
-            _remove(self.network.latches, self._key, self)
-
-
-class _Exchange(_Entry):
-    """One query on its way: who has still to answer, and whether the asker still listens."""
-
-    __slots__ = ("_on_done", "_on_reply", "_timer", "_waiting")
-
-    def __init__(
-        self,
-        session: MemoryTransport,
-        queryables: list[_Queryable],
-        make_query: Callable[[_Exchange, MemoryTransport], _MemoryQuery],
-        on_reply: Callable[[Reply], None],
-        on_done: Callable[[], None],
-    ) -> None:
-        super().__init__(session)
-        self._on_reply = on_reply
-        self._on_done = on_done
-        self._waiting = len(queryables)
-        self._timer: Timer | None = None
-        for queryable in queryables:
-            queryable.post(make_query(self, queryable.session))
-        if not queryables:
-            self._end()
-
-    def limit(self, timeout: float) -> None:
-        """End the exchange `timeout` [s] from now."""
-        self._timer = self.network.clock.call_later(timeout, self._time_out)
-
-    def _time_out(self) -> None:
-        with self.network.lock:
-            if self._waiting:
-                self._waiting = 0
-                self._end()
-
-    def reply_locked(self, reply: Reply) -> None:
-        if self._waiting:
-            self.session.inbox.post(partial(self._deliver, partial(self._on_reply, reply)))
-
-    def finish_locked(self) -> None:
-        if self._waiting:
-            self._waiting -= 1
-            if not self._waiting:
-                self._end()
-
-    def _end(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-        self.session.inbox.post(partial(self._deliver, self._finish))
-
-    def _finish(self) -> None:
-        self.close()
-        self._on_done()
-
-    def _deliver(self, function: Callable[[], object]) -> None:
-        if not self.closed:
-            function()
-
-    def withdraw_locked(self) -> None:
-        self._waiting = 0
-        if self._timer is not None:
-            self._timer.cancel()
-
-
-class _MemoryQuery(_Entry):
-    """A query as one queryable sees it."""
-
-    __slots__ = ("_exchange", "encoding", "key", "payload")
-
-    def __init__(
-        self, exchange: _Exchange, session: MemoryTransport, key: str, payload: bytes, encoding: str
-    ) -> None:
-        super().__init__(session)
-        self._exchange = exchange
-        self.key = key
-        self.payload = payload
-        self.encoding = encoding
-        session.declared[self] = None
-
-    def reply(self, payload: bytes, encoding: str = "") -> None:
-        self._reply(Reply(self.key, payload, encoding, error=False))
-
-    def reply_error(self, text: str) -> None:
-        self._reply(Reply(self.key, text.encode(), "", error=True))
-
-    def _reply(self, reply: Reply) -> None:
-        with self.network.lock:
-            if not self.closed:
-                self._exchange.reply_locked(reply)
-
-    def finish(self) -> None:
-        self.close()
-
-    def withdraw_locked(self) -> None:
-        self._exchange.finish_locked()
-
-
 class MemoryTransport:
     """One session of a `MemoryNetwork`."""
 
     def __init__(self, network: MemoryNetwork, session_id: str) -> None:
         self.network = network
-        self.inbox = _Inbox(network.clock)
-        self.declared: dict[_Entry, None] = {}
+        self.inbox = Inbox(network.clock)
+        self.declared: dict[Entry, None] = {}
         self.killed = False
         self._session_id = session_id
         self._closed = False
@@ -398,21 +98,19 @@ class MemoryTransport:
 
     def publisher(
         self, key: str, encoding: str = "", quality: Quality = DEFAULT_QUALITY
-    ) -> _MemoryPublisher:
+    ) -> Publisher:
         check_key(key)
-        return self._declare(
-            lambda: _MemoryPublisher(self, key, encoding, latch=quality.latch), key
-        )
+        return self._declare(lambda: Publisher(self, key, encoding, latch=quality.latch), key)
 
     def subscribe(
         self, key: str, callback: Callable[[Sample], None], *, history: bool = True
-    ) -> _Subscriber:
+    ) -> Subscriber:
         check_key(key)
-        return self._declare(lambda: _Subscriber(self, key, callback, history=history), key)
+        return self._declare(lambda: Subscriber(self, key, callback, history=history), key)
 
-    def queryable(self, key: str, callback: Callable[[Query], None]) -> _Queryable:
+    def queryable(self, key: str, callback: Callable[[Query], None]) -> Queryable:
         check_key(key)
-        return self._declare(lambda: _Queryable(self, key, callback), key)
+        return self._declare(lambda: Queryable(self, key, callback), key)
 
     def query(
         self,
@@ -423,26 +121,26 @@ class MemoryTransport:
         timeout: float,
         on_reply: Callable[[Reply], None],
         on_done: Callable[[], None],
-    ) -> _Exchange:
+    ) -> Exchange:
         check_key(key)
 
-        def make_query(exchange: _Exchange, session: MemoryTransport) -> _MemoryQuery:
-            return _MemoryQuery(exchange, session, key, payload, encoding)
+        def make_query(exchange: Exchange, session: MemoryTransport) -> MemoryQuery:
+            return MemoryQuery(exchange, session, key, payload, encoding)
 
-        def ask() -> _Exchange:
+        def ask() -> Exchange:
             asked = list(self.network.queryables.get(key, ()))
-            return _Exchange(self, asked, make_query, on_reply, on_done)
+            return Exchange(self, asked, make_query, on_reply, on_done)
 
         exchange = self._declare(ask, key)
         exchange.limit(timeout)
         return exchange
 
-    def declare_alive(self, key: str) -> _Token:
+    def declare_alive(self, key: str) -> Token:
         check_key(key)
-        return self._declare(lambda: _Token(self, key), key)
+        return self._declare(lambda: Token(self, key), key)
 
-    def watch_alive(self, pattern: str, callback: Callable[[Presence], None]) -> _Watcher:
-        return self._declare(lambda: _Watcher(self, pattern, callback), pattern)
+    def watch_alive(self, pattern: str, callback: Callable[[Presence], None]) -> Watcher:
+        return self._declare(lambda: Watcher(self, pattern, callback), pattern)
 
     def list_alive(self, pattern: str, timeout: float) -> list[str]:  # noqa: ARG002  answers at once
         compiled = compile_pattern(pattern)
@@ -482,14 +180,3 @@ class MemoryTransport:
             raise TransportError(
                 f"{key}: the session is closed. Try using a node that is still open."
             )
-
-
-def _add(table: dict[str, list[E]], key: str, entry: E) -> None:
-    table.setdefault(key, []).append(entry)
-
-
-def _remove(table: dict[str, list[E]], key: str, entry: E) -> None:
-    entries = table[key]
-    entries.remove(entry)
-    if not entries:
-        del table[key]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 import pytest
 
 from actionlib_core.clock import RealClock, VirtualClock, use_clock
+from actionlib_core.transport.faulty import FaultyTransport
 from actionlib_core.transport.memory import MemoryNetwork
 
 if TYPE_CHECKING:
@@ -99,11 +100,18 @@ def _zenoh() -> Network:
         "memory-virtual",
         "memory-seeded",
         "memory-real",
+        "faulty",
         pytest.param("zenoh", marks=pytest.mark.zenoh),
     ]
 )
 def network(request: pytest.FixtureRequest) -> Iterator[Network]:
-    if request.param in {"memory-virtual", "memory-seeded"}:
+    if request.param == "faulty":
+        with VirtualClock() as clock, use_clock(clock):
+            inner = MemoryNetwork(clock)
+            network = Network(clock, lambda: FaultyTransport(inner.session()))
+            yield network
+            network.close()
+    elif request.param in {"memory-virtual", "memory-seeded"}:
         seed = None if request.param == "memory-virtual" else 7
         with VirtualClock(seed) as clock, use_clock(clock):
             network = _memory(clock)

@@ -1,0 +1,344 @@
+"""What a session in memory declares, and the inbox that its callbacks are run from.
+
+An entry puts itself into the network's tables when it is made and leaves them when it is closed;
+both, and every method whose name ends in `_locked`, need the network's lock.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from functools import partial
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+from actionlib_core.clock._serial import report_thread_exception
+from actionlib_core.exceptions import TransportError
+from actionlib_core.transport import Presence, Reply, Sample
+from actionlib_core.transport._keys import compile_pattern
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.clock import Clock, Event, Timer
+    from actionlib_core.transport.memory import MemoryTransport
+
+T = TypeVar("T")
+E = TypeVar("E", bound="Entry")
+
+CLOSE_WAIT_S = 0.9  # how long `close` waits for a callback that is running in another thread
+
+
+class Inbox:
+    """What waits for one session, first in, first out."""
+
+    __slots__ = ("_clock", "_deaf", "_idle", "_items", "_lock", "_running")
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._items: deque[Callable[[], object]] = deque()
+        self._running: int | None = None
+        self._idle: Event | None = None
+        self._deaf = False
+
+    def post(self, item: Callable[[], object]) -> None:
+        self._items.append(item)
+        self._clock.call_later(0.0, self._deliver)
+
+    def _deliver(self) -> None:
+        with self._lock:
+            item = self._items.popleft()
+            if self._deaf:
+                return
+            self._running = threading.get_ident()
+        try:
+            item()
+        except Exception:  # noqa: BLE001  a border: reported, the next item is delivered
+            report_thread_exception()
+        finally:
+            with self._lock:
+                self._running = None
+                idle = self._idle
+            if idle is not None:
+                idle.set()
+
+    def shut(self, *, wait: bool) -> None:
+        """Deliver nothing more.
+
+        Blocks: if `wait`, until a callback running in another thread has returned, `CLOSE_WAIT_S`
+            at most.
+        """
+        with self._lock:
+            self._deaf = True
+            busy = self._running not in {None, threading.get_ident()}
+            if busy:
+                self._idle = self._clock.event()
+        if busy and wait and self._idle is not None:
+            self._idle.wait(CLOSE_WAIT_S)
+
+
+class Entry:
+    """Something declared by a session: it is in the tables of the network until closed."""
+
+    __slots__ = ("closed", "network", "session")
+
+    def __init__(self, session: MemoryTransport) -> None:
+        self.session = session
+        self.network = session.network
+        self.closed = False
+
+    def close(self) -> None:
+        with self.network.lock:
+            self.close_locked()
+
+    def close_locked(self) -> None:
+        if not self.closed:
+            self.closed = True
+            self.session.declared.pop(self, None)
+            self.withdraw_locked()
+
+    def withdraw_locked(self) -> None:
+        """Leave the network's tables."""
+        raise NotImplementedError
+
+
+class Listener(Entry, Generic[T]):
+    """A callback of a session."""
+
+    __slots__ = ("_callback",)
+
+    def __init__(self, session: MemoryTransport, callback: Callable[[T], None]) -> None:
+        super().__init__(session)
+        self._callback = callback
+
+    def post(self, item: T) -> None:
+        self.session.inbox.post(partial(self.deliver, item))
+
+    def deliver(self, item: T) -> None:
+        if not self.closed:
+            self._callback(item)
+
+
+class Subscriber(Listener[Sample]):
+    """Gets the messages of a key."""
+
+    __slots__ = ("_key",)
+
+    def __init__(
+        self,
+        session: MemoryTransport,
+        key: str,
+        callback: Callable[[Sample], None],
+        *,
+        history: bool,
+    ) -> None:
+        super().__init__(session, callback)
+        self._key = key
+        _add(self.network.subscribers, key, self)
+        for publisher in self.network.latches.get(key, ()) if history else ():
+            if publisher.last is not None:
+                self.post(publisher.last)
+
+    def withdraw_locked(self) -> None:
+        _remove(self.network.subscribers, self._key, self)
+
+
+class Queryable(Listener["MemoryQuery"]):
+    """Gets the queries on a key; one that it cannot answer any more is finished for it."""
+
+    __slots__ = ("_key",)
+
+    def __init__(
+        self, session: MemoryTransport, key: str, callback: Callable[[MemoryQuery], None]
+    ) -> None:
+        super().__init__(session, callback)
+        self._key = key
+        _add(self.network.queryables, key, self)
+
+    def deliver(self, item: MemoryQuery) -> None:
+        if self.closed:
+            item.finish()
+            return
+        try:
+            self._callback(item)
+        except Exception as error:
+            item.reply_error(f"{type(error).__name__}: {error}")
+            item.finish()
+            raise
+
+    def withdraw_locked(self) -> None:
+        _remove(self.network.queryables, self._key, self)
+
+
+class Watcher(Listener[Presence]):
+    """Hears of tokens."""
+
+    __slots__ = ("pattern",)
+
+    def __init__(
+        self, session: MemoryTransport, pattern: str, callback: Callable[[Presence], None]
+    ) -> None:
+        super().__init__(session, callback)
+        self.pattern = compile_pattern(pattern)
+        self.network.watchers.append(self)
+        for key in self.network.match_tokens(self.pattern):
+            self.post(Presence(key, alive=True))
+
+    def withdraw_locked(self) -> None:
+        self.network.watchers.remove(self)
+
+
+class Token(Entry):
+    """A liveliness token."""
+
+    __slots__ = ("_key",)
+
+    def __init__(self, session: MemoryTransport, key: str) -> None:
+        super().__init__(session)
+        self._key = key
+        self.network.count_token(key, 1)
+
+    def withdraw_locked(self) -> None:
+        self.network.count_token(self._key, -1)
+
+
+class Publisher(Entry):
+    """The sending end of a key."""
+
+    __slots__ = ("_encoding", "_key", "_latch", "last")
+
+    def __init__(self, session: MemoryTransport, key: str, encoding: str, *, latch: bool) -> None:
+        super().__init__(session)
+        self._key = key
+        self._encoding = encoding
+        self._latch = latch
+        self.last: Sample | None = None
+        if latch:
+            _add(self.network.latches, key, self)
+
+    def put(self, payload: bytes) -> None:
+        sample = Sample(self._key, payload, self._encoding, self.session.session_id)
+        with self.network.lock:
+            if self.closed:
+                if self.session.killed:
+                    return
+                raise TransportError(
+                    f"{self._key}: the publisher is closed. Try sending before the node is closed."
+                )
+            if self._latch:
+                self.last = sample
+            for subscriber in self.network.subscribers.get(self._key, ()):
+                subscriber.post(sample)
+
+    def matching(self) -> bool:
+        return self._key in self.network.subscribers
+
+    def withdraw_locked(self) -> None:
+        if self._latch:
+            _remove(self.network.latches, self._key, self)
+
+
+class Exchange(Entry):
+    """One query on its way: who has still to answer, and whether the asker still listens."""
+
+    __slots__ = ("_on_done", "_on_reply", "_timer", "_waiting")
+
+    def __init__(
+        self,
+        session: MemoryTransport,
+        queryables: list[Queryable],
+        make_query: Callable[[Exchange, MemoryTransport], MemoryQuery],
+        on_reply: Callable[[Reply], None],
+        on_done: Callable[[], None],
+    ) -> None:
+        super().__init__(session)
+        self._on_reply = on_reply
+        self._on_done = on_done
+        self._waiting = len(queryables)
+        self._timer: Timer | None = None
+        for queryable in queryables:
+            queryable.post(make_query(self, queryable.session))
+        if not queryables:
+            self._end()
+
+    def limit(self, timeout: float) -> None:
+        """End the exchange `timeout` [s] from now."""
+        self._timer = self.network.clock.call_later(timeout, self._time_out)
+
+    def _time_out(self) -> None:
+        with self.network.lock:
+            if self._waiting:
+                self._waiting = 0
+                self._end()
+
+    def reply_locked(self, reply: Reply) -> None:
+        if self._waiting:
+            self.session.inbox.post(partial(self._deliver, partial(self._on_reply, reply)))
+
+    def finish_locked(self) -> None:
+        if self._waiting:
+            self._waiting -= 1
+            if not self._waiting:
+                self._end()
+
+    def _end(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        self.session.inbox.post(partial(self._deliver, self._finish))
+
+    def _finish(self) -> None:
+        self.close()
+        self._on_done()
+
+    def _deliver(self, function: Callable[[], object]) -> None:
+        if not self.closed:
+            function()
+
+    def withdraw_locked(self) -> None:
+        self._waiting = 0
+        if self._timer is not None:
+            self._timer.cancel()
+
+
+class MemoryQuery(Entry):
+    """A query as one queryable sees it."""
+
+    __slots__ = ("_exchange", "encoding", "key", "payload")
+
+    def __init__(
+        self, exchange: Exchange, session: MemoryTransport, key: str, payload: bytes, encoding: str
+    ) -> None:
+        super().__init__(session)
+        self._exchange = exchange
+        self.key = key
+        self.payload = payload
+        self.encoding = encoding
+        session.declared[self] = None
+
+    def reply(self, payload: bytes, encoding: str = "") -> None:
+        self._reply(Reply(self.key, payload, encoding, error=False))
+
+    def reply_error(self, text: str) -> None:
+        self._reply(Reply(self.key, text.encode(), "", error=True))
+
+    def _reply(self, reply: Reply) -> None:
+        with self.network.lock:
+            if not self.closed:
+                self._exchange.reply_locked(reply)
+
+    def finish(self) -> None:
+        self.close()
+
+    def withdraw_locked(self) -> None:
+        self._exchange.finish_locked()
+
+
+def _add(table: dict[str, list[E]], key: str, entry: E) -> None:
+    table.setdefault(key, []).append(entry)
+
+
+def _remove(table: dict[str, list[E]], key: str, entry: E) -> None:
+    entries = table[key]
+    entries.remove(entry)
+    if not entries:
+        del table[key]
