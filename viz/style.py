@@ -7,6 +7,7 @@ name can break a picture, whatever it contains.
 from __future__ import annotations
 
 import html
+import re
 from typing import TYPE_CHECKING
 
 import graphviz
@@ -24,19 +25,29 @@ if TYPE_CHECKING:
     Attributes = dict[str, str]
 
 TOOLTIP_LENGTH = 600
+_BACKSLASH = re.compile(r"\\(?=[\w\\])")
 
 
 def markup(text: str) -> str:
     """Return `text` safe inside an HTML-like label."""
-    return html.escape(shorten(text), quote=True) or " "
+    return html.escape(_inert(shorten(text)), quote=True).replace("\\", "&#92;") or " "
 
 
 def plain(text: str, length: int = TOOLTIP_LENGTH) -> str:
     """Return `text` safe as the value of an ordinary attribute."""
     lines = [shorten(line, length) for line in text[: 4 * length].splitlines()[:12]]
-    escaped = [graphviz.escape(line.replace("&", "&amp;")) for line in lines]
+    escaped = [graphviz.escape(_inert(line).replace("&", "&amp;")) for line in lines]
     safe: str = graphviz.nohtml("\\n".join(escaped))
     return safe
+
+
+def _inert(text: str) -> str:
+    """Part a backslash from a letter by a space without width.
+
+    Graphviz replaces a backslash and an N, a G and others by names of its own, also where the
+    backslash is escaped, because it looks more than once.
+    """
+    return _BACKSLASH.sub("\\\\\u200b", text)
 
 
 def graph(theme: Theme) -> Attributes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 
@@ -108,14 +109,12 @@ def make_patrol():
 def make_large(states, seed=1):
     """A machine of exactly `states` states with random containers inside."""
     rng = random.Random(seed)
-    words = "TURN LIFT GRASP SCAN MOVE DOCK ALIGN READ PLACE OPEN CLOSE CHECK".split()
-    left = states - 1
+    words = ["TURN", "LIFT", "GRASP", "SCAN", "MOVE", "DOCK", "ALIGN", "READ", "PLACE", "CHECK"]
 
     def name(i):
         return f"{rng.choice(words)}_{i}"
 
     def container(label, budget, depth):
-        nonlocal left
         count = min(rng.randint(3, 8), budget)
         children = []
         for i in range(count):
@@ -127,11 +126,13 @@ def make_large(states, seed=1):
                 children.append(leaf(name(i), kind))
         if rng.random() < 0.25:
             pair = [(child.label, "succeeded") for child in children[:2]]
-            rules = [("succeeded", pair, "all of them"),
-                     ("aborted", [(children[-1].label, "aborted")], "the last one")]
+            rules = [
+                ("succeeded", pair, "all of them"),
+                ("aborted", [(children[-1].label, "aborted")], "the last one"),
+            ]
             return concurrence(label, children, rules)
         transitions = {}
-        for here, after in zip(children, children[1:], strict=False):
+        for here, after in pairwise(children):
             transitions[here.label] = {"succeeded": after.label}
             if rng.random() < 0.3:
                 transitions[here.label]["aborted"] = rng.choice(children).label

@@ -1,0 +1,163 @@
+"""Where things stand: read from the geometry, for machines small and large."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import pytest
+
+from viz import curves, engine, graph, layout
+from viz.extract import extract
+from viz.model import Diagram
+from viz.theme import LIGHT
+
+DOT = 4.5
+ARROW = 9.0
+
+
+class Picture:
+    """Boxes and ends of arrows by name, in points."""
+
+    def __init__(self, record, **options):
+        self.root = graph.draw(Diagram(extract(record, **options)), LIGHT)
+        self.geometry = engine.lay_out(lambda run: layout.compose(self.root, LIGHT, run))
+        self.boxes = {box.name: self._box(box) for box in self._all(self.root)}
+
+    def _all(self, box):
+        yield box
+        for child in box.boxes:
+            yield from self._all(child)
+
+    def _box(self, box):
+        place = self.geometry[box.name]
+        if "bb" in place:
+            return tuple(map(float, place["bb"].split(",")))
+        x, y = curves.point(place["pos"])
+        return (x - 15, y - 12, x + 15, y + 12)  # no label is narrower
+
+    def containers(self):
+        return list(self.root.containers())
+
+    def at(self, name):
+        return curves.point(self.geometry[name]["pos"])
+
+    def ends(self, arrow):
+        """First and last point, the tip of the arrow included."""
+        words = self.geometry[arrow.name]["pos"].split()
+        points = [curves.point(word) for word in words if word[0] not in "es"]
+        start, end = points[0], points[-1]
+        for word in words:
+            if word.startswith("s,"):
+                start = curves.point(word[2:])
+            if word.startswith("e,"):
+                end = curves.point(word[2:])
+        return (end, start) if arrow.back else (start, end)
+
+
+@pytest.fixture(scope="module", params=["patrol", 60, 500])
+def picture(request, patrol, large):
+    return Picture(patrol if request.param == "patrol" else large(request.param), depth=99)
+
+
+def inside(inner, outer):
+    return (
+        outer[0] <= inner[0]
+        and outer[1] <= inner[1]
+        and inner[2] <= outer[2]
+        and inner[3] <= outer[3]
+    )
+
+
+def apart(one, two):
+    return one[2] <= two[0] or two[2] <= one[0] or one[3] <= two[1] or two[3] <= one[1]
+
+
+def test_every_state_stands_inside_its_container(picture):
+    for container in picture.containers():
+        for child in container.boxes:
+            assert inside(picture.boxes[child.name], picture.boxes[container.name])
+
+
+def test_no_state_stands_on_another(picture):
+    for container in picture.containers():
+        for one, two in itertools.combinations(container.boxes, 2):
+            assert apart(picture.boxes[one.name], picture.boxes[two.name])
+
+
+def test_entries_and_outcomes_stand_on_the_border(picture):
+    for container in picture.containers():
+        left, bottom, right, top = picture.boxes[container.name]
+        x, y = picture.at(container.entry.name)
+        assert y == pytest.approx(top, abs=1.5)
+        assert left < x < right
+        for pill in container.pills:
+            x, y = picture.at(pill.name)
+            assert y == pytest.approx(bottom, abs=1.5)
+            assert left < x < right
+
+
+def test_arrows_into_a_container_end_at_its_entry_or_its_side(picture):
+    for container in picture.containers():
+        for arrow in container.arrows:
+            if not arrow.head.is_open or arrow.head.box == container.name:
+                continue
+            x, y = picture.ends(arrow)[1]
+            left, bottom, right, top = picture.boxes[arrow.head.box]
+            if arrow.head.part == "in":
+                entry = picture.at(f"{arrow.head.box}_in")
+                assert math.dist((x, y), entry) < 3 * DOT
+            else:
+                assert min(abs(x - left), abs(x - right)) < ARROW
+                assert bottom - ARROW < y < top + ARROW
+
+
+def test_arrows_out_of_a_container_begin_at_its_outcome(picture):
+    for container in picture.containers():
+        for arrow in container.arrows:
+            if arrow.tail.is_open and arrow.tail.part.startswith("o"):
+                x, y = picture.ends(arrow)[0]
+                pill_x, pill_y = picture.at(f"{arrow.tail.box}_{arrow.tail.part}")
+                assert y == pytest.approx(pill_y - 7.5, abs=4)
+                assert abs(x - pill_x) < 130
+
+
+def test_everything_is_on_the_canvas(picture):
+    width, height = layout.canvas_size(picture.geometry)
+    canvas = (
+        -layout.PAD - 1,
+        -layout.PAD - 1,
+        width - layout.PAD + 1,
+        height - layout.PAD + 1,
+    )
+    assert inside(picture.boxes[picture.root.name], canvas)
+
+
+def test_no_arrow_leaves_the_outermost_box_sideways(picture):
+    left, _, right, _ = picture.boxes[picture.root.name]
+    for container in picture.containers():
+        for arrow in container.arrows:
+            xs = [x for x, _ in curves.trace(picture.geometry[arrow.name]["pos"])]
+            assert left <= min(xs)
+            assert max(xs) <= right
+
+
+def test_the_reading_direction_is_down(patrol):
+    picture = Picture(patrol)
+    names = {box.attributes["id"]: box.name for box in picture._all(picture.root)}
+    drive = "/PATROL/WATCHED_DRIVE/DRIVE"
+    order = [f"{drive}/NEXT_WAYPOINT", f"{drive}/GO_THERE", f"{drive}/RECOVER"]
+    tops = [picture.boxes[names[path]][3] for path in order]
+    assert tops == sorted(tops, reverse=True)
+
+
+def test_a_picture_is_the_same_every_time(patrol):
+    assert Picture(patrol).geometry == Picture(patrol).geometry
+
+
+def test_titles_do_not_lie_on_the_line_from_the_entry(picture):
+    for container in picture.containers():
+        words = container.attributes["label"].split("<b>")[1].split("</b>")[0]
+        centre, _ = curves.point(picture.geometry[container.name]["lp"])
+        entry, _ = picture.at(container.entry.name)
+        assert abs(centre - entry) > len(words) * 2.2
