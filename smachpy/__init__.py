@@ -60,6 +60,7 @@ from smachpy.util import is_shutdown as is_shutdown
 from smachpy.util import set_shutdown_check as set_shutdown_check
 
 if TYPE_CHECKING:
+    from smachpy.checks import check as check
     from smachpy.condition_state import ConditionState as ConditionState
     from smachpy.introspection import Kind as Kind
     from smachpy.monitor_state import MonitorState as MonitorState
@@ -115,6 +116,7 @@ _LAZY: dict[str, str] = {
     "MonitorState": "smachpy.monitor_state",
     "ServiceState": "smachpy.service_state",
     "SimpleActionState": "smachpy.simple_action_state",
+    "check": "smachpy.checks",
 }
 
 

@@ -1,0 +1,184 @@
+"""Rules about userdata keys: read before written, written and never read.
+
+A variable is a key of one container's userdata. A container copies its input keys in when it
+begins and its output keys out when it ends. A leaf is taken to write all its output keys.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING, TypeAlias
+
+from smachpy.checks._core import graph as runs
+from smachpy.checks._core.model import Problem
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from smachpy.checks._core.graph import Graph, Node
+    from smachpy.checks._core.model import Subject
+    from smachpy.introspection import StateRecord
+
+Variable: TypeAlias = tuple[str, str]  # path of the container, key
+MOST_STEPS = 50_000  # moments looked at for a run that shows a problem
+
+
+def find(subject: Subject, graph: Graph) -> Iterator[Problem]:
+    """Yield what is wrong with the keys."""
+    flow = _Flow(subject, graph)
+    yield from flow.unset()
+    yield from flow.unread()
+
+
+class _Flow:
+    """What is certainly written at each moment."""
+
+    def __init__(self, subject: Subject, graph: Graph) -> None:
+        self._subject = subject
+        self._graph = graph
+        self._parents = {c.path: r for r in subject.root.walk() for c in r.children}
+        self._preset = frozenset(
+            (record.path, key)
+            for record in subject.root.walk()
+            for key in subject.facts_of(record).preset
+        )
+        self._written = self._solve()
+
+    # -- one moment ----------------------------------------------------------------------------
+
+    def _outer(self, record: StateRecord, key: str) -> Variable | None:
+        """Return the variable of the container around `record` that its `key` stands for."""
+        parent = self._parents.get(record.path)
+        return None if parent is None else (parent.path, dict(record.remapping).get(key, key))
+
+    def _pass(self, node: Node, written: frozenset[Variable]) -> frozenset[Variable]:
+        """Return what is written after a moment."""
+        record = node.record
+        new: set[Variable] = set()
+        if node.outcome is None and record.is_container:
+            for key in record.input_keys:
+                outer = self._outer(record, key)
+                if outer is None or outer in written:
+                    new.add((record.path, key))
+            item_key = dict(record.details).get("item key")
+            if record.kind == "iterator" and item_key is not None:
+                new.add((record.path, item_key))
+        elif node.outcome is not None:
+            for key in record.output_keys:
+                outer = self._outer(record, key)
+                if outer is not None and (not record.is_container or (record.path, key) in written):
+                    new.add(outer)
+        return written | new if new else written
+
+    def _solve(self) -> dict[int, frozenset[Variable]]:
+        """Return what is certainly written before each moment, whatever the run."""
+        graph = self._graph
+        written = {graph.start: self._preset}
+        queue = deque([graph.start])
+        while queue:
+            number = queue.popleft()
+            after_it = self._pass(graph.nodes[number], written[number])
+            for after in graph.after(number):
+                old = written.get(after)
+                new = after_it if old is None else old & after_it
+                if new != old:
+                    written[after] = new
+                    queue.append(after)
+        return written
+
+    # -- rules ---------------------------------------------------------------------------------
+
+    def _reads(self, record: StateRecord) -> list[str]:
+        """Return the keys that a leaf reads."""
+        known = self._subject.facts_of(record).reads
+        return [key for key in record.input_keys if known is None or key in known]
+
+    def unset(self) -> Iterator[Problem]:
+        told: set[tuple[str, str]] = set()
+        for number, written in sorted(self._written.items()):
+            node = self._graph.nodes[number]
+            if node.outcome is not None or node.record.is_container:
+                continue
+            for key in self._reads(node.record):
+                variable = self._outer(node.record, key)
+                if variable is None or variable in written or (node.record.path, key) in told:
+                    continue
+                told.add((node.record.path, key))
+                yield self._unset(node, key, variable)
+
+    def _unset(self, node: Node, key: str, variable: Variable) -> Problem:
+        steps = self._witness(node, variable)
+        alias = "" if variable[1] == key else f" ({key!r} there)"
+        return Problem(
+            "unset-key",
+            "error",
+            node.record.path,
+            f"{node.record.path} reads userdata key {variable[1]!r}{alias} of {variable[0]}, which "
+            "nobody has written on this run.",
+            "Write it before, set it in the machine's userdata, or declare it as an input key "
+            "of the machine.",
+            self._subject.facts_of(node.record).place,
+            runs.moments(steps),
+        )
+
+    def _witness(self, goal: Node, variable: Variable) -> list[Node]:
+        """Return a shortest run that gets to `goal` with `variable` unwritten."""
+        graph = self._graph
+        first = (graph.start, self._preset)
+        came: dict[tuple[int, frozenset[Variable]], tuple[int, frozenset[Variable]] | None]
+        came = {first: None}
+        queue = deque([first])
+        while queue and len(came) < MOST_STEPS:
+            at = queue.popleft()
+            if graph.nodes[at[0]].record.path == goal.record.path and variable not in at[1]:
+                steps = [at]
+                while (before := came[steps[-1]]) is not None:
+                    steps.append(before)
+                return [graph.nodes[number] for number, _ in reversed(steps)]
+            written = self._pass(graph.nodes[at[0]], at[1])
+            for after in graph.after(at[0]):
+                if (after, written) not in came:
+                    came[after, written] = at
+                    queue.append((after, written))
+        return graph.path([graph.start], {goal.number}) or []
+
+    def unread(self) -> Iterator[Problem]:
+        reached = {self._graph.nodes[number].record.path for number in self._written}
+        read = self._read()
+        told: set[Variable] = set()
+        for record in self._subject.root.walk():
+            parent = self._parents.get(record.path)
+            if record.is_container or parent is None or record.path not in reached:
+                continue
+            for key in record.output_keys:
+                variable = (parent.path, dict(record.remapping).get(key, key))
+                if variable in read or variable in told:
+                    continue
+                told.add(variable)
+                # After the run the caller can look at the root's own userdata.
+                sure = parent.path != self._subject.root.path
+                yield Problem(
+                    "unread-key",
+                    "warning" if sure else "note",
+                    record.path,
+                    f"{record.path} writes userdata key {variable[1]!r} of {variable[0]}, which no "
+                    "state reads.",
+                    "Remove it, read it, or declare it as an output key of the machine.",
+                    self._subject.facts_of(record).place,
+                )
+
+    def _read(self) -> set[Variable]:
+        """Return the variables that somebody reads."""
+        read: set[Variable] = set()
+        for record in self._subject.root.walk():
+            facts = self._subject.facts_of(record)
+            parent = self._parents.get(record.path)
+            if parent is not None:
+                names = dict(record.remapping)
+                read |= {(parent.path, names.get(key, key)) for key in record.input_keys}
+            read |= {(record.path, key) for key in record.output_keys if record.is_container}
+            if facts.watched:
+                keys = [k for c in record.children for k in c.output_keys]
+                names = {k: n for c in record.children for k, n in c.remapping}
+                read |= {(record.path, names.get(key, key)) for key in keys}
+        return read

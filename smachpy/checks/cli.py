@@ -1,0 +1,55 @@
+"""`smachpy check`: static checks from the command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from smachpy.checks import check
+from smachpy.checks.report import FORMATS
+from smachpy.checks.suppression import read_settings
+from smachpy.targets import load_target
+
+if TYPE_CHECKING:
+    import argparse
+
+    from smachpy.checks.report import Report
+    from smachpy.checks.suppression import Settings
+
+
+def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser("check", help="find what is wrong with a machine, without a run")
+    parser.add_argument(
+        "targets", nargs="+", metavar="TARGET", help="mission, module:factory or path.py[:factory]"
+    )
+    parser.add_argument("--format", choices=sorted(FORMATS), default="text", help="of the report")
+    parser.add_argument(
+        "--property",
+        action="append",
+        default=[],
+        dest="properties",
+        help="what must hold for every run: never(STATE), always_reaches(OUTCOME, ...), "
+        "before(STATE, STATE), after_preempt(STATE); may be repeated",
+    )
+    parser.add_argument("--pictures", metavar="FOLDER", help="draw the runs that show problems")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Check the targets; 1 when there are problems."""
+    settings = read_settings(Path.cwd())
+    reports = [_check(text, args, settings) for text in args.targets]
+    print(FORMATS[args.format](reports))
+    if args.pictures:
+        for report in reports:
+            report.draw(args.pictures)
+    return 0 if all(report.ok for report in reports) else 1
+
+
+def _check(text: str, args: argparse.Namespace, settings: Settings) -> Report:
+    target = load_target(text)
+    machine = target.build()
+    name = machine.name or target.name
+    own = [p for machine_name, texts in settings.properties if machine_name == name for p in texts]
+    return check(machine, properties=[*args.properties, *own], ignores=settings.ignores, name=name)

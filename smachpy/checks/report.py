@@ -1,0 +1,176 @@
+"""What a check found, as text, JSON, GitHub annotations or SARIF."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from smachpy.checks._core.rules import RULES
+from smachpy.pictures import draw_moments
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from smachpy.checks._core.model import Problem
+    from smachpy.introspection import StateRecord
+
+_LEVELS = {"error": "error", "warning": "warning", "note": "notice"}
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """The result of a check.
+
+    Attributes:
+        record: The machine.
+        problems: What is wrong.
+        ignored: What is switched off, with the reasons.
+        seconds: How long the check took.
+    """
+
+    record: StateRecord
+    problems: tuple[Problem, ...]
+    ignored: tuple[tuple[Problem, str], ...] = ()
+    seconds: float = 0.0
+
+    @property
+    def ok(self) -> bool:
+        """Whether there are no errors and no warnings."""
+        return not any(problem.severity != "note" for problem in self.problems)
+
+    def __bool__(self) -> bool:
+        return self.ok
+
+    def __str__(self) -> str:
+        return as_text([self])
+
+    def draw(self, folder: Path | str) -> list[Path]:
+        """Write a picture of the machine for each problem that has a run, with that run.
+
+        Returns:
+            The files; none when the drawing package is not installed.
+        """
+        files = []
+        for number, problem in enumerate(self.problems, 1):
+            if problem.moments:
+                name = f"{self.record.label}-{number}-{problem.rule}.svg"
+                file = draw_moments(self.record, problem.moments, Path(folder) / name)
+                files += [] if file is None else [file]
+        return files
+
+
+def as_text(reports: Iterable[Report]) -> str:
+    """Return reports for a terminal."""
+    lines: list[str] = []
+    for report in reports:
+        for problem in report.problems:
+            place = problem.place
+            where = f"{place.file}:{place.line}: " if place is not None and place.file else ""
+            lines.append(f"{where}{problem.severity}: {problem.message} [{problem.rule}]")
+            if problem.steps:
+                lines.append("    run: " + " ".join(problem.steps))
+            if problem.hint:
+                lines.append(f"    {problem.hint}")
+        lines += [f"ignored: {p.path}: {p.rule}: {reason}" for p, reason in report.ignored]
+        count = sum(problem.severity != "note" for problem in report.problems)
+        lines.append(
+            f"{report.record.path}: {count or 'no'} problem{'' if count == 1 else 's'} "
+            f"({report.seconds * 1e3:.1f} ms)"
+        )
+    return "\n".join(lines)
+
+
+def as_json(reports: Iterable[Report]) -> str:
+    """Return reports as JSON: a list of machines with their problems."""
+    return json.dumps(
+        [
+            {
+                "machine": report.record.path,
+                "ok": report.ok,
+                "seconds": report.seconds,
+                "problems": [_plain(problem) for problem in report.problems],
+                "ignored": [{**_plain(p), "reason": reason} for p, reason in report.ignored],
+            }
+            for report in reports
+        ],
+        indent=2,
+    )
+
+
+def as_github(reports: Iterable[Report]) -> str:
+    """Return reports as GitHub workflow commands."""
+    lines = []
+    for problem in (problem for report in reports for problem in report.problems):
+        fields = [f"title={problem.rule}"]
+        if problem.place is not None and problem.place.file:
+            fields = [
+                f"file={_relative(problem.place.file)}",
+                f"line={problem.place.line}",
+                *fields,
+            ]
+        text = " ".join([problem.message, problem.hint, *problem.steps]).strip()
+        lines.append(f"::{_LEVELS[problem.severity]} {','.join(fields)}::{_escaped(text)}")
+    return "\n".join(lines)
+
+
+def as_sarif(reports: Iterable[Report]) -> str:
+    """Return reports as SARIF 2.1.0.
+
+    Source: OASIS, Static Analysis Results Interchange Format 2.1.0.
+    """
+    results = [_result(problem) for report in reports for problem in report.problems]
+    rules = [
+        {"id": rule.name, "shortDescription": {"text": rule.summary}} for rule in RULES.values()
+    ]
+    driver = {
+        "name": "smachpy",
+        "informationUri": "https://pypi.org/project/smachpy",
+        "rules": rules,
+    }
+    return json.dumps(
+        {
+            "$schema": "https://json.schemastore.org/sarif-2.1.0.json",
+            "version": "2.1.0",
+            "runs": [{"tool": {"driver": driver}, "results": results}],
+        },
+        indent=2,
+    )
+
+
+def _result(problem: Problem) -> dict[str, Any]:
+    location: dict[str, Any] = {"logicalLocations": [{"fullyQualifiedName": problem.path}]}
+    if problem.place is not None and problem.place.file:
+        location["physicalLocation"] = {
+            "artifactLocation": {"uri": _relative(problem.place.file)},
+            "region": {"startLine": max(1, problem.place.line)},
+        }
+    result: dict[str, Any] = {
+        "ruleId": problem.rule,
+        "level": problem.severity,
+        "message": {"text": f"{problem.message} {problem.hint}".strip()},
+        "locations": [location],
+    }
+    if problem.steps:
+        steps = [{"location": {"message": {"text": step}}} for step in problem.steps]
+        result["codeFlows"] = [{"threadFlows": [{"locations": steps}]}]
+    return result
+
+
+def _plain(problem: Problem) -> dict[str, Any]:
+    return {**asdict(problem), "steps": problem.steps}
+
+
+def _relative(file: str) -> str:
+    try:
+        return Path(file).relative_to(Path.cwd()).as_posix()
+    except ValueError:
+        return Path(file).as_posix()
+
+
+def _escaped(text: str) -> str:
+    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+FORMATS = {"text": as_text, "json": as_json, "github": as_github, "sarif": as_sarif}

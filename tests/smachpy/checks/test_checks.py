@@ -1,0 +1,542 @@
+"""A planted bug of each kind is found, and nothing is said where nothing can be known."""
+
+from __future__ import annotations
+
+import json
+import time
+
+import pytest
+
+import smachpy
+from smachpy import CBState, Concurrence, Iterator, State, StateMachine, any_of, cb_interface
+from smachpy.checks import (
+    RULES,
+    Ignore,
+    IgnoreError,
+    PropertyError,
+    after_preempt,
+    always_reaches,
+    before,
+    check,
+    ignore,
+    never,
+)
+from smachpy.checks.report import FORMATS
+
+
+class Leaf(State):
+    """Ends with anything it declares; nobody can know which."""
+
+    def __init__(self, *outcomes, **kwargs):
+        super().__init__(outcomes or ("done",), **kwargs)
+        self.next = outcomes[0] if outcomes else "done"
+
+    def execute(self, ud):
+        return self.choose(ud)
+
+    def choose(self, ud):
+        return self.next
+
+
+def machine(*children, outcomes=("done",), **kwargs):
+    sm = StateMachine(outcomes, name="M", **kwargs)
+    with sm.opened(check=False):
+        for label, state, transitions, *remapping in children:
+            sm.add(label, state, transitions, *remapping)
+    return sm
+
+
+def rules(found):
+    return [problem.rule for problem in found.problems]
+
+
+def the(found, rule):
+    (problem,) = [problem for problem in found.problems if problem.rule == rule]
+    return problem
+
+
+def test_a_sound_machine_has_no_problems():
+    class Go(State):
+        def __init__(self):
+            super().__init__(["done", "failed", "preempted"], io_keys=["tries"])
+
+        def execute(self, ud):
+            ud.tries = ud.tries + 1
+            while not self.sleep(1):
+                pass
+            return "preempted" if self.preempt_requested() else "done" if ud.tries else "failed"
+
+    sm = machine(
+        ("GO", Go(), {"failed": "GO", "done": "TURN"}),
+        ("TURN", Leaf("done", "failed"), {}),
+        outcomes=["done", "failed", "preempted"],
+    )
+    sm.userdata.tries = 0
+    found = check(sm)
+    assert found
+    assert found.ok, found
+    assert found.problems == ()
+
+
+# -- structure -------------------------------------------------------------------------------------
+
+
+def test_inconsistent_machine():
+    sm = machine(("A", Leaf(), {"done": "NOWHERE"}))
+    assert rules(check(sm)) == ["inconsistent"]
+    assert the(check(sm), "inconsistent").path == "/M/A"
+
+
+def test_unmapped_outcome():
+    found = check(machine(("A", Leaf("done", "odd"), {})))
+    assert the(found, "unmapped-outcome").path == "/M/A"
+
+
+def test_unreachable_state():
+    found = check(machine(("A", Leaf(), {}), ("B", Leaf(), {"done": "A"})))
+    assert the(found, "unreachable-state").path == "/M/B"
+
+
+def test_a_state_behind_an_impossible_outcome_is_unreachable():
+    def work(ud):
+        return "done"
+
+    sm = machine(("A", CBState(work, outcomes=["done", "odd"]), {"odd": "B"}), ("B", Leaf(), {}))
+    found = check(sm)
+    assert the(found, "unreachable-state").path == "/M/B"
+    assert the(found, "impossible-outcome").path == "/M/A"
+
+
+def test_container_outcome_that_nothing_leads_to():
+    found = check(machine(("A", Leaf(), {}), outcomes=["done", "odd"]))
+    assert "'odd'" in the(found, "impossible-outcome").message
+
+
+def test_preempted_is_made_by_the_machine_itself():
+    assert check(machine(("A", Leaf(), {}), outcomes=["done", "preempted"])).ok
+
+
+def test_undeclared_outcome_with_its_line():
+    class Typo(State):
+        def __init__(self):
+            super().__init__(["done", "failed"])
+
+        def execute(self, ud):
+            if time:
+                return "dnoe"
+            return "failed"
+
+    found = check(machine(("A", Typo(), {"failed": "done"})))
+    problem = the(found, "undeclared-outcome")
+    assert "'dnoe'" in problem.message
+    assert problem.place.file == __file__
+
+
+def test_outcomes_of_timeouts_and_exceptions_are_possible():
+    class Go(State):
+        def execute(self, ud):
+            return "done"
+
+    state = Go(["done"], timeout=3, on_exception={OSError: "failed"})
+    sm = machine(("A", state, {"aborted": "done", "failed": "done"}))
+    assert check(sm).ok
+
+
+def test_computed_outcomes_are_trusted():
+    class Go(State):
+        def execute(self, ud):
+            return self.pick()
+
+        def pick(self):
+            return "odd"
+
+    assert check(machine(("A", Go(["done", "odd"]), {"odd": "done"}))).ok
+
+
+def test_a_local_name_that_only_gets_strings_is_known():
+    class Go(State):
+        def execute(self, ud):
+            answer = "done"
+            if time:
+                answer = "odd"
+            return answer
+
+    found = check(machine(("A", Go(["done", "odd", "never"]), {"odd": "done", "never": "done"})))
+    assert "'never'" in the(found, "impossible-outcome").message
+
+
+# -- userdata --------------------------------------------------------------------------------------
+
+
+def test_a_key_read_on_some_path_before_anyone_writes_it():
+    sm = machine(
+        ("LOOK", Leaf("found", "blind"), {"found": "FIND", "blind": "USE"}),
+        ("FIND", Leaf(output_keys=["pose"]), {"done": "USE"}),
+        ("USE", Leaf(input_keys=["goal"]), {}, {"goal": "pose"}),
+    )
+    problem = the(check(sm), "unset-key")
+    assert problem.path == "/M/USE"
+    assert problem.steps == ("/M/LOOK -blind->", "/M/USE")
+    assert "'pose'" in problem.message
+
+
+def test_keys_set_beforehand_given_by_the_caller_or_by_containers_are_written():
+    inner = machine(
+        ("READ", Leaf(input_keys=["a", "b"], output_keys=["c"]), {}),
+        input_keys=["a", "b"],
+        output_keys=["c"],
+    )
+    sm = machine(
+        ("IN", inner, {"done": "OUT"}),
+        ("OUT", Leaf(input_keys=["c"]), {}),
+        input_keys=["b"],
+    )
+    sm.userdata.a = 1
+    assert check(sm).ok
+    inner._input_keys = ("a",)
+    assert the(check(sm), "unset-key").path == "/M/IN/READ"
+
+
+def test_a_declared_key_that_the_code_asks_for_first_or_never_reads_is_no_problem():
+    class Asks(State):
+        def execute(self, ud):
+            if "pose" in ud:
+                return "done"
+            return "done"
+
+    class Writes(State):
+        def execute(self, ud):
+            ud.count = 0
+            return str(ud.count) and "done"
+
+    sm = machine(
+        ("A", Asks(["done"], input_keys=["pose"]), {"done": "B"}),
+        ("B", Writes(["done"], io_keys=["count"]), {}),
+    )
+    assert check(sm).ok
+
+
+def test_a_key_written_in_one_branch_and_read_in_another_is_a_race():
+    both = Concurrence(["done"], "done")
+    with both:
+        both.add("READ", Leaf(input_keys=["pose"]))
+        both.add("FIND", Leaf(output_keys=["pose"]))
+    problem = the(check(machine(("BOTH", both, {}))), "unset-key")
+    assert problem.path == "/M/BOTH/READ"
+
+
+def test_a_rule_of_a_concurrence_says_which_child_wrote():
+    both = Concurrence(
+        ["found", "lost"], "lost", outcome_map={"found": {"FIND": "done"}}, output_keys=["pose"]
+    )
+    with both:
+        both.add("FIND", Leaf("done", "failed", output_keys=["pose"]))
+        both.add("WATCH", Leaf())
+    sm = machine(
+        ("BOTH", both, {"found": "USE", "lost": "done"}), ("USE", Leaf(input_keys=["pose"]), {})
+    )
+    assert check(sm).ok
+
+
+def test_the_item_of_an_iterator_is_written():
+    each = Iterator(["done"], [], [], it=range(3), it_label="i", exhausted_outcome="done")
+    with each:
+        Iterator.set_contained_state("DO", Leaf(input_keys=["i"]))
+    assert check(machine(("EACH", each, {}))).ok
+
+
+def test_a_key_that_nobody_reads():
+    inner = machine(("WRITE", Leaf(output_keys=["junk"]), {}))
+    problem = the(check(machine(("IN", inner, {}))), "unread-key")
+    assert (problem.path, problem.severity) == ("/M/IN/WRITE", "warning")
+    # At the root the caller may look at it after the run.
+    found = check(inner)
+    assert the(found, "unread-key").severity == "note"
+    assert found.ok
+
+
+# -- loops, waits, preempts ------------------------------------------------------------------------
+
+
+def test_a_loop_with_no_way_out():
+    sm = machine(
+        ("A", Leaf("done", "again"), {"again": "B"}),
+        ("B", Leaf(), {"done": "C"}),
+        ("C", Leaf(), {"done": "B"}),
+    )
+    problem = the(check(sm), "endless-loop")
+    assert "B, C" in problem.message
+    assert problem.steps[0] == "/M/A -again->"
+
+
+def test_a_loop_that_only_a_preempt_ends_has_a_way_out():
+    sm = machine(("A", Leaf("done", "preempted"), {"done": "A"}), outcomes=["preempted"])
+    assert check(sm).ok
+
+
+def test_a_wait_without_a_timeout():
+    class Waits(State):
+        def execute(self, ud):
+            self.event.wait()
+            self.event.wait(3)
+            return "done"
+
+    sm = machine(("A", Waits(["done"]), {}))
+    assert "self.event.wait()" in the(check(sm), "no-timeout").message
+    assert check(machine(("A", Waits(["done"], timeout=5), {"aborted": "done"}))).ok
+    assert check(
+        machine(("A", machine(("B", Waits(["done"]), {}), timeout=9), {"aborted": "done"}))
+    ).ok
+
+
+def test_an_action_state_without_a_timeout():
+    from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
+    from smachpy.simple_action_state import SimpleActionState
+
+    ends = {"succeeded": "done", "aborted": "done", "preempted": "preempted"}
+    outcomes = ["done", "preempted"]
+    sm = machine(("A", SimpleActionState("move_base", MoveBaseAction), ends), outcomes=outcomes)
+    assert the(check(sm), "no-timeout").path == "/M/A"
+    limited = SimpleActionState("move_base", MoveBaseAction, exec_timeout=60.0)
+    assert check(machine(("A", limited, ends), outcomes=outcomes)).ok
+
+
+def test_a_loop_that_never_looks_at_the_preempt():
+    class Deaf(State):
+        def execute(self, ud):
+            for _ in range(100):
+                time.sleep(1)
+            return "done"
+
+    class Hears(State):
+        def execute(self, ud):
+            for _ in range(100):
+                time.sleep(1)
+                if self.stop_wanted():
+                    return "done"
+            return "done"
+
+        def stop_wanted(self):
+            return self.preempt_requested()
+
+    class HandsItselfOn(State):
+        def execute(self, ud):
+            while True:
+                time.sleep(1)
+                if helper(self):
+                    return "done"
+
+    class Cancelled(State):
+        async def execute(self, ud):
+            import asyncio
+
+            while True:
+                await asyncio.sleep(1)
+                if time:
+                    return "done"
+
+    found = check(machine(("A", Deaf(["done"]), {})))
+    assert "`for` loop" in the(found, "deaf-loop").message
+    assert the(found, "deaf-loop").place.file == __file__
+    for fine in (Hears, HandsItselfOn, Cancelled):
+        assert check(machine(("A", fine(["done"]), {}))).ok, fine
+
+
+def helper(state):
+    return state.preempt_requested()
+
+
+def test_a_concurrence_that_cannot_finish():
+    class Guard(State):
+        def execute(self, ud):
+            self.wait_preempt()
+            return "preempted"
+
+    def both(**kwargs):
+        made = Concurrence(["done"], "done", **kwargs)
+        with made:
+            made.add("GUARD", Guard(["preempted"]))
+            made.add("GO", Leaf())
+        return made
+
+    assert the(check(machine(("BOTH", both(), {}))), "stuck-concurrence").path == "/M/BOTH"
+    assert check(machine(("BOTH", both(child_termination_cb=lambda _: True), {}))).ok
+
+
+def test_an_ambiguous_outcome_map():
+    made = Concurrence(
+        ["won", "lost"], "lost", outcome_map={"won": {"A": "done"}, "lost": {"B": "done"}}
+    )
+    with made:
+        made.add("A", Leaf("done", "failed"))
+        made.add("B", Leaf("done", "failed"))
+    sm = machine(("C", made, {"won": "done", "lost": "done"}))
+    assert "A:done, B:done" in the(check(sm), "ambiguous-map").message
+
+
+def test_a_rule_that_can_never_hold_leaves_its_outcome_impossible():
+    made = Concurrence(
+        ["won", "lost"],
+        "lost",
+        outcome_map={"won": any_of({"A": "done"}), "lost": {"A": ["done", "failed"], "B": "done"}},
+    )
+    with made:
+        made.add("A", Leaf("done", "failed"))
+        made.add("B", Leaf("done"))
+    sm = machine(("C", made, {"won": "done", "lost": "done"}))
+    assert "'won'" in the(check(sm), "impossible-outcome").message
+
+
+def test_a_preempt_that_leaves_a_container_by_the_wrong_outcome():
+    def inner(target):
+        return machine(
+            ("DRIVE", Leaf("done", "preempted"), {"preempted": target}),
+            ("STOP", Leaf("stopped"), {"stopped": "preempted"}),
+            outcomes=["done", "failed", "preempted"],
+        )
+
+    def outer(part):
+        ends = {"failed": "NEXT", "done": "NEXT"}
+        return machine(("IN", part, ends), ("NEXT", Leaf(), {}), outcomes=["done", "preempted"])
+
+    found = check(outer(inner("failed")))
+    assert the(found, "preempt-outcome").path == "/M/IN"
+    assert "'failed'" in the(found, "preempt-outcome").message
+    found = check(outer(inner("STOP")))
+    assert "preempt-outcome" not in rules(found)
+
+
+# -- properties ------------------------------------------------------------------------------------
+
+
+def patrol():
+    return machine(
+        ("UNDOCK", Leaf("done", "failed"), {"done": "DRIVE", "failed": "ABORT"}),
+        ("DRIVE", Leaf("done", "failed", "preempted"), {"failed": "DRIVE", "preempted": "STOP"}),
+        ("STOP", Leaf("stopped"), {"stopped": "preempted"}),
+        ("ABORT", Leaf(), {"done": "aborted"}),
+        outcomes=["done", "aborted", "preempted"],
+    )
+
+
+def test_properties_that_hold():
+    wanted = [
+        before("UNDOCK", "DRIVE"),
+        always_reaches("done", "aborted"),
+        after_preempt("STOP"),
+        "before(/M/UNDOCK, ABORT)",
+    ]
+    assert check(patrol(), properties=wanted).ok
+
+
+@pytest.mark.parametrize(
+    ("wanted", "steps"),
+    [
+        (never("ABORT"), ("/M/UNDOCK -failed->", "/M/ABORT")),
+        (always_reaches("done"), ("/M/UNDOCK -failed->", "/M/ABORT -done->", "/M -aborted->")),
+        (before("DRIVE", "ABORT"), ("/M/UNDOCK -failed->", "/M/ABORT")),
+        (
+            after_preempt("ABORT"),
+            ("/M/UNDOCK -done->", "/M/DRIVE -preempted->", "/M/STOP -stopped->", "/M -preempted->"),
+        ),
+    ],
+)
+def test_properties_that_do_not_hold(wanted, steps):
+    problem = the(check(patrol(), properties=[wanted]), "property")
+    assert str(wanted) in problem.message
+    assert problem.steps == steps
+
+
+def test_always_reaches_finds_a_run_that_never_ends():
+    sm = machine(
+        ("A", Leaf(), {"done": "B"}), ("B", Leaf("done", "odd"), {"done": "A", "odd": "A"})
+    )
+    found = check(sm, properties=[always_reaches("done")])
+    assert "never ends" in the(found, "property").message
+
+
+@pytest.mark.parametrize(
+    "wanted",
+    ["never(NOWHERE)", "always_reaches(odd)", "sometimes(A)", "before(A)", "never", "never()"],
+)
+def test_properties_that_make_no_sense(wanted):
+    with pytest.raises(PropertyError, match="expected"):
+        check(patrol(), properties=[wanted])
+
+
+# -- switching off, formats ------------------------------------------------------------------------
+
+
+def test_switching_a_rule_off_with_a_reason():
+    class Waits(State):
+        def execute(self, ud):
+            self.event.wait()  # smachpy: ignore[no-timeout] the operator decides
+            return "done"
+
+    class WaitsToo(State):
+        def execute(self, ud):
+            self.event.wait()
+            return "done"
+
+    found = check(machine(("A", Waits(["done"]), {})))
+    assert found.ok
+    assert [reason for _, reason in found.ignored] == ["the operator decides"]
+    state = ignore(WaitsToo(["done"]), "no-timeout", "bounded by hardware")
+    assert check(machine(("A", state, {}))).ok
+    sm = machine(("A", WaitsToo(["done"]), {}))
+    assert check(sm, ignores=[Ignore("no-timeout", "why not", "/M/*")]).ok
+    assert not check(sm, ignores=[Ignore("no-timeout", "why not", "/OTHER/*")]).ok
+
+
+def test_a_rule_is_not_switched_off_without_a_reason_or_by_a_wrong_name():
+    with pytest.raises(IgnoreError, match="reason"):
+        ignore(Leaf(), "no-timeout", " ")
+    with pytest.raises(IgnoreError, match="no-timeout"):
+        ignore(Leaf(), "no-timeot", "because")
+
+
+def test_every_rule_has_a_planted_bug_in_this_file():
+    with open(__file__, encoding="utf-8") as file:
+        text = file.read()
+    assert [name for name in RULES if f'"{name}"' not in text] == []
+
+
+def test_formats():
+    report = check(patrol(), properties=["never(ABORT)"])
+    assert "run: /M/UNDOCK -failed-> /M/ABORT" in FORMATS["text"]([report])
+    data = json.loads(FORMATS["json"]([report]))
+    assert data[0]["problems"][0]["rule"] == "property"
+    assert FORMATS["github"]([report]).startswith("::error title=property::never(ABORT)")
+    sarif = json.loads(FORMATS["sarif"]([report]))
+    (result,) = sarif["runs"][0]["results"]
+    assert (result["ruleId"], result["level"]) == ("property", "error")
+    assert len(result["codeFlows"][0]["threadFlows"][0]["locations"]) == 2
+    assert sarif["version"] == "2.1.0"
+
+
+def test_the_run_that_shows_a_problem_is_drawn(tmp_path):
+    report = check(patrol(), properties=["never(ABORT)"])
+    (file,) = report.draw(tmp_path)
+    assert file.name == "M-1-property.svg"
+    assert "ABORT" in file.read_text()
+
+
+def test_a_check_takes_milliseconds():
+    children = [(f"S{i}", Leaf("done", "failed"), {"done": f"S{i + 1}"}) for i in range(99)]
+    sm = machine(*children, ("S99", Leaf("done", "failed"), {}), outcomes=["done", "failed"])
+    check(sm)
+    assert check(sm).seconds < 0.2
+
+
+def test_the_function_of_the_package():
+    assert smachpy.check(patrol()).ok
+
+
+@cb_interface(outcomes=["done", "odd"])
+def work(ud):
+    return "done"
+
+
+def test_the_callback_of_a_callback_state_is_looked_at():
+    found = check(machine(("A", CBState(work), {"odd": "done"})))
+    assert "'odd'" in the(found, "impossible-outcome").message

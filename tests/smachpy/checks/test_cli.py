@@ -1,0 +1,69 @@
+"""`smachpy check`."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from smachpy.cli import main
+
+MISSION = """
+import smachpy
+
+def mission():
+    sm = smachpy.StateMachine(["done", "failed"], name="M")
+    with sm:
+        sm.add("A", smachpy.CBState(lambda ud: "ok", outcomes=["ok"]), {"ok": "done"})
+        sm.add("B", smachpy.CBState(lambda ud: "ok", outcomes=["ok"]), {"ok": "failed"})
+    return sm
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "m.py").write_text(MISSION)
+    return tmp_path
+
+
+def test_problems_give_exit_code_1(folder, capsys):
+    assert main(["check", "m.py"]) == 1
+    assert "no run gets to /M/B. [unreachable-state]" in capsys.readouterr().out
+
+
+def test_pyproject_switches_off_with_a_reason_and_adds_properties(folder, capsys):
+    (folder / "pyproject.toml").write_text(
+        """
+        [tool.smachpy.check]
+        ignore = [
+            {rule = "unreachable-state", path = "/M/B", reason = "an operator sends it there"},
+            {rule = "impossible-outcome", reason = "as above"},
+        ]
+        properties = {M = ["never(B)"]}
+        """
+    )
+    assert main(["check", "m.py"]) == 0
+    assert "an operator sends it there" in capsys.readouterr().out
+    assert main(["check", "m.py", "--property", "never(A)", "--format", "json"]) == 1
+    assert json.loads(capsys.readouterr().out)[0]["problems"][0]["rule"] == "property"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('ignore = [{rule = "unreachable-state"}]', "reason"),
+        ('ignore = [{rule = "unreachable-stat", reason = "x"}]', "unreachable-state"),
+        ("ignore = [1]", "table"),
+        ("ignored = []", "'ignored'"),
+    ],
+)
+def test_a_pyproject_that_makes_no_sense(folder, capsys, text, said):
+    (folder / "pyproject.toml").write_text(f"[tool.smachpy.check]\n{text}\n")
+    assert main(["check", "m.py"]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_pictures(folder, capsys):
+    assert main(["check", "m.py", "--property", "never(A)", "--pictures", "out"]) == 1
+    assert [file.name for file in (folder / "out").iterdir()] == ["M-3-property.svg"]
