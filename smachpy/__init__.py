@@ -60,6 +60,7 @@ from smachpy.util import is_shutdown as is_shutdown
 from smachpy.util import set_shutdown_check as set_shutdown_check
 
 if TYPE_CHECKING:
+    from smachpy.action_server_wrapper import ActionServerWrapper as ActionServerWrapper
     from smachpy.checks import check as check
     from smachpy.condition_state import ConditionState as ConditionState
     from smachpy.introspection import Kind as Kind
@@ -68,6 +69,7 @@ if TYPE_CHECKING:
     from smachpy.simple_action_state import SimpleActionState as SimpleActionState
 
 __all__ = [
+    "ActionServerWrapper",
     "CBInterface",
     "CBState",
     "Concurrence",
@@ -112,6 +114,7 @@ __all__ = [
 
 # Names of states that need actionlib_core -> module that defines them; imported on first use.
 _LAZY: dict[str, str] = {
+    "ActionServerWrapper": "smachpy.action_server_wrapper",
     "ConditionState": "smachpy.condition_state",
     "MonitorState": "smachpy.monitor_state",
     "ServiceState": "smachpy.service_state",
