@@ -130,7 +130,8 @@ class _TimerThread:
 
     def __init__(self, clock: RealClock) -> None:
         self._clock = clock
-        self._lock = threading.Lock()
+        # Re-entrant: a signal handler that sets a timer may interrupt the code that holds it.
+        self._lock = threading.RLock()
         self._heap: list[tuple[float, int, RealTimer]] = []
         self._count = itertools.count()
         self._running = False

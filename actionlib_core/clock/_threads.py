@@ -60,27 +60,27 @@ class _Worker:
 
 
 class ThreadCache:
-    """Idle threads, newest first; starting one from here costs a lock hand-over."""
+    """Idle threads, newest first; starting one from here costs a lock hand-over.
+
+    No lock: list operations are atomic, and a signal handler may need a thread at any moment.
+    """
 
     def __init__(self) -> None:
         self._idle: list[_Worker] = []
-        self._lock = threading.Lock()
 
     def start(self, task: Job) -> None:
-        with self._lock:
-            worker = self._idle.pop() if self._idle else None
-        if worker is None:
+        try:
+            worker = self._idle.pop()
+        except IndexError:
             worker = _Worker(self)
         worker.give(task)
 
     def put_back(self, worker: _Worker) -> None:
-        with self._lock:
-            self._idle.append(worker)
+        self._idle.append(worker)
 
     def retire(self, worker: _Worker) -> bool:
-        with self._lock:
-            try:
-                self._idle.remove(worker)
-            except ValueError:
-                return False
-            return True
+        try:
+            self._idle.remove(worker)
+        except ValueError:
+            return False
+        return True

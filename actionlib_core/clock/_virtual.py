@@ -200,6 +200,20 @@ class VirtualClock:
         with self._lock:
             self._ready.remove(task.participant)
 
+    def interrupt(self, ident: int, error: BaseException) -> bool:
+        """End the wait of the participant in thread `ident` with `error`.
+
+        Returns:
+            Whether it was waiting on this clock.
+        """
+        with self._lock:
+            participant = self._participants.get(ident)
+            if participant is None or participant not in self._waits:
+                return False
+            participant.error = error
+            self._wake(participant)
+            return True
+
     # -- scheduling ----------------------------------------------------------------------------
 
     def _push(self, due: float, what: Participant | VirtualTimer, wait: int) -> None:
