@@ -49,12 +49,23 @@ class _Part:
 
 @dataclass(slots=True)
 class Graph:
-    """Moments and what may follow them."""
+    """Moments and what may follow them.
+
+    Attributes:
+        nodes: The moments.
+        edges: What may follow each.
+        only_preempt: Edges that only a preempt takes.
+        by_framework: Edges by which a container ends a run by itself after a preempt.
+        loose: Ends of children that were looked at alone; nothing follows in the graph.
+        start: The root begins.
+        ends: The root's outcomes.
+    """
 
     nodes: list[Node] = field(default_factory=list)
     edges: list[list[int]] = field(default_factory=list)
     only_preempt: set[tuple[int, int]] = field(default_factory=set)
     by_framework: set[tuple[int, int]] = field(default_factory=set)
+    loose: set[int] = field(default_factory=set)
     start: int = 0
     ends: dict[str, int] = field(default_factory=dict)
 
@@ -209,8 +220,10 @@ class _Builder:
                 self._edge(part.enter, node)
 
     def _concurrence(self, record: StateRecord, part: _Part) -> None:
-        for alone in record.children:  # before the others did anything
-            self._edge(part.enter, self.state(alone).enter)
+        for child_record in record.children:  # alone, before the others did anything
+            alone = self.state(child_record)
+            self._edge(part.enter, alone.enter)
+            self.graph.loose |= {node.number for node in alone.ends.values()}
         for outcome, allowed in outcomes_of(record, self._subject).items():
             if outcome not in part.ends:
                 continue

@@ -141,6 +141,7 @@ def _always_reaches(
     if steps is not None:
         return f"this run ends with {steps[-1].outcome!r}", steps
     good = {number for outcome, number in graph.ends.items() if outcome in wanted.names}
+    good |= graph.loose
     for number in sorted(graph.reachable([graph.start], preempt=False)):
         if not good & graph.reachable([number], preempt=False):
             return "this run never ends", graph.path([graph.start], {number}, preempt=False) or []

@@ -116,7 +116,7 @@ def _waits(subject: Subject, record: StateRecord, *, limited: bool) -> Iterator[
 
 def _loops(graph: Graph, reached: set[int]) -> Iterator[Problem]:
     """Moments that nothing but a preempt from outside can lead out of."""
-    can_end = set(graph.ends.values())
+    can_end = {*graph.ends.values(), *graph.loose}
     before: dict[int, list[int]] = {}
     for number in reached:
         for after in graph.after(number, framework=False):

@@ -274,6 +274,15 @@ def test_a_loop_that_only_a_preempt_ends_has_a_way_out():
     assert check(sm).ok
 
 
+def test_a_loop_inside_a_concurrence_has_its_way_out():
+    inner = machine(("A", Leaf("done", "again"), {"again": "B"}), ("B", Leaf(), {"done": "A"}))
+    both = Concurrence(["done"], "done")
+    with both:
+        both.add("LOOP", inner)
+        both.add("OTHER", Leaf())
+    assert check(machine(("BOTH", both, {})), properties=[always_reaches("done")]).ok
+
+
 def test_a_wait_without_a_timeout():
     class Waits(State):
         def execute(self, ud):
