@@ -296,9 +296,10 @@ class GoalManager:
                 if machine is not None and is_status(entry.status):
                     self._hear(machine, entry, server, now)
             if len(listed) < len(self._machines) or not listed.issuperset(self._machines):
+                answers = self._server() is not None
                 for machine in list(self._machines.values()):
                     if machine.goal.id not in listed:
-                        self._take(machine, machine.goal.on_unlisted(now))
+                        self._take(machine, machine.goal.on_unlisted(now, answers=answers))
                         self._arm(machine.goal.due)
 
     def _hear(self, machine: CommStateMachine, entry: StatusEntry, server: str, now: float) -> None:

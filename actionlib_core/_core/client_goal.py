@@ -164,14 +164,20 @@ class ClientGoal:
         self.status, self.text, self.result = status, text, result
         return path + self._go("result")
 
-    def on_unlisted(self, now: float) -> Path:
-        """Take a status list without this goal."""
+    def on_unlisted(self, now: float, *, answers: bool) -> Path:
+        """Take a status list without this goal.
+
+        Args:
+            now: The time [s, clock].
+            answers: The server is one that can be asked; a foreign one, that cannot, has forgotten
+                the goal.
+        """
         if not self.acknowledged or self.over:
             return ()
         if self._unlisted_since is None:
             self._unlisted_since = now
             self._due = min(self._due, now + ASK_FIRST_S)
-        elif now - self._unlisted_since > UNLISTED_S:
+        elif not answers and now - self._unlisted_since > UNLISTED_S:
             return self.lose("the action server no longer lists this goal")
         return ()
 

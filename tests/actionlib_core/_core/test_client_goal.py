@@ -111,10 +111,11 @@ def test_status_that_was_overtaken_changes_nothing():
 def test_unlisted_goal_is_asked_about_then_lost():
     goal = started()
     goal.on_status(Status.ACTIVE, "", 1.0)
-    assert goal.on_unlisted(2.0) == ()
+    assert goal.on_unlisted(2.0, answers=False) == ()
     assert goal.due < 3.0
-    assert goal.on_unlisted(2.0 + UNLISTED_S) == ()
-    assert goal.on_unlisted(2.1 + UNLISTED_S) == (C.LOST,)
+    assert goal.on_unlisted(2.0 + UNLISTED_S, answers=False) == ()
+    assert goal.on_unlisted(2.1 + UNLISTED_S, answers=True) == ()
+    assert goal.on_unlisted(2.1 + UNLISTED_S, answers=False) == (C.LOST,)
     assert "no longer lists" in goal.text
 
 
@@ -171,7 +172,7 @@ def test_whatever_arrives_the_goal_stays_sound(events):
         elif kind == "cancel":
             path, _ = goal.cancel(now)
         elif kind == "unlisted":
-            path = goal.on_unlisted(now)
+            path = goal.on_unlisted(now, answers=False)
         elif kind == "unknown":
             path = goal.on_unknown("")
         else:

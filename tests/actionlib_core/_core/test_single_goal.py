@@ -76,7 +76,7 @@ def test_reject_turns_goals_away_while_one_runs_or_waits():
 
 
 def test_unknown_policy_names_the_known():
-    with pytest.raises(ValueError, match="'fifo'.*'preempt', 'queue', 'reject'"):
+    with pytest.raises(ValueError, match=r"'fifo'.*'preempt', 'queue', 'reject'"):
         SingleGoal("fifo")
 
 
