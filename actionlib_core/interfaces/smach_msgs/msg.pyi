@@ -6,7 +6,7 @@ from actionlib_core.interfaces import Message as _Message
 class SmachContainerInitialStatusCmd(_Message):
     path: str  # of the container in the machine
     initial_states: list[str]  # labels to begin with next time
-    local_data: str  # userdata to set, pickled
+    local_data: str  # userdata to set, as JSON text
     def __init__(
         self,
         path: str | None = None,
@@ -19,7 +19,7 @@ class SmachContainerStatus(_Message):
     path: str  # of the container in the machine, for example /PATROL/DRIVE
     initial_states: list[str]  # labels
     active_states: list[str]  # labels
-    local_data: str  # the container's userdata, pickled
+    local_data: str  # the container's userdata, as JSON text
     info: str  # free text
     def __init__(
         self,
