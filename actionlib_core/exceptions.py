@@ -7,6 +7,7 @@ Exception
       +-- ConfigError           a configuration has errors, all at once
       +-- NodeError             a node is closed, missing or made twice
       +-- TransportError        the network session is closed or could not be opened
+      |    +-- AccessDeniedError a name that the router's access rules forbid
       +-- WaitTimeoutError      what was waited for did not come in time
       +-- ServiceException      a service call failed, or its handler raised
       |    +-- ServiceUnavailableError there is no server
@@ -80,6 +81,26 @@ class NodeError(ActionlibError, RuntimeError):
 
 class TransportError(ActionlibError, ConnectionError):
     """The network session is closed, or could not be opened."""
+
+
+class AccessDeniedError(TransportError):
+    """A name that the access rules of the other side forbid.
+
+    Attributes:
+        key: What was to be used.
+        allowed: The names that may be used.
+    """
+
+    def __init__(
+        self, key: str, who: str, allowed: tuple[str, ...], denied: tuple[str, ...]
+    ) -> None:
+        self.key = key
+        self.allowed = allowed
+        but = f" but {list(denied)}" if denied else ""
+        super().__init__(
+            f"{key}: access denied: got {who}; expected one who may use it, as this one may use "
+            f"{list(allowed)}{but}. Try a name space that is allowed, or another login."
+        )
 
 
 class WaitTimeoutError(ActionlibError, TimeoutError):

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from actionlib_core.config import ROUTER_ENDPOINT
 from actionlib_core.presence import ROOT
+from actionlib_core.transport._access import ACCESS_KEY
 
 if TYPE_CHECKING:
     from actionlib_core.config import AccessRule, Config
@@ -27,6 +28,7 @@ _MESSAGES = [
     "liveliness_query",
     "declare_liveliness_subscriber",
 ]
+_LOOKING = ["liveliness_query", "declare_liveliness_subscriber"]
 
 
 def zenoh_settings(config: Config) -> dict[str, object]:
@@ -92,19 +94,17 @@ def _login(config: Config) -> dict[str, object]:
 def _access(config: Config) -> dict[str, object]:
     if not config.access:
         return {}
-    rules = []
-    subjects = []
-    policies = []
+    # What everybody may: ask who is there (only what is allowed answers), and ask for the rules.
+    rules: list[dict[str, object]] = [
+        _rule(
+            "look", "allow", [f"{ROOT}/**"], ["liveliness_query", "declare_liveliness_subscriber"]
+        ),
+        _rule("ask", "allow", [ACCESS_KEY], ["query", "reply", "declare_queryable"]),
+    ]
+    subjects: list[dict[str, object]] = [{"id": "everybody"}]
+    policies: list[dict[str, object]] = [{"rules": ["look", "ask"], "subjects": ["everybody"]}]
     for index, rule in enumerate(config.access):
-        rules.append(
-            {
-                "id": f"rule{index}",
-                "messages": _MESSAGES,
-                "flows": ["ingress", "egress"],
-                "permission": rule.permission,
-                "key_exprs": _keys(rule),
-            }
-        )
+        rules.append(_rule(f"rule{index}", rule.permission, _keys(rule), _MESSAGES))
         subject: dict[str, object] = {"id": f"subject{index}"}
         if rule.users:
             subject["usernames"] = list(rule.users)
@@ -120,6 +120,16 @@ def _access(config: Config) -> dict[str, object]:
             "subjects": subjects,
             "policies": policies,
         }
+    }
+
+
+def _rule(name: str, permission: str, keys: list[str], messages: list[str]) -> dict[str, object]:
+    return {
+        "id": name,
+        "messages": messages,
+        "flows": ["ingress", "egress"],
+        "permission": permission,
+        "key_exprs": keys,
     }
 
 

@@ -26,10 +26,17 @@ from zenoh import handlers
 
 from actionlib_core.clock import RealClock, SerialExecutor
 from actionlib_core.config import Config, load_config
-from actionlib_core.exceptions import TransportError
+from actionlib_core.exceptions import AccessDeniedError, TransportError
 from actionlib_core.transport import Presence, Quality, Reply, Sample
+from actionlib_core.transport._access import (
+    ACCESS_KEY,
+    Permissions,
+    decode_permissions,
+    find_permissions,
+)
 from actionlib_core.transport._inlet import Gate, inside
 from actionlib_core.transport._keys import check_key, compile_pattern
+from actionlib_core.transport._refusal import explain_refusal
 from actionlib_core.transport._zenoh_config import zenoh_settings
 from actionlib_core.transport.zenoh._declared import (
     Asking,
@@ -53,6 +60,7 @@ D = TypeVar("D", bound=Declared)
 
 CLOSE_S = 0.5  # zenoh may take so long to leave the network; it is left behind after that
 IDLE_S = 0.3  # `close` waits so long for callbacks that are running
+ACCESS_S = 1.0  # longest wait for the other side's access rules
 ASK_S = 5.0  # longest wait for a latched publisher's answer
 DEFAULT = Quality()
 
@@ -78,10 +86,15 @@ class ZenohTransport:
         self._lock = threading.Lock()
         self._closed = False
         self._declared: dict[Declared, None] = {}
+        self._permissions: Permissions | None = None
         self.session = _open(self.config)
         self._session_id = str(self.session.zid())
         self.loopback = SerialExecutor(self.clock, f"transport-{self._session_id[:8]}")
         _open_transports[self] = None
+        if self.config.access:
+            self.queryable(ACCESS_KEY, self._tell_permissions)
+        if self.config.connect:
+            self._permissions = self._ask_permissions()
 
     @property
     def session_id(self) -> str:
@@ -190,8 +203,41 @@ class ZenohTransport:
         with self._lock:
             return self._declared.pop(entry, False) is None
 
+    def _tell_permissions(self, query: Query) -> None:
+        asked = json.loads(query.payload)
+        links = {str(link.zid): link.auth_identifier for link in self.session.info.links()}
+        certificate = links.get(asked["session"]) or ""
+        told = find_permissions(self.config.access, asked["user"], certificate)
+        query.reply(told.encode())
+        query.finish()
+
+    def _ask_permissions(self) -> Permissions | None:
+        """Return what the other side lets us do, None when it has no rules.
+
+        Blocks: for one exchange, `ACCESS_S` at most.
+        """
+        answers: list[Permissions] = []
+        done = self.clock.event()
+        question = {"session": self._session_id, "user": self.config.user}
+        asking = self.query(
+            ACCESS_KEY,
+            json.dumps(question).encode(),
+            timeout=ACCESS_S,
+            on_reply=lambda reply: answers.append(decode_permissions(reply.payload)),
+            on_done=done.set,
+        )
+        done.wait(ACCESS_S)
+        asking.close()
+        return answers[0] if answers else None
+
+    def _check_access(self, key: str) -> None:
+        permissions = self._permissions
+        if permissions is not None and not permissions.allows(key):
+            raise AccessDeniedError(key, permissions.who, permissions.allow, permissions.deny)
+
     def _declare(self, make: Callable[[], D], key: str) -> D:
         self._check_open(key)
+        self._check_access(key)
         try:
             with inside:
                 entry = make()
@@ -215,8 +261,9 @@ def _open(config: Config) -> zenoh.Session:
     try:
         return zenoh.open(raw)
     except zenoh.ZError as error:
-        where = f" {', '.join(config.connect)}" if config.connect else ""
-        raise TransportError(f"cannot join the network{where} as {config.mode}: {error}") from error
+        reached = not config.connect or "Unable to connect" not in str(error)
+        why = str(error) if reached else explain_refusal(config)
+        raise TransportError(f"cannot join the network as {config.mode}: {why}") from error
 
 
 def _leave(clock: RealClock, session: zenoh.Session) -> None:
