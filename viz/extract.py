@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import difflib
 from collections import Counter
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from smachpy.exceptions import SmachError
-from viz.model import Edge, Node, Pill, Rule, outcome_class
+from viz.model import MISSING, Edge, Node, Pill, Rule, outcome_class
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Collection, Iterable, Sequence
 
     from smachpy.introspection import StateRecord, TransitionRecord
 
@@ -75,7 +76,12 @@ def extract(record: StateRecord, *, depth: int | None = None, show_implicit: boo
 def _node(record: StateRecord, levels: int, wired: frozenset[str], *, show_implicit: bool) -> Node:
     if levels <= 0 or not record.children:
         return _closed(record)
-    shown = [t for t in record.transitions if show_implicit or _is_drawn(t)]
+    labels = {child.label for child in record.children}
+    shown = [
+        _checked(t, record, labels)
+        for t in record.transitions
+        if t.source in labels and (show_implicit or _is_drawn(t))
+    ]
     edges = _edges(record, shown)
     uses = _outcomes_used(record)
     children = tuple(
@@ -90,13 +96,32 @@ def _node(record: StateRecord, levels: int, wired: frozenset[str], *, show_impli
         doc=record.doc,
         details=record.details,
         outcomes=record.outcomes,
-        children=children,
+        children=children + _missing(record, edges, labels),
         initial=record.initial,
         edges=edges,
         rules=tuple(Rule(r.outcome, r.conditions, r.text) for r in record.rules),
         default_outcome=record.default_outcome,
         pills=_pills(record, edges, wired),
     )
+
+
+def _checked(
+    transition: TransitionRecord, record: StateRecord, labels: Collection[str]
+) -> TransitionRecord:
+    """The same transition, leading to a state when it names an outcome that does not exist."""
+    is_outcome = transition.target in record.outcomes and (
+        transition.target_is_outcome or transition.target not in labels
+    )
+    return replace(transition, target_is_outcome=is_outcome)
+
+
+def _missing(
+    record: StateRecord, edges: Iterable[Edge], labels: Collection[str]
+) -> tuple[Node, ...]:
+    """States that an inconsistent machine speaks of and does not have."""
+    targets = [edge.target for edge in edges if not edge.to_outcome]
+    names = dict.fromkeys(name for name in (*record.initial, *targets) if name not in labels)
+    return tuple(Node(f"{record.path}/{name}", name, MISSING) for name in names)
 
 
 def _closed(record: StateRecord) -> Node:

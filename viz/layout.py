@@ -10,7 +10,7 @@ one run of `dot`. Lengths are points (1/72 inch), y points up.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
+from itertools import islice, product
 from math import ceil
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -81,7 +81,7 @@ def compose(root: Box, theme: Theme, run: Engine) -> Geometry:
     """Return the positions of everything in `root`, as Graphviz attributes by name.
 
     Args:
-        root: The picture; must be an open container.
+        root: The picture.
         theme: Fonts and sizes.
         run: Lays DOT texts out and returns Graphviz' JSON for each.
 
@@ -96,25 +96,29 @@ def compose_all(roots: Sequence[Box], theme: Theme, run: Engine) -> list[Geometr
     pages: dict[int, _Page] = {}
     for height in range(1, max(root.height() for root in roots) + 1):
         level = [box for box in containers if box.height() == height]
-        tries = [(box, how) for box in level for how in _tries(box)]
-        results = run([_page_text(box, how, theme, pages) for box, how in tries])
+        texts = [_page_text(box, how, theme, pages) for box in level for how in _tries(box)]
+        results = iter(run(texts))
         for box in level:
-            mine = [r for (b, _), r in zip(tries, results, strict=True) if b is box]
-            pages[id(box)] = _page(box, mine[0] if len(mine) == 1 else min(mine, key=_untidiness))
-    geometries = []
-    for root in roots:
-        page = pages[id(root)]
-        width, height = page.width + 2 * PAD, page.height + 2 * PAD
-        view = f"{width},{height},1,{page.width / 2},{page.height / 2}"
-        geometry: Geometry = {CANVAS: {"viewport": view}}
-        _place(root, pages, (0.0, 0.0), geometry)
-        geometries.append(geometry)
-    return geometries
+            found = list(islice(results, len(_tries(box))))
+            best = found[0] if len(found) == 1 else min(found, key=_untidiness)
+            pages[id(box)] = _page(box, best)
+    return [_geometry(root, pages) for root in roots]
+
+
+def _geometry(root: Box, pages: Mapping[int, _Page]) -> Geometry:
+    page = pages.get(id(root))
+    if page is None:  # a plain state, alone
+        return {CANVAS: {}, root.name: {"pos": "0,0"}}
+    width, height = page.width + 2 * PAD, page.height + 2 * PAD
+    view = f"{width},{height},1,{page.width / 2},{page.height / 2}"
+    geometry: Geometry = {CANVAS: {"viewport": view}}
+    _place(root, pages, (0.0, 0.0), geometry)
+    return geometry
 
 
 def canvas_size(geometry: Geometry) -> tuple[float, float]:
-    """Return width and height of a laid out picture in points."""
-    width, height, *_ = geometry[CANVAS]["viewport"].split(",")
+    """Return width and height of a laid out picture in points, roughly for a plain state."""
+    width, height, *_ = geometry[CANVAS].get("viewport", "300,60").split(",")
     return float(width), float(height)
 
 

@@ -13,6 +13,9 @@ if TYPE_CHECKING:
 
 OutcomeClass = Literal["success", "failure", "preempted", "other"]
 
+MISSING = "missing"
+"""Kind of a state that a machine speaks of and does not have."""
+
 _SUCCESS = frozenset(
     {"succeeded", "success", "done", "ok", "yes", "true", "valid", "complete", "completed"}
     | {"finished", "reached", "arrived"}
@@ -92,7 +95,7 @@ class Node:
 
     Attributes:
         path: `/ROOT/CHILD`.
-        kind: As in `smachpy.introspection.StateRecord`.
+        kind: As in `smachpy.introspection.StateRecord`, or `MISSING`.
         details: Pairs (name, value) for the tooltip.
         hidden: Number of states inside that the picture does not show.
         children: Empty for a plain state and for a closed container.

@@ -6,13 +6,13 @@ name can break a picture, whatever it contains.
 
 from __future__ import annotations
 
-import html
 import re
+from string import punctuation
 from typing import TYPE_CHECKING
 
 import graphviz
 
-from viz.model import outcome_class
+from viz.model import MISSING, outcome_class
 from viz.theme import FONT
 from viz.words import ENDINGS, GLYPHS, KIND_WORDS, shorten
 
@@ -25,12 +25,14 @@ if TYPE_CHECKING:
     Attributes = dict[str, str]
 
 TOOLTIP_LENGTH = 600
+# Graphviz stumbles over more than XML's five characters, over a closing bracket for one.
+_ENTITIES = {ord(mark): f"&#{ord(mark)};" for mark in punctuation if mark not in "_-."}
 _BACKSLASH = re.compile(r"\\(?=[\w\\])")
 
 
 def markup(text: str) -> str:
     """Return `text` safe inside an HTML-like label."""
-    return html.escape(_inert(shorten(text)), quote=True).replace("\\", "&#92;") or " "
+    return _inert(shorten(text)).translate(_ENTITIES) or " "
 
 
 def plain(text: str, length: int = TOOLTIP_LENGTH) -> str:
@@ -269,6 +271,8 @@ def _state_label(node: Node, marks: Marks, theme: Theme) -> str:
     name = markup(node.label)
     text = f'<font color="{theme.muted}" point-size="10">{glyph}&#160;</font>' if glyph else ""
     text += f"<b>{name}</b>" if node.path in marks.active or node.hidden else name
+    if node.kind == MISSING:
+        return f"<{name} <i>missing</i>>"
     if node.hidden:
         word = KIND_WORDS.get(node.kind, "")
         note = f"{word}, {node.hidden} states" if word else f"{node.hidden} states"
@@ -291,20 +295,24 @@ def _count(count: int, ink: str) -> str:
 
 def _status(node: Node, marks: Marks, theme: Theme) -> tuple[Swatch, Attributes]:
     """Colours, line and fill of a state by what the run did with it."""
+    last = marks.last.get(node.path)
+    if node.kind == MISSING:
+        return theme.failure, {"penwidth": "2.2", "style": "rounded,filled,dotted"}
     if node.path in marks.active:
         return theme.active, {"penwidth": "2.4"}
-    if not marks.has_run:
-        return theme.inactive, {}
-    last = marks.last.get(node.path)
-    if last is None:
+    if last is not None:
+        return _ended(outcome_class(last), theme)
+    if marks.has_run:
         return theme.inactive, {"color": theme.faint, "fontcolor": theme.muted, "penwidth": "1"}
-    kind = outcome_class(last)
-    swatch = theme.outcome(kind)
-    if kind == "failure":
-        return swatch, {"penwidth": "2.2"}
-    if kind == "preempted":
-        return swatch, {"penwidth": "2", "style": "rounded,filled,dashed"}
-    return swatch, {"penwidth": "1.8"}
+    return theme.inactive, {}
+
+
+def _ended(kind: OutcomeClass, theme: Theme) -> tuple[Swatch, Attributes]:
+    look = {
+        "failure": {"penwidth": "2.2"},
+        "preempted": {"penwidth": "2", "style": "rounded,filled,dashed"},
+    }
+    return theme.outcome(kind), look.get(kind, {"penwidth": "1.8"})
 
 
 def _swatch(swatch: Swatch) -> Attributes:

@@ -10,7 +10,12 @@ if TYPE_CHECKING:
 LABEL_LENGTH = 40
 # Glyphs that Liberation Sans and Arial have: no picture shows empty boxes for them.
 GLYPHS = {"action": "\u25ba", "service": "\u2194", "monitor": "\u25cf", "condition": "?"}
-KIND_WORDS = {"concurrence": "concurrent", "iterator": "repeats", "sequence": "sequence"}
+KIND_WORDS = {
+    "concurrence": "concurrent",
+    "iterator": "repeats",
+    "sequence": "sequence",
+    "missing": "missing",
+}
 ENDINGS: dict[OutcomeClass, str] = {
     "success": "\u221a",
     "failure": "\u00d7",
