@@ -27,11 +27,19 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
 _DEPTH = 40
+_SIZED = (str, bytes, bytearray, list, tuple, dict, set, frozenset)
 
 
-def dumps(values: Mapping[str, Any]) -> str:
-    """Return `values` as JSON text; what has no JSON form becomes a `$repr`."""
-    return json.dumps({key: _encode(value, 0) for key, value in values.items()}, allow_nan=False)
+def dumps(values: Mapping[str, Any], *, longest: int | None = None) -> str:
+    """Return `values` as JSON text; what has no JSON form becomes a `$repr`.
+
+    Args:
+        values: By name.
+        longest: Texts, bytes and containers with more elements become a `$repr` of their size, for
+            showing; None: everything is written.
+    """
+    encode = _Encoder(longest).encode
+    return json.dumps({key: encode(value, 0) for key, value in values.items()}, allow_nan=False)
 
 
 def loads(text: str) -> dict[str, Any]:
@@ -57,55 +65,60 @@ def find_lost(values: Mapping[str, Any]) -> list[str]:
     return [key for key, value in values.items() if '{"$repr"' in dumps({"_": value})]
 
 
-def _encode(value: Any, depth: int) -> Any:
-    if value is None or isinstance(value, (bool, str)):
-        return value
-    if depth < _DEPTH:
-        for kind, encode in _ENCODERS:
-            if isinstance(value, kind):
-                return encode(value, depth + 1)
-        if hasattr(value, "_md5sum") and hasattr(value, "to_dict"):
-            return _encode_message(value, depth)
-    return {"$repr": _repr(value)}
+class _Encoder:
+    """Turns values into what JSON knows; `longest` as in `dumps`."""
+
+    def __init__(self, longest: int | None) -> None:
+        self._longest = longest
+        self._encoders: tuple[tuple[type | tuple[type, ...], Callable[[Any, int], Any]], ...] = (
+            (int, lambda value, _: int(value)),
+            (float, _encode_float),
+            (list, self._list),
+            (tuple, lambda value, depth: {"$tuple": self._list(value, depth)}),
+            (dict, self._dict),
+            ((set, frozenset), self._set),
+            ((bytes, bytearray), lambda value, _: {"$bytes": base64.b64encode(value).decode()}),
+            (Time, lambda value, _: {"$time": [value.secs, value.nsecs]}),
+            (Duration, lambda value, _: {"$duration": [value.secs, value.nsecs]}),
+        )
+
+    def encode(self, value: Any, depth: int) -> Any:
+        if value is None or isinstance(value, bool):
+            return value
+        if self._longest is not None and isinstance(value, _SIZED) and len(value) > self._longest:
+            return {"$repr": f"<{type(value).__name__} of {len(value)} elements>"}
+        if isinstance(value, str):
+            return str(value)
+        if depth < _DEPTH:
+            for kind, encode in self._encoders:
+                if isinstance(value, kind):
+                    return encode(value, depth + 1)
+            if hasattr(value, "_md5sum") and hasattr(value, "to_dict"):
+                return self._message(value, depth)
+        return {"$repr": _repr(value)}
+
+    def _dict(self, value: dict[Any, Any], depth: int) -> Any:
+        if all(isinstance(key, str) and not key.startswith("$") for key in value):
+            return {key: self.encode(item, depth) for key, item in value.items()}
+        pairs = value.items()
+        return {"$items": [[self.encode(k, depth), self.encode(v, depth)] for k, v in pairs]}
+
+    def _message(self, message: Any, depth: int) -> Any:
+        try:
+            fields = message.to_dict()
+        except ActionlibError:  # a field holds what it cannot carry: show it, do not send it
+            return {"$repr": _repr(message)}
+        return {"$msg": message._type, "fields": self.encode(fields, depth + 1)}
+
+    def _list(self, value: list[Any] | tuple[Any, ...], depth: int) -> list[Any]:
+        return [self.encode(item, depth) for item in value]
+
+    def _set(self, value: set[Any] | frozenset[Any], depth: int) -> Any:
+        return {"$set": sorted((self.encode(item, depth) for item in value), key=repr)}
 
 
 def _encode_float(value: float, _depth: int) -> Any:
     return float(value) if math.isfinite(value) else {"$float": str(float(value))}
-
-
-def _encode_dict(value: dict[Any, Any], depth: int) -> Any:
-    if all(isinstance(key, str) and not key.startswith("$") for key in value):
-        return {key: _encode(item, depth) for key, item in value.items()}
-    return {"$items": [[_encode(k, depth), _encode(v, depth)] for k, v in value.items()]}
-
-
-def _encode_message(message: Any, depth: int) -> Any:
-    try:
-        fields = message.to_dict()
-    except ActionlibError:  # a field holds what the message cannot carry: show it, do not send it
-        return {"$repr": _repr(message)}
-    return {"$msg": message._type, "fields": _encode(fields, depth + 1)}  # noqa: SLF001  ROS's name
-
-
-def _encode_list(value: list[Any] | tuple[Any, ...], depth: int) -> list[Any]:
-    return [_encode(item, depth) for item in value]
-
-
-def _encode_set(value: set[Any] | frozenset[Any], depth: int) -> Any:
-    return {"$set": sorted((_encode(item, depth) for item in value), key=repr)}
-
-
-_ENCODERS: tuple[tuple[type | tuple[type, ...], Callable[[Any, int], Any]], ...] = (
-    (int, lambda value, _: int(value)),
-    (float, _encode_float),
-    (list, _encode_list),
-    (tuple, lambda value, depth: {"$tuple": _encode_list(value, depth)}),
-    (dict, _encode_dict),
-    ((set, frozenset), _encode_set),
-    ((bytes, bytearray), lambda value, _: {"$bytes": base64.b64encode(value).decode("ascii")}),
-    (Time, lambda value, _: {"$time": [value.secs, value.nsecs]}),
-    (Duration, lambda value, _: {"$duration": [value.secs, value.nsecs]}),
-)
 
 
 def _repr(value: Any) -> str:

@@ -98,3 +98,26 @@ def test_bad_texts_raise_value_errors(text, problem):
 
 def test_no_text_is_no_values():
     assert loads("") == {}
+
+
+def test_long_values_can_be_left_out():
+    values = {"map": bytes(1000), "path": list(range(1000)), "name": "x" * 9, "deep": [["y" * 11]]}
+    read = json.loads(dumps(values, longest=10))
+    assert read == {
+        "map": {"$repr": "<bytes of 1000 elements>"},
+        "path": {"$repr": "<list of 1000 elements>"},
+        "name": "x" * 9,
+        "deep": [[{"$repr": "<str of 11 elements>"}]],
+    }
+
+
+def test_messages_are_carried_over():
+    from actionlib_core.interfaces.geometry_msgs.msg import PoseStamped
+
+    pose = PoseStamped()
+    pose.header.frame_id = "map"
+    pose.header.stamp = Time(12, 34)
+    pose.pose.position.x = float("inf")
+    assert loads(dumps({"goal": [pose]})) == {"goal": [pose]}
+    pose.pose.position.x = "here"
+    assert find_lost({"goal": pose}) == ["goal"]
