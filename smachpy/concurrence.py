@@ -240,6 +240,7 @@ class Concurrence(Container):
             if self._start_cbs:
                 self.call_start_cbs()
             if self._preempt_requested:
+                frame.answered = True
                 frame.emit_own(Preempted, "")
                 outcome = "preempted"
             else:
@@ -329,6 +330,8 @@ class Concurrence(Container):
     def _outcome(self, frame: Frame, group: Group) -> str:
         """Return the outcome that the callback, the rules or the default give."""
         outcomes = group.outcomes()
+        answered = any(branch.answered for branch in group.branches)
+        frame.answered = self._preempt_requested and answered
         if self._outcome_cb is not None:
             try:
                 answer = self._outcome_cb(dict(outcomes))
@@ -342,8 +345,7 @@ class Concurrence(Container):
         ruled = decide(self._rules, outcomes)
         if ruled is not None:
             return ruled
-        cut = any(branch.cut for branch in group.branches)
-        if self._preempt_requested and cut and self._may_end_preempted():
+        if frame.answered and self._may_end_preempted():
             frame.emit_own(Preempted, "")
             return "preempted"
         return self._default_outcome

@@ -79,6 +79,7 @@ class Container(State):
         self._context_kwargs: dict[str, Any] = {}
         self._plan: Any = None
         self._control: Control | None = None
+        self._answered = False  # the last run ended because a preempt was taken up
         # Held while a preempt is passed on, and by the runner when it ends a child: re-entrant,
         # because a signal handler may come in between.
         self._lock = threading.RLock()
@@ -237,10 +238,16 @@ class Container(State):
             if self._frame is frame:
                 self._frame = None
                 self._preempt_requested = False
+            self._answered = frame.answered
             told = frame.told
             if told is not None and not frame.dead:
                 disarm(frame)
                 told.state.recall_preempt()
+
+    def _forget_preempt(self) -> None:
+        with self._lock:
+            if self._frame is None:
+                self._preempt_requested = False
 
     def request_preempt(self) -> None:
         """Ask the container and all active states below it to stop.

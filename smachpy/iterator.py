@@ -10,7 +10,7 @@ from smachpy._core.spec import ChildSpec, LoopSpec
 from smachpy._core.validate import loop_problems
 from smachpy._runtime.interrupt import Interruption
 from smachpy._runtime.step import run_watched
-from smachpy._runtime.watch import disarm
+from smachpy._runtime.watch import disarm, has_answered
 from smachpy.container import Container
 from smachpy.events import Iterated, OutcomeForced, Preempted
 from smachpy.exceptions import (
@@ -313,7 +313,8 @@ class Iterator(Container):
         """Return the outcome after a preempt, and whether it ends the iterator."""
         step = plan.step
         with self._lock:  # whoever passes a preempt on is done after this
-            served = frame.told is step and not step.state.preempt_requested()
+            answered = has_answered(frame, outcome)
+            frame.answered = answered and self._preempt_requested
             disarm(frame)
             step.state.recall_preempt()
             override, frame.override = frame.override, None
@@ -322,11 +323,12 @@ class Iterator(Container):
                 frame.emit(OutcomeForced, override.outcome)
                 return override.outcome, False
             return outcome, False
-        if outcome in plan.breaks or outcome == "preempted" or served:
+        if outcome in plan.breaks or answered:
             return outcome, True
         return self._preempted(frame, step), True
 
     def _preempted(self, frame: Frame, step: Step) -> str:
+        frame.answered = True
         frame.emit_own(Preempted, step.label)
         return "preempted"
 

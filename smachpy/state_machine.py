@@ -11,7 +11,7 @@ from smachpy._core.spec import ChildSpec, MachineSpec
 from smachpy._core.validate import machine_problems
 from smachpy._runtime.interrupt import Interruption
 from smachpy._runtime.step import End, Step, run_watched
-from smachpy._runtime.watch import disarm
+from smachpy._runtime.watch import disarm, has_answered
 from smachpy.container import Container
 from smachpy.events import Jumped, OutcomeForced, Preempted
 from smachpy.exceptions import (
@@ -370,6 +370,7 @@ class StateMachine(Container):
 
     def _preempted(self, frame: Frame, step: Step) -> End:
         """End because of a preempt; `step` was not started, or finished in vain."""
+        frame.answered = True
         frame.emit_own(Preempted, step.label)
         return End("preempted")
 
@@ -382,7 +383,7 @@ class StateMachine(Container):
         """
         state = step.state
         with self._lock:  # whoever passes a preempt on is done after this
-            served = frame.told is step and not state.preempt_requested()
+            answered = frame.answered = has_answered(frame, outcome)
             disarm(frame)
             state.recall_preempt()
             override, frame.override = frame.override, None
@@ -392,8 +393,8 @@ class StateMachine(Container):
                 following = self._following(frame, step, outcome)
                 if following.final:
                     return following
-                if served or outcome == "preempted":
-                    self._preempt_requested = False
+                if answered:
+                    self._preempt_requested = frame.answered = False
                     return following
                 return self._preempted(frame, step)
         if override is not None:

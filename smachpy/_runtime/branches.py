@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from smachpy._runtime.frame import FRAME, Frame
 from smachpy._runtime.interrupt import Interruption
 from smachpy._runtime.step import run_watched
-from smachpy._runtime.watch import disarm
+from smachpy._runtime.watch import disarm, has_answered
 from smachpy.events import OutcomeForced
 from smachpy.exceptions import InvalidTransitionError, InvalidUserCodeError, did_you_mean
 
@@ -28,11 +28,10 @@ class Branch(Frame):
         outcome: What it ended with; None while it runs, or when it raised.
         error: What it raised.
         ended: It has ended, or was abandoned.
-        cut: It had been asked to stop when it ended.
         task: The task that runs it.
     """
 
-    __slots__ = ("cut", "ended", "error", "group", "outcome", "task")
+    __slots__ = ("ended", "error", "group", "outcome", "task")
 
     def __init__(self, group: Group, step: Step) -> None:
         frame = group.frame
@@ -42,7 +41,6 @@ class Branch(Frame):
         self.outcome: str | None = None
         self.error: BaseException | None = None
         self.ended = False
-        self.cut = False
         self.task: Task | None = None
 
     def run_child(self) -> None:
@@ -149,7 +147,7 @@ class Group:
                 return
             branch.ended = True
             branch.outcome, branch.error = outcome, error
-            branch.cut = branch.told is not None
+            branch.answered = has_answered(branch, outcome)
             disarm(branch)
             if not branch.dead:
                 branch.step.state.recall_preempt()

@@ -72,6 +72,7 @@ class Frame:
         path: Path of the container.
         step: What runs now: anything with `label` and `state`; None between runs.
         told: The step whose state was asked to stop.
+        answered: The container ends because a preempt was taken up.
         watch: What sees to it that the told step stops.
         override: What an operator wants instead of the told step's outcome.
         boundary: The task that can be left behind when a state below ignores its preempt.
@@ -81,6 +82,7 @@ class Frame:
     """
 
     __slots__ = (
+        "answered",
         "boundary",
         "container",
         "dead",
@@ -106,6 +108,7 @@ class Frame:
         self.told: Any = None
         self.watch: Any = None
         self.override: Override | None = None
+        self.answered = False
         self.injected = False
         self.dead = False
         self.boundary: Any = None if parent is None else parent.boundary

@@ -52,6 +52,7 @@ def execute_root(root: Container, parent_ud: UserData | Remapper | None) -> str:
             ctrl_c.remove()
         stop.end()
         forget()
+        root._forget_preempt()  # noqa: SLF001  one asked for during the last steps was for this run
 
 
 def _run_root(

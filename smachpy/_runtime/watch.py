@@ -52,14 +52,16 @@ class Watch:
                 return
             path = frame.here()
             stack = stack_of(frame.thread)
-            self._again()
-            interrupt(frame)
         log.logerr(
             f"{path}: still runs {self._grace:g} s after its preempt; interrupted. It was at:\n"
             f"{stack}"
         )
         clock = frame.run.clock
         frame.publish(Abandoned(path, clock.now(), clock.time_ns(), self._grace, stack))
+        with frame.container._lock:  # noqa: SLF001  one machinery
+            if self._is_on():
+                self._again()
+                interrupt(frame)
 
     def _again(self) -> None:
         self._timer = self._frame.run.clock.call_later(self._patience, self._escalate)
@@ -82,7 +84,7 @@ class Watch:
 
 def arm(frame: Frame, step: Step) -> None:
     """Watch the child that was just told to stop; with the container's lock held."""
-    if frame.watch is not None or getattr(step.state, "is_container", False):
+    if frame.watch is not None or step.state.is_container:
         return  # watched already, or a container, which watches its own leaves
     grace = grace_of(frame, step)
     if grace is not None:
@@ -96,6 +98,21 @@ def disarm(frame: Frame) -> None:
         watch.cancel()
     close(frame)
     frame.told = None
+
+
+def has_answered(frame: Frame, outcome: object) -> bool:
+    """Tell whether the child that ended with `outcome` took up a preempt it was told of.
+
+    It did if it says 'preempted' or has serviced the request; work that just finished did not.
+    Called with the container's lock held, before `disarm`.
+    """
+    told = frame.told
+    if told is None:
+        return False
+    if outcome == "preempted":
+        return True
+    state = told.state
+    return bool(state._answered if state.is_container else not state.preempt_requested())  # noqa: SLF001
 
 
 def grace_of(frame: Frame, step: Step) -> float | None:
@@ -124,6 +141,7 @@ def bury(frame: Frame, boundary: Any) -> None:
         if step is not None:
             step.next = _Nowhere()
             step.userdata._revoke()  # noqa: SLF001  one machinery
+            step.state.recall_preempt()
         with container._lock:  # noqa: SLF001  one machinery
             container._plan = None  # noqa: SLF001
             if container._frame is above:  # noqa: SLF001

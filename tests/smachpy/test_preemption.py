@@ -1,0 +1,689 @@
+"""The preemption contract: cut everywhere, and look whether it holds."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import signal
+import socket
+import sys
+import threading
+from collections import Counter
+
+import pytest
+
+import smachpy
+from actionlib_core import shutdown
+from actionlib_core.clock import VirtualClock, current_clock, use_clock
+from smachpy.events import Abandoned, Entered, Left, Preempted, PreemptRequested
+
+
+class Work(smachpy.State):
+    """Works for a while and listens; `polls` looks at the flag, otherwise it waits for it."""
+
+    def __init__(self, seconds=1.0, outcome="ok"):
+        super().__init__(outcomes=[outcome, "preempted"])
+        self.seconds = seconds
+        self.outcome = outcome
+
+    def execute(self, userdata):
+        if self.sleep(self.seconds):
+            self.service_preempt()
+            return "preempted"
+        return self.outcome
+
+
+class Deaf(smachpy.State):
+    """Finishes whatever happens."""
+
+    def __init__(self, seconds=0.0, outcome="ok"):
+        super().__init__(outcomes=[outcome])
+        self.seconds = seconds
+        self.outcome = outcome
+        self.runs = 0
+
+    def execute(self, userdata):
+        self.runs += 1
+        if self.seconds:
+            current_clock().sleep(self.seconds)
+        return self.outcome
+
+
+def chain(*states, outcomes=("done", "preempted"), **options):
+    sm = smachpy.StateMachine(outcomes=outcomes, **options)
+    with sm:
+        for i, state in enumerate(states):
+            target = f"S{i + 1}" if i + 1 < len(states) else "done"
+            smachpy.StateMachine.add(f"S{i}", state, {state.get_registered_outcomes()[0]: target})
+    return sm
+
+
+def mission():
+    """Everything nested in everything."""
+    inner = smachpy.StateMachine(outcomes=["done", "preempted"])
+    with inner:
+        smachpy.StateMachine.add("A", Work(1.0), {"ok": "B"})
+        smachpy.StateMachine.add("B", Deaf(0.5), {"ok": "done"})
+    loop = smachpy.Iterator(["done", "preempted"], [], [], it=range(3), exhausted_outcome="done")
+    with loop:
+        smachpy.Iterator.set_contained_state("EACH", Work(0.5), loop_outcomes=["ok"])
+    both = smachpy.Concurrence(["done", "preempted"], "done")
+    with both:
+        smachpy.Concurrence.add("INNER", inner)
+        smachpy.Concurrence.add("LOOP", loop)
+        smachpy.Concurrence.add("LEAF", Work(2.0))
+    sm = smachpy.StateMachine(outcomes=["done", "preempted"])
+    with sm:
+        smachpy.StateMachine.add("FIRST", Work(1.0), {"ok": "BOTH"})
+        smachpy.StateMachine.add("BOTH", both, {"done": "LAST"})
+        smachpy.StateMachine.add("LAST", Work(1.0), {"ok": "done"})
+    return sm
+
+
+def every_state(container):
+    for child in container.get_children().values():
+        yield child
+        if isinstance(child, smachpy.Container):
+            yield from every_state(child)
+
+
+def assert_clean(sm):
+    assert not sm.preempt_requested()
+    assert not sm.is_running()
+    for state in every_state(sm):
+        assert not state.preempt_requested(), state
+
+
+@pytest.mark.parametrize("seed", [None, *range(12)])
+@pytest.mark.parametrize("at", [i * 0.25 for i in range(17)])
+def test_preempt_at_every_instant_ends_it_and_leaves_nothing(at, seed):
+    with VirtualClock(seed) as clock, use_clock(clock):
+        sm = mission()
+        events = []
+        sm.subscribe(events.append)
+        asked = clock.spawn(lambda: (clock.sleep(at), sm.request_preempt()), name="operator")
+        outcome = sm.execute()
+        ended = clock.now()
+        asked.join()
+        if at < 4.0:
+            assert outcome == "preempted"
+            assert ended <= at + 0.5  # the deaf leaf ends by itself
+        assert Counter(e.path for e in events if isinstance(e, Entered)) == Counter(
+            e.path for e in events if isinstance(e, Left)
+        )
+        if not sm.preempt_requested():  # it came after the end: then it is for the next run
+            assert_clean(sm)
+        else:
+            assert sm.execute() == "preempted"
+        before = clock.now()
+        assert sm.execute() == "done"
+        assert clock.now() - before == 4.0
+        assert_clean(sm)
+
+
+class CutAt:
+    """Requests a preempt at the n-th line that the library executes in this thread."""
+
+    def __init__(self, sm, n):
+        self.sm = sm
+        self.left = n
+        self.done = False
+        self.over = False  # the run is over: what comes now is for the next one
+
+    def trace(self, frame, event, _arg):
+        if frame.f_code.co_name == "_forget_preempt":
+            self.done = self.over = True
+        if self.done or "/smachpy/" not in frame.f_code.co_filename:
+            return None
+        return self.line
+
+    def line(self, frame, event, _arg):
+        if event == "line" and not self.done:
+            self.left -= 1
+            if self.left < 0:
+                self.done = True
+                sys.settrace(None)
+                self.sm.request_preempt()
+        return self.line
+
+    def run(self):
+        before = sys.gettrace()
+        sys.settrace(self.trace)
+        try:
+            return self.sm.execute()
+        finally:
+            sys.settrace(before)
+
+
+def nested_and_deaf():
+    inner = chain(Deaf(), Deaf(), outcomes=["done", "preempted"])
+    loop = smachpy.Iterator(["done", "preempted"], [], [], it=range(2), exhausted_outcome="done")
+    with loop:
+        smachpy.Iterator.set_contained_state("EACH", Deaf())
+    return chain(Deaf(), inner, loop, Deaf())
+
+
+@pytest.mark.parametrize("watched", [False, True])
+def test_preempt_at_every_line_of_the_machinery(watched):
+    n = 0
+    cuts = Counter()
+    while True:
+        sm = nested_and_deaf()
+        if watched:
+            sm.subscribe(lambda event: None)
+        cut = CutAt(sm, n)
+        outcome = cut.run()
+        if cut.over:
+            break
+        cuts[outcome] += 1
+        assert outcome in {"done", "preempted"}
+        assert_clean(sm)
+        assert sm.execute() == "done"
+        assert_clean(sm)
+        n += 1
+    assert cuts["preempted"] > 50
+    assert cuts["done"] > 3
+
+
+def test_preempt_before_execute_runs_no_child_and_holds_for_one_run():
+    leaf = Deaf()
+    sm = chain(leaf)
+    sm.request_preempt()
+    sm.request_preempt()
+    assert sm.execute() == "preempted"
+    assert leaf.runs == 0
+    assert sm.execute() == "done"
+
+
+@pytest.mark.parametrize("make", ["machine", "concurrence", "iterator", "sequence"])
+def test_preempt_before_execute_of_every_container(make, clock):
+    leaf = Deaf()
+    outcomes = ["ok", "preempted"]
+    if make == "machine":
+        container = smachpy.StateMachine(outcomes)
+        container.add("A", leaf)
+    elif make == "sequence":
+        container = smachpy.Sequence(outcomes, "ok")
+        container.add("A", leaf)
+    elif make == "concurrence":
+        container = smachpy.Concurrence(outcomes, "ok")
+        container.add("A", leaf)
+    else:
+        container = smachpy.Iterator(outcomes, [], [], it=[1], exhausted_outcome="ok")
+        container.set_contained_state("A", leaf)
+    container.request_preempt()
+    assert container.execute() == "preempted"
+    assert leaf.runs == 0
+    assert container.execute() == "ok"
+    assert leaf.runs == 1
+
+
+def test_finished_work_keeps_its_outcome_and_userdata(clock):
+    class Measure(smachpy.State):
+        def __init__(self):
+            super().__init__(["measured"], output_keys=["value"])
+
+        def execute(self, userdata):
+            current_clock().sleep(1.0)
+            userdata.value = 42
+            return "measured"
+
+    sm = smachpy.StateMachine(["measured", "preempted"])
+    sm.add("M", Measure())
+    clock.call_later(0.5, sm.request_preempt)
+    assert sm.execute() == "measured"
+    assert sm.userdata.value == 42
+    assert_clean(sm)
+
+
+def test_finished_work_that_leads_on_ends_preempted_and_starts_nothing(clock):
+    last = Deaf()
+    sm = chain(Deaf(1.0), last)
+    events = []
+    sm.subscribe(events.append)
+    clock.call_later(0.5, sm.request_preempt)
+    assert sm.execute() == "preempted"
+    assert last.runs == 0
+    assert [e.label for e in events if isinstance(e, Preempted)] == ["S0"]
+
+
+def test_served_preempt_follows_the_users_transition(clock):
+    stop = Deaf(outcome="stopped")
+    sm = smachpy.StateMachine(["preempted"])
+    with sm:
+        smachpy.StateMachine.add("DRIVE", Work(10.0), {"ok": "DRIVE", "preempted": "STOP"})
+        smachpy.StateMachine.add("STOP", stop, {"stopped": "preempted"})
+    clock.call_later(1.0, sm.request_preempt)
+    assert sm.execute() == "preempted"
+    assert stop.runs == 1
+    assert clock.now() == 1.0
+
+
+def test_second_preempt_reaches_the_state_that_cleans_up(clock):
+    sm = smachpy.StateMachine(["preempted"])
+    with sm:
+        smachpy.StateMachine.add("DRIVE", Work(10.0), {"ok": "DRIVE", "preempted": "STOP"})
+        smachpy.StateMachine.add("STOP", Work(100.0), {"ok": "preempted"})
+    clock.call_later(1.0, sm.request_preempt)
+    clock.call_later(3.0, sm.request_preempt)
+    assert sm.execute() == "preempted"
+    assert clock.now() == 3.0
+
+
+def test_every_descendant_is_told_before_request_returns(clock):
+    sm = mission()
+    seen = {}
+
+    def ask():
+        sm.request_preempt()
+        seen.update({type(s).__name__ + str(i): s for i, s in enumerate(every_state(sm))})
+        both = sm["BOTH"]
+        assert both.preempt_requested()
+        assert both["INNER"].preempt_requested()
+        assert both["INNER"]["A"].preempt_requested()
+        assert both["LOOP"]["EACH"].preempt_requested()
+        assert both["LEAF"].preempt_requested()
+        seen["asserted"] = True
+
+    clock.call_later(1.25, ask)
+    assert sm.execute() == "preempted"
+    assert seen["asserted"]
+
+
+@pytest.mark.parametrize("where", ["start", "transition", "termination", "listener", "state"])
+def test_preempt_from_a_callback(where):
+    last = Deaf()
+    sm = chain(Deaf(), last)
+
+    def ask(*_args):
+        sm.request_preempt()
+
+    if where == "start":
+        sm.register_start_cb(ask)
+    elif where == "transition":
+        sm.register_transition_cb(ask)
+    elif where == "termination":
+        sm.register_termination_cb(ask)
+    elif where == "listener":
+        sm.subscribe(lambda e: ask() if isinstance(e, Left) else None)
+    else:
+        sm["S0"].execute = lambda ud: ask() or "ok"
+    expected = "done" if where == "termination" else "preempted"
+    assert sm.execute() == expected
+    assert last.runs == (1 if where == "termination" else 0)
+    assert_clean(sm)
+
+
+def test_preempt_from_a_signal_handler():
+    sm = chain(Work(30.0))
+    before = signal.signal(signal.SIGUSR1, lambda *a: sm.request_preempt())
+    try:
+        sm.register_start_cb(
+            lambda *a: current_clock().call_later(
+                0.02, lambda: os.kill(os.getpid(), signal.SIGUSR1)
+            )
+        )
+        assert sm.execute() == "preempted"
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+    assert_clean(sm)
+
+
+def test_leaf_that_raises_while_preempted_raises(clock):
+    class Breaks(smachpy.State):
+        def __init__(self):
+            super().__init__(["ok"])
+
+        def execute(self, userdata):
+            self.wait_preempt(5.0)
+            raise ValueError("motor")
+
+    sm = chain(Breaks())
+    clock.call_later(1.0, sm.request_preempt)
+    with pytest.raises(smachpy.InvalidUserCodeError, match="motor"):
+        sm.execute()
+    assert_clean(sm)
+
+
+def test_preempting_a_leaf_directly_does_not_stick(clock):
+    sm = chain(Deaf(1.0), Work(1.0))
+    clock.call_later(0.5, sm["S0"].request_preempt)
+    assert sm.execute() == "done"
+    assert_clean(sm)
+
+
+def test_recalled_preempt_is_none(clock):
+    sm = chain(Work(1.0))
+    sm.request_preempt()
+    sm.recall_preempt()
+    assert sm.execute() == "done"
+
+
+def test_unregistered_preempted_of_a_nested_machine_is_no_error(clock):
+    inner = smachpy.StateMachine(["done"])
+    inner.add("A", Deaf(1.0), {"ok": "B"})
+    inner.add("B", Deaf(1.0), {"ok": "done"})
+    sm = smachpy.StateMachine(["done"])
+    sm.add("INNER", inner)
+    clock.call_later(0.5, sm.request_preempt)
+    assert sm.execute() == "preempted"
+    assert sm.execute() == "done"
+
+
+# -- leaves that do not listen ---------------------------------------------------------------
+
+
+def ignore_until(seconds):
+    return lambda: current_clock().sleep(seconds)
+
+
+def swallow_exceptions():
+    while True:
+        try:
+            current_clock().sleep(1.0)
+        except Exception:
+            pass
+
+
+class Ignores(smachpy.State):
+    def __init__(self, body, **options):
+        super().__init__(["ok", "preempted"], **options)
+        self.body = body
+
+    def execute(self, userdata):
+        self.body()
+        return "ok"
+
+
+@pytest.fixture
+def quiet():
+    logging.disable(logging.CRITICAL)
+    yield
+    logging.disable(logging.NOTSET)
+
+
+@pytest.mark.parametrize("seed", [None, *range(5)])
+@pytest.mark.parametrize("body", [ignore_until(3600.0), swallow_exceptions])
+@pytest.mark.parametrize("depth", [1, 4])
+def test_leaf_that_ignores_is_interrupted_after_its_grace(seed, body, depth, quiet):
+    with VirtualClock(seed) as clock, use_clock(clock):
+        sm = chain(Ignores(body), preempt_timeout=3.0)
+        for _ in range(depth - 1):
+            sm = chain(sm)
+        events = []
+        sm.subscribe(events.append)
+        clock.call_later(1.0, sm.request_preempt)
+        assert sm.execute() == "preempted"
+        assert clock.now() == 4.0
+        (report,) = [e for e in events if isinstance(e, Abandoned)]
+        assert report.path == "/SM_ROOT" + "/S0" * depth
+        assert report.grace == 3.0
+        assert "in execute" in report.stack
+        assert_clean(sm)
+
+
+@pytest.mark.parametrize("seed", [None, *range(5)])
+def test_ignoring_branch_does_not_hold_the_others(seed, quiet):
+    with VirtualClock(seed) as clock, use_clock(clock):
+        both = smachpy.Concurrence(["done", "preempted"], "done", preempt_timeout=2.0)
+        both.add("DEAF", Ignores(ignore_until(3600.0)))
+        both.add("DEEP", chain(Ignores(ignore_until(3600.0))))
+        both.add("GOOD", Work(3600.0))
+        clock.call_later(1.0, both.request_preempt)
+        assert both.execute() == "preempted"
+        assert clock.now() == 3.0
+        assert_clean(both)
+
+
+def test_grace_is_the_states_own_then_the_containers_then_ten_seconds(clock, quiet):
+    def measure(leaf=None, inner=None, outer=None):
+        state = Ignores(ignore_until(3600.0), **(leaf or {}))
+        sm = chain(chain(state, **(inner or {})), **(outer or {}))
+        before = clock.now()
+        clock.call_later(1.0, sm.request_preempt)
+        sm.execute()
+        return clock.now() - before - 1.0
+
+    assert measure() == 10.0
+    assert measure(outer={"preempt_timeout": 7.0}) == 7.0
+    assert measure(outer={"preempt_timeout": 7.0}, inner={"preempt_timeout": 5.0}) == 5.0
+    assert measure(leaf={"preempt_timeout": 2.0}, inner={"preempt_timeout": 5.0}) == 2.0
+    assert measure(leaf={"preempt_timeout": None}) == 3599.0
+
+
+def spin():
+    while True:
+        pass
+
+
+def lock():
+    blocked = threading.Lock()
+    blocked.acquire()
+    blocked.acquire()
+
+
+def receive():
+    a, b = socket.socketpair()
+    with a, b:
+        a.recv(1)
+
+
+def swallow():
+    while True:
+        try:
+            threading.Event().wait(0.001)
+        except Exception:
+            pass
+
+
+def swallow_twice():
+    left = 2
+    while left:
+        try:
+            threading.Event().wait(10)
+        except BaseException:
+            left -= 1
+    threading.Event().wait(10)
+
+
+@pytest.mark.parametrize("body", [spin, lock, receive, swallow, swallow_twice])
+@pytest.mark.parametrize("depth", [1, 3])
+def test_blocked_leaf_in_the_main_thread_is_broken(body, depth, quiet):
+    sm = chain(Ignores(body), preempt_timeout=0.02)
+    for _ in range(depth - 1):
+        sm = chain(sm)
+    sm.register_start_cb(lambda *a: current_clock().call_later(0.01, sm.request_preempt))
+    assert sm.execute() == "preempted"
+    assert_clean(sm)
+
+
+@pytest.mark.parametrize("place", ["branch", "branch machine", "root"])
+def test_thread_blocked_in_c_is_left_behind_and_cannot_come_back(place, quiet):
+    release = threading.Lock()
+    release.acquire()
+    late = []
+
+    class Blocks(smachpy.State):
+        def __init__(self):
+            super().__init__(["ok"], output_keys=["x"])
+
+        def execute(self, userdata):
+            if not late:
+                late.append("started")
+                try:
+                    release.acquire()
+                finally:
+                    late.append("ended")
+                    userdata.x = "late"
+            return "ok"
+
+    after = Deaf()
+    machine = chain(Blocks(), after, preempt_timeout=0.02)
+    outcomes = []
+    if place == "root":
+        top = machine
+    else:
+        top = smachpy.Concurrence(["done", "preempted"], "done", preempt_timeout=0.02)
+        top.add("M", machine if place == "branch machine" else Blocks())
+    current_clock().spawn(
+        lambda: (threading.Event().wait(0.03), top.request_preempt()), name="asks"
+    )
+    if place == "root":
+        runner = threading.Thread(target=lambda: outcomes.append(top.execute()))
+        runner.start()
+        runner.join(5)
+    else:
+        outcomes.append(top.execute())
+    assert outcomes == ["preempted"]
+    assert late == ["started"]
+    assert_clean(top)
+    assert after.runs == 0
+    # The same machine runs again while the old thread still hangs.
+    again = threading.Thread(target=lambda: outcomes.append(top.execute()))
+    again.start()
+    again.join(5)
+    assert outcomes[1] in {"done", "preempted"}
+    runs = after.runs
+    release.release()
+    for thread in threading.enumerate():
+        if thread is not threading.main_thread() and thread.name.startswith("/SM_ROOT"):
+            thread.join(2)
+    assert after.runs == runs
+    assert "x" not in machine.userdata or machine.userdata.x != "late" or place == "root"
+
+
+# -- other ways to listen ----------------------------------------------------------------------
+
+
+def test_async_leaf_is_cancelled(clock):
+    cleaned = []
+
+    class Drives(smachpy.State):
+        def __init__(self):
+            super().__init__(["ok", "preempted"])
+
+        async def execute(self, userdata):
+            try:
+                await asyncio.sleep(100)
+            finally:
+                cleaned.append(clock.now())
+            return "ok"
+
+    sm = chain(Drives())
+    clock.call_later(2.0, sm.request_preempt)
+    assert sm.execute() == "preempted"
+    assert cleaned == [2.0]
+    assert_clean(sm)
+
+
+def test_wait_preempt_and_sleep(clock):
+    state = Work()
+    assert state.wait_preempt(1.0) is False
+    assert state.sleep(0.5) is False
+    assert clock.now() == 1.5
+    clock.call_later(0.25, state.request_preempt)
+    assert state.wait_preempt() is True
+    assert clock.now() == 1.75
+    assert state.sleep(10.0) is True
+    assert clock.now() == 1.75
+
+
+# -- Ctrl-C ------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def own_shutdown():
+    with shutdown.use_shutdown(shutdown.Shutdown()) as mine:
+        yield mine
+
+
+def send(number):
+    current_clock().call_later(0.01, lambda: os.kill(os.getpid(), number))
+
+
+def test_ctrl_c_preempts_and_requests_the_shutdown(own_shutdown):
+    sm = chain(Work(30.0))
+    sm.register_start_cb(lambda *a: send(signal.SIGINT))
+    assert sm.execute() == "preempted"
+    assert own_shutdown.requested()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert_clean(sm)
+    assert chain(Deaf()).execute() == "preempted"  # the program is ending
+    own_shutdown.clear()
+    assert chain(Deaf()).execute() == "done"
+
+
+def test_second_ctrl_c_is_a_keyboard_interrupt(own_shutdown):
+    class Stubborn(smachpy.State):
+        def __init__(self):
+            super().__init__(["ok"])
+
+        def execute(self, userdata):
+            self.wait_preempt()
+            send(signal.SIGINT)
+            threading.Event().wait(10)
+            return "ok"
+
+    sm = chain(Stubborn())
+    sm.register_start_cb(lambda *a: send(signal.SIGINT))
+    with pytest.raises(KeyboardInterrupt):
+        sm.execute()
+    assert not sm.is_running()
+    assert sm["S0"].preempt_requested() is False
+
+
+@pytest.mark.parametrize("kind", [KeyboardInterrupt, SystemExit])
+def test_exits_are_never_wrapped(kind):
+    def leave(ud):
+        raise kind
+
+    inner = smachpy.StateMachine(["ok"])
+    inner.add("A", smachpy.CBState(leave, outcomes=["ok"]))
+    sm = smachpy.StateMachine(["ok"])
+    sm.add("INNER", inner)
+    with pytest.raises(kind):
+        sm.execute()
+
+
+def test_exits_in_a_branch_are_never_wrapped():
+    def leave(ud):
+        raise SystemExit(3)
+
+    both = smachpy.Concurrence(["ok"], "ok")
+    both.add("A", smachpy.CBState(leave, outcomes=["ok"]))
+    both.add("B", Work(30.0))
+    with pytest.raises(SystemExit):
+        both.execute()
+
+
+def test_shutdown_requested_by_the_program_preempts(own_shutdown, clock):
+    sm = chain(Work(30.0))
+    clock.call_later(1.0, own_shutdown.request)
+    assert sm.execute() == "preempted"
+    assert clock.now() == 1.0
+
+
+def test_set_shutdown_check_is_obeyed():
+    from smachpy import util
+
+    before = util._check[0]
+    answers = iter([False, True, True])
+    try:
+        smachpy.set_shutdown_check(lambda: next(answers, True))
+        last = Deaf()
+        assert chain(Deaf(), last).execute() == "preempted"
+        assert last.runs == 0
+        assert smachpy.is_shutdown()
+    finally:
+        util._check[0] = before
+
+
+def test_requests_are_events(clock):
+    sm = chain(chain(Work(5.0)))
+    events = []
+    sm.subscribe(events.append)
+    clock.call_later(1.0, sm.request_preempt)
+    sm.execute()
+    paths = [e.path for e in events if isinstance(e, PreemptRequested)]
+    assert paths == ["/SM_ROOT", "/SM_ROOT/S0", "/SM_ROOT/S0/S0"]
