@@ -201,14 +201,14 @@ class VirtualClock:
             self._ready.remove(task.participant)
 
     def interrupt(self, ident: int, error: BaseException) -> bool:
-        """End the wait of the participant in thread `ident` with `error`.
+        """Raise `error` in the participant in thread `ident` when it has its next turn.
 
         Returns:
-            Whether it was waiting on this clock.
+            Whether it is waiting on this clock, for an event, for time or for its turn.
         """
         with self._lock:
             participant = self._participants.get(ident)
-            if participant is None or participant not in self._waits:
+            if participant is None or participant not in {*self._waits, *self._ready}:
                 return False
             participant.error = error
             self._wake(participant)
