@@ -57,6 +57,7 @@ class SentGoal(Generic[R, F]):
         self._wakers: list[Callable[[], object]] = []
         self._feedback: deque[F] = deque(maxlen=FEEDBACK_KEPT)
         self._machine: CommStateMachine | None = None
+        self._accepted = False
 
     def on_created(self, machine: CommStateMachine) -> None:
         """Learn which goal it is; not for users."""
@@ -64,7 +65,9 @@ class SentGoal(Generic[R, F]):
 
     def on_transition(self, machine: CommStateMachine, state: CommState) -> None:
         """Note a state; not for users."""
-        if state in {CommState.DONE, CommState.LOST}:
+        if state in {CommState.ACTIVE, CommState.PREEMPTING}:
+            self._accepted = True
+        elif state in {CommState.DONE, CommState.LOST}:
             machine.settled.set()
         self._tell()
 
@@ -107,6 +110,23 @@ class SentGoal(Generic[R, F]):
         """Whether the goal has ended."""
         return self._goal.goal.over
 
+    @property
+    def accepted(self) -> bool:
+        """Whether the server has accepted the goal, now or before."""
+        return self._accepted
+
+    def get_result(self) -> R | None:
+        """Return the result message as it is now, whatever the goal's end; None without one."""
+        result: Any = self._goal.goal.result
+        return result  # type: ignore[no-any-return]
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait for the goal's end and leave it at that; return whether it has come.
+
+        Blocks: until then, `timeout` [s] at most; None: no limit.
+        """
+        return self._goal.settled.wait(timeout)
+
     def cancel(self) -> None:
         """Ask for the goal's end; it ends when the server says so."""
         self._goal.manager.cancel(self._goal)
@@ -139,6 +159,27 @@ class SentGoal(Generic[R, F]):
             raise self._late(timeout)
         return self._outcome()
 
+    def news(self) -> Iterator[F | None]:
+        """Return what happens, to loop over: feedback, and None at each new state.
+
+        Raises:
+            GoalTimeoutError: while looping; the time of `send` was over, the goal is cancelled.
+
+        Blocks: while looping, until there is something new or the goal is over.
+        """
+        while True:
+            self._changed.clear()
+            over = self.over
+            while self._feedback:
+                yield self._feedback.popleft()
+            yield None
+            if over:
+                return
+            left = self._left(None)
+            if not self._changed.wait(left) and left is not None and not self.over:
+                self.cancel()
+                raise self._late(None)
+
     def next_feedback(self) -> F | None:
         """Wait for feedback and take it; None once the goal is over and all was taken.
 
@@ -147,17 +188,7 @@ class SentGoal(Generic[R, F]):
 
         Blocks: until then.
         """
-        while True:
-            self._changed.clear()
-            over = self.over
-            if self._feedback:
-                return self._feedback.popleft()
-            if over:
-                return None
-            left = self._left(None)
-            if not self._changed.wait(left) and left is not None and not self.over:
-                self.cancel()
-                raise self._late(None)
+        return next((item for item in self.news() if item is not None), None)
 
     def _wait(self, timeout: float | None) -> bool:
         return self._goal.settled.wait(self._left(timeout)) or self.over

@@ -1,0 +1,86 @@
+"""The `actionlib` command (also `rosaction`): actions, topics, services and interfaces.
+
+Every module beside this one that has a function `register(subparsers)` adds commands: it adds its
+parsers and sets `run=function(args) -> int`. Names are ROS names, renamed by `a:=b`, `__ns:=...` or
+`--ros-args` as in every node.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import pkgutil
+import signal
+import sys
+import traceback
+from importlib.metadata import version
+from typing import TYPE_CHECKING, NoReturn
+
+from actionlib_core.exceptions import ActionlibError
+from actionlib_core.names import parse_arguments
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from actionlib_core.node import Node
+
+EXIT_FAILED = 1
+EXIT_ERROR = 2
+EXIT_INTERRUPTED = 128 + signal.SIGINT
+
+
+class UsageError(ActionlibError):
+    """What the user asked for cannot be done; the text says why and what to try."""
+
+
+class _Parser(argparse.ArgumentParser):
+    """argparse with the house's exit code and a way out in every error."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(EXIT_ERROR, f"{self.prog}: {message}\nTry '{self.prog} --help'.\n")
+
+
+def main(argv: Sequence[str] | None = None, *, node: Node | None = None) -> int:
+    """Run the command line; returns the exit code.
+
+    Exit codes: 0 success, 1 the goal or call did not succeed, 2 bad input, 130 Ctrl-C.
+
+    Args:
+        argv: The arguments; those of the process when None.
+        node: Where to work; None joins the network for this command.
+    """
+    given = list(sys.argv[1:] if argv is None else argv)
+    debug = "--debug" in given
+    try:
+        names = parse_arguments([word for word in given if word != "--debug"])
+        args = _parser().parse_args(names.rest)
+        args.node, args.names = node, names
+        return int(args.run(args))
+    except KeyboardInterrupt:
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:  # `actionlib list | head`: the reader has seen enough
+        sys.stderr.close()
+        return 0
+    except ActionlibError as error:
+        if debug:
+            traceback.print_exception(error)
+        else:
+            print(f"actionlib: {error}", file=sys.stderr)
+        return EXIT_ERROR
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="actionlib",
+        description="Look at, use and operate actions, topics and services.",
+        epilog="--debug shows tracebacks. SMACHPY_CONFIG names the network configuration.",
+    )
+    parser.add_argument("--version", action="version", version=f"actionlib {version('smachpy')}")
+    parser.add_argument("--config", metavar="FILE", help="how to join the network")
+    subparsers = parser.add_subparsers(
+        metavar="COMMAND", required=True, parser_class=_Parser, dest="command"
+    )
+    for module in sorted(pkgutil.iter_modules(__path__), key=lambda module: module.name):
+        if not module.name.startswith("_"):
+            importlib.import_module(f"{__name__}.{module.name}").register(subparsers)
+    return parser

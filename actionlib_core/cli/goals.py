@@ -1,0 +1,156 @@
+"""`actionlib cancel` and `actionlib goal list|info`: the goals of a server."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.cli import EXIT_FAILED, UsageError
+from actionlib_core.cli._network import Answer, action_class, ask, find_server, open_node
+from actionlib_core.cli._output import add_json, print_message
+
+if TYPE_CHECKING:
+    import argparse
+
+    from actionlib_core._action_wire import StatusEntry
+    from actionlib_core.node import Node
+
+NS = 1_000_000_000
+
+
+def register(subparsers: Any) -> None:
+    """Add the commands to an argparse subparsers object."""
+    parser = subparsers.add_parser(
+        "cancel",
+        help="cancel goals of an action",
+        description="With an ID: that goal. With --before: those with a stamp at or before it. "
+        "With both: either. With --all: all, of all clients.",
+    )
+    parser.add_argument("name", metavar="NAME", help="the action")
+    parser.add_argument("id", metavar="ID", nargs="?", default="", help="a goal's id")
+    parser.add_argument("--all", action="store_true", help="all goals")
+    parser.add_argument("--before", metavar="STAMP", help="seconds since the epoch")
+    add_json(parser)
+    parser.set_defaults(run=_cancel)
+
+    parser = subparsers.add_parser("goal", help="look at the goals of an action")
+    verbs = parser.add_subparsers(metavar="VERB", required=True)
+    verb = verbs.add_parser("list", help="list the goals that a server tracks")
+    verb.add_argument("name", metavar="NAME", help="the action")
+    verb.add_argument("-c", "--count", action="store_true", help="only how many")
+    add_json(verb)
+    verb.set_defaults(run=_list)
+    verb = verbs.add_parser("info", help="show the status, and the result when there is one")
+    verb.add_argument("name", metavar="NAME", help="the action")
+    verb.add_argument("id", metavar="ID", help="the goal's id")
+    verb.add_argument("--status-only", action="store_true", help="only the status")
+    verb.add_argument("--result-only", action="store_true", help="only the result")
+    add_json(verb)
+    verb.set_defaults(run=_info)
+
+
+def _goals(node: Node, name: str) -> list[StatusEntry]:
+    from actionlib_core._action_wire import unpack_statuses
+
+    return unpack_statuses(ask(node, name, "").payload)
+
+
+def _describe(entry: StatusEntry) -> dict[str, Any]:
+    from actionlib_core._core.states import Status
+
+    return {
+        "id": entry.id,
+        "status": Status(entry.status).name,
+        "stamp": entry.stamp_ns / NS,
+        "text": entry.text,
+    }
+
+
+def _list(args: argparse.Namespace) -> int:
+    with open_node(args) as node:
+        find_server(node, args.name)
+        goals = [_describe(entry) for entry in _goals(node, args.name)]
+    if args.json:
+        print(json.dumps(goals))
+    elif args.count:
+        print(len(goals))
+    else:
+        for goal in goals:
+            print(f"{goal['id']} {goal['status']} {goal['stamp']:.3f} {goal['text']}".rstrip())
+    return 0
+
+
+def _info(args: argparse.Namespace) -> int:
+    from actionlib_core._action_wire import unpack_report, unpack_status
+    from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
+    from actionlib_core.wire import encoding_of
+
+    with open_node(args) as node:
+        spec = action_class(find_server(node, args.name).type)
+        answer: Answer = ask(node, args.name, args.id)
+    result = None
+    if answer.encoding == encoding_of(GoalStatus):
+        entry = unpack_status(answer.payload)
+    else:
+        entry, start = unpack_report(answer.payload)
+        result = type(spec().action_result.result).from_bytes(answer.payload[start:])
+    status = _describe(entry)
+    if args.json:
+        print(json.dumps({**status, "result": None if result is None else result.to_dict()}))
+    else:
+        if not args.result_only:
+            print(f"Goal: {entry.id}\nStatus: {status['status']}\nText: {entry.text}")
+        if result is not None and not args.status_only:
+            print_message("Result:", result)
+    return EXIT_FAILED if status["status"] == "LOST" else 0
+
+
+def _cancel(args: argparse.Namespace) -> int:
+    if not (args.id or args.all or args.before):
+        raise UsageError(
+            "cancel: got no ID, --all or --before; expected one. Try 'actionlib goal list NAME'."
+        )
+    if args.all and (args.id or args.before):
+        raise UsageError("cancel: got --all beside ID or --before; expected one of the two.")
+    stamp_ns = _stamp(args.before)
+    from actionlib_core._action_wire import pack_goal_id
+    from actionlib_core._client_port import GOAL
+    from actionlib_core._core.states import TERMINAL
+    from actionlib_core.interfaces.actionlib_msgs.msg import GoalID
+    from actionlib_core.wire import encoding_of
+
+    with open_node(args) as node:
+        name = find_server(node, args.name).name
+        goals = [entry for entry in _goals(node, f"/{name}") if entry.status not in TERMINAL]
+        asked = [
+            entry.id
+            for entry in goals
+            if args.all or entry.id == args.id or 0 < entry.stamp_ns <= stamp_ns
+        ]
+        publisher = node.transport.publisher(f"{name}/cancel", encoding_of(GoalID), GOAL)
+        publisher.put(pack_goal_id(args.id, stamp_ns))
+        ask(node, f"/{name}", "")  # the answer comes after the cancel was taken
+        publisher.close()
+    if args.json:
+        print(json.dumps({"cancelled": asked}))
+        return 0
+    for goal_id in asked:
+        print(f"Cancel requested for goal {goal_id}")
+    if not asked:
+        print("No running goal is meant; the server remembers the cancel for a goal to come.")
+    return 0
+
+
+def _stamp(text: str | None) -> int:
+    from actionlib_core.time import Time
+
+    if text is None:
+        return 0
+    try:
+        seconds, _, fraction = text.partition(".")
+        return Time(int(seconds), int((fraction + "0" * 9)[:9])).to_nsec()
+    except (ValueError, TypeError) as error:
+        raise UsageError(
+            f"cancel: --before: got {text!r}; expected seconds since the epoch, 1700000000.5 "
+            "for example."
+        ) from error

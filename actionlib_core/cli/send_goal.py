@@ -1,0 +1,148 @@
+"""`actionlib send_goal`: send one goal and follow it to its end."""
+
+from __future__ import annotations
+
+import re
+import sys
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.cli import EXIT_FAILED, EXIT_INTERRUPTED, UsageError
+from actionlib_core.cli._network import action_class, open_node, wait_for_server
+from actionlib_core.cli._output import add_json, print_json, print_message
+
+if TYPE_CHECKING:
+    import argparse
+
+    from actionlib_core.action_client import ActionClient
+    from actionlib_core.sent_goal import SentGoal
+
+_TYPE = re.compile(r"\w+(/\w+){1,2}")
+CANCEL_S = 10.0  # how long the answer to a cancel is awaited
+
+
+def register(subparsers: Any) -> None:
+    """Add the command to an argparse subparsers object."""
+    parser = subparsers.add_parser(
+        "send_goal",
+        help="send a goal, wait for its result",
+        description="Exit code 0 when the goal SUCCEEDED. Ctrl-C cancels it first.",
+    )
+    parser.add_argument("name", metavar="NAME", help="the action")
+    parser.add_argument(
+        "words",
+        metavar="[TYPE] YAML",
+        nargs="*",
+        help="the goal as YAML, for example '{order: 10}'; the type is asked of the server",
+    )
+    parser.add_argument("-f", "--feedback", action="store_true", help="print feedback")
+    parser.add_argument("--stdin", action="store_true", help="read the YAML from standard input")
+    parser.add_argument(
+        "--timeout", type=float, metavar="S", help="longest time for server and goal [s]"
+    )
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Send the goal that the arguments describe."""
+    type_name, text = _split(args.words, stdin=args.stdin)
+    with open_node(args, settle=0.0) as node:
+        if not args.json:
+            print("Waiting for an action server to become available...", flush=True)
+        started = node.clock.now()
+        server = wait_for_server(node, args.name, args.timeout)
+        spec = action_class(type_name or server.type)
+        from actionlib_core.action_client import ActionClient
+
+        client: ActionClient[Any] = ActionClient(args.name, spec, node=node)
+        try:
+            goal = client.types.goal.from_yaml(text) if text.strip() else client.types.goal()
+            client.wait_for_server(1.0)
+            left = None
+            if args.timeout is not None:
+                left = max(0.0, args.timeout - (node.clock.now() - started))
+            return _drive(client, goal, left, args)
+        finally:
+            client.stop()
+
+
+def _split(words: list[str], *, stdin: bool) -> tuple[str, str]:
+    """Tell type and YAML apart."""
+    words = list(words)
+    type_name = words.pop(0) if words and _TYPE.fullmatch(words[0]) else ""
+    if stdin:
+        words.append(sys.stdin.read())
+    if len(words) > 1:
+        raise UsageError(
+            f"send_goal: got {len(words)} goals {words!r}; expected one. Try quoting the YAML: "
+            "'{order: 10}'."
+        )
+    return type_name, words[0] if words else ""
+
+
+def _drive(
+    client: ActionClient[Any], goal: Any, timeout: float | None, args: argparse.Namespace
+) -> int:
+    if not args.json:
+        print_message("Sending goal:", goal)
+    handle: SentGoal[Any, Any] = client.send(goal, timeout=timeout)
+    interrupted = timed_out = False
+    try:
+        _follow(handle, args)
+    except KeyboardInterrupt:
+        interrupted = True
+        _cancel(handle, args)
+    except TimeoutError:
+        timed_out = True
+        _cancel(handle, args)
+    _print_end(handle, args)
+    if timed_out:
+        print(f"actionlib: send_goal: not over within {args.timeout:g} s", file=sys.stderr)
+    if interrupted:
+        return EXIT_INTERRUPTED
+    return 0 if handle.status.name == "SUCCEEDED" and not timed_out else EXIT_FAILED
+
+
+def _follow(handle: SentGoal[Any, Any], args: argparse.Namespace) -> None:
+    announced = False
+    for feedback in handle.news():
+        if not announced and handle.accepted:
+            announced = True
+            if args.json:
+                print_json(event="accepted", id=handle.id)
+            else:
+                print(f"Goal accepted with ID: {handle.id}\n", flush=True)
+        if feedback is None or not args.feedback:
+            continue
+        if args.json:
+            print_json(event="feedback", feedback=feedback.to_dict())
+        else:
+            print_message("Feedback:", feedback)
+
+
+def _cancel(handle: SentGoal[Any, Any], args: argparse.Namespace) -> None:
+    if not args.json:
+        print("Canceling goal...", flush=True)
+    handle.cancel()
+    if handle.wait(CANCEL_S) and not args.json:
+        print("Goal canceled.", flush=True)
+
+
+def _print_end(handle: SentGoal[Any, Any], args: argparse.Namespace) -> None:
+    status = handle.status.name
+    message = handle.get_result()
+    if args.json:
+        print_json(
+            event="result",
+            id=handle.id,
+            status=status,
+            text=handle.text,
+            result=None if message is None else message.to_dict(),
+        )
+        return
+    if status == "REJECTED":
+        print(f"Goal was rejected.{f' {handle.text}' if handle.text else ''}")
+        return
+    if message is not None:
+        print_message("Result:", message)
+    print(f"Goal finished with status: {status}{f' ({handle.text})' if handle.text else ''}")

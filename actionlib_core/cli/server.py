@@ -1,0 +1,149 @@
+"""`actionlib server`: an action server operated by hand."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.cli._network import action_class, open_node
+from actionlib_core.cli._output import add_json, print_json, print_message
+from actionlib_core.exceptions import ActionlibError
+
+if TYPE_CHECKING:
+    import argparse
+
+    from actionlib_core.server_goal_handle import ServerGoalHandle
+
+HELP = """Commands, one a line; N is a goal's number, the newest open one when left out:
+  [N] accept [TEXT]      [N] reject [TEXT]
+  [N] feedback YAML      [N] succeed [YAML]     [N] abort [YAML]     [N] preempt [YAML]
+  list                   quit"""
+
+
+def register(subparsers: Any) -> None:
+    """Add the command to an argparse subparsers object."""
+    parser = subparsers.add_parser(
+        "server",
+        help="be the server of an action, by hand",
+        description="Prints goals and takes commands from standard input.",
+        epilog=HELP,
+        formatter_class=_raw(),
+    )
+    parser.add_argument("name", metavar="NAME", help="the action")
+    parser.add_argument("type", metavar="TYPE", help="pkg/Name, pkg/action/Name or pkg/NameAction")
+    parser.add_argument("--accept", action="store_true", help="accept every goal at once")
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def _raw() -> Any:
+    import argparse
+
+    return argparse.RawDescriptionHelpFormatter
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve until the input ends."""
+    from actionlib_core.action_server import ActionServer
+
+    spec = action_class(args.type)
+    with open_node(args) as node:
+        desk = Desk(args)
+        server = ActionServer(args.name, spec, desk.on_goal, desk.on_cancel, node=node)
+        desk.types = server.types
+        if not args.json:
+            print(f"Serving /{server.ns}. {HELP}", flush=True)
+        try:
+            for line in sys.stdin:
+                if line.strip() == "quit":
+                    break
+                desk.obey(line)
+        finally:
+            server.stop()
+        server.wait(0.0)
+    return 0
+
+
+class Desk:
+    """The goals that have come, by number, and the commands for them."""
+
+    def __init__(self, args: argparse.Namespace) -> None:
+        self.types: Any = None
+        self._args = args
+        self._goals: dict[int, ServerGoalHandle] = {}
+
+    def on_goal(self, handle: ServerGoalHandle) -> None:
+        """Show a new goal."""
+        number = len(self._goals) + 1
+        self._goals[number] = handle
+        if self._args.json:
+            print_json(event="goal", number=number, goal=handle.get_goal().to_dict())
+        else:
+            print_message(f"Goal {number} ({handle.get_goal_id().id}):", handle.get_goal())
+        if self._args.accept:
+            handle.set_accepted()
+
+    def on_cancel(self, handle: ServerGoalHandle) -> None:
+        """Show that a goal is asked to stop."""
+        number = next(n for n, known in self._goals.items() if known == handle)
+        if self._args.json:
+            print_json(event="cancel", number=number)
+        else:
+            print(f"Goal {number} is asked to stop.", flush=True)
+
+    def obey(self, line: str) -> None:
+        """Carry out one command; a mistake is told and changes nothing."""
+        first, _, rest = line.strip().partition(" ")
+        try:
+            if not first:
+                return
+            if first.isdigit():
+                number = int(first)
+                first, _, rest = rest.strip().partition(" ")
+            else:
+                number = max(self._open(), default=0)
+            if first == "list":
+                self._list()
+            else:
+                self._do(number, first, rest.strip())
+        except ActionlibError as error:
+            print(f"actionlib: {error}", file=sys.stderr, flush=True)
+
+    def _open(self) -> list[int]:
+        from actionlib_core._core.states import TERMINAL
+
+        return [
+            n for n, goal in self._goals.items() if goal.get_goal_status().status not in TERMINAL
+        ]
+
+    def _list(self) -> None:
+        from actionlib_core._core.states import Status
+
+        for number, goal in self._goals.items():
+            print(f"{number} {Status(goal.get_goal_status().status).name}", flush=True)
+
+    def _do(self, number: int, verb: str, rest: str) -> None:
+        handle = self._goals.get(number)
+        if handle is None:
+            raise ActionlibError(f"{verb}: got goal {number}; expected one of {self._open()}.")
+        if verb == "accept":
+            handle.set_accepted(rest)
+        elif verb == "reject":
+            handle.set_rejected(None, rest)
+        elif verb == "feedback":
+            handle.publish_feedback(self.types.feedback.from_yaml(rest))
+        else:
+            self._end(handle, verb, rest)
+
+    def _end(self, handle: ServerGoalHandle, verb: str, rest: str) -> None:
+        ends = {
+            "succeed": handle.set_succeeded,
+            "abort": handle.set_aborted,
+            "preempt": handle.set_canceled,
+        }
+        if verb not in ends:
+            raise ActionlibError(
+                f"got {verb!r}; expected one of "
+                f"{['accept', 'reject', 'feedback', *ends, 'list', 'quit']}."
+            )
+        ends[verb](self.types.result.from_yaml(rest) if rest else None, verb)
