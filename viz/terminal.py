@@ -16,6 +16,9 @@ of the clock draws, and a terminal that blocks (Ctrl-S, a slow link) loses lines
 
 from __future__ import annotations
 
+import errno
+import io
+import sys
 import threading
 from collections import deque
 from typing import TYPE_CHECKING, Self
@@ -38,8 +41,7 @@ if TYPE_CHECKING:
 
     from rich.console import RenderableType
 
-    from actionlib_core.clock import Clock
-    from actionlib_core.clock._protocol import Task
+    from actionlib_core.clock import Clock, Task
     from smachpy import events as ev
     from smachpy.introspection import StateRecord
     from viz.history import Goal
@@ -84,7 +86,7 @@ class TerminalView:
         self.history = History()
         self._record = record
         self._kinds = {state.path: state.kind for state in record.walk() if not state.children}
-        self._console = console or Console(highlight=False)
+        self._console = console or _standard_output()
         self._clock = clock or current_clock()
         panel = self._console.is_terminal and not plain
         self._live = _live_panel(self._console) if panel else None
@@ -94,6 +96,7 @@ class TerminalView:
         self._lost = 0
         self._wake = self._clock.event()
         self._closing = False
+        self._gone = False
         self._task: Task | None = None
 
     def __enter__(self) -> Self:
@@ -126,7 +129,7 @@ class TerminalView:
         """Take one event in; for `machine.subscribe`."""
         line = self._narrator.tell(event)
         self.history.on_event(event)
-        if line is not None:
+        if line is not None and not self._gone:
             with self._lock:
                 self._lost += len(self._lines) == BACKLOG
                 self._lines.append(line)
@@ -135,6 +138,9 @@ class TerminalView:
 
     def print_summary(self, outcome: str | None) -> None:
         """Print the table of states and the mission's outcome; None: the mission raised.
+
+        Raises:
+            BrokenPipeError: nobody reads standard output any more.
 
         Blocks: while the terminal takes the text.
         """
@@ -153,9 +159,16 @@ class TerminalView:
                 if not self._closing:
                     self._clock.sleep(FRAME)
             self._frame()
-        finally:
-            if self._live is not None:
-                self._live.stop()
+            self._release()
+        except (OSError, SystemExit):  # a closed pipe, a lost login: the mission goes on unseen
+            self._gone = True
+        except BaseException:
+            self._release()
+            raise
+
+    def _release(self) -> None:
+        if self._live is not None:
+            self._live.stop()
 
     def _frame(self) -> None:
         with self._lock:
@@ -224,6 +237,19 @@ class TerminalView:
             cells.append(Text(progress.text, "dim", no_wrap=True, overflow="ellipsis"))
             table.add_row(*cells)
         return table
+
+
+def _standard_output() -> Console:
+    if isinstance(sys.stdout, io.TextIOWrapper):  # an ASCII terminal gets question marks
+        sys.stdout.reconfigure(errors="replace")
+    return _Output(highlight=False)
+
+
+class _Output(Console):
+    """A console that tells when nobody reads it, instead of ending the process."""
+
+    def on_broken_pipe(self) -> None:
+        raise BrokenPipeError(errno.EPIPE, "nobody reads standard output any more")
 
 
 def _live_panel(console: Console) -> Live:

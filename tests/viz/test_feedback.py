@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+from types import SimpleNamespace as Message
+
+import pytest
+
+from viz.feedback import Progress, progress_of
+from viz.history import Goal
+
+
+def pose(x, y):
+    return Message(pose=Message(position=Message(x=x, y=y)))
+
+
+def progress(goal, first, now):
+    return progress_of(Goal("/M/A", "a", "g", 0.0, goal, now, first))
+
+
+def test_without_feedback_there_is_nothing_to_tell():
+    assert progress(None, None, None) == Progress()
+
+
+def test_the_way_left_of_move_base_is_measured_to_the_target():
+    goal = Message(target_pose=pose(3.0, 4.0))
+    found = progress(goal, Message(base_position=pose(0, 0)), Message(base_position=pose(3.0, 3.0)))
+    assert found.distance == pytest.approx(1.0)
+    assert found.fraction == pytest.approx(0.8)
+
+
+@pytest.mark.parametrize(
+    ("first", "now", "fraction"),
+    [
+        (Message(percent=10.0), Message(percent=50), 0.5),
+        (Message(progress=0.0), Message(progress=0.25), 0.25),
+        (Message(distance_remaining=8.0), Message(distance_remaining=2.0), 0.75),
+        (Message(remaining=10), Message(remaining=9), 0.1),
+        (Message(distance_remaining=2.0), Message(distance_remaining=8.0), 0.0),
+        (Message(distance_remaining=0.0), Message(distance_remaining=0.0), None),
+        (Message(percent=float("nan")), Message(percent=float("inf")), None),
+        (Message(progress=True), Message(progress="half"), None),
+        (Message(), Message(), None),
+        ("text", "text", None),
+    ],
+)
+def test_progress_is_read_from_the_usual_fields(first, now, fraction):
+    assert progress(None, first, now).fraction == (
+        None if fraction is None else pytest.approx(fraction)
+    )
+
+
+def test_durations_count_in_seconds():
+    def left(seconds):
+        return Message(time_left=Message(to_sec=lambda: seconds))
+
+    assert progress(None, left(4.0), left(1.0)).fraction == pytest.approx(0.75)
+
+
+def test_texts_and_small_values_are_shown():
+    assert progress(None, 1, Message(text="re-planning")).text == "re-planning"
+    assert progress(None, 1, Message(cycle=3, speed=0.25, pose=object())).text == (
+        "cycle 3, speed 0.25"
+    )
+
+
+def test_slots_are_read_too():
+    class Slotted:
+        __slots__ = ("_hidden", "count")
+
+        def __init__(self):
+            self.count = 7
+            self._hidden = 1
+
+    assert progress(None, None, Slotted()).text == "count 7"
+
+
+def test_messages_that_raise_are_left_out():
+    class Bad:
+        @property
+        def text(self):
+            raise RuntimeError
+
+        @property
+        def distance(self):
+            raise KeyError
+
+        def __getattr__(self, name):
+            raise ValueError(name)
+
+    assert progress(Bad(), Bad(), Bad()) == Progress()
+
+
+def test_control_characters_never_reach_the_terminal():
+    assert "\x1b" not in progress(None, 1, Message(text="\x1b[2J cleared")).text
