@@ -15,6 +15,7 @@ from actionlib_core.clock._real import RealClock as RealClock
 from actionlib_core.clock._serial import SerialExecutor as SerialExecutor
 from actionlib_core.clock._virtual import VirtualClock as VirtualClock
 from actionlib_core.clock._virtual_parts import Deadlock as Deadlock
+from actionlib_core.clock._virtual_parts import TimeLimit as TimeLimit
 
 __all__ = [
     "Clock",
@@ -23,6 +24,7 @@ __all__ = [
     "RealClock",
     "SerialExecutor",
     "Task",
+    "TimeLimit",
     "Timer",
     "VirtualClock",
     "current_clock",

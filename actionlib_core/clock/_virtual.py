@@ -21,13 +21,15 @@ from actionlib_core.clock._virtual_parts import (
     Deadlock,
     Participant,
     Stopped,
+    TimeLimit,
     VirtualEvent,
     VirtualTask,
     VirtualTimer,
+    name_waits,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine, Iterator, Mapping
+    from collections.abc import Callable, Coroutine, Iterator
     from types import TracebackType
     from typing import Self
 
@@ -59,6 +61,10 @@ class VirtualClock:
         choose: Called with a number n of participants and callbacks that can go on, n > 1, gives
             the index of the next one, in place of `seed`; to go through interleavings one by one.
 
+    Attributes:
+        limit: When time would pass this [s], the wait of the thread that made the clock raises
+            `TimeLimit` instead; None, the default: never.
+
     Threads: only participants may wait; `Event.set` and `call_later` may come from any thread.
 
     Raises:
@@ -77,6 +83,7 @@ class VirtualClock:
         self.seed = seed
         self.rate = rate
         self._pick = choose or _picker(seed)
+        self.limit: float | None = None
         self._now = 0.0
         self._stepped = time.monotonic()
         self._poke = RealEvent()
@@ -253,7 +260,7 @@ class VirtualClock:
 
     def _is_alone(self, deadline: float) -> bool:
         """Tell whether nobody can go on before `deadline`: the wait is a step of time, no more."""
-        if self._ready or self.rate is not None:
+        if self._ready or self.rate is not None or self._is_past(deadline):
             return False
         due = self._next_due()
         return due is None or due > deadline
@@ -341,11 +348,16 @@ class VirtualClock:
         if self._ready:
             return self._ready.pop(self._pick(len(self._ready)) if len(self._ready) > 1 else 0)
         if self._owner in self._waits:
-            self._owner.error = Deadlock(_name_waits(self._waits))
+            waits = name_waits(self._waits)
+            over = self.limit is not None and self._next_due() is not None
+            self._owner.error = TimeLimit(self._now, waits) if over else Deadlock(waits)
             self._wake(self._owner)
             self._ready.clear()
             return self._owner
         return None
+
+    def _is_past(self, due: float) -> bool:
+        return self.limit is not None and due > self.limit
 
     def _next_due(self) -> float | None:
         """Return the next deadline that still matters."""
@@ -363,7 +375,7 @@ class VirtualClock:
     def _jump(self) -> None:
         """Advance to the next deadline; all that are due become ready."""
         due = self._next_due()
-        if due is None:
+        if due is None or self._is_past(due):
             return
         self._now = max(due, self._now)
         self._stepped = time.monotonic() if self.rate is not None else 0.0
@@ -408,18 +420,6 @@ class VirtualClock:
 def _describe(event: VirtualEvent | None, deadline: float | None) -> str:
     what = "time to pass" if event is None else event.name
     return what if deadline is None else f"{what} (until {deadline:.6g} s)"
-
-
-def _name_waits(waits: Mapping[Participant, int]) -> dict[str, str]:
-    """Say who waits for what; a name that comes twice is numbered."""
-    named: dict[str, str] = {}
-    for participant in waits:
-        name, number = participant.name, 1
-        while name in named:
-            number += 1
-            name = f"{participant.name} ({number})"
-        named[name] = participant.waiting
-    return named
 
 
 def _picker(seed: int | None) -> Callable[[int], int]:

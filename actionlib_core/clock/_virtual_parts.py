@@ -33,6 +33,22 @@ class Deadlock(Exception):  # noqa: N818  the field's word
         )
 
 
+class TimeLimit(Exception):  # noqa: N818  as Deadlock
+    """Time would have passed `VirtualClock.limit`.
+
+    Attributes:
+        waits: Participant name -> what it waits for.
+    """
+
+    def __init__(self, now: float, waits: Mapping[str, str]) -> None:
+        self.waits = dict(waits)
+        lines = [f"  - {name}: waits for {what}" for name, what in self.waits.items()]
+        super().__init__(
+            f"virtual clock: time is up at {now:g} s; expected an end before its limit:\n"
+            + "\n".join(lines)
+        )
+
+
 class Stopped(BaseException):
     """The clock was closed while this participant waited."""
 
@@ -139,3 +155,15 @@ class VirtualTimer:
 
     def cancel(self) -> None:
         self.callback = None
+
+
+def name_waits(waits: Mapping[Participant, int]) -> dict[str, str]:
+    """Say who waits for what; a name that comes twice is numbered."""
+    named: dict[str, str] = {}
+    for participant in waits:
+        name, number = participant.name, 1
+        while name in named:
+            number += 1
+            name = f"{participant.name} ({number})"
+        named[name] = participant.waiting
+    return named

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from actionlib_core.clock import Deadlock, VirtualClock
+from actionlib_core.clock import Deadlock, TimeLimit, VirtualClock
 
 
 def test_time_jumps_to_the_next_deadline(clock):
@@ -185,3 +185,28 @@ def test_ten_hours_of_sleeps_cost_little(clock):
     for _ in range(36_000):
         clock.sleep(1)
     assert clock.now() == 36_000
+
+
+def test_a_limit_ends_waits_that_would_pass_it(clock):
+    clock.limit = 10
+
+    def tick():
+        while True:
+            clock.sleep(1)
+
+    clock.spawn(tick, name="ticker")
+    clock.sleep(9)
+    with pytest.raises(TimeLimit, match="ticker: waits for time to pass"):
+        clock.event("the end").wait()
+    with pytest.raises(TimeLimit):
+        clock.sleep(5)
+    assert clock.now() == 10
+    clock.limit = None
+    clock.sleep(5)
+    assert clock.now() == 15
+
+
+def test_a_limit_hides_no_deadlock(clock):
+    clock.limit = 10
+    with pytest.raises(Deadlock):
+        clock.event("the end").wait()
