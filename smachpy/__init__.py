@@ -64,6 +64,8 @@ if TYPE_CHECKING:
     from smachpy.checks import check as check
     from smachpy.condition_state import ConditionState as ConditionState
     from smachpy.introspection import Kind as Kind
+    from smachpy.introspection_client import IntrospectionClient as IntrospectionClient
+    from smachpy.introspection_server import IntrospectionServer as IntrospectionServer
     from smachpy.monitor_state import MonitorState as MonitorState
     from smachpy.service_state import ServiceState as ServiceState
     from smachpy.simple_action_state import SimpleActionState as SimpleActionState
@@ -76,6 +78,8 @@ __all__ = [
     "ConditionState",
     "Container",
     "InconsistentMachineError",
+    "IntrospectionClient",
+    "IntrospectionServer",
     "InvalidConstructionError",
     "InvalidStateError",
     "InvalidTransitionError",
@@ -116,6 +120,8 @@ __all__ = [
 _LAZY: dict[str, str] = {
     "ActionServerWrapper": "smachpy.action_server_wrapper",
     "ConditionState": "smachpy.condition_state",
+    "IntrospectionClient": "smachpy.introspection_client",
+    "IntrospectionServer": "smachpy.introspection_server",
     "MonitorState": "smachpy.monitor_state",
     "ServiceState": "smachpy.service_state",
     "SimpleActionState": "smachpy.simple_action_state",

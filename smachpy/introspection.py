@@ -14,7 +14,31 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from smachpy.introspection_client import IntrospectionClient
+    from smachpy.introspection_server import (
+        INIT_TOPIC,
+        STATUS_TOPIC,
+        STRUCTURE_TOPIC,
+        ContainerProxy,
+        IntrospectionServer,
+    )
     from smachpy.state import State
+
+__all__ = [
+    "INIT_TOPIC",
+    "KINDS",
+    "STATUS_TOPIC",
+    "STRUCTURE_TOPIC",
+    "ContainerProxy",
+    "IntrospectionClient",
+    "IntrospectionServer",
+    "Kind",
+    "RuleRecord",
+    "StateRecord",
+    "Structure",
+    "TransitionRecord",
+    "describe",
+]
 
 Kind: TypeAlias = Literal[
     "state",
@@ -238,3 +262,22 @@ def _is_required(spec: Any) -> bool:
     from dataclasses import MISSING
 
     return spec.default is MISSING and spec.default_factory is MISSING
+
+
+# What smach_ros.introspection holds -> module that defines it; imported on first use.
+_LAZY = {
+    "INIT_TOPIC": "smachpy.introspection_server",
+    "STATUS_TOPIC": "smachpy.introspection_server",
+    "STRUCTURE_TOPIC": "smachpy.introspection_server",
+    "ContainerProxy": "smachpy.introspection_server",
+    "IntrospectionClient": "smachpy.introspection_client",
+    "IntrospectionServer": "smachpy.introspection_server",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _LAZY:
+        from importlib import import_module
+
+        return getattr(import_module(_LAZY[name]), name)
+    raise AttributeError(f"module 'smachpy.introspection' has no attribute {name!r}")

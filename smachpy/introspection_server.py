@@ -1,0 +1,401 @@
+"""`IntrospectionServer`: a running machine, to be watched from elsewhere.
+
+Of every container, on the topics of SMACH, as smach_msgs:
+
+    <server>/smach/container_structure   its children and transitions, latched
+    <server>/smach/container_status      what is active, and its userdata, latched
+    <server>/smach/container_init        commands that choose where the next run begins
+
+and of the machine as a whole, as JSON in std_msgs/String:
+
+    <server>/smach/description           `smachpy.introspection.StateRecord`, latched
+    <server>/smach/events                `smachpy.events`, each with a sequence number `seq`
+
+Everything is sent when it changes and only then; userdata is JSON, nothing is ever pickled.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections import deque
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.clock import SerialExecutor
+from actionlib_core.interfaces.smach_msgs.msg import (
+    SmachContainerInitialStatusCmd,
+    SmachContainerStatus,
+    SmachContainerStructure,
+)
+from actionlib_core.interfaces.std_msgs.msg import Header, String
+from actionlib_core.node import get_node
+from actionlib_core.time import Time
+from actionlib_core.topic import Publisher, Subscriber
+from smachpy import log
+from smachpy._runtime.pace import Pace
+from smachpy.container import Container
+from smachpy.events import Started, to_record
+from smachpy.exceptions import InvalidStateError, SmachError
+from smachpy.introspection import describe
+from smachpy.user_data import UserData
+from smachpy.userdata_json import dumps, loads
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.node import Node
+    from actionlib_core.time import Duration
+    from smachpy.events import Event
+    from smachpy.state import State
+
+__all__ = [
+    "DESCRIPTION_TOPIC",
+    "EVENTS_TOPIC",
+    "INIT_TOPIC",
+    "STATUS_TOPIC",
+    "STRUCTURE_TOPIC",
+    "ContainerProxy",
+    "IntrospectionServer",
+]
+
+STATUS_TOPIC = "/smach/container_status"
+INIT_TOPIC = "/smach/container_init"
+STRUCTURE_TOPIC = "/smach/container_structure"
+EVENTS_TOPIC = "/smach/events"
+DESCRIPTION_TOPIC = "/smach/description"
+
+REMOTE_INIT = "REMOTE_INIT"
+REFUSED = "REMOTE_INIT_REFUSED: "
+REQUEST_ID = "$id"
+
+STATUS_INTERVAL_S = 0.05
+"""A container's status is sent at most so often; events are never held back."""
+
+LONGEST_VALUE = 10_000
+"""Userdata values with more elements are shown by their size."""
+
+QUEUED_EVENTS = 20_000
+"""More than these wait for the network: the newest are dropped, which shows in `seq`."""
+
+STOP_S = 1.0
+
+
+class ContainerProxy:
+    """Shows one container; `IntrospectionServer` makes one for each.
+
+    Args:
+        server_name: First part of the topics' names.
+        container: What to show.
+        path: What to call it, "/SM_ROOT/DRIVE".
+        update_rate: As SMACH takes it; there are no heartbeats here.
+        node: Where to send; the current node when None.
+
+    Raises:
+        InvalidStateError: `container` is none.
+    """
+
+    def __init__(
+        self,
+        server_name: str,
+        container: State,
+        path: str,
+        update_rate: float | Duration = 2.0,
+        *,
+        node: Node | None = None,
+        executor: SerialExecutor | None = None,
+    ) -> None:
+        if not isinstance(container, Container):
+            raise InvalidStateError(
+                f"introspection of {path!r}: got {container!r}; expected a container."
+            )
+        del update_rate
+        self._server_name = server_name
+        self._container = container
+        self._path = path
+        self._node = node
+        self._executor = executor
+        self._structure: Publisher | None = None
+        self._status: Publisher | None = None
+        self._commands: Subscriber[Any] | None = None
+        self._pace: Pace | None = None
+        self._unsubscribe: Callable[[], None] | None = None
+        self._forget: Callable[[], None] | None = None
+        self._info = "Initial state"
+        self._sent: dict[str, Any] = {}
+
+    def start(self, *, obey: bool = True) -> None:
+        """Send structure and status, and from now on what changes; a second call does nothing.
+
+        Args:
+            obey: Take commands that choose the initial state.
+        """
+        if self._pace is not None:
+            return
+        node = get_node() if self._node is None else self._node
+        if self._executor is None:
+            self._executor = SerialExecutor(node.clock, f"introspection {self._path}")
+        self._pace = Pace(node.clock, self._executor, self._update, STATUS_INTERVAL_S)
+        name = self._server_name
+        self._structure = Publisher(
+            name + STRUCTURE_TOPIC, SmachContainerStructure, latch=True, node=node
+        )
+        self._status = Publisher(name + STATUS_TOPIC, SmachContainerStatus, latch=True, node=node)
+        self._update()
+        self._unsubscribe = self._container.subscribe(self._on_event)
+        if obey:
+            self._commands = Subscriber(
+                name + INIT_TOPIC, SmachContainerInitialStatusCmd, self.obey, node=node
+            )
+        self._forget = node.on_close(self.stop)  # the newest are closed first: before our topics
+
+    def stop(self) -> None:
+        """Send the last status and leave the topics; a second call does nothing."""
+        pace, self._pace = self._pace, None
+        if pace is None:
+            return
+        pace.close()
+        if self._forget is not None:
+            self._forget()
+        if self._unsubscribe is not None:
+            self._unsubscribe()
+        if self._commands is not None:
+            self._commands.unregister()
+        if self._executor is not None:
+            self._executor.join(STOP_S)
+        self._update()
+        for publisher in (self._structure, self._status):
+            if publisher is not None:
+                publisher.unregister()
+        self._sent.clear()
+
+    def obey(self, command: Any) -> bool:
+        """Carry out a SmachContainerInitialStatusCmd; whether it was for this container.
+
+        The answer is a status whose `info` begins with the command's request id (the entry "$id" of
+        its userdata, if any) and goes on with "REMOTE_INIT", or "REMOTE_INIT_REFUSED: " and why.
+        """
+        if command.path != self._path:
+            return False
+        request = ""
+        try:
+            values = loads(command.local_data)
+            request = str(values.pop(REQUEST_ID, ""))
+            userdata = UserData()
+            userdata.update(values)
+            self._container.set_initial_state(list(command.initial_states), userdata)
+        except (SmachError, ValueError) as error:
+            log.logwarn(f"{self._path}: initial state was not set from remote: {error}")
+            self._send_status(f"{request}{REFUSED}{error}")
+        else:
+            log.loginfo(f"{self._path}: initial state set from remote: {command.initial_states}")
+            self._send_status(f"{request}{REMOTE_INIT}")
+        return True
+
+    def _on_event(self, event: Event) -> None:
+        self._info = type(event).__name__
+        pace = self._pace
+        if pace is not None:
+            pace.mark()
+
+    def _update(self) -> None:
+        """Send what has changed."""
+        structure = self._describe_structure()
+        if structure != self._sent.get("structure"):
+            self._sent["structure"] = structure
+            self._publish(self._structure, structure)
+        self._send_status(self._info, only_changes=True)
+
+    def _send_status(self, info: str, *, only_changes: bool = False) -> None:
+        try:
+            status = self._describe_status()
+        except RuntimeError:  # userdata changed while it was read: another event is on its way
+            if self._pace is not None:
+                self._pace.mark()
+            return
+        if only_changes and status == self._sent.get("status"):
+            return
+        self._sent["status"] = status
+        self._publish(self._status, status | {"info": info})
+
+    def _publish(self, publisher: Publisher | None, fields: dict[str, Any]) -> None:
+        if publisher is not None:
+            stamp = Time(0, publisher.node.clock.time_ns())
+            publisher.publish(header=Header(stamp=stamp), **fields)
+
+    def _describe_structure(self) -> dict[str, Any]:
+        edges = list(self._container.get_internal_edges())
+        return {
+            "path": self._path,
+            "children": list(self._container.get_children()),
+            "internal_outcomes": [str(outcome) for outcome, _, _ in edges],
+            "outcomes_from": [str(source) for _, source, _ in edges],
+            "outcomes_to": [str(target) for _, _, target in edges],
+            "container_outcomes": list(self._container.get_registered_outcomes()),
+        }
+
+    def _describe_status(self) -> dict[str, Any]:
+        userdata = self._container.userdata
+        values = {key: userdata[key] for key in userdata.keys() if key in userdata}  # noqa: SIM118
+        return {
+            "path": self._path,
+            "initial_states": list(self._container.get_initial_states()),
+            "active_states": list(self._container.get_active_states()),
+            "local_data": dumps(values, longest=LONGEST_VALUE),
+        }
+
+
+class IntrospectionServer:
+    """Shows a machine and all containers in it.
+
+    Args:
+        server_name: First part of the topics' names.
+        state: The machine.
+        path: What to call it, "/SM_ROOT".
+        obey: Take commands that choose the initial state; False only shows.
+        node: Where to send; the current node when None.
+
+    Raises:
+        InvalidStateError: `state` is no container.
+
+    Threads: `start` and `stop` by their caller; messages are sent in a thread of their own, so that
+        the machine never waits for the network.
+    """
+
+    def __init__(
+        self,
+        server_name: str,
+        state: State,
+        path: str,
+        *,
+        obey: bool = True,
+        node: Node | None = None,
+    ) -> None:
+        self._server_name = server_name
+        self._state = state
+        self._path = path
+        self._obey = obey
+        self._node = node
+        self._executor: SerialExecutor | None = None
+        self._proxies: list[ContainerProxy] = []
+        self._feed: _Feed | None = None
+        self._commands: Subscriber[Any] | None = None
+        self._forget: Callable[[], None] | None = None
+        if not isinstance(state, Container):
+            raise InvalidStateError(
+                f"IntrospectionServer {server_name!r}: got {state!r}; expected a container."
+            )
+
+    def start(self) -> None:
+        """Begin to show the machine; a second call does nothing."""
+        if self._forget is not None:
+            return
+        node = get_node() if self._node is None else self._node
+        self._node = node
+        self._executor = SerialExecutor(node.clock, f"introspection {self._server_name}")
+        self.construct(self._server_name, self._state, self._path)
+        for proxy in self._proxies:
+            proxy.start(obey=False)
+        assert isinstance(self._state, Container)
+        self._feed = _Feed(self._server_name, self._state, self._path, node)
+        if self._obey:
+            self._commands = Subscriber(
+                self._server_name + INIT_TOPIC,
+                SmachContainerInitialStatusCmd,
+                self._on_command,
+                node=node,
+            )
+        self._forget = node.on_close(self.stop)
+
+    def stop(self) -> None:
+        """Send the last status and leave the topics; a second call does nothing."""
+        forget, self._forget = self._forget, None
+        if forget is None:
+            return
+        forget()
+        if self._commands is not None:
+            self._commands.unregister()
+        if self._feed is not None:
+            self._feed.close()
+        self.clear()
+
+    def construct(self, server_name: str, state: State, path: str) -> None:
+        """Make the proxies of a container and of all below it; `start` does it."""
+        if not isinstance(state, Container):
+            return
+        self._proxies.append(
+            ContainerProxy(server_name, state, path, node=self._node, executor=self._executor)
+        )
+        for label, child in state.get_children().items():
+            self.construct(server_name, child, f"{path}/{label}")
+
+    def clear(self) -> None:
+        """Stop the proxies and forget them."""
+        for proxy in self._proxies:
+            proxy.stop()
+        self._proxies.clear()
+
+    def _on_command(self, command: Any) -> None:
+        if not any(proxy.obey(command) for proxy in self._proxies):
+            log.logwarn(
+                f"{self._server_name}: initial state was not set from remote: got path "
+                f"{command.path!r}; expected one of {[p._path for p in self._proxies]}."  # noqa: SLF001
+            )
+
+
+class _Feed:
+    """Sends description and events of a machine.
+
+    The listener turns events into text at once, as their values may change later; another thread
+    sends them.
+    """
+
+    def __init__(self, server_name: str, machine: Container, path: str, node: Node) -> None:
+        self._machine = machine
+        self._path = path
+        self._root = path
+        self._numbers = itertools.count(1)
+        self._queue: deque[str] = deque()
+        self._executor = SerialExecutor(node.clock, f"events of {server_name}")
+        self._description = ""
+        self._descriptions = Publisher(
+            server_name + DESCRIPTION_TOPIC, String, latch=True, node=node
+        )
+        self._events = Publisher(server_name + EVENTS_TOPIC, String, node=node)
+        self._describe()
+        self._unsubscribe = machine.subscribe(self._on_event)
+
+    def close(self) -> None:
+        """Send what waits, leave the topics."""
+        self._unsubscribe()
+        self._executor.join(STOP_S)
+        self._descriptions.unregister()
+        self._events.unregister()
+
+    def _on_event(self, event: Event) -> None:
+        number = next(self._numbers)
+        if isinstance(event, Started):
+            self._root = event.path
+            self._executor.submit(self._describe)
+        if not self._events.get_num_connections() or len(self._queue) >= QUEUED_EVENTS:
+            return
+        record = to_record(event)
+        record["path"] = self._rename(event.path)
+        record["seq"] = number
+        self._queue.append(json.dumps(record))
+        self._executor.submit(self._send)
+
+    def _rename(self, path: str) -> str:
+        """Return a path of this run under the name that the machine has here."""
+        frame = self._machine._frame  # noqa: SLF001  the machine's own path, which a parent decides
+        if frame is not None:
+            self._root = frame.path
+        return self._path + path.removeprefix(self._root)
+
+    def _send(self) -> None:
+        self._events.publish(self._queue.popleft())
+
+    def _describe(self) -> None:
+        text = describe(self._machine, name=self._path.strip("/")).to_json()
+        if text != self._description:
+            self._description = text
+            self._descriptions.publish(text)
