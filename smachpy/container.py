@@ -86,6 +86,12 @@ class Container(State):
 
     # -- structure -----------------------------------------------------------------------------
 
+    def _repr_svg_(self) -> str | None:
+        """Return the picture that a notebook shows."""
+        from smachpy.pictures import draw_svg
+
+        return draw_svg(self)
+
     def __getitem__(self, key: str) -> State:
         """Return the child with this label."""
         try:

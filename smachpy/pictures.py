@@ -1,7 +1,7 @@
 """Pictures for messages: drawn by an installed package, or not at all.
 
-A package that draws offers a function in the entry-point group `smachpy.pictures` under the name
-`run`. It is called as `draw(record, file, run=events)`.
+A package that draws offers functions in the entry-point group `smachpy.pictures`: `run`, called as
+`draw(record, file, run=events)`, and `svg`, called as `draw(machine)`, which returns SVG text.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from smachpy.introspection import StateRecord
+    from smachpy.state import State
 
 GROUP = "smachpy.pictures"
 
@@ -38,6 +39,20 @@ def draw_run(record: StateRecord, events: Iterable[Event], file: Path) -> Path |
             log.logwarn(f"{record.path}: no picture {str(file)!r}: {error}")
             return None
         return file
+    return None
+
+
+def draw_svg(machine: State) -> str | None:
+    """Return `machine` as SVG text, None when nothing that draws is installed.
+
+    Raises:
+        SmachError: drawing failed, for want of a `dot` program, say.
+
+    Blocks: while the picture is laid out, under a second.
+    """
+    for point in entry_points(group=GROUP, name="svg"):
+        picture: str = point.load()(machine)
+        return picture
     return None
 
 

@@ -304,3 +304,10 @@ def test_the_resolution_of_a_png_has_a_limit():
 
     assert resolution(500, 900) == 144
     assert resolution(500, 72_000) == 16
+
+
+def test_a_notebook_shows_the_machine():
+    machine = smachpy.StateMachine(outcomes=["done"], name="SHOWN")
+    with machine:
+        smachpy.StateMachine.add("ONLY", smachpy.State(outcomes=["done"]))
+    assert states_of(machine._repr_svg_()) == ["/SHOWN", "/SHOWN/ONLY"]
