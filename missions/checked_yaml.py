@@ -253,7 +253,7 @@ class Document:
         except MarkedYAMLError as error:
             mark = error.problem_mark or error.context_mark
             line = int(mark.line) + 1 if mark is not None else 0
-            got = " ".join(str(error.problem or error.context).split())
+            got = f"a mistake ({' '.join(str(error.problem or error.context).split())})"
             raise InputFileError([Problem(self.name, line, "", got, "valid YAML")]) from error
         except YAMLError as error:
             raise InputFileError([Problem(self.name, 0, "", str(error), "valid YAML")]) from error

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -65,8 +66,8 @@ def serve(args: argparse.Namespace) -> int:
             raise NavigationError(f"{where}: {error}. Try --pose X Y YAW.") from error
         with Node("move_base", namespace=args.namespace) as node:
             server = RobotServer(robot, node=node)
-            server.start()
             try:
+                server.start()
                 if not args.child:
                     x, y, _ = robot.body.pose
                     name = node.resolve("move_base")
@@ -99,7 +100,8 @@ def parameters() -> str:
 
 def _end_with_stdin(ending: shutdown.Shutdown) -> None:
     """Ask the process to end when nobody holds the other end of its standard input any more."""
-    sys.stdin.buffer.read()
+    while os.read(sys.stdin.fileno(), 4096):  # not through the buffer: its lock outlives the thread
+        pass
     ending.request("the parent has gone")
 
 

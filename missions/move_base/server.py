@@ -41,6 +41,7 @@ BASE_FRAME: Final = "base_link"
 _LATE: Final = 0.5  # [s] a loop this late gives the lost time up instead of hurrying after it
 _AT_DOCK: Final = 0.2  # [m] the charger reaches this far
 _CHARGE_PERIOD: Final = 0.5  # [s] between two feedback messages of `charge`
+_JUST_PAST: Final = 1e-3  # [s] waited longer, as a rounding error would never pass
 _SHORTEST_ROTATION: Final = 1e-3  # a quaternion shorter than this is no rotation
 
 
@@ -85,10 +86,10 @@ class RobotServer:
         Raises:
             ServerConflictError: another server has one of the names.
         """
-        self._publish_odometry()
-        self._housekeeper = self._clock.spawn(self._keep_house, name="robot battery")
         self._move.start()
         self._charge.start()
+        self._publish_odometry()
+        self._housekeeper = self._clock.spawn(self._keep_house, name="robot battery")
 
     def close(self) -> None:
         """Stop taking goals; a running one is aborted. A second call does nothing.
@@ -233,7 +234,7 @@ class RobotServer:
                 return
             charge = battery.charge(self._clock.now())
             self._charge.publish_feedback(ChargeFeedback(charge=charge, seconds_left=left))
-            self._charge_wake.wait(min(left, _CHARGE_PERIOD))
+            self._charge_wake.wait(min(left + _JUST_PAST, _CHARGE_PERIOD))
             if not self._closing.is_set():
                 self._charge_wake.clear()
         self._charge.set_succeeded(self._charge_result(), text="charged")

@@ -1,0 +1,67 @@
+from __future__ import annotations
+
+import contextlib
+from dataclasses import dataclass, replace
+from functools import partial
+
+import pytest
+
+from actionlib_core.node import Node, use_node
+from actionlib_core.transport.memory import MemoryNetwork
+from missions.maps import OFFICE_MAP, OFFICE_ROBOT
+from missions.move_base.config import load_config
+from missions.move_base.occupancy import load_map
+from missions.move_base.server import RobotServer
+from missions.move_base.world import Robot, World
+
+
+@pytest.fixture(scope="session")
+def office():
+    return load_map(OFFICE_MAP)
+
+
+@pytest.fixture(scope="session")
+def office_robot():
+    return load_config(OFFICE_ROBOT)
+
+
+@dataclass
+class Simulation:
+    """A robot with its server, and a node for the mission, on one network in virtual time."""
+
+    world: World
+    robot: Robot
+    server: RobotServer
+    node: Node
+
+
+@contextlib.contextmanager
+def _simulate(clock, grid, config, *, namespace="", pose=None):
+    network = MemoryNetwork(clock)
+    with (
+        Node("robot", transport=network.session(), clock=clock, namespace=namespace) as robot_node,
+        Node("mission", transport=network.session(), clock=clock, namespace=namespace) as node,
+        use_node(node),
+    ):
+        world = World(grid)
+        robot = Robot(world, config, pose or config.start, clock.now())
+        server = RobotServer(robot, node=robot_node)
+        server.start()
+        try:
+            yield Simulation(world, robot, server, node)
+        finally:
+            server.close()
+
+
+@pytest.fixture
+def simulate(clock, office):
+    """`with simulate(config) as simulation`: any robot on the office floor."""
+    return partial(_simulate, clock, office)
+
+
+@pytest.fixture
+def simulation(simulate, office_robot):
+    """The office robot with a full battery, at its dock."""
+    battery = replace(office_robot.battery, capacity=100.0, charge=1.0)
+    with simulate(replace(office_robot, battery=battery)) as made:
+        yield made

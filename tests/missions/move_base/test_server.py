@@ -1,0 +1,263 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from actionlib_core.exceptions import ServerConflictError
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
+from actionlib_core.interfaces.geometry_msgs.msg import PoseStamped
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
+from actionlib_core.interfaces.nav_msgs.msg import Odometry
+from actionlib_core.interfaces.sensor_msgs.msg import BatteryState
+from actionlib_core.simple_action_client import SimpleActionClient
+from actionlib_core.topic import Subscriber, wait_for_message
+from missions.interfaces import ChargeAction, ChargeGoal
+from missions.move_base.geometry import Pose2D, wrap_angle
+from missions.move_base.server import RobotServer
+from missions.waypoints import goal_at
+
+OFFICE_1 = Pose2D(2.0, 3.0, 0.0)
+OPEN_PLAN = Pose2D(16.5, 10.4, 1.57)
+
+
+@pytest.fixture
+def client(simulation):
+    client = SimpleActionClient("move_base", MoveBaseAction)
+    assert client.wait_for_server(1.0)
+    return client
+
+
+def drive(client, pose, frame="map"):
+    client.send_goal(goal_at(pose, frame))
+    assert client.wait_for_result(300.0)
+    return client.get_state(), client.get_goal_status_text()
+
+
+def test_it_drives_to_a_goal_and_reports_its_pose_ten_times_a_second(clock, simulation, client):
+    poses = []
+    start = clock.now()
+    client.send_goal(goal_at(OFFICE_1), feedback_cb=lambda f: poses.append((clock.now(), f)))
+    client.wait_for_result()
+    assert client.get_state() == GoalStatus.SUCCEEDED
+    assert simulation.robot.body.pose.distance(OFFICE_1) < 0.05
+    times = [t - start for t, _ in poses]
+    assert times == pytest.approx([0.1 * i for i in range(1, len(times) + 1)], abs=0.06)
+    base = [f.base_position for _, f in poses]
+    assert {b.header.frame_id for b in base} == {"map"}
+    assert base[-1].pose.position.x == pytest.approx(2.0, abs=0.05)
+    assert base[0].header.stamp < base[-1].header.stamp
+
+
+@pytest.mark.parametrize(
+    ("pose", "frame", "text"),
+    [
+        (Pose2D(0.5, 5.0, 0), "map", "in a wall"),
+        (Pose2D(99, 0, 0), "map", "outside the map"),
+        (Pose2D(0.75, 5.0, 0), "map", "too near to a wall"),
+        (Pose2D(1, 0, 0), "odom", "goal frame: got 'odom'; expected 'map' or 'base_link'"),
+        (Pose2D(1, 0, 0), "", "goal frame: got ''"),
+        (Pose2D(math.nan, 0, 0), "map", "no finite numbers"),
+    ],
+)
+def test_an_impossible_goal_is_aborted_with_the_reason_and_nothing_moves(
+    simulation, client, pose, frame, text
+):
+    status, why = drive(client, pose, frame)
+    assert status == GoalStatus.ABORTED
+    assert text in why
+    assert simulation.robot.odometer == 0.0
+
+
+def test_an_orientation_of_zeros_is_refused(client):
+    client.send_goal_and_wait(MoveBaseGoal(target_pose=PoseStamped()))
+    assert "all zeros are no rotation" in client.get_goal_status_text()
+
+
+def test_a_goal_in_the_robots_own_frame_is_relative(simulation, client):
+    before = simulation.robot.body.pose
+    assert drive(client, Pose2D(1, 0, 0), "/base_link")[0] == GoalStatus.SUCCEEDED
+    expected = before.then(Pose2D(1, 0, 0))
+    assert simulation.robot.body.pose.distance(expected) < 0.05
+    assert abs(wrap_angle(simulation.robot.body.yaw - expected.yaw)) < 0.05
+
+
+def test_cancel_stops_it_within_its_braking_distance(clock, simulation, client):
+    client.send_goal(goal_at(OFFICE_1))
+    clock.sleep(5.0)
+    body = simulation.robot.body
+    assert body.speed > 1.0
+    before, allowed = body.pose, body.braking_distance() + body.speed * 0.1
+    client.cancel_goal()
+    client.wait_for_result(5.0)
+    assert client.get_state() == GoalStatus.PREEMPTED
+    assert body.standing
+    assert body.pose.distance(before) <= allowed
+
+
+def test_a_newer_goal_takes_over_without_a_stop(clock, simulation, client):
+    other = SimpleActionClient("move_base", MoveBaseAction)
+    client.send_goal(goal_at(OFFICE_1))
+    clock.sleep(4.0)
+    speed = simulation.robot.body.speed
+    other.send_goal(goal_at(Pose2D(4.6, 10.6, 0)))
+    clock.sleep(0.11)
+    assert client.get_state() == GoalStatus.PREEMPTED
+    assert simulation.robot.body.speed > speed / 2
+    other.wait_for_result()
+    assert other.get_state() == GoalStatus.SUCCEEDED
+    assert simulation.robot.body.pose.distance(Pose2D(4.6, 10.6, 0)) < 0.05
+
+
+def test_a_newer_goal_that_is_impossible_stops_it(clock, simulation, client):
+    client.send_goal(goal_at(OFFICE_1))
+    clock.sleep(4.0)
+    other = SimpleActionClient("move_base", MoveBaseAction)
+    other.send_goal_and_wait(goal_at(Pose2D(0.5, 5.0, 0)))
+    assert other.get_state() == GoalStatus.ABORTED
+    assert simulation.robot.body.standing
+
+
+def test_the_way_is_planned_anew_when_it_is_blocked(clock, simulation, client):
+    client.send_goal(goal_at(OPEN_PLAN))
+    clock.sleep(1.0)
+    simulation.world.add_obstacle(13.0, 7.8, 0.4)
+    client.wait_for_result()
+    assert client.get_state() == GoalStatus.SUCCEEDED
+
+
+def test_a_way_that_stays_blocked_is_given_up(simulation, client):
+    for y in (6.9, 7.6, 8.3):
+        simulation.world.add_obstacle(6.0, y, 0.4)
+    status, why = drive(client, OFFICE_1)
+    assert status == GoalStatus.ABORTED
+    assert "every path is blocked; gave up after 3 recoveries" in why
+
+
+def test_closing_the_server_aborts_the_goal(clock, simulation, client):
+    client.send_goal(goal_at(OFFICE_1))
+    clock.sleep(2.0)
+    simulation.server.close()
+    assert client.wait_for_result(1.0)
+    assert client.get_state() == GoalStatus.ABORTED
+
+
+def test_an_empty_battery_stops_it(office_robot, simulate):
+    battery = replace(office_robot.battery, charge=0.05)
+    with simulate(replace(office_robot, battery=battery)) as simulation:
+        client = SimpleActionClient("move_base", MoveBaseAction)
+        client.wait_for_server()
+        status, why = drive(client, OFFICE_1)
+        assert (status, why) == (GoalStatus.ABORTED, "the battery is empty")
+        assert simulation.robot.body.standing
+
+
+def test_odometry_and_battery_can_be_watched_at_rest_and_on_the_way(clock, simulation, client):
+    odometry = wait_for_message("odom", Odometry, 1.0)
+    assert odometry.pose.pose.position.x == pytest.approx(9.8)
+    assert (odometry.header.frame_id, odometry.child_frame_id) == ("map", "base_link")
+    battery = wait_for_message("battery", BatteryState, 1.0)
+    assert battery.percentage == pytest.approx(1.0, abs=1e-3)
+    assert battery.power_supply_status == BatteryState.POWER_SUPPLY_STATUS_DISCHARGING
+    seen = []
+    with Subscriber("odom", Odometry, lambda message: seen.append(message)):
+        drive(client, OFFICE_1)
+        clock.sleep(0.1)
+    assert max(m.twist.twist.linear.x for m in seen) > 1.0
+    assert seen[-1].twist.twist.linear.x == pytest.approx(0.0, abs=1e-6)
+
+
+# -- charging --------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def charger(office_robot, simulate):
+    battery = replace(office_robot.battery, charge=0.2)
+    with simulate(replace(office_robot, battery=battery)) as simulation:
+        client = SimpleActionClient("charge", ChargeAction)
+        assert client.wait_for_server(1.0)
+        yield simulation, client
+
+
+def test_it_charges_at_its_dock(clock, charger):
+    simulation, client = charger
+    seen, start = [], clock.now()
+    client.send_goal(ChargeGoal(until=0.9), feedback_cb=seen.append)
+    client.wait_for_result()
+    assert client.get_state() == GoalStatus.SUCCEEDED
+    assert client.get_result().charge == pytest.approx(0.9, abs=1e-3)
+    config = simulation.robot.config.battery
+    assert clock.now() - start == pytest.approx(
+        0.7 * config.capacity * 3600 / config.charge_power, abs=0.01
+    )
+    assert [f.charge for f in seen] == sorted(f.charge for f in seen)
+    assert simulation.robot.battery.power < 0
+
+
+def test_charging_can_be_stopped(clock, charger):
+    simulation, client = charger
+    client.send_goal(ChargeGoal(until=0.9))
+    clock.sleep(1.2)
+    start = clock.now()
+    client.cancel_goal()
+    client.wait_for_result()
+    assert client.get_state() == GoalStatus.PREEMPTED
+    assert clock.now() == start
+    assert 0.2 < client.get_result().charge < 0.9
+    assert simulation.robot.battery.power < 0
+
+
+@pytest.mark.parametrize(("until", "text"), [(0.0, "expected more than 0"), (1.5, "at most 1")])
+def test_a_charge_that_cannot_be_reached_is_refused(charger, until, text):
+    _, client = charger
+    client.send_goal_and_wait(ChargeGoal(until=until))
+    assert client.get_state() == GoalStatus.ABORTED
+    assert text in client.get_goal_status_text()
+
+
+def test_it_charges_only_at_the_dock(charger):
+    simulation, client = charger
+    simulation.robot.body.x += 3.0
+    client.send_goal_and_wait(ChargeGoal(until=0.9))
+    assert "3.0 m away from its dock; drive to (9.80, 7.10) first" in client.get_goal_status_text()
+
+
+def test_driving_off_ends_the_charging(clock, charger):
+    simulation, client = charger
+    move = SimpleActionClient("move_base", MoveBaseAction)
+    client.send_goal(ChargeGoal(until=1.0))
+    clock.sleep(1.0)
+    move.send_goal(goal_at(OFFICE_1))
+    client.wait_for_result()
+    assert client.get_state() == GoalStatus.ABORTED
+    assert client.get_goal_status_text() == "the robot left the dock"
+    assert simulation.robot.battery.power < 0
+    move.cancel_goal()
+    move.wait_for_result()
+
+
+def test_without_a_dock_there_is_no_charging(office_robot, simulate):
+    with simulate(replace(office_robot, dock=None)):
+        client = SimpleActionClient("charge", ChargeAction)
+        client.wait_for_server()
+        client.send_goal_and_wait(ChargeGoal(until=0.9))
+        assert client.get_goal_status_text() == "this robot has no dock"
+
+
+# -- names -----------------------------------------------------------------------------------------
+
+
+def test_two_robots_of_one_name_are_refused(simulation):
+    with pytest.raises(ServerConflictError, match="two servers"):
+        RobotServer(simulation.robot, node=simulation.node).start()
+
+
+def test_a_namespace_holds_its_own_robot(office_robot, simulate):
+    with simulate(office_robot, namespace="robot_1") as simulation:
+        client = SimpleActionClient("/robot_1/move_base", MoveBaseAction, node=simulation.node)
+        assert client.wait_for_server(1.0)
+        client.send_goal_and_wait(goal_at(Pose2D(0.5, 0, 0), "robot_1/base_link"))
+        assert client.get_state() == GoalStatus.SUCCEEDED
+        client.send_goal_and_wait(goal_at(Pose2D(0.5, 0, 0), "robot_2/base_link"))
+        assert "expected 'map' or 'robot_1/base_link'" in client.get_goal_status_text()

@@ -1,0 +1,218 @@
+"""`smachpy run` as a user types it: real processes, real zenoh."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from missions.maps import OFFICE_MAP
+
+pytestmark = [pytest.mark.zenoh, pytest.mark.timeout(120)]
+
+SMACHPY = [sys.executable, "-c", "import sys; from smachpy.cli import main; sys.exit(main())"]
+WAYPOINTS = """\
+map: {map}
+dock: {{x: 9.8, y: 7.1, yaw: 1.5708}}
+low_battery: 0.5
+charge_until: 0.7
+waypoints:
+  - {{name: near, x: 10.8, y: 7.6, yaw: 0.0}}
+  - {{name: back, x: 8.8, y: 7.7, yaw: 3.0}}
+"""
+ROBOT = """\
+robot: {max_speed: 2.0, acceleration: 3.0, braking: 3.0, max_turn_rate: 3.0}
+battery: {capacity: 1.0, charge: 0.52, charge_power: 1200}
+start: {x: 9.8, y: 7.1, yaw: 1.5708}
+dock: {x: 9.8, y: 7.1, yaw: 1.5708}
+"""
+
+
+def wait_for_line(process, text, seconds=20.0):
+    """Read the process's output up to a line with `text`."""
+    seen = []
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        line = process.stdout.readline()
+        seen.append(line)
+        if text in line:
+            return
+        if not line:
+            break
+    raise AssertionError(f"not printed: {text!r}\n{''.join(seen)}")
+
+
+def children_of(pid):
+    found = []
+    for task in Path(f"/proc/{pid}/task").iterdir():
+        found += [int(word) for word in (task / "children").read_text().split()]
+    return found
+
+
+def is_alive(pid):
+    try:
+        return "Z" not in Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except FileNotFoundError:
+        return False
+
+
+def wait_gone(pid, seconds):
+    deadline = time.monotonic() + seconds
+    while is_alive(pid):
+        assert time.monotonic() < deadline, f"process {pid} is still there"
+        with contextlib.suppress(ChildProcessError):
+            os.sched_yield()
+
+
+def run(*arguments, **options):
+    return subprocess.run(
+        [*SMACHPY, *arguments],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        stdin=subprocess.DEVNULL,
+        **options,
+    )
+
+
+@contextlib.contextmanager
+def started(*arguments):
+    process = subprocess.Popen(
+        [*SMACHPY, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        stdin=subprocess.DEVNULL,
+        text=True,
+    )
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.kill()
+        process.wait()
+        process.stdout.close()
+
+
+@pytest.fixture
+def files(tmp_path):
+    (tmp_path / "way.yaml").write_text(WAYPOINTS.format(map=OFFICE_MAP))
+    (tmp_path / "robot.yaml").write_text(ROBOT)
+    return tmp_path
+
+
+@pytest.fixture
+def far(files):
+    """Arguments of a patrol that drives for a while."""
+    text = WAYPOINTS.format(map=OFFICE_MAP).replace("10.8, y: 7.6", "2.0, y: 3.0")
+    (files / "far.yaml").write_text(text.replace("low_battery: 0.5", "low_battery: 0.1"))
+    way = f"waypoints={files / 'far.yaml'}"
+    return ["run", "patrol", "--start-robot", "--plain", "--out", str(files / "out"), "-i", way]
+
+
+def test_a_patrol_of_two_processes_succeeds_and_leaves_its_pictures(files):
+    out = files / "out"
+    done = run(
+        *("run", "patrol", "--start-robot", "--plain", "--out", str(out)),
+        *("-i", f"waypoints={files / 'way.yaml'}", "--config", str(files / "robot.yaml")),
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "RECHARGE/CHARGE  succeeded" in done.stdout
+    assert "PATROL: succeeded" in done.stdout
+    assert "<svg" in (out / "patrol.svg").read_text()
+    assert (out / "patrol_track.png").read_bytes().startswith(b"\x89PNG")
+    assert done.stderr == ""
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_stops_the_robot_and_everything_ends_soon(far, number, code):
+    with started(*far) as process:
+        wait_for_line(process, "move_base")
+        (robot,) = children_of(process.pid)
+        time.sleep(2.0)
+        start = time.monotonic()
+        process.send_signal(number)
+        output = process.stdout.read()
+        assert process.wait(10) == code, output
+        assert time.monotonic() - start < 3.0
+        assert "PATROL: preempted" in output
+        assert "stopped on request" in output
+        assert not is_alive(robot)
+
+
+def test_a_mission_that_is_killed_takes_its_robot_along(far):
+    with started(*far) as process:
+        wait_for_line(process, "move_base")
+        (robot,) = children_of(process.pid)
+        process.kill()
+        process.wait()
+        wait_gone(robot, 5.0)
+
+
+def test_a_robot_that_is_killed_ends_the_mission(far):
+    with started(*far) as process:
+        wait_for_line(process, "move_base")
+        (robot,) = children_of(process.pid)
+        os.kill(robot, signal.SIGKILL)
+        output = process.stdout.read()
+        assert process.wait(10) == 1
+        assert "PATROL: aborted" in output
+        assert "LOST" in output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["run", "patroll"], "Did you mean 'patrol'"),
+        (["run", "patrol", "-i", "waypoints=nowhere.yaml"], "nowhere.yaml: got"),
+        (["run", "patrol", "-i", "speed=3"], "no such input; expected one of"),
+        (["run", "patrol", "-i", "speed"], "expected KEY=VALUE"),
+        (["run", "patrol", "--server-timeout", "0.3"], "Try --start-robot"),
+        (["run", "patrol", "--start-robot", "--map", "nowhere.yaml"], "nowhere.yaml: got"),
+        (["run", "patrol", "--start-robot", "--pose", "0", "0", "0"], "Try --pose X Y YAW"),
+    ],
+)
+def test_bad_input_is_one_screen_without_traceback(arguments, text, tmp_path):
+    done = run(*arguments, cwd=tmp_path)
+    assert done.returncode == 2, done.stdout + done.stderr
+    assert text in done.stderr
+    assert "Traceback" not in done.stderr
+    assert len(done.stderr.splitlines()) < 20
+
+
+def test_two_robots_of_one_name(files):
+    robot = [sys.executable, "-m", "missions.move_base"]
+    with subprocess.Popen(robot, stdout=subprocess.PIPE, text=True) as first:
+        wait_for_line(first, "ready")
+        second = subprocess.run(robot, capture_output=True, text=True, timeout=30)
+        assert second.returncode == 2
+        assert "action 'move_base': two servers" in second.stderr
+        assert "Traceback" not in second.stderr
+        first.send_signal(signal.SIGTERM)
+        assert first.wait(5) == 0
+
+
+def test_list_names_the_missions():
+    done = run("list")
+    assert done.returncode == 0
+    assert [line.split()[0] for line in done.stdout.splitlines()] == [
+        "countdown",
+        "patrol",
+        "there_and_back",
+    ]
+
+
+def test_the_parameters_of_the_robot_are_listed_and_can_be_read_again(tmp_path):
+    from missions.move_base.__main__ import parameters
+    from missions.move_base.config import SimConfig, load_config
+
+    path = tmp_path / "all.yaml"
+    path.write_text(parameters())
+    config = load_config(path)
+    assert config.robot == SimConfig().robot
+    assert config.battery == SimConfig().battery

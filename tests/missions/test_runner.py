@@ -1,0 +1,97 @@
+from __future__ import annotations
+
+import pytest
+
+import smachpy
+from missions.exceptions import MissionError
+from missions.move_base.geometry import Pose2D
+from missions.recorder import TrackRecorder
+from missions.runner import RunOptions, build, good_outcomes, needed_servers
+from missions.waypoints import Waypoint, goal_at
+from smachpy import events as ev
+from smachpy.targets import Target
+
+
+class Done(smachpy.State):
+    def __init__(self):
+        super().__init__(outcomes=["done"])
+
+    def execute(self, userdata):
+        return "done"
+
+
+def machine(outcomes=("done",), **userdata):
+    sm = smachpy.StateMachine(outcomes=list(outcomes))
+    for key, value in userdata.items():
+        sm.userdata[key] = value
+    with sm:
+        smachpy.StateMachine.add("ONE", Done(), transitions={"done": outcomes[0]})
+    return sm
+
+
+def target(thing):
+    return Target("mine", "here:mine", "", thing)
+
+
+def test_inputs_become_arguments_or_userdata():
+    seen = []
+
+    def factory(speed=1.0):
+        seen.append(speed)
+        return machine(places=[])
+
+    built = build(target(factory), {"speed": 2.5, "places": ["a"]})
+    assert seen == [2.5]
+    assert built.userdata.places == ["a"]
+
+
+def test_an_unknown_input_names_the_known_ones():
+    with pytest.raises(
+        MissionError, match=r"--input sped: .* expected one of \['places', 'speed'\]"
+    ):
+        build(target(lambda speed=1: machine(places=[])), {"sped": 1})
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "success", "good"),
+    [
+        (("succeeded", "aborted", "done"), (), {"succeeded"}),
+        (("all_checked", "failed", "preempted"), (), {"all_checked"}),
+        (("a", "b"), ("b",), {"b"}),
+    ],
+)
+def test_which_outcomes_are_a_success(outcomes, success, good):
+    record = smachpy.describe(machine(outcomes))
+    assert good_outcomes(record, RunOptions(success=success)) == good
+
+
+def test_the_needed_servers_are_those_of_the_action_states():
+    from missions.patrol import patrol
+
+    assert needed_servers(smachpy.describe(patrol())) == {"move_base", "charge"}
+    assert needed_servers(smachpy.describe(machine())) == set()
+
+
+def test_the_recorder_names_goals_after_waypoints_else_after_states():
+    from actionlib_core.interfaces.geometry_msgs.msg import PoseStamped
+    from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseFeedback
+
+    recorder = TrackRecorder()
+    assert not recorder.has_goals
+    near, far = Pose2D(1, 2, 0), Pose2D(5, 5, 1)
+    head = ("/M/DRIVE_HOME", 0.0, 0)
+    recorder.on_event(ev.UserdataWritten(*head, "waypoint", Waypoint("kitchen", near)))
+    recorder.on_event(ev.GoalSent(*head, "move_base", "g1", goal_at(near)))
+    recorder.on_event(ev.GoalSent(*head, "move_base", "g2", goal_at(far)))
+    recorder.on_event(ev.GoalSent(*head, "move_base", "g3", goal_at(far, "base_link")))
+    recorder.on_event(ev.GoalSent(*head, "charge", "g4", object()))
+    for x in (0.0, 0.5, 0.5, 1.0):
+        pose = PoseStamped()
+        pose.pose.position.x = x
+        recorder.on_event(ev.GoalFeedback(*head, "move_base", "g1", MoveBaseFeedback(pose)))
+    recorder.on_event(ev.GoalDone(*head, "move_base", "g1", "SUCCEEDED", ""))
+    recorder.on_event(ev.GoalDone(*head, "move_base", "g2", "ABORTED", ""))
+    assert recorder.has_goals
+    marks = [(m.label, m.reached) for m in recorder._marks()]
+    assert marks == [("kitchen", True), ("drive home", False)]
+    assert recorder.track == [(0.0, 0.0), (0.5, 0.0), (1.0, 0.0)]
