@@ -218,7 +218,7 @@ def _start(thread: threading.Thread) -> None:
     """Start a thread; a participant's thread becomes a participant."""
     clock = _here()
     if clock is None or _belongs(sys._getframe(1), REAL_TIME):  # noqa: SLF001
-        _thread_start(thread)
+        _really(_thread_start, thread)
         return
     run = thread.run
 

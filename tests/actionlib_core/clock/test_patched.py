@@ -261,6 +261,18 @@ def test_threads_and_locks_of_the_house_stay_real(patched):
     assert patched.now() == 5
 
 
+def test_a_callback_of_the_clock_may_start_a_task_that_needs_a_new_thread(patched):
+    done = []
+
+    def start_many():
+        for _ in range(50):
+            patched.spawn(lambda: done.append(time.monotonic()), name="t")
+
+    patched.call_later(1, start_many)
+    time.sleep(2)
+    assert done == [1] * 50
+
+
 def interleaving(seed: int) -> list[str]:
     with VirtualClock(seed) as clock, use_clock(clock), clock.patched():
         order = []
