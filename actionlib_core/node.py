@@ -24,6 +24,7 @@ from actionlib_core.config import load_config
 from actionlib_core.exceptions import NodeError
 from actionlib_core.names import check_base_name, clean_namespace, parse_arguments, resolve_name
 from actionlib_core.presence import Endpoint, Kind, token_key
+from actionlib_core.shutdown import current_shutdown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -230,8 +231,14 @@ class _Default:
             clock=RealClock(),
         )
         self._node = node
-        atexit.register(node.close)
+        atexit.register(_leave, node)
         return node
+
+
+def _leave(node: Node) -> None:
+    """Let those finish who asked for it (`Shutdown.at_exit`), then leave the network."""
+    current_shutdown().leave()
+    node.close()
 
 
 _default = _Default()

@@ -12,6 +12,7 @@ Tests use a `Shutdown` of their own (`use_shutdown`) and request it by hand.
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import signal
 import threading
@@ -20,6 +21,7 @@ from contextvars import ContextVar
 from typing import TYPE_CHECKING
 
 from actionlib_core.clock import RealClock, SerialExecutor, current_clock
+from actionlib_core.clock._serial import report_thread_exception
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -41,6 +43,7 @@ class Shutdown:
         self._events: weakref.WeakKeyDictionary[Clock, Event] = weakref.WeakKeyDictionary()
         self._callbacks: dict[int, tuple[SerialExecutor, Callable[[], object]]] = {}
         self._count = 0
+        self._at_exit: dict[int, Callable[[], object]] = {}
 
     @property
     def reason(self) -> str | None:
@@ -89,6 +92,39 @@ class Shutdown:
                 self._callbacks.pop(number, None)
 
         return forget
+
+    def at_exit(self, callback: Callable[[], object]) -> Callable[[], None]:
+        """Call `callback` when the interpreter exits, before the default node leaves the network.
+
+        Returns:
+            Forgets the callback.
+
+        Threads: the callback runs in the main thread and may block; threads still run then. An
+            exception is given to `threading.excepthook`.
+        """
+        with self._lock:
+            if not self._at_exit:
+                atexit.register(self.leave)
+            self._count += 1
+            number = self._count
+            self._at_exit[number] = callback
+
+        def forget() -> None:
+            with self._lock:
+                self._at_exit.pop(number, None)
+
+        return forget
+
+    def leave(self) -> None:
+        """Call what `at_exit` was given, the newest first; each once."""
+        with self._lock:
+            callbacks = [self._at_exit[number] for number in sorted(self._at_exit, reverse=True)]
+            self._at_exit.clear()
+        for callback in callbacks:
+            try:
+                callback()
+            except Exception:  # noqa: BLE001  a border: reported, the others are called too
+                report_thread_exception()
 
     def request(self, reason: str = "requested") -> bool:
         """Ask the program to end.

@@ -57,6 +57,7 @@ from smachpy.util import CBInterface as CBInterface
 from smachpy.util import cb_interface as cb_interface
 from smachpy.util import has_smach_interface as has_smach_interface
 from smachpy.util import is_shutdown as is_shutdown
+from smachpy.util import set_preempt_handler as set_preempt_handler
 from smachpy.util import set_shutdown_check as set_shutdown_check
 
 if TYPE_CHECKING:
@@ -112,6 +113,7 @@ __all__ = [
     "logwarn",
     "n_of",
     "set_loggers",
+    "set_preempt_handler",
     "set_shutdown_check",
     "state",
 ]

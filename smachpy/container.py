@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from types import TracebackType
     from typing import Self, Unpack
 
+    from actionlib_core.clock import Event as ClockEvent
     from smachpy.control import Control
     from smachpy.events import Event
     from smachpy.state import StateOptions
@@ -54,6 +55,7 @@ class Container(State):
 
     is_container: ClassVar[bool] = True
     name: str | None = None
+    _end_waiters: tuple[ClockEvent, ...] = ()
 
     def __init__(
         self,
@@ -139,6 +141,25 @@ class Container(State):
     def is_running(self) -> bool:
         """Tell whether it runs."""
         return self._frame is not None
+
+    def wait_ended(self, timeout: float | None = None) -> bool:
+        """Wait until it does not run.
+
+        Returns:
+            Whether that came within `timeout` [s].
+
+        Blocks: until then; None waits for ever.
+        """
+        ended = self._clock().event()
+        with self._lock:
+            if self._frame is None:
+                return True
+            self._end_waiters = (*self._end_waiters, ended)
+        try:
+            return ended.wait(timeout)
+        finally:
+            with self._lock:
+                self._end_waiters = tuple(e for e in self._end_waiters if e is not ended)
 
     def reset_userdata(self) -> None:
         """Forget all userdata of this container and of all containers below it."""
@@ -244,6 +265,8 @@ class Container(State):
             if self._frame is frame:
                 self._frame = None
                 self._preempt_requested = False
+                for ended in self._end_waiters:
+                    ended.set()
             self._answered = frame.answered
             told = frame.told
             if told is not None and not frame.dead:

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 
+from smachpy import log
 from smachpy._core.names import unique_names
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
+
+    from smachpy.state import State
 
 __all__ = [
     "CBInterface",
     "cb_interface",
     "has_smach_interface",
     "is_shutdown",
+    "set_preempt_handler",
     "set_shutdown_check",
 ]
 
@@ -36,6 +40,32 @@ def is_shutdown() -> bool:
     By the check of `set_shutdown_check`, else by `actionlib_core.shutdown`.
     """
     return _check[0]()
+
+
+def set_preempt_handler(sc: State, *, timeout: float | None = 60.0) -> None:
+    """Preempt `sc` when the program is to end, and let it finish before the network is left.
+
+    A machine that runs is preempted by the program's shutdown anyway; this makes the program wait
+    for one that runs in another thread, so that its goals are cancelled and not left running.
+
+    Args:
+        sc: A container, or a state.
+        timeout: Longest wait for its end [s]; None waits for ever.
+    """
+    from actionlib_core import shutdown
+
+    running: Callable[[], bool] = getattr(sc, "is_running", lambda: True)
+    wait: Callable[[float | None], object] = getattr(sc, "wait_ended", lambda _timeout: True)
+
+    def stop() -> None:
+        if running():
+            sc.request_preempt()
+            if not wait(timeout):
+                log.logerr(f"{sc!r} still runs {timeout} s after its preempt; it is left behind.")
+
+    current = shutdown.current_shutdown()
+    current.on_shutdown(stop)
+    current.at_exit(stop)
 
 
 def set_shutdown_check(cb: Callable[[], bool]) -> None:
