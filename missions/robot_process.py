@@ -87,16 +87,20 @@ class RobotProcess:
             code = self._process.returncode
             raise MissionError(said or f"the robot process ended with exit code {code}")
 
+    def let_go(self) -> None:
+        """Tell the process to end, without waiting for it."""
+        if self._process is not None and self._process.stdin is not None:
+            self._process.stdin.close()
+
     def stop(self) -> None:
         """End the process; a second call does nothing.
 
-        Blocks: until it has ended, 2.5 s at most.
+        Blocks: until it has ended, 3.5 s at most.
         """
         process = self._process
         if process is None:
             return
-        if process.stdin is not None:
-            process.stdin.close()
+        self.let_go()
         if not self._ended.wait(_GRACE):
             process.terminate()
             if not self._ended.wait(_LAST_GRACE):

