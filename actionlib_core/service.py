@@ -185,6 +185,10 @@ class Service(_ServiceEnd):
         return make() if result is None else make(result)
 
 
+def _show(seconds: float | None) -> str:
+    return "all the time" if seconds is None else f"{seconds:g} s"
+
+
 def _fail(query: Query, error: Exception) -> None:
     text = json.dumps({"type": type(error).__name__, "text": str(error)})
     query.reply_error(text)
@@ -275,8 +279,8 @@ class ServiceProxy(_ServiceEnd):
         seconds = to_seconds(timeout)
         if not self._wait_for_server(seconds):
             raise WaitTimeoutError(
-                f"/{self.resolved_name}: no server: got none in {seconds} s; expected one of type "
-                f"{self.type}. Try 'actionlib service list'."
+                f"/{self.resolved_name}: no server: got none in {_show(seconds)}; expected one of "
+                f"type {self.type}. Try 'actionlib service list'."
             )
 
     def _wait_for_server(self, timeout: float | None) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 import re
 from typing import TYPE_CHECKING, Any
 
@@ -130,14 +131,40 @@ def _csv_line(values: list[Any]) -> str:
 
 
 def to_yaml(value: Any, *, flow: bool = False) -> str:
-    """Return plain data as YAML: arrays of scalars on one line, or all on one line (`flow`)."""
-    from ruamel.yaml import YAML
+    """Return plain data as YAML: arrays of scalars on one line, or everything (`flow`)."""
+    return _flow(value) if flow else "\n".join(_block(value, ""))
 
-    yaml = YAML(typ="safe", pure=True)
-    yaml.default_flow_style = True if flow else None
-    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
-    yaml.width = 1_000_000
-    yaml.allow_unicode = True
-    buffer = io.StringIO()
-    yaml.dump(value, buffer)
-    return buffer.getvalue().removesuffix("...\n").rstrip("\n")
+
+def _block(value: Any, indent: str) -> list[str]:
+    if isinstance(value, dict) and value:
+        return [
+            line
+            for key, item in value.items()
+            for line in _under(f"{indent}{key}:", item, f"{indent}  ")
+        ]
+    if isinstance(value, list) and any(isinstance(item, (dict, list)) for item in value):
+        return [line for item in value for line in _item(item, indent)]
+    return [f"{indent}{_flow(value)}"]
+
+
+def _under(head: str, value: Any, indent: str) -> list[str]:
+    lines = _block(value, indent)
+    nested = isinstance(value, (dict, list)) and lines != [f"{indent}{_flow(value)}"]
+    return [head, *lines] if nested else [f"{head} {_flow(value)}"]
+
+
+def _item(value: Any, indent: str) -> list[str]:
+    first, *others = _block(value, f"{indent}  ")
+    return [f"{indent}- {first.lstrip()}", *others]
+
+
+def _flow(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {_flow(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_flow, value))}]"
+    if isinstance(value, float) and not math.isfinite(value):
+        return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    return json.dumps(value)

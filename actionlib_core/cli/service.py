@@ -6,9 +6,10 @@ import json
 import sys
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core.cli import UsageError
+from actionlib_core.cli import EXIT_FAILED, UsageError
 from actionlib_core.cli._ends import ends_by_name, find_ends, only_type, types_of
 from actionlib_core.cli._network import SETTLE_S, open_node
+from actionlib_core.exceptions import ServiceException
 from actionlib_core.presence import Kind
 
 if TYPE_CHECKING:
@@ -86,7 +87,11 @@ def _call(args: argparse.Namespace) -> int:
         proxy.wait_for_service(args.timeout)
         while True:
             _note(args, f"requester: making request: {request!r}\n")
-            response = proxy(request)
+            try:
+                response = proxy(request)
+            except ServiceException as error:
+                print(f"actionlib: {error}", file=sys.stderr)
+                return EXIT_FAILED
             if args.json:
                 print(json.dumps(response.to_dict()), flush=True)
             else:

@@ -1,0 +1,225 @@
+"""`actionlib topic`, over the network in memory."""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+
+import pytest
+from ruamel.yaml import YAML
+
+from actionlib_core.cli import main
+from actionlib_core.cli._message_text import flatten, shorten, split_path, to_yaml
+from actionlib_core.interfaces.geometry_msgs.msg import Point, PoseStamped
+from actionlib_core.interfaces.sensor_msgs.msg import LaserScan
+from actionlib_core.interfaces.std_msgs.msg import Int32, String
+from actionlib_core.node import Node
+from actionlib_core.topic import Publisher, Subscriber
+from actionlib_core.transport.memory import MemoryNetwork
+
+
+@pytest.fixture
+def nodes(clock):
+    network = MemoryNetwork(clock)
+    made = [Node(name, transport=network.session(), clock=clock) for name in ("cli", "robot")]
+    yield made
+    for node in made:
+        node.close()
+        node.transport.close()
+
+
+@pytest.fixture
+def cli(nodes):
+    return lambda *words: main(["topic", *words], node=nodes[0])
+
+
+@pytest.fixture
+def robot(nodes):
+    return nodes[1]
+
+
+def test_list(cli, robot, capsys):
+    Publisher("chatter", String, node=robot)
+    Subscriber("chatter", String, print, node=robot)
+    Subscriber("count", Int32, print, node=robot)
+    assert cli("list") == 0
+    assert capsys.readouterr().out == "/chatter\n/count\n"
+    cli("list", "-t")
+    assert (
+        capsys.readouterr().out == "/chatter [std_msgs/msg/String]\n/count [std_msgs/msg/Int32]\n"
+    )
+    cli("list", "-c")
+    assert capsys.readouterr().out == "2\n"
+    cli("list", "-v")
+    assert capsys.readouterr().out.splitlines() == [
+        "Published topics:", " * /chatter [std_msgs/msg/String] 1 publisher", "",
+        "Subscribed topics:", " * /chatter [std_msgs/msg/String] 1 subscriber",
+        " * /count [std_msgs/msg/Int32] 1 subscriber", "",
+    ]  # fmt: skip
+    cli("list", "--json")
+    assert json.loads(capsys.readouterr().out)[0] == {
+        "name": "/chatter", "types": ["std_msgs/msg/String"],
+        "publishers": ["/robot"], "subscribers": ["/robot"],
+    }  # fmt: skip
+
+
+def test_info_and_type(cli, robot, capsys):
+    Publisher("chatter", String, node=robot)
+    assert cli("info", "chatter") == 0
+    assert capsys.readouterr().out == (
+        "Type: std_msgs/msg/String\nPublisher count: 1\nSubscription count: 0\n"
+    )
+    cli("info", "/chatter", "-v")
+    assert "Node: /robot  type: std_msgs/String  md5: 992ce8a1" in capsys.readouterr().out
+    cli("type", "chatter")
+    assert capsys.readouterr().out == "std_msgs/msg/String\n"
+    cli("type", "chatter", "--json")
+    assert json.loads(capsys.readouterr().out) == ["std_msgs/msg/String"]
+
+
+def test_unknown_topic_is_named_with_those_there_are(cli, robot, capsys):
+    Publisher("chatter", String, node=robot)
+    for words in (("type", "nope"), ("info", "nope"), ("echo", "nope")):
+        assert cli(*words) == 2
+        error = capsys.readouterr().err
+        assert "topic '/nope': not there; expected one of ['/chatter']" in error
+    assert cli("info", "a b") == 2
+    assert "invalid topic name" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("flags", "shown"),
+    [
+        ([], 'data: "hello"\n---\n'),
+        (["--csv"], "hello\n"),
+        (["--json"], '{"data": "hello"}\n'),
+        (["--field", "data"], '"hello"\n---\n'),
+        (["--no-str"], 'data: "<string length: 5>"\n---\n'),
+        (["--flow-style"], '{data: "hello"}\n---\n'),
+        (["-l", "3"], 'data: "hel..."\n---\n'),
+        (["--raw"], "b'\\x05\\x00\\x00\\x00hello'\n---\n"),
+    ],
+)
+def test_echo_once(cli, robot, capsys, flags, shown):
+    Publisher("chatter", String, latch=True, node=robot).publish("hello")
+    assert cli("echo", "chatter", "--once", *flags) == 0
+    assert capsys.readouterr().out == shown
+
+
+def test_echo_counts_and_times_out(cli, robot, capsys, clock):
+    publisher = Publisher("count", Int32, node=robot)
+
+    def publish():
+        for number in range(3):
+            clock.sleep(1)
+            publisher.publish(number)
+
+    clock.spawn(publish, name="robot")
+    assert cli("echo", "count", "-n", "2", "--csv") == 0
+    assert capsys.readouterr().out == "0\n1\n"
+    assert cli("echo", "count", "std_msgs/Int32", "--csv", "--timeout", "5") == 1
+    captured = capsys.readouterr()
+    assert captured.out == "2\n"
+    assert "/count: no message in 5 s" in captured.err
+
+
+def test_echo_of_a_field_that_is_not_there(cli, robot, capsys):
+    Publisher("pose", PoseStamped, latch=True, node=robot).publish()
+    assert cli("echo", "pose", "--once", "--field", "pose.position.q") == 2
+    assert "'q' is not there; there are ['x', 'y', 'z']" in capsys.readouterr().err
+    assert cli("echo", "pose", "--once", "--field", "pose..x") == 2
+    assert "field path: malformed at 4" in capsys.readouterr().err
+
+
+def test_echo_shortens_long_arrays_unless_told_not_to(cli, robot, capsys):
+    Publisher("scan", LaserScan, latch=True, node=robot).publish(ranges=[1.0] * 200)
+    cli("echo", "scan", "--once", "--field", "ranges", "--csv")
+    assert capsys.readouterr().out.count("1.0") == 128
+    cli("echo", "scan", "--once", "--field", "ranges", "--csv", "-f")
+    assert capsys.readouterr().out.count("1.0") == 200
+    cli("echo", "scan", "--once", "--no-arr")
+    assert 'ranges: "<array length: 200>"' in capsys.readouterr().out
+
+
+def test_pub_waits_for_a_subscriber_and_publishes(cli, robot, capsys, clock):
+    heard = []
+    clock.call_later(3.0, lambda: Subscriber("point", Point, heard.append, node=robot))
+    assert cli("pub", "point", "geometry_msgs/msg/Point", "{x: 1.0}", "-1") == 0
+    clock.sleep(1)
+    assert heard == [Point(x=1.0)]
+    assert capsys.readouterr().out.splitlines()[:3] == [
+        "Waiting for at least 1 matching subscription(s)...",
+        "publisher: beginning loop",
+        "publishing #1: Point(x=1.0, y=0.0, z=0.0)",
+    ]
+
+
+def test_pub_keeps_its_rate(cli, robot, clock, capsys):
+    times = []
+    Subscriber("chatter", String, lambda _: times.append(round(clock.now(), 6)), node=robot)
+    start = clock.now()
+    assert cli("pub", "chatter", "std_msgs/String", "data: x", "-r", "4", "-t", "5", "--json") == 0
+    clock.sleep(1)
+    assert times == [start + n * 0.25 for n in range(5)]
+    assert capsys.readouterr().out == '{"data": "x"}\n' * 5
+
+
+def test_pub_from_standard_input(cli, robot, clock, monkeypatch):
+    heard = []
+    Subscriber("chatter", String, heard.append, node=robot)
+    monkeypatch.setattr(sys, "stdin", io.StringIO("data: a\n---\ndata: b\n---\n"))
+    assert cli("pub", "chatter", "std_msgs/String", "--stdin") == 0
+    clock.sleep(1)
+    assert heard == [String("a"), String("b")]
+
+
+def test_pub_tells_what_is_wrong(cli, capsys):
+    assert cli("pub", "chatter", "std_msgs/String", "{date: x}", "-1") == 2
+    assert "date" in capsys.readouterr().err
+    assert cli("pub", "chatter", "std_msgs/Strin", "{}", "-1") == 2
+    assert "String" in capsys.readouterr().err
+    assert cli("pub", "chatter", "std_msgs/String", "{}", "-1", "--timeout", "2") == 2
+    assert "no 1 subscribers in 2 s" in capsys.readouterr().err
+
+
+def test_hz(cli, robot, clock, capsys):
+    publisher = Publisher("chatter", String, node=robot)
+
+    def publish():
+        for _ in range(100):
+            publisher.publish("x")
+            clock.sleep(0.1)
+
+    clock.spawn(publish, name="robot")
+    assert cli("hz", "chatter", "-n", "2") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "average rate: 10.000"
+    assert lines[1].startswith("\tmin: 0.100s max: 0.100s std dev: 0.00000s window: ")
+    assert cli("hz", "nothing", "-n", "1", "--json") == 0
+    assert "no new messages" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        {"a": {"b": [1, 2.5], "c": "x: y"}, "d": [], "e": {}},
+        {"list": [{"x": 1, "y": {"z": [1]}}, {"x": 2, "y": {"z": []}}], "t": True},
+        [[1, 2], [3]],
+        "text",
+        {"nested": [[{"a": 1}], []]},
+        {"inf": float("inf"), "minus": float("-inf"), "ü": "größe\n"},
+    ],
+)
+@pytest.mark.parametrize("flow", [False, True])
+def test_yaml_reads_back(value, flow):
+    assert YAML(typ="safe", pure=True).load(to_yaml(value, flow=flow)) == value
+
+
+def test_paths_and_cutting():
+    assert split_path("pose.position[0].x") == ["pose", "position", 0, "x"]
+    assert split_path("data[-1]") == ["data", -1]
+    assert flatten({"a": [1, {"b": 2}], "c": 3}) == [1, 2, 3]
+    assert shorten({"a": [1, 2, 3], "b": "abcd"}, 2, no_arr=False, no_str=False) == {
+        "a": [1, 2, "..."], "b": "ab...",
+    }  # fmt: skip
