@@ -67,7 +67,8 @@ class RunOptions:
 def run_mission(target: Target, options: RunOptions) -> int:
     """Run it to its end and return the exit code.
 
-    Ctrl-C and SIGTERM preempt the mission, a second Ctrl-C ends the process.
+    Ctrl-C and SIGTERM request the shutdown, which preempts the mission; a second Ctrl-C ends the
+    process.
 
     Raises:
         SmachError: the inputs do not fit, a server is missing, or the robot cannot start.
@@ -92,7 +93,6 @@ def run_mission(target: Target, options: RunOptions) -> int:
             _load_artists()
         if not waiter.wait(options.server_timeout, robot):
             return _signal_exit(ending)
-        stack.callback(ending.on_shutdown(machine.request_preempt))
         stack.callback(machine.subscribe(recorder.on_event))
         view = stack.enter_context(viz.TerminalView(record, plain=options.plain))
         stack.callback(machine.subscribe(view.on_event))

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from missions.checked_yaml import Section
-    from missions.move_base.costmap import Costmap
+    from missions.move_base.floor import Floor
 
 _SHARE: Final = Limits(low=0.0, high=1.0)
 
@@ -88,21 +88,21 @@ def load_route(path: Path) -> Route:
     return Route(waypoints, dock, low, until)
 
 
-def _floor(top: Section, path: Path) -> Costmap | None:
+def _floor(top: Section, path: Path) -> Floor | None:
     """Return the floor that the file names, inflated by its robot."""
     robot = SimConfig()
     if "robot" in top:
         robot = load_config(path.parent / top.text("robot", REQUIRED))
     if "map" not in top:
         return None
-    from missions.move_base.costmap import Costmap
+    from missions.move_base.floor import Floor
     from missions.move_base.occupancy import load_map
 
     grid = load_map(path.parent / top.text("map", REQUIRED))
-    return Costmap(grid, robot.robot.radius, robot.planner)
+    return Floor(grid, robot.robot.radius, robot.planner)
 
 
-def _waypoint(section: Section, default_name: str, floor: Costmap | None) -> Waypoint:
+def _waypoint(section: Section, default_name: str, floor: Floor | None) -> Waypoint:
     name = section.text("name", default_name)
     x = section.number("x", REQUIRED, unit="m")
     y = section.number("y", REQUIRED, unit="m")

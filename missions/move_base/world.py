@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Final
 from missions.exceptions import NavigationError
 from missions.move_base.battery import Battery
 from missions.move_base.body import Body
-from missions.move_base.costmap import Costmap, Obstacle
+from missions.move_base.costmap import Costmap
+from missions.move_base.floor import Obstacle
 from missions.move_base.planner import Planner
 
 if TYPE_CHECKING:

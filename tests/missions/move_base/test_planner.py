@@ -9,7 +9,8 @@ import pytest
 from missions.exceptions import NavigationError
 from missions.maps import OFFICE_MAP
 from missions.move_base.config import PlannerConfig
-from missions.move_base.costmap import Costmap, Obstacle
+from missions.move_base.costmap import Costmap
+from missions.move_base.floor import Obstacle
 from missions.move_base.geometry import ORIGIN, Pose2D
 from missions.move_base.occupancy import OccupancyMap, load_map
 from missions.move_base.planner import Planner
@@ -44,6 +45,18 @@ def test_unknown_floor_is_solid_unless_the_config_says_otherwise():
     with pytest.raises(NavigationError, match="in a wall or another solid thing"):
         Costmap(grid, 0.2, PlannerConfig()).check_place(5, 2)
     assert Costmap(grid, 0.2, PlannerConfig(unknown_is_free=True)).check_place(5, 2) == (40, 100)
+
+
+def test_a_place_is_judged_as_the_costmap_does(office):
+    costmap = office.costmap
+    generator = np.random.default_rng(1)
+    for row, column in generator.integers((0, 0), costmap.blocked.shape, (3000, 2)):
+        try:
+            costmap.check_place(*costmap.map.centre(row, column))
+        except NavigationError:
+            assert costmap.blocked[row, column]
+        else:
+            assert not costmap.blocked[row, column]
 
 
 def test_cost_falls_with_the_distance_from_walls():
