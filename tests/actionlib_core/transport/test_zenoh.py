@@ -1,0 +1,296 @@
+"""What only real sessions and processes can show: exits, kills, stops, and a router between."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from contextlib import contextmanager
+
+import pytest
+
+from actionlib_core.clock import RealClock
+from actionlib_core.config import Config, load_config
+from actionlib_core.exceptions import TransportError
+from actionlib_core.transport import Quality
+from actionlib_core.transport.zenoh import ZenohTransport
+
+pytestmark = pytest.mark.zenoh
+
+CLOCK = RealClock()
+WAIT_S = 15.0
+
+
+class Watch:
+    """Follows the tokens `@test/*` and waits for them."""
+
+    def __init__(self, transport):
+        self._changed = CLOCK.event()
+        self.alive = set()
+        transport.watch_alive("@test/*", self)
+
+    def __call__(self, presence):
+        (self.alive.add if presence.alive else self.alive.discard)(presence.key)
+        self._changed.set()
+
+    def wait(self, condition, timeout=WAIT_S):
+        deadline = CLOCK.now() + timeout
+        while not condition(self.alive):
+            assert self._changed.wait(deadline - CLOCK.now()), self.alive
+            self._changed.clear()
+
+
+@contextmanager
+def child(code, **environment):
+    process = subprocess.Popen(
+        [sys.executable, "-c", code],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, **environment},
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+        for pipe in (process.stdin, process.stdout, process.stderr):
+            pipe.close()
+
+
+START = """
+import sys, threading, time
+from actionlib_core.transport import Quality
+from actionlib_core.transport.zenoh import ZenohTransport
+t = ZenohTransport()
+t.subscribe("goal", lambda sample: None)
+t.queryable("add", lambda query: None)
+token = t.declare_alive("@test/child")
+"""
+
+ENDINGS = {
+    "falls off the end": "sys.stdin.readline()",
+    "sys.exit": "sys.stdin.readline(); sys.exit(3)",
+    "exception": "sys.stdin.readline(); raise ValueError('no')",
+    "keyboard interrupt": "sys.stdin.readline(); raise KeyboardInterrupt",
+    "closed before": "sys.stdin.readline(); t.close()",
+    "thread still busy": (
+        "threading.Thread(target=time.sleep, args=(60,), daemon=True).start(); sys.stdin.readline()"
+    ),
+    "a query is open": (
+        "t.query('add', b'', timeout=60, on_reply=print, on_done=print); sys.stdin.readline()"
+    ),
+    "in a callback": (
+        "t.subscribe('goal', lambda s: time.sleep(60)); t.publisher('goal').put(b''); "
+        "sys.stdin.readline()"
+    ),
+    "default node": (
+        "from actionlib_core import get_node; get_node().on_close(lambda: print('closed', "
+        "flush=True)); sys.stdin.readline()"
+    ),
+    "many sessions": "more = [ZenohTransport() for _ in range(3)]; sys.stdin.readline()",
+}
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_program_ends_within_a_second_on_every_path(ending):
+    transport = ZenohTransport()
+    try:
+        watch = Watch(transport)
+        with child(START + ENDINGS[ending]) as process:
+            watch.wait(lambda alive: alive)
+            process.stdin.write("\n")
+            start = CLOCK.now()
+            process.stdin.close()
+            process.wait(WAIT_S)
+            assert CLOCK.now() - start < 3.0  # under a second alone, with room for a busy machine
+            watch.wait(lambda alive: not alive)
+            assert process.returncode >= 0 or ending == "keyboard interrupt"
+            errors = process.stderr.read()
+            assert "Fatal" not in errors
+            if ending == "default node":
+                assert process.stdout.read() == "closed\n"
+    finally:
+        transport.close()
+
+
+def test_killed_process_is_seen_at_once():
+    transport = ZenohTransport()
+    try:
+        watch = Watch(transport)
+        with child(START + "sys.stdin.readline()") as process:
+            watch.wait(lambda alive: alive)
+            done = CLOCK.event()
+            transport.query("add", b"", timeout=60, on_reply=print, on_done=done.set)
+            process.kill()
+            start = CLOCK.now()
+            watch.wait(lambda alive: not alive)
+            assert done.wait(WAIT_S)
+            assert CLOCK.now() - start < 1.0
+    finally:
+        transport.close()
+
+
+def test_stopped_process_is_lost_after_its_lease_and_found_again(tmp_path):
+    file = tmp_path / "config.yaml"
+    file.write_text(f"domain: {load_config().domain}\nlease: 1.0\n")
+    transport = ZenohTransport(load_config(file))
+    try:
+        watch = Watch(transport)
+        with child(START + "sys.stdin.readline()", SMACHPY_CONFIG=str(file)) as process:
+            watch.wait(lambda alive: alive)
+            process.send_signal(signal.SIGSTOP)
+            start = CLOCK.now()
+            watch.wait(lambda alive: not alive)
+            assert 0.5 < CLOCK.now() - start < 8.0
+            process.send_signal(signal.SIGCONT)
+            watch.wait(lambda alive: alive)
+    finally:
+        transport.close()
+
+
+def test_close_does_not_wait_for_a_process_that_does_not_read():
+    transport = ZenohTransport()
+    watch = Watch(transport)
+    with child(START + "sys.stdin.readline()") as process:
+        watch.wait(lambda alive: alive)
+        process.send_signal(signal.SIGSTOP)
+        publisher = transport.publisher("goal")
+        stuck = CLOCK.event()
+
+        def flood():
+            try:
+                while True:
+                    timer = CLOCK.call_later(0.3, stuck.set)
+                    publisher.put(bytes(1_000_000))
+                    timer.cancel()
+            except TransportError:
+                pass
+
+        task = CLOCK.spawn(flood, name="flood")
+        assert stuck.wait(WAIT_S)
+        start = CLOCK.now()
+        transport.close()
+        assert CLOCK.now() - start < 1.0
+        process.kill()
+        assert task.join(WAIT_S)
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@pytest.fixture
+def router():
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    transport = ZenohTransport(Config(mode="router", listen=(endpoint,), discovery="off"))
+    yield endpoint
+    transport.close()
+
+
+@pytest.mark.parametrize("mode", ["client", "peer"])
+def test_sessions_meet_through_a_router(router, mode):
+    config = Config(mode=mode, connect=(router,), discovery="off")
+    a, b = ZenohTransport(config), ZenohTransport(config)
+    try:
+        latched = a.publisher("map", "enc", Quality(latch=True))
+        latched.put(b"old")
+        latched.put(b"new")
+        a.queryable("add", lambda q: (q.reply(b"sum of " + q.payload), q.finish()))
+        a.declare_alive("@test/a")
+        watch = Watch(b)
+        watch.wait(lambda alive: alive)
+        heard, answers, changed = [], [], CLOCK.event()
+
+        def on_sample(sample):
+            heard.append(sample)
+            changed.set()
+
+        b.subscribe("map", on_sample)
+        assert changed.wait(WAIT_S)
+        done = CLOCK.event()
+        b.query("add", b"1", timeout=WAIT_S, on_reply=answers.append, on_done=done.set)
+        assert done.wait(WAIT_S)
+        assert [s[1:] for s in heard] == [(b"new", "enc", a.session_id)]
+        assert [r.payload for r in answers] == [b"sum of 1"]
+        assert b.list_alive("@test/*", WAIT_S) == ["@test/a"]
+        a.close()
+        watch.wait(lambda alive: not alive)
+    finally:
+        a.close()
+        b.close()
+
+
+def test_unreachable_router_is_named():
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    config = Config(mode="client", connect=(endpoint,), connect_timeout=0.3, discovery="off")
+    with pytest.raises(TransportError) as caught:
+        ZenohTransport(config)
+    text = str(caught.value)
+    assert text.startswith(f"cannot join the network as client: {endpoint}: nothing answers there")
+    assert "Try starting the router with 'actionlib router'" in text
+
+
+def test_taken_endpoint_is_named(router):
+    with pytest.raises(TransportError, match="cannot join the network as router"):
+        ZenohTransport(Config(mode="router", listen=(router,), discovery="off"))
+
+
+def test_domains_do_not_meet():
+    first, second = load_config().domain, load_config().domain % 9999 + 1
+    sessions = [ZenohTransport(Config(domain=domain, settle=0.3)) for domain in (first, second)]
+    try:
+        sessions[0].declare_alive("@test/a")
+        assert sessions[1].list_alive("@test/*", 0.5) == []
+    finally:
+        for session in sessions:
+            session.close()
+
+
+def test_settled_session_knows_the_others_when_it_is_open():
+    first = ZenohTransport()
+    try:
+        first.declare_alive("@test/a")
+        second = ZenohTransport(Config(domain=load_config().domain, settle=5.0))
+        try:
+            assert second.list_alive("@test/*", WAIT_S) == ["@test/a"]
+        finally:
+            second.close()
+    finally:
+        first.close()
+
+
+def test_no_thread_of_ours_while_idle():
+    before = {t for t in threading.enumerate() if t.name.startswith("transport")}
+    transport = ZenohTransport()
+    try:
+        for number in range(50):
+            transport.subscribe(f"key/{number}", print)
+        assert {t for t in threading.enumerate() if t.name.startswith("transport")} == before
+    finally:
+        transport.close()
+
+
+def test_router_command_serves_until_it_is_told_to_end():
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    command = [
+        sys.executable, "-c", "import sys; from actionlib_core.cli import main; sys.exit(main())",
+        "router", "--listen", endpoint,
+    ]  # fmt: skip
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        line = process.stdout.readline()
+        assert f"listens at {endpoint}" in line
+        config = Config(mode="client", connect=(endpoint,), discovery="off")
+        ZenohTransport(config).close()
+        process.send_signal(signal.SIGINT)
+        assert process.wait(WAIT_S) == 0
+    finally:
+        process.kill()
+        process.communicate()
