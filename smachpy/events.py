@@ -12,6 +12,7 @@ in place of `Left`.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple, TypeAlias
 
 
@@ -228,13 +229,20 @@ Event: TypeAlias = (
 )
 
 EVENT_TYPES: tuple[type[Event], ...] = Event.__args__
+
+LONGEST_TEXT = 4_000
+LONGEST_LIST = 1_000
+DEEPEST = 20
+"""What of a value is put into a record; it is to be looked at, not to be computed with."""
+
 _BY_NAME = {kind.__name__: kind for kind in EVENT_TYPES}
 
 
 def to_record(event: Event) -> dict[str, Any]:
     """Return `event` as a dict of its fields and its `kind`, for JSON.
 
-    Values that JSON does not know (goals, userdata) are replaced by their `repr`.
+    Messages become `{"$msg": type, "fields": {...}}`; other values that JSON does not know are
+    replaced by their `repr`, and those that are too long to look at are cut or named by their size.
     """
     record: dict[str, Any] = {"kind": type(event).__name__}
     for key, value in event._asdict().items():
@@ -262,11 +270,45 @@ def from_record(record: dict[str, Any]) -> Event:
         ) from error
 
 
-def _plain(value: Any) -> Any:
-    if value is None or isinstance(value, (bool, int, float, str)):
+def _plain(value: Any, depth: int = 0) -> Any:
+    if value is None or isinstance(value, (bool, int)):
         return value
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, dict) and all(isinstance(key, str) for key in value):
-        return {key: _plain(item) for key, item in value.items()}
-    return repr(value)
+    if isinstance(value, float) and math.isfinite(value):
+        return value
+    if isinstance(value, str):
+        return value if len(value) <= LONGEST_TEXT else value[:LONGEST_TEXT] + "\u2026"
+    shown = _container(value, depth) if depth < DEEPEST else None
+    return _text_of(value) if shown is None else shown
+
+
+def _container(value: Any, depth: int) -> Any:
+    """What is inside, None when it is no container or too long."""
+    if isinstance(value, (list, tuple, dict)):
+        if len(value) > LONGEST_LIST:
+            return None
+        if not isinstance(value, dict):
+            return [_plain(item, depth + 1) for item in value]
+        pairs = list(value.items())
+        if all(isinstance(key, str) for key, _ in pairs):
+            return {key: _plain(item, depth + 1) for key, item in pairs}
+        return None
+    if hasattr(value, "_md5sum") and hasattr(value, "__slots__"):
+        return _fields_of(value, depth)
+    return None
+
+
+def _fields_of(message: Any, depth: int) -> Any:
+    fields = {name: getattr(message, name, None) for name in message.__slots__}
+    return {"$msg": message._type, "fields": _plain(fields, depth + 1)}
+
+
+def _text_of(value: Any) -> str:
+    if isinstance(value, (list, tuple, dict, set, frozenset, bytes, bytearray)):
+        size = len(value)
+        if size > LONGEST_LIST:
+            return f"<{type(value).__name__} of {size} elements>"
+    try:
+        text = repr(value)
+    except Exception as error:  # noqa: BLE001  foreign code: its failure is what there is to show
+        return f"<{type(value).__name__}: its repr raised {type(error).__name__}>"
+    return text if len(text) <= LONGEST_TEXT else text[:LONGEST_TEXT] + "\u2026"

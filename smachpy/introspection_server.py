@@ -10,15 +10,14 @@ and of the machine as a whole, as JSON in std_msgs/String:
 
     <server>/smach/description           `smachpy.introspection.StateRecord`, latched
     <server>/smach/events                `smachpy.events`, each with a sequence number `seq`
+    <server>/smach/history               what happened before, a service (`smachpy.feed`)
+    <server>/smach/control               commands, where they are obeyed (`smachpy.remote_control`)
 
 Everything is sent when it changes and only then; userdata is JSON, nothing is ever pickled.
 """
 
 from __future__ import annotations
 
-import itertools
-import json
-from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.clock import SerialExecutor
@@ -27,16 +26,16 @@ from actionlib_core.interfaces.smach_msgs.msg import (
     SmachContainerStatus,
     SmachContainerStructure,
 )
-from actionlib_core.interfaces.std_msgs.msg import Header, String
+from actionlib_core.interfaces.std_msgs.msg import Header
 from actionlib_core.node import get_node
 from actionlib_core.time import Time
 from actionlib_core.topic import Publisher, Subscriber
 from smachpy import log
 from smachpy._runtime.pace import Pace
 from smachpy.container import Container
-from smachpy.events import Started, to_record
 from smachpy.exceptions import InvalidStateError, SmachError
-from smachpy.introspection import describe
+from smachpy.feed import DESCRIPTION_TOPIC, EVENTS_TOPIC, STOP_S, Feed
+from smachpy.remote_control import ControlServer
 from smachpy.user_data import UserData
 from smachpy.userdata_json import dumps, loads
 
@@ -61,8 +60,6 @@ __all__ = [
 STATUS_TOPIC = "/smach/container_status"
 INIT_TOPIC = "/smach/container_init"
 STRUCTURE_TOPIC = "/smach/container_structure"
-EVENTS_TOPIC = "/smach/events"
-DESCRIPTION_TOPIC = "/smach/description"
 
 REMOTE_INIT = "REMOTE_INIT"
 REFUSED = "REMOTE_INIT_REFUSED: "
@@ -73,11 +70,6 @@ STATUS_INTERVAL_S = 0.05
 
 LONGEST_VALUE = 10_000
 """Userdata values with more elements are shown by their size."""
-
-QUEUED_EVENTS = 20_000
-"""More than these wait for the network: the newest are dropped, which shows in `seq`."""
-
-STOP_S = 1.0
 
 
 class ContainerProxy:
@@ -252,6 +244,7 @@ class IntrospectionServer:
         state: The machine.
         path: What to call it, "/SM_ROOT".
         obey: Take commands that choose the initial state; False only shows.
+        control: Take all the commands of `machine.control`, from everybody on the network.
         node: Where to send; the current node when None.
 
     Raises:
@@ -268,16 +261,19 @@ class IntrospectionServer:
         path: str,
         *,
         obey: bool = True,
+        control: bool = False,
         node: Node | None = None,
     ) -> None:
         self._server_name = server_name
         self._state = state
         self._path = path
         self._obey = obey
+        self._controlled = control
+        self._control: ControlServer | None = None
         self._node = node
         self._executor: SerialExecutor | None = None
         self._proxies: list[ContainerProxy] = []
-        self._feed: _Feed | None = None
+        self._feed: Feed | None = None
         self._commands: Subscriber[Any] | None = None
         self._forget: Callable[[], None] | None = None
         if not isinstance(state, Container):
@@ -296,7 +292,9 @@ class IntrospectionServer:
         for proxy in self._proxies:
             proxy.start(obey=False)
         assert isinstance(self._state, Container)
-        self._feed = _Feed(self._server_name, self._state, self._path, node)
+        if self._controlled:
+            self._control = ControlServer(self._server_name, self._state, self._path, node)
+        self._feed = Feed(self._server_name, self._state, self._path, node, control=self._control)
         if self._obey:
             self._commands = Subscriber(
                 self._server_name + INIT_TOPIC,
@@ -314,6 +312,8 @@ class IntrospectionServer:
         forget()
         if self._commands is not None:
             self._commands.unregister()
+        if self._control is not None:
+            self._control.close()
         if self._feed is not None:
             self._feed.close()
         self.clear()
@@ -340,62 +340,3 @@ class IntrospectionServer:
                 f"{self._server_name}: initial state was not set from remote: got path "
                 f"{command.path!r}; expected one of {[p._path for p in self._proxies]}."  # noqa: SLF001
             )
-
-
-class _Feed:
-    """Sends description and events of a machine.
-
-    The listener turns events into text at once, as their values may change later; another thread
-    sends them.
-    """
-
-    def __init__(self, server_name: str, machine: Container, path: str, node: Node) -> None:
-        self._machine = machine
-        self._path = path
-        self._root = path
-        self._numbers = itertools.count(1)
-        self._queue: deque[str] = deque()
-        self._executor = SerialExecutor(node.clock, f"events of {server_name}")
-        self._description = ""
-        self._descriptions = Publisher(
-            server_name + DESCRIPTION_TOPIC, String, latch=True, node=node
-        )
-        self._events = Publisher(server_name + EVENTS_TOPIC, String, node=node)
-        self._describe()
-        self._unsubscribe = machine.subscribe(self._on_event)
-
-    def close(self) -> None:
-        """Send what waits, leave the topics."""
-        self._unsubscribe()
-        self._executor.join(STOP_S)
-        self._descriptions.unregister()
-        self._events.unregister()
-
-    def _on_event(self, event: Event) -> None:
-        number = next(self._numbers)
-        if isinstance(event, Started):
-            self._root = event.path
-            self._executor.submit(self._describe)
-        if not self._events.get_num_connections() or len(self._queue) >= QUEUED_EVENTS:
-            return
-        record = to_record(event)
-        record["path"] = self._rename(event.path)
-        record["seq"] = number
-        self._queue.append(json.dumps(record))
-        self._executor.submit(self._send)
-
-    def _rename(self, path: str) -> str:
-        """Return a path of this run under the name that the machine has here."""
-        frame = self._machine._frame  # noqa: SLF001  the machine's own path, which a parent decides
-        if frame is not None:
-            self._root = frame.path
-        return self._path + path.removeprefix(self._root)
-
-    def _send(self) -> None:
-        self._events.publish(self._queue.popleft())
-
-    def _describe(self) -> None:
-        text = describe(self._machine, name=self._path.strip("/")).to_json()
-        if text != self._description:
-            self._description = text
-            self._descriptions.publish(text)

@@ -1,0 +1,226 @@
+"""`machine.control` over the network, for machines whose server was told to obey.
+
+    <server>/smach/control          commands, JSON in std_msgs/String
+    <server>/smach/control_result   the answers, JSON in std_msgs/String
+
+A command is an object: `id` (comes back with the answer), `command`, and what that needs:
+
+    pause  resume  step
+    preempt path          jump path          force path outcome
+    break path [outcome]  unbreak path [outcome]
+    initial path states
+
+An answer is `id`, `ok`, `text` (why not), `paused` and `breakpoints` (pairs path, outcome).
+"""
+
+from __future__ import annotations
+
+import json
+import uuid
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.clock import SerialExecutor
+from actionlib_core.interfaces.std_msgs.msg import String
+from actionlib_core.topic import Publisher, Subscriber
+from smachpy import log
+from smachpy.exceptions import SmachError
+from smachpy.user_data import UserData
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.node import Node
+    from smachpy.container import Container
+
+CONTROL_TOPIC = "/smach/control"
+RESULT_TOPIC = "/smach/control_result"
+
+COMMANDS: dict[str, tuple[str, ...]] = {
+    "pause": (),
+    "resume": (),
+    "step": (),
+    "preempt": ("path",),
+    "jump": ("path",),
+    "force": ("path", "outcome"),
+    "break": ("path",),
+    "unbreak": ("path",),
+    "initial": ("path", "states"),
+}
+"""What every command needs."""
+
+ANSWER_S = 3.0
+
+
+class CommandError(SmachError):
+    """A command is unknown, lacks something, or is about a state that is not there."""
+
+
+class ControlServer:
+    """Obeys commands from the network.
+
+    Args:
+        server_name: First part of the topics' names.
+        machine: What to control.
+        path: What the machine is called in commands.
+        node: Where it listens.
+
+    Threads: commands are carried out one after another in a thread of the node's clock.
+    """
+
+    def __init__(self, server_name: str, machine: Container, path: str, node: Node) -> None:
+        self._machine = machine
+        self._path = path
+        self._executor = SerialExecutor(node.clock, f"control of {server_name}")
+        self._results = Publisher(server_name + RESULT_TOPIC, String, node=node)
+        self._commands = Subscriber(server_name + CONTROL_TOPIC, String, self._take, node=node)
+
+    def close(self) -> None:
+        """Obey no more; a second call does nothing."""
+        self._commands.unregister()
+        self._executor.join(ANSWER_S)
+        self._results.unregister()
+
+    def state(self) -> dict[str, Any]:
+        """Return whether the machine is paused, and its breakpoints."""
+        control = self._machine.control
+        return {
+            "paused": control.is_paused(),
+            "breakpoints": [[self._shown(path), out] for path, out in control.breakpoints()],
+        }
+
+    def _take(self, message: Any) -> None:
+        self._executor.submit(lambda: self._obey(message.data))
+
+    def _obey(self, text: str) -> None:
+        request, problem = "", ""
+        try:
+            command = parse_command(text)
+            request = str(command.get("id", ""))
+            self._carry_out(command)
+            log.loginfo(f"{self._path}: command from remote: {command}")
+        except SmachError as error:
+            problem = str(error)
+            log.logwarn(f"{self._path}: command from remote refused: {problem}")
+        answer = {"id": request, "ok": not problem, "text": problem, **self.state()}
+        self._results.publish(json.dumps(answer))
+
+    def _carry_out(self, command: dict[str, Any]) -> None:
+        control = self._machine.control
+        path = self._own(str(command.get("path", "")))
+        outcome = command.get("outcome")
+        actions: dict[str, Callable[[], object]] = {
+            "pause": control.pause,
+            "resume": control.resume,
+            "step": control.step,
+            "preempt": lambda: control.preempt(path),
+            "jump": lambda: control.jump(path),
+            "force": lambda: control.force_outcome(path, str(outcome)),
+            "break": lambda: control.add_breakpoint(path, outcome),
+            "unbreak": lambda: control.remove_breakpoint(path, outcome),
+            "initial": lambda: self._begin_at(path, command["states"]),
+        }
+        actions[command["command"]]()
+
+    def _begin_at(self, path: str, states: list[str]) -> None:
+        container: Any = self._machine
+        for label in path.removeprefix(self._root()).strip("/").split("/"):
+            if label:
+                container = (
+                    container.get_children().get(label)
+                    if hasattr(container, "get_children")
+                    else None
+                )
+        if not hasattr(container, "set_initial_state"):
+            raise CommandError(f"command 'initial': path: got {path!r}; expected a container's.")
+        container.set_initial_state([str(state) for state in states], UserData())
+
+    def _root(self) -> str:
+        return f"/{self._machine.name or 'SM_ROOT'}"
+
+    def _own(self, path: str) -> str:
+        return self._root() + path.removeprefix(self._path) if self._is_ours(path) else path
+
+    def _is_ours(self, path: str) -> bool:
+        return path == self._path or path.startswith(self._path + "/")
+
+    def _shown(self, path: str) -> str:
+        return self._path + path.removeprefix(self._root())
+
+
+class ControlClient:
+    """Sends commands to one server.
+
+    Args:
+        server_name: The server.
+        node: Where.
+    """
+
+    def __init__(self, server_name: str, node: Node) -> None:
+        self._name = server_name
+        self._clock = node.clock
+        self._waiting: dict[str, tuple[Any, list[dict[str, Any]]]] = {}
+        self._results = Subscriber(server_name + RESULT_TOPIC, String, self._take, node=node)
+        self._commands = Publisher(server_name + CONTROL_TOPIC, String, node=node)
+
+    def close(self) -> None:
+        """Leave the topics; a second call does nothing."""
+        self._results.unregister()
+        self._commands.unregister()
+
+    def send(self, command: dict[str, Any], timeout: float = ANSWER_S) -> dict[str, Any]:
+        """Send a command and return the answer.
+
+        Raises:
+            CommandError: the command is wrong, or nobody answers.
+
+        Blocks: until the answer, `timeout` [s] at most.
+        """
+        request = uuid.uuid4().hex
+        text = json.dumps({**command, "id": request})
+        parse_command(text)
+        event, answers = self._clock.event(), list[dict[str, Any]]()
+        self._waiting[request] = event, answers
+        try:
+            self._commands.wait_for_connections(1, timeout)
+            self._commands.publish(text)
+            if not event.wait(timeout):
+                raise CommandError(
+                    f"{self._name}: got no answer in {timeout:g} s; expected one. Was the mission "
+                    "started with --control?"
+                )
+            return answers[0]
+        finally:
+            del self._waiting[request]
+
+    def _take(self, message: Any) -> None:
+        answer = json.loads(message.data)
+        waiting = self._waiting.get(answer["id"])
+        if waiting is not None:
+            waiting[1].append(answer)
+            waiting[0].set()
+
+
+def parse_command(text: str) -> dict[str, Any]:
+    """Return the command that `text` is.
+
+    Raises:
+        CommandError: it is none; names what is missing.
+    """
+    try:
+        command = json.loads(text)
+    except ValueError as error:
+        raise CommandError(f"command: got no JSON: {error}; expected an object.") from error
+    if not isinstance(command, dict):
+        raise CommandError(f"command: got {command!r}; expected an object.")
+    name = command.get("command")
+    if not isinstance(name, str) or name not in COMMANDS:
+        raise CommandError(f"command: got {name!r}; expected one of {sorted(COMMANDS)}.")
+    for field in COMMANDS[name]:
+        kind = list if field == "states" else str
+        if not isinstance(command.get(field), kind):
+            got = command.get(field)
+            raise CommandError(f"command {name!r}: {field}: got {got!r}; expected {kind.__name__}.")
+    outcome = command.get("outcome")
+    if outcome is not None and not isinstance(outcome, str):
+        raise CommandError(f"command {name!r}: outcome: got {outcome!r}; expected str.")
+    return command

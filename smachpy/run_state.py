@@ -1,0 +1,167 @@
+"""What is going on in a machine, folded from the records of its events.
+
+A `RunState` is data that JSON knows, so that it can be sent to whoever begins to watch in the
+middle of a run, or can be the place from which a recorded run is wound back. It keeps counts and
+the newest facts, never the events.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+RAISED = "exception"
+"""Stands for the outcome of a state that raised."""
+
+ENDED_GOALS = 20
+"""So many goals that have ended are kept."""
+
+
+class RunState:
+    """Takes records (`smachpy.events.to_record`) in and keeps what they add up to.
+
+    Attributes:
+        data: The facts. Times are nanoseconds since the Unix epoch.
+            run: number of runs begun; started, ended, outcome: of the newest run;
+            states: by path: visits, since (None while it does not run), outcome, outcomes (times
+            each), seconds (in finished visits), error, preempt (when it was asked to stop),
+            attempt, item (of an iterator), waits (why it is held back);
+            goals: by goal id: path, action, since, goal, feedback, first_feedback, status, text,
+            result, ended; userdata: by "container key": key, value, writer, at, container.
+
+    Threads: one at a time.
+    """
+
+    def __init__(self, data: dict[str, Any] | None = None) -> None:
+        self.data: dict[str, Any] = data or {
+            "run": 0,
+            "started": None,
+            "ended": None,
+            "outcome": None,
+            "states": {},
+            "goals": {},
+            "userdata": {},
+        }
+        self._fold: dict[str, Callable[[dict[str, Any]], None]] = {
+            "Started": self._on_started,
+            "Finished": self._on_finished,
+            "Entered": self._on_entered,
+            "Left": lambda record: self._leave(record, record["outcome"]),
+            "Failed": self._on_failed,
+            "PreemptRequested": self._on_preempt,
+            "Retried": lambda r: self._set(r, attempt=r["attempt"] + 1),
+            "Iterated": lambda r: self._set(r, item=r["number"]),
+            "Paused": lambda r: self._set(r, waits=r["reason"]),
+            "Resumed": lambda r: self._set(r, waits=None),
+            "UserdataWritten": self._on_userdata,
+            "GoalSent": self._on_goal_sent,
+            "GoalFeedback": self._on_feedback,
+            "GoalDone": self._on_goal_done,
+        }
+
+    def fold(self, record: dict[str, Any]) -> None:
+        """Take one record in; kinds that change nothing are passed over."""
+        fold = self._fold.get(record["kind"])
+        if fold is not None:
+            fold(record)
+
+    def active(self) -> list[str]:
+        """Return the paths of what runs."""
+        states = self.data["states"]
+        return [path for path, state in states.items() if state["since"] is not None]
+
+    def _state(self, path: str) -> dict[str, Any]:
+        states: dict[str, dict[str, Any]] = self.data["states"]
+        if path not in states:
+            states[path] = {
+                "visits": 0,
+                "since": None,
+                "outcome": None,
+                "outcomes": {},
+                "seconds": 0.0,
+            }
+        return states[path]
+
+    def _set(self, record: dict[str, Any], **facts: Any) -> None:
+        self._state(record["path"]).update(facts)
+
+    def _on_started(self, record: dict[str, Any]) -> None:
+        self.data["run"] += 1
+        self.data.update(started=record["stamp_ns"], ended=None, outcome=None)
+        for state in self.data["states"].values():
+            state.update(since=None, preempt=None, waits=None)
+        self._on_entered(record)
+
+    def _on_finished(self, record: dict[str, Any]) -> None:
+        outcome = record["outcome"] or RAISED
+        self._leave(record, outcome)
+        self.data.update(ended=record["stamp_ns"], outcome=outcome)
+
+    def _on_entered(self, record: dict[str, Any]) -> None:
+        state = self._state(record["path"])
+        state["visits"] += 1
+        state.update(since=record["stamp_ns"], preempt=None, waits=None, error=None, attempt=1)
+
+    def _on_failed(self, record: dict[str, Any]) -> None:
+        self._leave(record, RAISED)
+        self._set(record, error=record["error"])
+
+    def _leave(self, record: dict[str, Any], outcome: str) -> None:
+        state = self._state(record["path"])
+        if state["since"] is not None:
+            state["seconds"] += (record["stamp_ns"] - state["since"]) / 1e9
+        state.update(since=None, outcome=outcome, preempt=None, waits=None)
+        state["outcomes"][outcome] = state["outcomes"].get(outcome, 0) + 1
+
+    def _on_preempt(self, record: dict[str, Any]) -> None:
+        state = self._state(record["path"])
+        if state["since"] is not None and not state.get("preempt"):
+            state["preempt"] = record["stamp_ns"]
+
+    def _on_userdata(self, record: dict[str, Any]) -> None:
+        container = record["path"].rpartition("/")[0] or record["path"]
+        self.data["userdata"][f"{container} {record['key']}"] = {
+            "key": record["key"],
+            "value": record["value"],
+            "writer": record["path"],
+            "at": record["stamp_ns"],
+            "container": container,
+        }
+
+    def _on_goal_sent(self, record: dict[str, Any]) -> None:
+        goals = self.data["goals"]
+        goals[record["goal_id"]] = {
+            "path": record["path"],
+            "action": record["action"],
+            "since": record["stamp_ns"],
+            "goal": record["goal"],
+            "feedback": None,
+            "first_feedback": None,
+            "status": "ACTIVE",
+            "text": "",
+            "result": None,
+            "ended": None,
+            "attempt": self._state(record["path"]).get("attempt", 1),
+        }
+        ended = [goal_id for goal_id, goal in goals.items() if goal["ended"] is not None]
+        for goal_id in ended[:-ENDED_GOALS]:
+            del goals[goal_id]
+
+    def _on_feedback(self, record: dict[str, Any]) -> None:
+        goal = self.data["goals"].get(record["goal_id"])
+        if goal is not None:
+            goal["feedback"] = record["feedback"]
+            if goal["first_feedback"] is None:
+                goal["first_feedback"] = record["feedback"]
+
+    def _on_goal_done(self, record: dict[str, Any]) -> None:
+        goal = self.data["goals"].get(record["goal_id"])
+        if goal is not None:
+            goal.update(
+                status=record["status"],
+                text=record["text"],
+                result=record["result"],
+                ended=record["stamp_ns"],
+            )
