@@ -39,6 +39,7 @@ from smachpy.exceptions import InvalidUserCodeError as InvalidUserCodeError
 from smachpy.exceptions import ReadOnlyError as ReadOnlyError
 from smachpy.exceptions import SmachError as SmachError
 from smachpy.exceptions import UserDataKeyError as UserDataKeyError
+from smachpy.exceptions import UserDataTypeError as UserDataTypeError
 from smachpy.introspection import StateRecord as StateRecord
 from smachpy.introspection import describe as describe
 from smachpy.iterator import Iterator as Iterator
@@ -100,6 +101,7 @@ __all__ = [
     "StateRecord",
     "UserData",
     "UserDataKeyError",
+    "UserDataTypeError",
     "all_of",
     "any_of",
     "cb_interface",

@@ -6,6 +6,7 @@ coroutines at once, and an exception inside a `with` leaves nothing behind.
 
 from __future__ import annotations
 
+import contextlib
 import types
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, Concatenate, Generic, NoReturn, ParamSpec, TypeVar
@@ -13,17 +14,17 @@ from typing import TYPE_CHECKING, Any, Concatenate, Generic, NoReturn, ParamSpec
 from smachpy.exceptions import InvalidConstructionError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from smachpy.container import Container
+    from collections.abc import Callable, Iterator
+    from types import TracebackType
+    from typing import Self
 
 P = ParamSpec("P")
 R_co = TypeVar("R_co", covariant=True)
 
-OPEN: ContextVar[tuple[Container, ...]] = ContextVar("smachpy_open_containers", default=())
+OPEN: ContextVar[tuple[Openable, ...]] = ContextVar("smachpy_open_containers", default=())
 
 
-def innermost(kind: type[Container]) -> Any:
+def innermost(kind: type) -> Any:
     """Return the container of this kind that was opened last, else None."""
     for container in reversed(OPEN.get()):
         if isinstance(container, kind):
@@ -61,3 +62,87 @@ class construction_method(Generic[P, R_co]):  # noqa: N801  a decorator
         if container is None:
             container = _NoneOpen(owner, self._name)
         return types.MethodType(self._function, container)
+
+
+class Openable:
+    """The part of a container that `with` opens."""
+
+    def __init__(self) -> None:
+        self._open_tokens: list[Any] = []
+        self._context_kwargs: dict[str, Any] = {}
+
+    def check_consistency(self) -> None:
+        """Check the container and all below it."""
+        raise NotImplementedError
+
+    def __enter__(self) -> Self:
+        """Open the container for `add`."""
+        self._open_tokens.append(OPEN.set((*OPEN.get(), self)))
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Close it; at the outermost container everything is checked."""
+        OPEN.reset(self._open_tokens.pop())
+        if error is None and not OPEN.get() and self._context_kwargs.get("check", True):
+            self.check_consistency()
+
+    @contextlib.contextmanager
+    def opened(self, **kwargs: Any) -> Iterator[Self]:
+        """Open the container in a `with` block.
+
+        Args:
+            **kwargs: `check=False` leaves the check to the next `with` or to `execute`, so that
+                a machine can be built in several steps.
+        """
+        before, self._context_kwargs = self._context_kwargs, kwargs
+        try:
+            with self:
+                yield self
+        finally:
+            self._context_kwargs = before
+
+    def open(self) -> None:
+        """Open the container for `add`, until `close`."""
+        self.__enter__()
+
+    def close(self) -> None:
+        """Close what `open` opened.
+
+        Raises:
+            InvalidConstructionError: it is not the container that was opened last.
+        """
+        if not OPEN.get() or OPEN.get()[-1] is not self:
+            raise InvalidConstructionError(
+                f"{type(self).__name__}.close: it is not the container opened last: got "
+                f"{[type(c).__name__ for c in OPEN.get()]} open; expected it last."
+            )
+        self.__exit__(None, None, None)
+
+    def is_opened(self) -> bool:
+        """Tell whether `add` goes to this container."""
+        return bool(OPEN.get()) and OPEN.get()[-1] is self
+
+    def assert_opened(self, msg: str = "") -> None:
+        """Raise unless it is open."""
+        if not self.is_opened():
+            raise InvalidConstructionError(
+                f"{type(self).__name__}: not open: expected `with sm:`. {msg}".rstrip()
+            )
+
+    @classmethod
+    def _any_containers_opened(cls) -> bool:
+        return bool(OPEN.get())
+
+    @classmethod
+    def _currently_opened_container(cls) -> Any:
+        found = innermost(cls)
+        if found is None:
+            raise InvalidConstructionError(
+                f"{cls.__name__}: none is open; expected one. Try `with sm:`."
+            )
+        return found

@@ -70,6 +70,7 @@ class Concurrence(Container):
             has ended; returns True to preempt all others, a list of labels to preempt those,
             False to let them run. Called in the container's thread, never two at once.
         name: Name of the machine when it is the root.
+        userdata_type: A dataclass or TypedDict: the userdata has its fields, and their defaults.
         **options: See `StateOptions`.
 
     Raises:
@@ -92,9 +93,12 @@ class Concurrence(Container):
         child_termination_cb: Callable[[dict[str, str | None]], Any] | None = None,
         *,
         name: str | None = None,
+        userdata_type: type | None = None,
         **options: Unpack[StateOptions],
     ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, name=name, **options)
+        super().__init__(
+            outcomes, input_keys, output_keys, name=name, userdata_type=userdata_type, **options
+        )
         problems = []
         if not (default_outcome or outcome_map or outcome_cb):
             problems.append("outcome policy: got none; expected default_outcome at least")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 import threading
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
 
 from smachpy import log
-from smachpy._construction import OPEN, innermost
+from smachpy._construction import Openable
+from smachpy._core.typed import CheckedDict
+from smachpy._runtime.callbacks import Callbacks
 from smachpy._runtime.frame import FRAME, Frame
 from smachpy._runtime.root import execute_root
 from smachpy._runtime.step import Step
@@ -15,30 +16,25 @@ from smachpy._runtime.watch import arm, disarm
 from smachpy.events import PreemptRequested
 from smachpy.exceptions import (
     InconsistentMachineError,
-    InvalidConstructionError,
     InvalidStateError,
     did_you_mean,
 )
 from smachpy.state import State
-from smachpy.user_data import UserData
+from smachpy.user_data import UserData, reset, typed_userdata
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-    from types import TracebackType
-    from typing import Self, Unpack
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from typing import Unpack
 
     from actionlib_core.clock import Event as ClockEvent
     from smachpy.control import Control
-    from smachpy.events import Event
     from smachpy.state import StateOptions
     from smachpy.user_data import Remapper
 
 __all__ = ["Container"]
 
-Callback = tuple["Callable[..., object]", "tuple[Any, ...]"]
 
-
-class Container(State):
+class Container(Openable, Callbacks, State):
     """A state made of states.
 
     Args:
@@ -46,6 +42,7 @@ class Container(State):
         input_keys: Keys copied from the parent's userdata when it starts.
         output_keys: Keys copied to the parent's userdata when it ends.
         name: Name of the machine when it is the root, first part of every path below it.
+        userdata_type: A dataclass or TypedDict: the userdata has its fields, and their defaults.
         **options: See `StateOptions`.
 
     Attributes:
@@ -64,21 +61,18 @@ class Container(State):
         output_keys: Iterable[str] = (),
         *,
         name: str | None = None,
+        userdata_type: type | None = None,
         **options: Unpack[StateOptions],
     ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, **options)
-        self.userdata = UserData()
+        State.__init__(self, outcomes, input_keys, output_keys, **options)
+        Openable.__init__(self)
+        Callbacks.__init__(self)
+        self.userdata = UserData() if userdata_type is None else typed_userdata(userdata_type)
         if name is not None:
             self.name = name
         self._states: dict[str, State] = {}
         self._remappings: dict[str, dict[str, str]] = {}
-        self._start_cbs: list[Callback] = []
-        self._transition_cbs: list[Callback] = []
-        self._termination_cbs: list[Callback] = []
-        self._listeners: tuple[Callable[[Event], object], ...] = ()
         self._frame: Frame | None = None
-        self._open_tokens: list[Any] = []
-        self._context_kwargs: dict[str, Any] = {}
         self._plan: Any = None
         self._control: Control | None = None
         self._answered = False  # the last run ended because a preempt was taken up
@@ -105,18 +99,10 @@ class Container(State):
         """Return label -> child, in the order in which they were added."""
         return self._states
 
-    def get_initial_states(self) -> list[str]:
-        """Return the labels of the children that run first."""
-        raise NotImplementedError
-
     def set_initial_state(
         self, initial_states: Sequence[str], userdata: UserData | None = None
     ) -> None:
         """Choose where the next run begins, and add to the userdata."""
-        raise NotImplementedError
-
-    def get_active_states(self) -> list[str]:
-        """Return the labels of the children that run now."""
         raise NotImplementedError
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
@@ -162,8 +148,8 @@ class Container(State):
                 self._end_waiters = tuple(e for e in self._end_waiters if e is not ended)
 
     def reset_userdata(self) -> None:
-        """Forget all userdata of this container and of all containers below it."""
-        self.userdata._data.clear()  # noqa: SLF001  ours
+        """Bring the userdata, also of all containers below, back to its defaults, or to none."""
+        reset(self.userdata)
         for child in self.get_children().values():
             if isinstance(child, Container):
                 child.reset_userdata()
@@ -337,68 +323,6 @@ class Container(State):
             except KeyError:
                 log.logwarn(f"{type(self).__name__}: output key {key!r} has no value to copy.")
 
-    # -- callbacks and listeners ---------------------------------------------------------------
-
-    def register_start_cb(
-        self, start_cb: Callable[..., object], cb_args: Iterable[Any] = ()
-    ) -> None:
-        """Call `start_cb(userdata, initial_states, *cb_args)` at the start of each run."""
-        self._start_cbs.append((start_cb, tuple(cb_args)))
-
-    def register_transition_cb(
-        self, transition_cb: Callable[..., object], cb_args: Iterable[Any] = ()
-    ) -> None:
-        """Call `transition_cb(userdata, active_states, *cb_args)` after each transition."""
-        self._transition_cbs.append((transition_cb, tuple(cb_args)))
-
-    def register_termination_cb(
-        self, termination_cb: Callable[..., object], cb_args: Iterable[Any] = ()
-    ) -> None:
-        """Call `termination_cb(userdata, terminal_states, outcome, *cb_args)` at the end."""
-        self._termination_cbs.append((termination_cb, tuple(cb_args)))
-
-    def call_start_cbs(self) -> None:
-        """Call the start callbacks; one that raises is reported, the others still run."""
-        self._call(self._start_cbs, self.get_initial_states())
-
-    def call_transition_cbs(self) -> None:
-        """Call the transition callbacks; one that raises is reported, the others still run."""
-        self._call(self._transition_cbs, self.get_active_states())
-
-    def call_termination_cbs(self, terminal_states: Sequence[str], outcome: str) -> None:
-        """Call the termination callbacks; one that raises is reported, the others still run."""
-        self._call(self._termination_cbs, terminal_states, outcome)
-
-    def _call(self, callbacks: list[Callback], *arguments: object) -> None:
-        for callback, extra in tuple(callbacks):
-            try:
-                callback(self.userdata, *arguments, *extra)
-            except Exception as error:  # noqa: BLE001  a border: reported, the machine goes on
-                frame = self._frame
-                if frame is not None:
-                    frame.callback_failed(callback, error)
-                else:
-                    log.log_exception(f"callback {callback!r} raised {error!r}", error)
-
-    def subscribe(self, listener: Callable[[Event], object]) -> Callable[[], None]:
-        """Give every event of this container and of all below it to `listener`.
-
-        Returns:
-            A function that ends it.
-
-        Threads: `listener` is called in the thread where the event happens and holds the machine
-            up while it runs. What it raises is logged and otherwise without effect.
-        """
-        self._listeners = (*self._listeners, listener)
-        frame = self._frame
-        if frame is not None:
-            frame.run.watched = True
-
-        def unsubscribe() -> None:
-            self._listeners = tuple(item for item in self._listeners if item is not listener)
-
-        return unsubscribe
-
     @property
     def control(self) -> Control:
         """The operator's control of this machine: pause, step, jump and so on; see `Control`."""
@@ -408,83 +332,28 @@ class Container(State):
             self._control = Control(self)
         return self._control
 
-    # -- construction --------------------------------------------------------------------------
-
-    def __enter__(self) -> Self:
-        """Open the container for `add`."""
-        self._open_tokens.append(OPEN.set((*OPEN.get(), self)))
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        """Close it; at the outermost container everything is checked."""
-        OPEN.reset(self._open_tokens.pop())
-        if error is None and not OPEN.get() and self._context_kwargs.get("check", True):
-            self.check_consistency()
-
-    @contextlib.contextmanager
-    def opened(self, **kwargs: Any) -> Iterator[Self]:
-        """Open the container in a `with` block.
-
-        Args:
-            **kwargs: `check=False` leaves the check to the next `with` or to `execute`, so that
-                a machine can be built in several steps.
-        """
-        before, self._context_kwargs = self._context_kwargs, kwargs
-        try:
-            with self:
-                yield self
-        finally:
-            self._context_kwargs = before
-
-    def open(self) -> None:
-        """Open the container for `add`, until `close`."""
-        self.__enter__()
-
-    def close(self) -> None:
-        """Close what `open` opened.
-
-        Raises:
-            InvalidConstructionError: it is not the container that was opened last.
-        """
-        if not OPEN.get() or OPEN.get()[-1] is not self:
-            raise InvalidConstructionError(
-                f"{type(self).__name__}.close: it is not the container opened last: got "
-                f"{[type(c).__name__ for c in OPEN.get()]} open; expected it last."
-            )
-        self.__exit__(None, None, None)
-
-    def is_opened(self) -> bool:
-        """Tell whether `add` goes to this container."""
-        return bool(OPEN.get()) and OPEN.get()[-1] is self
-
-    def assert_opened(self, msg: str = "") -> None:
-        """Raise unless it is open."""
-        if not self.is_opened():
-            raise InvalidConstructionError(
-                f"{type(self).__name__}: not open: expected `with sm:`. {msg}".rstrip()
-            )
-
-    @classmethod
-    def _any_containers_opened(cls) -> bool:
-        return bool(OPEN.get())
-
-    @classmethod
-    def _currently_opened_container(cls) -> Any:
-        found = innermost(cls)
-        if found is None:
-            raise InvalidConstructionError(
-                f"{cls.__name__}: none is open; expected one. Try `with sm:`."
-            )
-        return found
-
 
 def _all_problems(container: Container, where: str) -> Iterator[str]:
     yield from container.find_problems(where)
+    yield from _key_problems(container, where)
     for label, child in container.get_children().items():
         if isinstance(child, Container):
             yield from _all_problems(child, f"{where}/{label}")
+
+
+def _key_problems(container: Container, where: str) -> Iterator[str]:
+    """Yield the keys of children that typed userdata has no field for."""
+    data = container.userdata._data  # noqa: SLF001  one machinery
+    if not isinstance(data, CheckedDict):
+        return
+    fields = data.fields
+    for label, state in container.get_children().items():
+        names = container._remappings[label]  # noqa: SLF001  its own module
+        keys = (*state.get_registered_input_keys(), *state.get_registered_output_keys())
+        for key in dict.fromkeys(names.get(key, key) for key in keys):
+            if "." not in key and key not in fields.types:
+                yield (
+                    f"{where}/{label}: userdata key is no field of {fields.kind.__name__}: got "
+                    f"{key!r}; expected one of {sorted(fields.types)}."
+                    f"{did_you_mean(key, fields.types)}"
+                )

@@ -9,6 +9,7 @@
           |    +-- InconsistentMachineError
           +-- InvalidUserCodeError       a state or a callback raised; see `path` and `__cause__`
                +-- UserDataKeyError      a key was not declared or is not there (KeyError too)
+               +-- UserDataTypeError     a value does not fit its typed field (TypeError too)
                +-- ReadOnlyError         an input-only value was changed (TypeError too)
 
 Exceptions never write to a log; who handles one decides.
@@ -96,6 +97,26 @@ class UserDataKeyError(InvalidUserCodeError, KeyError, AttributeError):
 
     def __str__(self) -> str:
         return self.message
+
+
+class UserDataTypeError(InvalidUserCodeError, TypeError):
+    """A value does not fit the field of typed userdata.
+
+    Attributes:
+        key: The field.
+        value: What was written.
+        expected: The annotated type.
+    """
+
+    def __init__(self, key: str, value: object, expected: object) -> None:
+        self.key = key
+        self.value = value
+        self.expected = expected
+        name = getattr(expected, "__name__", None) or str(expected)
+        super().__init__(
+            f"userdata key {key!r} has another type: got {value!r} ({type(value).__name__}); "
+            f"expected {name}."
+        )
 
 
 class ReadOnlyError(InvalidUserCodeError, TypeError):

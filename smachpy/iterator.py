@@ -66,6 +66,7 @@ class Iterator(Container):
         it_label: Userdata key under which the child finds its item.
         exhausted_outcome: Outcome when no item is left.
         name: Name of the machine when it is the root.
+        userdata_type: A dataclass or TypedDict: the userdata has its fields, and their defaults.
         **options: See `StateOptions`.
     """
 
@@ -81,10 +82,13 @@ class Iterator(Container):
         exhausted_outcome: str = "exhausted",
         *,
         name: str | None = None,
+        userdata_type: type | None = None,
         **options: Unpack[StateOptions],
     ) -> None:
         names = (*unique_names(outcomes, "outcomes"), exhausted_outcome)
-        super().__init__(names, input_keys, output_keys, name=name, **options)
+        super().__init__(
+            names, input_keys, output_keys, name=name, userdata_type=userdata_type, **options
+        )
         self._items: Any = it
         self._items_label = it_label
         self._exhausted_outcome = exhausted_outcome

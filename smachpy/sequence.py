@@ -26,6 +26,7 @@ class Sequence(StateMachine):
         input_keys: Keys copied from the parent's userdata when it starts.
         output_keys: Keys copied to the parent's userdata when it ends.
         name: Name of the machine when it is the root.
+        userdata_type: A dataclass or TypedDict: the userdata has its fields, and their defaults.
         **options: See `StateOptions`.
     """
 
@@ -39,9 +40,12 @@ class Sequence(StateMachine):
         output_keys: Iterable[str] = (),
         *,
         name: str | None = None,
+        userdata_type: type | None = None,
         **options: Unpack[StateOptions],
     ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, name=name, **options)
+        super().__init__(
+            outcomes, input_keys, output_keys, name=name, userdata_type=userdata_type, **options
+        )
         self._connector_outcome = connector_outcome
 
     @construction_method

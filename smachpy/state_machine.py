@@ -80,6 +80,7 @@ class StateMachine(Container):
         input_keys: Keys copied from the parent's userdata when it starts.
         output_keys: Keys copied to the parent's userdata when it ends.
         name: Name of the machine when it is the root.
+        userdata_type: A dataclass or TypedDict: the userdata has its fields, and their defaults.
         **options: See `StateOptions`.
     """
 
@@ -92,9 +93,12 @@ class StateMachine(Container):
         output_keys: Iterable[str] = (),
         *,
         name: str | None = None,
+        userdata_type: type | None = None,
         **options: Unpack[StateOptions],
     ) -> None:
-        super().__init__(outcomes, input_keys, output_keys, name=name, **options)
+        super().__init__(
+            outcomes, input_keys, output_keys, name=name, userdata_type=userdata_type, **options
+        )
         self._transitions: dict[str, dict[str, str | None]] = {}
         self._initial_state_label: str | None = None
         self._next_initial: str | None = None

@@ -10,6 +10,7 @@ import copy
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from smachpy._core.readonly import ATOMS, read_only, writable
+from smachpy._core.typed import CheckedDict, Fields
 from smachpy._runtime.frame import current_path
 from smachpy.exceptions import UserDataKeyError
 
@@ -120,6 +121,27 @@ class UserData:
         ) from None
 
 
+def typed_userdata(kind: type) -> UserData:
+    """Return userdata whose keys are the fields of `kind`, filled with their defaults.
+
+    Raises:
+        InvalidStateError: `kind` has no annotated fields.
+    """
+    made = UserData()
+    object.__setattr__(made, "_data", CheckedDict(Fields(kind)))
+    return made
+
+
+def reset(userdata: UserData) -> None:
+    """Forget all values; typed userdata goes back to its defaults. Constants stay."""
+    data = userdata._data  # noqa: SLF001  its own module
+    if isinstance(data, CheckedDict):
+        data.reset()
+        return
+    for key in [key for key in data if "." not in key]:
+        del data[key]
+
+
 def _rebuild(data: dict[str, Any]) -> UserData:
     made = UserData()
     made._data.update(data)  # noqa: SLF001  its own module
@@ -188,9 +210,10 @@ class Remapper:
 
     def __setattr__(self, name: str, value: Any) -> None:
         try:
-            self._data[self._output[name]] = value if type(value) in ATOMS else writable(value)
+            key = self._output[name]
         except KeyError:
             self._unwritable(name)
+        self._data[key] = value if type(value) in ATOMS else writable(value)
 
     def __dir__(self) -> list[str]:
         return [*object.__dir__(self), *self.keys()]
@@ -202,7 +225,7 @@ class Remapper:
 
     def _revoke(self) -> None:
         """Cut the window off: its state was left behind and may not write any more."""
-        object.__setattr__(self, "_data", dict(self._data) if type(self._data) is dict else {})
+        object.__setattr__(self, "_data", {key: self._data[key] for key in self._data.keys()})  # noqa: SIM118
 
     def _unreadable(self, key: str) -> NoReturn:
         if key[:1] == "_":
