@@ -22,6 +22,7 @@ T = TypeVar("T")
 _U32 = struct.Struct("<I")
 _TIME = struct.Struct("<II")
 _HEADER = struct.Struct("<IIII")  # seq, stamp, length of an empty frame_id
+_TAIL = struct.Struct("<BI")  # status, length of its text
 _NS = 1_000_000_000
 
 
@@ -126,9 +127,9 @@ def unpack_goal(payload: bytes) -> tuple[str, int, bytes]:
         ValueError: the bytes are cut short or are not text where text belongs.
     """
     at = _skip_header(payload)
-    stamp_ns = _read_time(payload, at)
+    secs, nsecs = _TIME.unpack_from(payload, at)
     goal_id, at = _read_text(payload, at + 8)
-    return goal_id, stamp_ns, payload[at:]
+    return goal_id, secs * _NS + nsecs, payload[at:]
 
 
 def pack_goal_id(goal_id: str, stamp_ns: int) -> bytes:
@@ -144,20 +145,15 @@ def unpack_goal_id(payload: bytes) -> tuple[str, int]:
     Raises:
         ValueError: the bytes are cut short or are not text where text belongs.
     """
-    return _read_text(payload, 8)[0], _read_time(payload, 0)
+    secs, nsecs = _TIME.unpack_from(payload, 0)
+    return _read_text(payload, 8)[0], secs * _NS + nsecs
 
 
 def pack_status(entry: StatusEntry) -> bytes:
     """Write an actionlib_msgs/GoalStatus."""
     text = entry.text.encode()
-    return b"".join(
-        (
-            pack_goal_id(entry.id, entry.stamp_ns),
-            bytes((entry.status,)),
-            _U32.pack(len(text)),
-            text,
-        )
-    )
+    front = pack_goal_id(entry.id, entry.stamp_ns)
+    return front + _TAIL.pack(entry.status, len(text)) + text
 
 
 @_reads("GoalStatus")
@@ -213,26 +209,26 @@ def _pack_header(sent_ns: int) -> bytes:
 
 
 def _skip_header(payload: bytes) -> int:
-    (length,) = _U32.unpack_from(payload, 12)
-    return 16 + int(length)
-
-
-def _read_time(payload: bytes, at: int) -> int:
-    secs, nsecs = _TIME.unpack_from(payload, at)
-    return int(secs) * _NS + int(nsecs)
+    return 16 + int(_U32.unpack_from(payload, 12)[0])
 
 
 def _read_status(payload: bytes, at: int) -> tuple[StatusEntry, int]:
-    stamp_ns = _read_time(payload, at)
+    secs, nsecs = _TIME.unpack_from(payload, at)
     goal_id, at = _read_text(payload, at + 8)
-    status = payload[at]
-    text, at = _read_text(payload, at + 1)
-    return StatusEntry(goal_id, stamp_ns, status, text), at
+    status, length = _TAIL.unpack_from(payload, at)
+    at += _TAIL.size
+    text = _text(payload, at, length) if length else ""
+    return StatusEntry(goal_id, secs * _NS + nsecs, status, text), at + length
 
 
 def _read_text(payload: bytes, at: int) -> tuple[str, int]:
     (length,) = _U32.unpack_from(payload, at)
-    end = at + 4 + length
-    if end > len(payload):
-        raise IndexError(end)
-    return payload[at + 4 : end].decode(), end
+    at += 4
+    return _text(payload, at, length), at + length
+
+
+def _text(payload: bytes, at: int, length: int) -> str:
+    raw = payload[at : at + length]
+    if len(raw) < length:
+        raise IndexError(at)
+    return raw.decode()

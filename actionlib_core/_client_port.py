@@ -16,7 +16,6 @@ from actionlib_core._action_wire import (
     unpack_status,
     unpack_statuses,
 )
-from actionlib_core._core.states import Status
 from actionlib_core.exceptions import ActionlibError, TypeMismatchError
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from actionlib_core.presence import Kind, find_mismatch, parse_token, token_key, token_pattern
@@ -106,9 +105,9 @@ class ClientPort:
         self._declared = [
             self._goals,
             self._cancels,
-            transport.subscribe(self.keys.status, self._on_status),
-            transport.subscribe(self.keys.feedback, self._on_feedback),
-            transport.subscribe(self.keys.result, self._on_result),
+            transport.subscribe(self.keys.status, self._on_status, history=False),
+            transport.subscribe(self.keys.feedback, self._on_feedback, history=False),
+            transport.subscribe(self.keys.result, self._on_result, history=False),
             transport.declare_alive(token_key(self.endpoint)),
             transport.watch_alive(token_pattern(Kind.ACTION_SERVER, self.name), self._on_presence),
         ]
@@ -205,6 +204,8 @@ class ClientPort:
 
     def _is_readable(self, sample: Sample, message_class: Any) -> bool:
         """Check the type; a wrong one is reported once per sender and type."""
+        if sample.encoding == encoding_of(message_class):
+            return True
         try:
             check_encoding(
                 sample.encoding,
@@ -235,8 +236,3 @@ class ClientPort:
         if error is not None:
             self._report_once(f"{server.session} {server.type} {server.md5}", error)
         self._listener.on_server(server, error)
-
-
-def is_status(number: int) -> bool:
-    """Tell whether a number from the network is a goal status."""
-    return 0 <= number <= Status.LOST

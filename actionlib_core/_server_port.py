@@ -127,9 +127,9 @@ class ServerPort:
     def _declare(self) -> None:
         transport = self._node.transport
         self._declared = [
-            transport.subscribe(self.keys.goal, self._on_goal),
-            transport.subscribe(self.keys.cancel, self._on_cancel),
-            transport.subscribe(self.keys.ack, self._on_ack),
+            transport.subscribe(self.keys.goal, self._on_goal, history=False),
+            transport.subscribe(self.keys.cancel, self._on_cancel, history=False),
+            transport.subscribe(self.keys.ack, self._on_ack, history=False),
             transport.queryable(self.keys.result, self._on_query),
         ]
         self._token = transport.declare_alive(token_key(self.endpoint))
@@ -221,6 +221,8 @@ class ServerPort:
 
     def _is_readable(self, sample: Sample, message_class: Any) -> bool:
         """Check the type; a wrong one is reported once per sender and type."""
+        if sample.encoding == encoding_of(message_class):
+            return True
         try:
             check_encoding(
                 sample.encoding,

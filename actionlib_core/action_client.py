@@ -325,8 +325,7 @@ class ActionClient(Generic[A_co]):
                 f"action '{self.ns}': goal: got {goal!r}; expected a message of type "
                 f"{self.types.goal._type}."
             )
-        goal_id = self._ids.generate_ID()
-        return goal_id.id, goal_id.stamp.to_nsec(), goal.to_bytes()
+        return *self._ids.generate(), goal.to_bytes()
 
     def _on_transition(
         self, callback: Callable[[ClientGoalHandle], object] | None

@@ -323,7 +323,7 @@ class ActionServer:
     def on_goal(self, goal_id: str, stamp_ns: int, content: Any, client: str) -> None:
         """Take a goal from the network; not for users."""
         if not goal_id:
-            goal_id = self._ids.generate_ID().id
+            goal_id, stamp_ns = self._ids.generate()
         record = ServerGoal(goal_id, stamp_ns or self._clock.time_ns(), client=client)
         with self.lock:
             if self._stopped:

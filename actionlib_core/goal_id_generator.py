@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from typing import TYPE_CHECKING
 
+from actionlib_core.clock import current_clock
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID
 from actionlib_core.time import Time
 
@@ -41,7 +42,14 @@ class GoalIDGenerator:
         """
         self.name = name
 
+    def generate(self) -> tuple[str, int]:
+        """Return a new id and its stamp [ns since the epoch]."""
+        clock = self._clock if self._clock is not None else current_clock()
+        stamp_ns = clock.time_ns()
+        secs, nsecs = divmod(stamp_ns, 1_000_000_000)
+        return f"{self.name}-{next(_count)}-{secs}.{nsecs}", stamp_ns
+
     def generate_ID(self) -> GoalID:  # noqa: N802  actionlib's name
         """Return a new id, stamped with the present time."""
-        stamp = Time.now() if self._clock is None else Time(0, self._clock.time_ns())
-        return GoalID(stamp=stamp, id=f"{self.name}-{next(_count)}-{stamp.secs}.{stamp.nsecs}")
+        goal_id, stamp_ns = self.generate()
+        return GoalID(stamp=Time(0, stamp_ns), id=goal_id)

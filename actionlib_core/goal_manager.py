@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core._action_wire import pack_goal
 from actionlib_core._callbacks import CallbackQueue
-from actionlib_core._client_port import ClientPort, is_status
+from actionlib_core._client_port import ClientPort
 from actionlib_core._core.client_goal import ClientGoal, Duty, Path
 from actionlib_core._core.states import TERMINAL, Status
 from actionlib_core.comm_state_machine import CommStateMachine
@@ -28,6 +28,7 @@ log = logging.getLogger(__name__)
 
 TICK_S = 0.05  # repetitions and acknowledgements due within this go out together
 ACK_AT = 64  # so many acknowledgements go out at once
+STATUSES = {int(status): status for status in Status}
 REMEMBERED = 1024  # ids of ended goals whose result may come again
 
 
@@ -293,7 +294,7 @@ class GoalManager:
             for entry in entries:
                 listed.add(entry.id)
                 machine = self._machines.get(entry.id)
-                if machine is not None and is_status(entry.status):
+                if machine is not None:
                     self._hear(machine, entry, server, now)
             if len(listed) < len(self._machines) or not listed.issuperset(self._machines):
                 answers = self._server() is not None
@@ -303,10 +304,14 @@ class GoalManager:
                         self._arm(machine.goal.due)
 
     def _hear(self, machine: CommStateMachine, entry: StatusEntry, server: str, now: float) -> None:
+        status = STATUSES.get(entry.status)
+        if status is None:
+            log.error("action '%s': unknown status %d of a goal", self.name, entry.status)
+            return
         if server:
             machine.goal.server = server
         before = machine.goal.comm
-        self._take(machine, machine.goal.on_status(Status(entry.status), entry.text, now))
+        self._take(machine, machine.goal.on_status(status, entry.text, now))
         if machine.goal.comm is not before:
             self._arm(machine.goal.due)
 
@@ -323,7 +328,7 @@ class GoalManager:
                 log.error("action '%s': feedback cannot be read: %s", self.name, error)  # noqa: TRY400
                 return
         with self._lock:
-            if is_status(entry.status) and not machine.goal.over:
+            if not machine.goal.over:
                 self._hear(machine, entry, server, self._clock.now())
                 if machine.on_feedback is not None:
                     machine.on_feedback(machine, feedback)
@@ -335,7 +340,7 @@ class GoalManager:
             if entry.id in self._ended:
                 self._acknowledge(entry.id)
             return
-        status = Status(entry.status) if is_status(entry.status) else Status.LOST
+        status = STATUSES.get(entry.status, Status.LOST)
         text, result = entry.text, None
         try:
             result = self.types.result.from_bytes(body)
@@ -346,13 +351,14 @@ class GoalManager:
     def on_answer(self, entry: StatusEntry) -> None:
         """Take a status as the answer to a question."""
         machine = self._machines.get(entry.id)
-        if machine is None or not is_status(entry.status):
+        if machine is None:
             return
-        if entry.status in TERMINAL:
-            self._end(machine, Status(entry.status), entry.text, None, "")
+        status = STATUSES.get(entry.status)
+        if status in TERMINAL:
+            self._end(machine, status, entry.text, None, "")
             return
         with self._lock:
-            if entry.status == Status.LOST:
+            if status is Status.LOST:
                 self._take(machine, machine.goal.on_unknown(entry.text))
             else:
                 self._hear(machine, entry, "", self._clock.now())
