@@ -67,6 +67,31 @@ def with_stem(curve: str, x: float, top: float) -> str:
     return f"{head}e,{arrow} {text} {points}"
 
 
+def around(start: Point, end: Point, lane: float, floor: float, corner: float) -> str:
+    """Return a curve down from `start`, right to x = `lane`, up and left to `end`, with its arrow.
+
+    Args:
+        start: Where it begins.
+        end: The arrow's tip.
+        lane: Right end.
+        floor: Lower end.
+        corner: Radius of the corners.
+    """
+    (x, _), (tip_x, tip_y) = start, end
+    turns = [
+        (start, (x, floor), (x + corner, floor)),
+        ((lane - corner, floor), (lane, floor), (lane, floor + corner)),
+        ((lane, tip_y - corner), (lane, tip_y), (tip_x + 2 + corner, tip_y)),
+    ]
+    chain = [start]
+    for before, bend, after in turns:
+        if chain[-1] != before:
+            chain += [chain[-1], before, before]
+        chain += [bend, bend, after]
+    points = " ".join(f"{px:.2f},{py:.2f}" for px, py in chain)
+    return f"e,{tip_x:.2f},{tip_y:.2f} {points}"
+
+
 def _box(line: Sequence[Point]) -> tuple[float, float, float, float]:
     xs = [x for x, _ in line]
     ys = [y for _, y in line]

@@ -15,6 +15,7 @@ from viz.history import History
 from viz.mermaid import mermaid_text
 from viz.model import Diagram, Marks, Node
 from viz.outline import outline_text
+from viz.page import INCH
 from viz.theme import THEMES, Theme
 
 if TYPE_CHECKING:
@@ -207,7 +208,7 @@ def _drawn(form: engine.Format) -> Callable[[StateRecord, Look, Marks], bytes]:
 def _resolution(places: layout.Geometry) -> int:
     """Sharp on any screen, but never more pixels than image viewers can open."""
     width, height = layout.canvas_size(places)
-    return int(min(SHARP, MOST_PIXELS * layout.INCH / max(width, height)))
+    return int(min(SHARP, MOST_PIXELS * INCH / max(width, height)))
 
 
 def _dot(record: StateRecord, look: Look, marks: Marks) -> bytes:

@@ -28,7 +28,7 @@ from smachpy.exceptions import SmachError
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    Run = Callable[[Sequence[str]], list[dict[str, Any]]]
+    Run = Callable[[Sequence[str]], list[dict[str, Any] | None]]
 
 DOT_VARIABLE = "SMACHPY_DOT"
 TIME_LIMIT = 20.0
@@ -81,8 +81,8 @@ def find_dot() -> tuple[str, ...]:
 def lay_out(work: Callable[[Run], T]) -> T:
     """Call `work` with a function that lays DOT texts out; return what `work` returns.
 
-    The function takes any number of texts and returns Graphviz' JSON for each; it may be called
-    again and again, one process serves all calls.
+    The function takes any number of texts and returns Graphviz' JSON for each, None for a text
+    on which `dot` crashes. It may be called again and again; one process serves all calls.
 
     Args:
         work: Called once more, with cheaper settings, when the first time takes too long.
@@ -143,6 +143,10 @@ class _TooSlowError(Exception):
     """The time limit has passed."""
 
 
+class _CrashError(Exception):
+    """`dot` ended by a signal."""
+
+
 class _Layouts:
     """A `dot` process that lays out one batch of texts after another."""
 
@@ -150,9 +154,30 @@ class _Layouts:
         self._command = command
         self._environment = environment
         self._deadline = _REAL.now() + TIME_LIMIT
-        self._errors = tempfile.TemporaryFile()  # noqa: SIM115  closed on exit
 
     def __enter__(self) -> Self:
+        self._start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop()
+
+    def run(self, texts: Sequence[str]) -> list[dict[str, Any] | None]:
+        """Return the JSON of each text, None for one on which `dot` crashes."""
+        if not texts:
+            return []
+        try:
+            output = self._exchange(_joined(texts), len(texts)).decode("utf-8")
+        except _CrashError:
+            self._stop()
+            self._start()
+            half = len(texts) // 2
+            return [*self.run(texts[:half]), *self.run(texts[half:])] if half else [None]
+        decoder = json.JSONDecoder(strict=False)
+        return [decoder.decode(page + "}") for page in output.split(_JSON_END)[:-1]]
+
+    def _start(self) -> None:
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115  closed by `_stop`
         try:
             self._process = subprocess.Popen(  # noqa: S603  the command is the user's own `dot`
                 self._command,
@@ -169,21 +194,14 @@ class _Layouts:
         assert self._process.stdout is not None
         self._in, self._out = self._process.stdin, self._process.stdout
         os.set_blocking(self._in.fileno(), False)
-        return self
 
-    def __exit__(self, *_: object) -> None:
+    def _stop(self) -> None:
         self._process.kill()
         self._process.wait()
         self._out.close()
         with contextlib.suppress(BrokenPipeError):
             self._in.close()
         self._errors.close()
-
-    def run(self, texts: Sequence[str]) -> list[dict[str, Any]]:
-        """Return the JSON of each text."""
-        output = self._exchange(_joined(texts), len(texts)).decode("utf-8")
-        decoder = json.JSONDecoder(strict=False)
-        return [decoder.decode(page + "}") for page in output.split(_JSON_END)[:-1]]
 
     def _exchange(self, data: bytes, expected: int) -> bytes:
         """Write and read at the same time, so that no full pipe stops either side."""
@@ -216,8 +234,11 @@ class _Layouts:
         piece = os.read(self._out.fileno(), 1 << 20)
         if piece:
             return piece
+        code = self._process.wait()
+        if code < 0:
+            raise _CrashError
         self._errors.seek(0)
-        raise _failed(self._command, self._process.wait(), self._errors.read())
+        raise _failed(self._command, code, self._errors.read())
 
 
 def _call(command: Sequence[str], texts: Sequence[str]) -> bytes:

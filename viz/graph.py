@@ -183,7 +183,8 @@ class _Interior:
                 if edge.to_outcome
                 else self._entrance(edge.target, back=edge.back)
             )
-            self._arrow(self._exit(edge.source, outcomes[0]), head, attributes, back=edge.back)
+            back = edge.back and edge.source != edge.target
+            self._arrow(self._exit(edge.source, outcomes[0]), head, attributes, back=back)
 
     def _decisions(self) -> None:
         """Rules over several states meet in a bar; one over a single state is a plain arrow."""

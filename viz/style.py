@@ -62,6 +62,7 @@ def graph(theme: Theme) -> Attributes:
         "fontsize": "11",
         "labeljust": "l",
         "nodesep": "0.26",
+        "notranslate": "true",
         "pad": "0.25",
         "ranksep": "0.34",
         "splines": "true",

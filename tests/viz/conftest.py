@@ -114,13 +114,21 @@ def make_large(states, seed=1):
     def name(i):
         return f"{rng.choice(words)}_{i}"
 
-    def container(label, budget, depth):
-        count = min(rng.randint(3, 8), budget)
+    def sizes(budget):
+        """Numbers of states below 4 to 8 children; they sum up with the children to `budget`."""
+        if budget <= 7:
+            return [0] * budget
+        inside = rng.randint(1, min(4, budget // 6))
+        plain = rng.randint(2, 4)
+        shares = [(budget - plain - inside) // inside] * inside
+        shares[0] += budget - plain - inside - sum(shares)
+        return rng.sample([0] * plain + shares, plain + inside)
+
+    def container(label, budget):
         children = []
-        for i in range(count):
-            share = (budget - count) // count
-            if share >= 3 and depth < 7 and rng.random() < 0.8:
-                children.append(container(name(i), share, depth + 1))
+        for i, size in enumerate(sizes(budget)):
+            if size:
+                children.append(container(name(i), size))
             else:
                 kind = rng.choice(["action", "action", "service", "callback", "condition"])
                 children.append(leaf(name(i), kind))
@@ -138,24 +146,9 @@ def make_large(states, seed=1):
                 transitions[here.label]["aborted"] = rng.choice(children).label
         return machine(label, children, transitions)
 
-    record = container("FACTORY", states - 1, 0)
-    missing = states - sum(1 for _ in record.walk())
-    extra = tuple(leaf(f"EXTRA_{i}") for i in range(missing))
-    chain = [*record.children, *extra]
-    edges = tuple(
-        TransitionRecord(a.label, "succeeded", b.label)
-        for a, b in zip(chain[len(record.children) - 1 :], extra, strict=False)
-    )
-    return rooted(
-        replace(
-            record,
-            kind="machine",
-            children=tuple(chain),
-            initial=(chain[0].label,),
-            rules=(),
-            transitions=record.transitions + edges,
-        )
-    )
+    record = rooted(container("FACTORY", states - 1))
+    assert sum(1 for _ in record.walk()) == states
+    return record
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,211 @@
+"""What the page can show: machines with their histories, wherever they come from."""
+
+from __future__ import annotations
+
+import json
+import threading
+import uuid
+from collections import deque
+from typing import TYPE_CHECKING, Any
+
+from smachpy.introspection import StateRecord
+from smachpy.run_state import RunState
+from viz.live.progress import annotate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+KEPT_EVENTS = 20_000
+"""So many events of one machine can be wound back; older ones only count."""
+
+
+class Machine:
+    """One machine: its structure, the newest events, and what happened before them.
+
+    Args:
+        name: What it is found under.
+        on_change: Called after every change, with the machine.
+
+    Attributes:
+        record: Its structure; None until it is known.
+        revision: Counts the structures.
+        stale: Since when nobody speaks for it [ns since the epoch]; None while somebody does.
+        control: Pause and breakpoints; None when it obeys no commands.
+
+    Threads: every method may be called from any thread.
+    """
+
+    def __init__(self, name: str, on_change: Callable[[Machine], object]) -> None:
+        self.name = name
+        self.record: StateRecord | None = None
+        self.revision = 0
+        self.problems: list[dict[str, str]] = []
+        self.control: dict[str, Any] | None = None
+        self.stale: int | None = None
+        self.recorded = False
+        self.epoch = uuid.uuid4().hex
+        self._on_change = on_change
+        self._lock = threading.Lock()
+        self._base = RunState()
+        self._now = RunState()
+        self._events: deque[tuple[int, dict[str, Any], str]] = deque()
+        self._seq = 0
+
+    @property
+    def seq(self) -> int:
+        """Number of the newest event."""
+        return self._seq
+
+    def reset(self, history: dict[str, Any], *, limit: int = KEPT_EVENTS) -> None:
+        """Begin anew with what a server tells (`smachpy.feed`), or a file."""
+        record = StateRecord.from_json(json.dumps(history["description"]))
+        with self._lock:
+            self.epoch = str(history["epoch"])
+            self.problems = list(history.get("problems") or ())
+            self.control = history.get("control")
+            self.stale = None
+            self._set_record(record)
+            base = history.get("base")
+            self._base = RunState(json.loads(json.dumps(base)) if base else None)
+            self._now = RunState(json.loads(json.dumps(base)) if base else None)
+            self._events.clear()
+            self._seq = 0
+            for event in history["events"]:
+                self._append(event, limit)
+        self._on_change(self)
+
+    def describe(self, record: StateRecord) -> None:
+        """Take a new structure."""
+        with self._lock:
+            changed = record != self.record
+            self._set_record(record)
+        if changed:
+            self._on_change(self)
+
+    def add(self, records: Iterable[dict[str, Any]]) -> bool:
+        """Take events in, each with its `seq`; False when some are missing before them."""
+        with self._lock:
+            for record in records:
+                if record["seq"] <= self._seq:
+                    continue
+                if record["seq"] != self._seq + 1:
+                    return False
+                self._append(record, KEPT_EVENTS)
+        self._on_change(self)
+        return True
+
+    def set_stale(self, since: int | None) -> None:
+        """Say since when nobody speaks for the machine."""
+        self.stale = since
+        self._on_change(self)
+
+    def set_control(self, state: dict[str, Any]) -> None:
+        """Take the answer to a command."""
+        self.control = {"paused": state["paused"], "breakpoints": state["breakpoints"]}
+        self._on_change(self)
+
+    def since(self, seq: int) -> list[str] | None:
+        """Return the events after number `seq` as JSON texts; None when they are gone."""
+        with self._lock:
+            missing = self._seq - seq
+            if missing < 0 or missing > len(self._events):
+                return None
+            return [text for _, _, text in list(self._events)[len(self._events) - missing :]]
+
+    def snapshot(self, *, short: bool = False) -> tuple[int, str]:
+        """Return the newest number and all that a page needs to begin, as JSON.
+
+        Args:
+            short: What happened before is not told, for pages that could not follow.
+        """
+        with self._lock:
+            base = json.dumps((self._now if short else self._base).data)
+            texts = [] if short else [text for _, _, text in self._events]
+            head = json.dumps({**self._facts(), "seq": self._seq, "problems": self.problems})
+        return self._seq, f'{head[:-1]}, "base": {base}, "events": [{", ".join(texts)}]}}'
+
+    def events(self) -> list[dict[str, Any]]:
+        """Return the kept events."""
+        with self._lock:
+            return [record for _, record, _ in self._events]
+
+    def base(self) -> dict[str, Any]:
+        """Return a copy of what happened before the kept events."""
+        with self._lock:
+            copy: dict[str, Any] = json.loads(json.dumps(self._base.data))
+            return copy
+
+    def summary(self) -> dict[str, Any]:
+        """Return what a list of machines shows."""
+        with self._lock:
+            active = self._now.active()
+            leaves = [p for p in active if not any(other.startswith(p + "/") for other in active)]
+            run = self._now.data
+            return {
+                **self._facts(),
+                "active": leaves[:8],
+                "started": run["started"],
+                "ended": run["ended"],
+                "outcome": run["outcome"],
+            }
+
+    def _facts(self) -> dict[str, Any]:
+        return {
+            "name": self.name,
+            "label": self.record.label if self.record else self.name,
+            "epoch": self.epoch,
+            "revision": self.revision,
+            "stale": self.stale,
+            "control": self.control,
+            "recorded": self.recorded,
+        }
+
+    def _set_record(self, record: StateRecord) -> None:
+        if record != self.record:
+            self.record = record
+            self.revision += 1
+
+    def _append(self, record: dict[str, Any], limit: int) -> None:
+        record = annotate(record, self._now.data["goals"])
+        self._now.fold(record)
+        self._seq = record["seq"]
+        self._events.append((self._seq, record, json.dumps(record)))
+        if len(self._events) > limit:
+            self._base.fold(self._events.popleft()[1])
+
+
+class Machines:
+    """All machines that a page can choose from.
+
+    Threads: every method may be called from any thread; listeners are called from any.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._machines: dict[str, Machine] = {}
+        self._listeners: list[Callable[[Machine], object]] = []
+
+    def get(self, name: str) -> Machine | None:
+        """Return the machine of that name."""
+        return self._machines.get(name)
+
+    def obtain(self, name: str) -> Machine:
+        """Return the machine of that name, a new one if there is none."""
+        with self._lock:
+            if name not in self._machines:
+                self._machines[name] = Machine(name, self._changed)
+            return self._machines[name]
+
+    def summaries(self) -> list[dict[str, Any]]:
+        """Return what is known of every machine, by name."""
+        with self._lock:
+            machines = sorted(self._machines.items())
+        return [machine.summary() for _, machine in machines if machine.record is not None]
+
+    def listen(self, listener: Callable[[Machine], object]) -> None:
+        """Call `listener` after every change of a machine."""
+        self._listeners.append(listener)
+
+    def _changed(self, machine: Machine) -> None:
+        for listener in list(self._listeners):
+            listener(machine)
