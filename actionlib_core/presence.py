@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from actionlib_core.transport import Transport
 
 ROOT = "@smachpy"
-_WORDS_BEFORE_NAME = 7
+WORDS_BEFORE_NAME = 7
 
 
 class Kind(StrEnum):
@@ -67,8 +67,8 @@ def token_key(endpoint: Endpoint) -> str:
 
 def parse_token(key: str) -> Endpoint | None:
     """Return what a token's key says, None when it is none of ours."""
-    words = key.split("/", _WORDS_BEFORE_NAME)
-    if len(words) <= _WORDS_BEFORE_NAME or words[0] != ROOT:
+    words = key.split("/", WORDS_BEFORE_NAME)
+    if len(words) <= WORDS_BEFORE_NAME or words[0] != ROOT:
         return None
     _, kind, session, entity, node, type_name, md5, name = words
     try:

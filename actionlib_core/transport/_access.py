@@ -11,7 +11,7 @@ import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from actionlib_core.presence import ROOT, parse_token
+from actionlib_core.presence import ROOT, WORDS_BEFORE_NAME
 from actionlib_core.transport._keys import key_matches
 
 if TYPE_CHECKING:
@@ -79,9 +79,10 @@ def _concerns(rule: AccessRule, user: str, certificate: str) -> bool:
 
 
 def _name_of(key: str) -> str | None:
-    """Return the ROS name that a key is about; None for keys that are about none."""
+    """Return the ROS name that a key is about; None for keys and patterns that are about none."""
     if key.startswith(f"{ROOT}/"):
-        endpoint = parse_token(key)
-        return None if endpoint is None else endpoint.name
+        words = key.split("/", WORDS_BEFORE_NAME)
+        name = words[-1] if len(words) > WORDS_BEFORE_NAME else "*"
+        return None if "*" in name else name
     name = key.partition("/@")[0]
     return None if name.startswith("@") else name

@@ -1,0 +1,133 @@
+"""Logins and access rules, enforced by a router; certificates are in docs/security.md."""
+
+from __future__ import annotations
+
+import socket
+
+import pytest
+
+from actionlib_core.clock import RealClock
+from actionlib_core.config import AccessRule, Config
+from actionlib_core.exceptions import AccessDeniedError, TransportError
+from actionlib_core.transport import Quality
+from actionlib_core.transport.zenoh import ZenohTransport
+
+pytestmark = pytest.mark.zenoh
+
+CLOCK = RealClock()
+WAIT_S = 15.0
+RULES = (
+    AccessRule(("robot_1/**",), users=("alice",)),
+    AccessRule(("robot_1/secret",), users=("alice",), permission="deny"),
+    AccessRule(("robot_2/**",), users=("bob",)),
+    AccessRule(("public/**",)),
+)
+
+
+@pytest.fixture(scope="module")
+def endpoint(tmp_path_factory):
+    users = tmp_path_factory.mktemp("users") / "users.txt"
+    users.write_text("alice:secret\nbob:hunter2\n")
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    router = ZenohTransport(
+        Config(
+            mode="router", listen=(endpoint,), discovery="off", users_file=str(users), access=RULES
+        )
+    )
+    yield endpoint
+    router.close()
+
+
+@pytest.fixture
+def join(endpoint):
+    joined = []
+
+    def join(user="", password="", **fields):
+        login = {"user": user, "password": password, "connect_timeout": 1.0}
+        config = Config(mode="client", connect=(endpoint,), discovery="off", **{**login, **fields})
+        transport = ZenohTransport(config)
+        joined.append(transport)
+        return transport
+
+    yield join
+    for transport in joined:
+        transport.close()
+
+
+@pytest.mark.parametrize(
+    ("user", "password", "shown"),
+    [
+        ("alice", "wrong", "user 'alice' with this password"),
+        ("mallory", "secret", "user 'mallory' with this password"),
+        ("", "", "no user"),
+    ],
+)
+def test_wrong_login_is_refused_and_told(join, user, password, shown):
+    with pytest.raises(TransportError) as caught:
+        join(user, password)
+    text = str(caught.value)
+    assert f"it answers but does not let us in: got {shown}; expected a user" in text
+    assert not password or password not in text
+
+
+def test_allowed_names_work(join):
+    first, second = join("alice", "secret"), join("alice", "secret")
+    heard, changed = [], CLOCK.event()
+
+    def on_sample(sample):
+        heard.append(sample.payload)
+        changed.set()
+
+    first.publisher("robot_1/map", "", Quality(latch=True)).put(b"x")
+    first.declare_alive("@smachpy/service/s/1/n/t/m/robot_1/grip")
+    second.subscribe("robot_1/map", on_sample)
+    assert changed.wait(WAIT_S)
+    assert heard == [b"x"]
+    assert second.list_alive("@smachpy/*/*/*/*/*/*/**", WAIT_S) == [
+        "@smachpy/service/s/1/n/t/m/robot_1/grip"
+    ]
+
+
+@pytest.mark.parametrize("key", ["robot_2/goal", "robot_1/secret", "other"])
+def test_forbidden_names_are_refused_and_told(join, key):
+    alice = join("alice", "secret")
+    calls = (
+        lambda: alice.publisher(key),
+        lambda: alice.subscribe(key, print),
+        lambda: alice.queryable(key, print),
+        lambda: alice.query(key, b"", timeout=1.0, on_reply=print, on_done=print),
+        lambda: alice.declare_alive(f"@smachpy/service/s/1/n/t/m/{key}"),
+    )
+    for call in calls:
+        with pytest.raises(AccessDeniedError, match="access denied: got user 'alice'") as caught:
+            call()
+        assert caught.value.allowed == ("robot_1/**", "public/**")
+
+
+def test_who_does_not_ask_is_stopped_all_the_same(join):
+    alice, bob = join("alice", "secret"), join("bob", "hunter2")
+    bob._permissions = None
+    heard, seen, end = [], [], CLOCK.event()
+
+    def on_sample(sample):
+        heard.append(sample.payload)
+        if sample.payload == b"end":
+            end.set()
+
+    alice.subscribe("robot_1/cmd", on_sample)
+    alice.subscribe("public/end", on_sample)
+    alice.declare_alive("@smachpy/service/s/1/n/t/m/robot_1/grip")
+    bob.watch_alive("@smachpy/*/*/*/*/*/*/**", seen.append)
+    bob.publisher("robot_1/cmd").put(b"drive!")
+    publisher = bob.publisher("public/end")
+    shown = CLOCK.event()
+    alice.watch_alive("@smachpy/*/*/*/*/*/*/public/*", lambda _: shown.set())
+    bob.declare_alive("@smachpy/service/s/1/n/t/m/public/bob")
+    assert shown.wait(WAIT_S)
+    publisher.put(b"end")
+    assert end.wait(WAIT_S)
+    assert heard == [b"end"]
+    assert bob.list_alive("@smachpy/*/*/*/*/*/*/robot_1/**", WAIT_S) == []
+    assert [p.key.rpartition("/m/")[2] for p in seen] == ["public/bob"]
