@@ -64,13 +64,12 @@ class CountdownServer:
         self._server.start()
 
     def close(self) -> None:
-        """Leave the network; a running countdown is aborted."""
+        """Leave the network; a running countdown is stopped."""
         self._stop.set()
         self._server.stop()
 
     def _count(self, goal: CountdownGoal) -> None:
-        self._stop.clear()
-        left = goal.seconds
+        left, due = goal.seconds, self._clock.now() + 1.0
         while left > 0:
             if self._server.is_preempt_requested():
                 text = f"stopped with {left} s left"
@@ -78,8 +77,10 @@ class CountdownServer:
                 return
             self._show(left)
             self._server.publish_feedback(CountdownFeedback(seconds_left=left))
-            if not self._stop.wait(1.0):  # a preempt ends the second early
-                left -= 1
+            if self._stop.wait(due - self._clock.now()):  # a preempt ends the second early
+                self._stop.clear()
+            else:
+                left, due = left - 1, due + 1.0
         self._show(0)
         self._server.set_succeeded(CountdownResult(seconds_left=0), "zero")
 
