@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
     Point = tuple[float, float]
 
+ARROW = 6.2
+"""Length of an arrow's head [points]."""
 _PAIR = re.compile(r"(-?[\d.]+(?:e[+-]?\d+)?),(-?[\d.]+(?:e[+-]?\d+)?)")
 
 
@@ -81,7 +83,7 @@ def around(start: Point, end: Point, lane: float, floor: float, corner: float) -
     turns = [
         (start, (x, floor), (x + corner, floor)),
         ((lane - corner, floor), (lane, floor), (lane, floor + corner)),
-        ((lane, tip_y - corner), (lane, tip_y), (tip_x + 2 + corner, tip_y)),
+        ((lane, tip_y - corner), (lane, tip_y), (tip_x + ARROW, tip_y)),
     ]
     chain = [start]
     for before, bend, after in turns:

@@ -50,6 +50,7 @@ class Theme:
     failure: Swatch
     preempted: Swatch
     other: Swatch
+    waiting: Swatch
 
     def container(self, depth: int) -> str:
         """Return the fill of a container at `depth`; the outermost is 0."""
@@ -81,6 +82,7 @@ LIGHT = Theme(
     failure=Swatch("#FBE3DA", "#9A2E08", "#7A2306"),
     preempted=Swatch("#FFF1CC", "#B07C00", "#6B4C00"),
     other=Swatch("#E8EDF3", "#52606D", "#323F4B"),
+    waiting=Swatch("#F1E1EC", "#521A47", "#521A47"),
 )
 
 DARK = Theme(
@@ -98,6 +100,7 @@ DARK = Theme(
     failure=Swatch("#4A2013", "#FF8661", "#FFD0C0"),
     preempted=Swatch("#3D2F06", "#C79A12", "#FFE29A"),
     other=Swatch("#27333F", "#9AA5B1", "#CBD2D9"),
+    waiting=Swatch("#3B2335", "#E7A7DA", "#FADCF3"),
 )
 
 THEMES = {theme.name: theme for theme in (LIGHT, DARK)}

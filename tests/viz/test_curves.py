@@ -33,3 +33,13 @@ def test_a_stem_goes_before_the_curve_and_keeps_its_arrow():
         curves.with_stem(LINE, 0, 30)
         == "e,30,0 0.00,30.00 0.00,20.00 0.00,10.00 0,0 10,0 20,0 30,0"
     )
+
+
+def test_a_way_round_goes_down_right_up_and_back():
+    curve = curves.around((10, 50), (100, 80), 120, 40, 6)
+    line = curves.trace(curve)
+    assert line[0] == (10, 50)
+    assert min(y for _, y in line) == pytest.approx(40)
+    assert max(x for x, _ in line) == pytest.approx(120)
+    assert line[-1] == (pytest.approx(100 + curves.ARROW), 80)
+    assert curve.startswith("e,100.00,80.00 ")

@@ -211,7 +211,7 @@ def records(draw, depth=2):
     )  # fmt: skip
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=20, deadline=None, suppress_health_check=list(HealthCheck))
 @given(record=records(), show_implicit=st.booleans(), depth=st.integers(1, 3) | st.none())
 def test_whatever_the_machine_it_is_drawn(build, record, show_implicit, depth):
     whole = build.rooted(record)
@@ -262,10 +262,9 @@ def test_times_to_hold(large, tmp_path):
 
     sixty, five_hundred = large(60), large(500)
     viz.picture(sixty, "svg")  # imports and font caches
-    best = min(took(lambda: viz.picture(sixty, "svg", depth=99)) for _ in range(3))
-    assert best < 0.5 * 3  # other work may share the cores
-    best = min(took(lambda: viz.atlas(five_hundred, tmp_path)) for _ in range(2))
-    assert best < 2 * 3
+    busy = 5  # other work may share the cores
+    assert min(took(lambda: viz.picture(sixty, "svg", depth=99)) for _ in range(3)) < 0.5 * busy
+    assert took(lambda: viz.atlas(five_hundred, tmp_path)) < 2 * busy
 
 
 def test_a_real_machine_is_drawn_before_and_after_its_run():

@@ -126,6 +126,17 @@ def test_a_crash_is_told_with_what_the_program_said(script):
         engine.draw(TEXT, "svg")
 
 
+def test_only_the_text_that_makes_dot_crash_is_lost(script):
+    script(
+        "import os, sys\n"
+        "for line in sys.stdin:\n"
+        "    if 'bad' in line: os.kill(os.getpid(), 11)\n"
+        "    if line.startswith('//'): print('{\\n}', flush=True)\n"
+    )
+    texts = ["good", "bad", "good", "good", "bad"]
+    assert engine.lay_out(lambda run: run(texts)) == [{}, None, {}, {}, None]
+
+
 def test_a_program_that_cannot_be_started_is_told(tmp_path, monkeypatch):
     program = tmp_path / "dot"
     program.write_bytes(b"\x7fELF nonsense")

@@ -161,3 +161,46 @@ def test_titles_do_not_lie_on_the_line_from_the_entry(picture):
         centre, _ = curves.point(picture.geometry[container.name]["lp"])
         entry, _ = picture.at(container.entry.name)
         assert abs(centre - entry) > len(words) * 2.2
+
+
+@pytest.fixture(scope="module")
+def looping(build):
+    """A container inside, both outcomes of which lead back into it."""
+    inner = build.machine("INNER", [build.leaf("A"), build.leaf("B")], {})
+    back = {"succeeded": "INNER", "aborted": "INNER", "preempted": "DONE"}
+    done = build.leaf("DONE")
+    return build.rooted(build.machine("M", [inner, done], {"INNER": back}))
+
+
+def test_arrows_back_into_their_container_go_round_it(looping):
+    picture = Picture(looping)
+    root = picture.root
+    inner, done = root.boxes
+    loops = [a for a in root.arrows if a.tail.box == a.head.box == inner.name]
+    assert len(loops) == 2
+    left, bottom, right, top = picture.boxes[inner.name]
+    for arrow in loops:
+        line = curves.trace(picture.geometry[arrow.name]["pos"], 8)
+        assert not any(left < x < right and bottom < y < top for x, y in line)
+        assert all(apart((x, y, x, y), picture.boxes[done.name]) for x, y in line)
+        assert picture.ends(arrow)[1] == (pytest.approx(right), pytest.approx(top, abs=60))
+
+
+def test_a_page_that_makes_dot_crash_is_laid_out_simpler(looping):
+    root = graph.draw(Diagram(extract(looping)), LIGHT)
+
+    def work(run):
+        def fragile(texts):
+            return [
+                None if "splines=true" in text.splitlines()[2] else run([text])[0] for text in texts
+            ]
+
+        return layout.compose(root, LIGHT, fragile)
+
+    assert engine.lay_out(work)[root.name]["bb"]
+
+
+def test_a_page_that_always_crashes_is_told(looping):
+    root = graph.draw(Diagram(extract(looping)), LIGHT)
+    with pytest.raises(layout.LayoutError, match="/M/INNER"):
+        layout.compose(root, LIGHT, lambda texts: [None for _ in texts])

@@ -135,6 +135,16 @@ class Machine:
             copy: dict[str, Any] = json.loads(json.dumps(self._base.data))
             return copy
 
+    def active(self) -> list[str]:
+        """Return the paths of what runs."""
+        with self._lock:
+            return self._now.active()
+
+    def facts(self) -> dict[str, Any]:
+        """Return what is known of the machine besides its events."""
+        with self._lock:
+            return self._facts()
+
     def summary(self) -> dict[str, Any]:
         """Return what a list of machines shows."""
         with self._lock:

@@ -102,7 +102,7 @@ class Link:
         self._closed = False
         server = f"/{name}"
         self._client = ControlClient(server, node) if control else None
-        self._history = ServiceProxy(server + HISTORY_SERVICE, Trigger, node=node)
+        self._history = ServiceProxy(server + HISTORY_SERVICE, Trigger, timeout=HISTORY_S, node=node)
         self._topics = (
             Subscriber(server + EVENTS_TOPIC, String, self._take, node=node),
             Subscriber(server + DESCRIPTION_TOPIC, String, self._take_description, node=node),
@@ -155,12 +155,14 @@ class Link:
         if self._closed or not self._alive:
             return
         try:
-            answer = self._history.call(timeout=HISTORY_S)
+            answer = self._history.call()
         except ActionlibError as error:
             logger.warning("%s: no history: %s", self._name, error)
             return
         history = json.loads(answer.message)
-        newest = history["events"][-1]["seq"] if history["events"] else 0
-        same = self._machine.record is not None and self._machine.epoch == history["epoch"]
-        if not same or self._machine.stale is not None or newest > self._machine.seq:
-            self._machine.reset(history)
+        machine = self._machine
+        if machine.record is not None and machine.epoch == history["epoch"]:
+            machine.set_stale(None)
+            if machine.add(history["events"]):
+                return
+        machine.reset(history)

@@ -1,0 +1,330 @@
+"""What a browser may ask for: the page, the machines, their events, and to command them.
+
+    GET  /                    the page
+    GET  /api/events          everything about one machine as server-sent events:
+                              snap, facts, machines, and unnamed batches of events
+    GET  /api/model           structure of a machine
+    GET  /api/picture         svg, png, pdf or dot
+    GET  /api/export          the run as .html or .jsonl
+    GET  /api/statistics      of recorded runs
+    POST /api/control         a command
+
+Nothing here holds up a machine: a page is sent what it has not seen yet when it can take it, and
+one that is too far behind gets a snapshot instead.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+from typing import TYPE_CHECKING, Any
+
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.middleware import Middleware
+from starlette.responses import JSONResponse, PlainTextResponse, Response, StreamingResponse
+from starlette.routing import Route
+
+from smachpy.exceptions import SmachError
+from viz.live import page
+from viz.live.security import Guard, refuse_command
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Callable
+
+    from starlette.requests import Request
+
+    from viz.live.machines import Machine, Machines
+
+COALESCE_S = 0.016
+"""Events wait so long for others: at most 60 messages a second."""
+
+LIST_S = 0.5
+BEAT_S = 5.0
+FARTHEST = 3_000
+"""A page that is more events behind gets a snapshot."""
+
+MOST_PAGES = 64
+PICTURES = {
+    "svg": "image/svg+xml",
+    "png": "image/png",
+    "pdf": "application/pdf",
+    "dot": "text/vnd.graphviz",
+    "mmd": "text/plain",
+    "txt": "text/plain",
+}
+
+
+class Viewer:
+    """The page's server side.
+
+    Args:
+        machines: What there is to see.
+        token: What commands must carry; None obeys none.
+        send: Sends a command to a machine and returns the answer; blocks.
+        follow: Whether pages follow the active states from the start.
+        statistics: Of recorded runs, by machine label.
+    """
+
+    def __init__(
+        self,
+        machines: Machines,
+        *,
+        token: str | None = None,
+        send: Callable[[str, dict[str, Any]], dict[str, Any]] | None = None,
+        follow: bool = False,
+        statistics: Callable[[str], dict[str, Any] | None] = lambda _label: None,
+        hosts: tuple[str, ...] = (),
+    ) -> None:
+        self._machines = machines
+        self._token = token
+        self._send = send
+        self._follow = follow
+        self._statistics = statistics
+        self._pages: set[_Page] = set()
+        self._drawing = asyncio.Semaphore(1)
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._woken = False
+        machines.listen(self._on_change)
+        self.app = Starlette(
+            routes=[
+                Route("/", self._index),
+                Route("/theme.css", self._theme),
+                Route("/api/events", self._events),
+                Route("/api/machines", self._list),
+                Route("/api/model", self._model),
+                Route("/api/picture", self._picture),
+                Route("/api/export", self._export),
+                Route("/api/statistics", self._runs),
+                Route("/api/control", self._control, methods=["POST"]),
+                Route("/{name:path}", self._file),
+            ],
+            middleware=[Middleware(Guard, hosts=hosts)],
+            lifespan=self._life,
+        )
+
+    @contextlib.asynccontextmanager
+    async def _life(self, _app: Starlette) -> AsyncIterator[None]:
+        self._loop = asyncio.get_running_loop()
+        yield
+        self._loop = None
+
+    def close(self) -> None:
+        """End the streams of all pages, which otherwise have no end; from any thread."""
+        loop = self._loop
+        if loop is not None:
+            with contextlib.suppress(RuntimeError):  # the loop has just ended
+                loop.call_soon_threadsafe(self._end_pages)
+
+    def _end_pages(self) -> None:
+        for one in self._pages:
+            one.closed = True
+            one.news.set()
+
+    def _on_change(self, _machine: Machine) -> None:
+        """Wake the pages; from any thread, and once until they have woken."""
+        loop = self._loop
+        if loop is None or self._woken:
+            return
+        self._woken = True
+        with contextlib.suppress(RuntimeError):  # the loop has just ended
+            loop.call_soon_threadsafe(self._wake)
+
+    def _wake(self) -> None:
+        self._woken = False
+        for one in self._pages:
+            one.news.set()
+
+    # -- answers -------------------------------------------------------------------------------
+
+    async def _index(self, _request: Request) -> Response:
+        return Response(page.index(), media_type=page.TYPES[".html"])
+
+    async def _theme(self, _request: Request) -> Response:
+        return Response(page.theme_css(), media_type=page.TYPES[".css"])
+
+    async def _file(self, request: Request) -> Response:
+        name = request.path_params["name"]
+        content = page.read(name)
+        if content is None:
+            return PlainTextResponse(f"no such file: {name}", status_code=404)
+        etag = f'"{page.version()}"'
+        headers = {"etag": etag, "cache-control": "no-cache"}
+        if request.headers.get("if-none-match") == etag:
+            return Response(status_code=304, headers=headers)
+        media = page.TYPES["." + name.rpartition(".")[2]]
+        return Response(content, media_type=media, headers=headers)
+
+    async def _list(self, _request: Request) -> Response:
+        return JSONResponse(self._machines.summaries())
+
+    async def _model(self, request: Request) -> Response:
+        machine = self._asked(request)
+        if machine is None or machine.record is None:
+            return _unknown(request)
+        shown = {"revision": machine.revision, **page.model(machine.record)}
+        return JSONResponse(shown)
+
+    async def _runs(self, request: Request) -> Response:
+        machine = self._asked(request)
+        if machine is None or machine.record is None:
+            return _unknown(request)
+        return JSONResponse(self._statistics(machine.record.label))
+
+    async def _picture(self, request: Request) -> Response:
+        machine = self._asked(request)
+        form = request.query_params.get("format", "svg")
+        if machine is None or machine.record is None or form not in PICTURES:
+            return _unknown(request)
+        from viz.drawing import picture
+
+        looks: dict[str, Any] = {
+            "theme": "dark" if request.query_params.get("theme") == "dark" else "light",
+            "active": [p for p in machine.active() if request.query_params.get("active")],
+        }
+        async with self._drawing:
+            try:
+                data = await run_in_threadpool(picture, machine.record, form, **looks)
+            except SmachError as error:
+                return PlainTextResponse(str(error), status_code=503)
+        return _download(data, PICTURES[form], f"{_file_name(machine)}.{form}")
+
+    async def _export(self, request: Request) -> Response:
+        machine = self._asked(request)
+        form = request.query_params.get("format", "html")
+        if machine is None or machine.record is None or form not in {"html", "jsonl"}:
+            return _unknown(request)
+        from viz.runs.recording import recording_lines
+
+        if form == "jsonl":
+            lines = recording_lines(machine.record, machine.events(), machine.base())
+            return _download("".join(lines).encode(), "application/jsonl", "run.jsonl")
+        run = {"model": page.model(machine.record), "snap": json.loads(machine.snapshot()[1])}
+        text = await run_in_threadpool(page.standalone, run, machine.record.label)
+        return _download(text.encode(), page.TYPES[".html"], f"{_file_name(machine)}.html")
+
+    async def _control(self, request: Request) -> Response:
+        reason = refuse_command(request, self._token)
+        if reason is not None or self._send is None:
+            return JSONResponse({"ok": False, "text": reason}, status_code=403)
+        name = request.query_params.get("machine", "")
+        try:
+            command = await request.json()
+            if not isinstance(command, dict):
+                raise TypeError(command)
+        except (ValueError, TypeError):
+            text = "command: got no JSON object; expected one."
+            return JSONResponse({"ok": False, "text": text}, status_code=400)
+        try:
+            return JSONResponse(await run_in_threadpool(self._send, name, command))
+        except SmachError as error:
+            return JSONResponse({"ok": False, "text": str(error)}, status_code=409)
+
+    async def _events(self, request: Request) -> Response:
+        if len(self._pages) >= MOST_PAGES:
+            return PlainTextResponse(f"{MOST_PAGES} pages are open already", status_code=503)
+        one = _Page(
+            self._machines,
+            request.query_params.get("machine", ""),
+            request.headers.get("last-event-id", ""),
+            {"follow": self._follow, "control": self._token is not None},
+        )
+        return StreamingResponse(self._stream(one), media_type="text/event-stream")
+
+    async def _stream(self, one: _Page) -> AsyncIterator[str]:
+        self._pages.add(one)
+        try:
+            async for text in one.messages():
+                yield text
+        finally:
+            self._pages.discard(one)
+
+    def _asked(self, request: Request) -> Machine | None:
+        return self._machines.get(request.query_params.get("machine", ""))
+
+
+class _Page:
+    """One open page: what it has been sent, and what it has not."""
+
+    def __init__(
+        self, machines: Machines, name: str, last_id: str, settings: dict[str, Any]
+    ) -> None:
+        self.news = asyncio.Event()
+        self.closed = False
+        self._machines = machines
+        self._name = name
+        self._settings = settings
+        epoch, _, seq = last_id.partition(":")
+        self._epoch = epoch
+        self._seq = int(seq) if seq.isdigit() else 0
+        self._facts = ""
+        self._list = ""
+        self._listed = 0.0
+
+    async def messages(self) -> AsyncIterator[str]:
+        """Yield what to send, for ever."""
+        loop = asyncio.get_running_loop()
+        yield f"retry: 500\nevent: settings\ndata: {json.dumps(self._settings)}\n\n"
+        while not self.closed:
+            self.news.clear()
+            machine = self._choose()
+            if machine is not None:
+                for text in self._update(machine):
+                    yield text
+            due = self._listed + LIST_S - loop.time()
+            if due <= 0:
+                self._listed = loop.time()
+                text = json.dumps(self._machines.summaries())
+                if text != self._list:
+                    self._list = text
+                    yield f"event: machines\ndata: {text}\n\n"
+                due = BEAT_S
+            try:
+                await asyncio.wait_for(self.news.wait(), max(due, COALESCE_S))
+                await asyncio.sleep(COALESCE_S)
+            except TimeoutError:
+                if due >= BEAT_S:
+                    yield ": beat\n\n"
+
+    def _choose(self) -> Machine | None:
+        """The machine that the page shows: the one it names, else the first there is."""
+        if not self._name:
+            there = self._machines.summaries()
+            live = [one for one in there if one["stale"] is None] or there
+            self._name = live[0]["name"] if live else ""
+        machine = self._machines.get(self._name)
+        return None if machine is None or machine.record is None else machine
+
+    def _update(self, machine: Machine) -> list[str]:
+        texts: list[str] = []
+        behind = machine.since(self._seq) if machine.epoch == self._epoch else None
+        if behind is None or len(behind) > FARTHEST:
+            short = behind is not None
+            self._epoch = machine.epoch
+            self._seq, snap = machine.snapshot(short=short)
+            texts.append(f"event: snap\nid: {self._epoch}:{self._seq}\ndata: {snap}\n\n")
+            behind = []
+        facts = json.dumps(machine.facts())
+        if facts != self._facts:
+            self._facts = facts
+            texts.append(f"event: facts\ndata: {facts}\n\n")
+        if behind:
+            self._seq += len(behind)
+            data = f"[{','.join(behind)}]"
+            texts.append(f"id: {self._epoch}:{self._seq}\ndata: {data}\n\n")
+        return texts
+
+
+def _unknown(request: Request) -> Response:
+    return PlainTextResponse(f"nothing there: {request.url.query}", status_code=404)
+
+
+def _file_name(machine: Machine) -> str:
+    label = machine.record.label if machine.record else machine.name
+    return "".join(c if c.isalnum() and c.isascii() else "_" for c in label)[:60] or "machine"
+
+
+def _download(data: bytes, media: str, name: str) -> Response:
+    headers = {"content-disposition": f'attachment; filename="{name}"'}
+    return Response(data, media_type=media, headers=headers)
