@@ -1,0 +1,285 @@
+"""Actions between real processes: killed, stopped, restarted, and with the link cut."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+
+import pytest
+
+from actionlib_core.action_client import ActionClient
+from actionlib_core.config import Config
+from actionlib_core.interfaces.actionlib import msg
+from actionlib_core.node import Node
+from actionlib_core.transport.zenoh import ZenohTransport
+
+pytestmark = pytest.mark.zenoh
+
+LEASE_S = 1.0
+LONG_S = 20.0
+
+SERVER = """
+import sys
+from actionlib_core.config import Config
+from actionlib_core.interfaces.actionlib.msg import TestAction, TestFeedback, TestResult
+from actionlib_core.node import Node
+from actionlib_core.simple_action_server import SimpleActionServer
+from actionlib_core.transport.zenoh import ZenohTransport
+
+config = Config(discovery="off", listen=("tcp/127.0.0.1:{port}",), lease={lease})
+node = Node("server", transport=ZenohTransport(config))
+
+def execute(goal):
+    print("run", goal.goal, flush=True)
+    if server.wait_preempt(goal.goal / 10):
+        print("preempted", flush=True)
+        server.set_preempted()
+    else:
+        server.set_succeeded(TestResult(goal.goal))
+
+server = SimpleActionServer("demo", TestAction, execute, node=node, on_client_lost="{on_lost}")
+print("ready", flush=True)
+sys.stdin.read()
+node.close()
+node.transport.close()
+"""
+
+CLIENT = """
+from actionlib_core.action_client import ActionClient
+from actionlib_core.config import Config
+from actionlib_core.interfaces.actionlib.msg import TestAction, TestGoal
+from actionlib_core.node import Node
+from actionlib_core.transport.zenoh import ZenohTransport
+
+config = Config(discovery="off", connect=("tcp/127.0.0.1:{port}",), lease={lease})
+node = Node("doomed", transport=ZenohTransport(config))
+client = ActionClient("demo", TestAction, node=node)
+assert client.wait_for_server(20)
+client.send_goal(TestGoal(600)).wait()
+"""
+
+
+class Process:
+    """A Python program of a test, ended with it."""
+
+    def __init__(self, script: str, **values: object) -> None:
+        values = {"lease": LEASE_S, "on_lost": "continue", **values}
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", textwrap.dedent(script).format(**values)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    def expect(self, line: str) -> None:
+        ready, _, _ = select.select([self.process.stdout], [], [], LONG_S)
+        assert ready, f"no line within {LONG_S} s; expected {line!r}"
+        assert self.process.stdout.readline().strip() == line
+
+    def signal(self, number: int) -> None:
+        os.kill(self.process.pid, number)
+
+    def close(self) -> None:
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait()
+        self.process.stdin.close()
+        self.process.stdout.close()
+
+
+class Proxy:
+    """Passes TCP on to a port; `cut` ends all links and lets none in until `mend`."""
+
+    def __init__(self, target: int) -> None:
+        self._target = target
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.port = self._listener.getsockname()[1]
+        self._pairs: list[socket.socket] = []
+        self._open = True
+        self._alive = True
+        self._thread = threading.Thread(target=self._run, name="proxy")
+        self._thread.start()
+
+    def _run(self) -> None:
+        links: dict[socket.socket, socket.socket] = {}
+        while self._alive:
+            readable, _, _ = select.select([self._listener, *links], [], [], 0.05)
+            if not self._open:
+                for link in links:
+                    link.close()
+                links.clear()
+                readable = [r for r in readable if r is self._listener]
+            for link in readable:
+                if link is self._listener:
+                    self._accept(links)
+                elif link in links:
+                    self._pass_on(link, links)
+        for link in links:
+            link.close()
+        self._listener.close()
+
+    def _accept(self, links: dict[socket.socket, socket.socket]) -> None:
+        front, _ = self._listener.accept()
+        if not self._open:
+            front.close()
+            return
+        back = socket.create_connection(("127.0.0.1", self._target))
+        links[front], links[back] = back, front
+
+    def _pass_on(self, link: socket.socket, links: dict[socket.socket, socket.socket]) -> None:
+        try:
+            data = link.recv(65536)
+            if data:
+                links[link].sendall(data)
+                return
+        except OSError:
+            pass
+        other = links.pop(link)
+        links.pop(other, None)
+        link.close()
+        other.close()
+
+    def cut(self) -> None:
+        self._open = False
+
+    def mend(self) -> None:
+        self._open = True
+
+    def close(self) -> None:
+        self._alive = False
+        self._thread.join()
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@pytest.fixture
+def stage():
+    """Starts processes, proxies and clients, and ends them all."""
+    with_close = []
+
+    class Stage:
+        port = free_port()
+
+        def process(self, script, **values):
+            process = Process(script, **{"port": self.port, **values})
+            with_close.append(process.close)
+            return process
+
+        def server(self, **values):
+            server = self.process(SERVER, **values)
+            server.expect("ready")
+            return server
+
+        def proxy(self):
+            proxy = Proxy(self.port)
+            with_close.append(proxy.close)
+            return proxy
+
+        def client(self, port=None, **kwargs):
+            endpoint = f"tcp/127.0.0.1:{port or self.port}"
+            config = Config(discovery="off", connect=(endpoint,), lease=LEASE_S)
+            transport = ZenohTransport(config)
+            node = Node("client", transport=transport)
+            with_close.append(transport.close)
+            with_close.append(node.close)
+            client = ActionClient("demo", msg.TestAction, node=node, **kwargs)
+            assert client.wait_for_server(LONG_S)
+            return client
+
+    yield Stage()
+    for close in reversed(with_close):
+        close()
+
+
+def test_kill_of_the_server_is_known_at_once(stage):
+    server = stage.server()
+    client = stage.client()
+    handle = client.send_goal(msg.TestGoal(600))
+    server.expect("run 600")
+    start = time.monotonic()
+    server.signal(signal.SIGKILL)
+    assert handle.wait(LONG_S)
+    assert time.monotonic() - start < 0.5  # 50 ms on a computer with nothing else to do
+    assert handle.get_terminal_state().name == "LOST"
+    assert "node 'server'" in handle.get_goal_status_text()
+
+
+@pytest.mark.parametrize("on_lost", ["continue", "cancel"])
+def test_kill_of_the_client(stage, on_lost):
+    server = stage.server(on_lost=on_lost)
+    doomed = stage.process(CLIENT)
+    server.expect("run 600")
+    doomed.signal(signal.SIGKILL)
+    if on_lost == "cancel":
+        server.expect("preempted")
+        return
+    client = stage.client()
+    second = client.send_goal(msg.TestGoal(1))  # preempts the goal that goes on
+    server.expect("preempted")
+    assert second.wait(LONG_S)
+
+
+def test_server_stopped_for_longer_than_the_lease(stage):
+    server = stage.server()
+    client = stage.client(server_lost_timeout=LONG_S)
+    handle = client.send_goal(msg.TestGoal(10))
+    server.expect("run 10")
+    server.signal(signal.SIGSTOP)
+    time.sleep(2.5 * LEASE_S)
+    assert not handle.wait(0)
+    server.signal(signal.SIGCONT)
+    assert handle.wait(LONG_S)
+    assert handle.get_terminal_state().name == "SUCCEEDED"
+    assert handle.get_result() == msg.TestResult(10)
+
+
+def test_server_stopped_without_patience_is_lost_within_the_lease(stage):
+    server = stage.server()
+    client = stage.client()
+    handle = client.send_goal(msg.TestGoal(600))
+    server.expect("run 600")
+    server.signal(signal.SIGSTOP)
+    assert handle.wait(4 * LEASE_S)
+    assert handle.get_terminal_state().name == "LOST"
+    server.signal(signal.SIGCONT)
+
+
+def test_restarted_server_takes_the_next_goal_and_not_the_old_one(stage):
+    server = stage.server()
+    client = stage.client()
+    handle = client.send_goal(msg.TestGoal(600))
+    server.expect("run 600")
+    server.signal(signal.SIGKILL)
+    assert handle.wait(LONG_S)
+    server.close()
+    again = stage.server()
+    following = client.send_goal(msg.TestGoal(1))
+    assert following.wait(LONG_S)
+    assert following.get_terminal_state().name == "SUCCEEDED"
+    again.expect("run 1")
+
+
+def test_link_cut_during_a_goal(stage):
+    server = stage.server()
+    proxy = stage.proxy()
+    client = stage.client(proxy.port, server_lost_timeout=LONG_S)
+    handle = client.send_goal(msg.TestGoal(5))
+    server.expect("run 5")
+    proxy.cut()
+    time.sleep(1.5)  # the goal ends meanwhile
+    assert not handle.wait(0)
+    proxy.mend()
+    assert handle.wait(LONG_S)
+    assert handle.get_terminal_state().name == "SUCCEEDED"
+    assert handle.get_result() == msg.TestResult(5)
