@@ -28,8 +28,6 @@ class UserData:
     Threads: single reads and writes are atomic; several together are not.
     """
 
-    __slots__ = ("__weakref__", "_data")
-
     _data: dict[str, Any]
 
     def __init__(self) -> None:

@@ -103,4 +103,6 @@ def run_watched(frame: Frame, step: Step) -> Any:
         frame.emit(Left, "preempted")
         raise
     frame.emit(Left, outcome)
+    if frame.run.control is not None:
+        frame.run.control.note_outcome(frame, step, outcome)
     return outcome

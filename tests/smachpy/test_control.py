@@ -1,0 +1,218 @@
+"""The operator's hand on a running machine."""
+
+from __future__ import annotations
+
+import pytest
+
+import smachpy
+from smachpy.control import ControlError
+from smachpy.events import Entered, Jumped, OutcomeForced, Paused, Resumed
+
+
+class Work(smachpy.State):
+    def __init__(self, seconds=1.0):
+        super().__init__(["ok", "failed", "preempted"])
+        self.seconds = seconds
+        self.runs = 0
+
+    def execute(self, userdata):
+        self.runs += 1
+        return "preempted" if self.sleep(self.seconds) else "ok"
+
+
+def mission():
+    inner = smachpy.StateMachine(["ok", "failed", "preempted"])
+    with inner:
+        smachpy.StateMachine.add("X", Work(), {"ok": "Y"})
+        smachpy.StateMachine.add("Y", Work())
+    sm = smachpy.StateMachine(["ok", "failed", "preempted"], name="P")
+    with sm:
+        smachpy.StateMachine.add("A", Work(), {"ok": "INNER"})
+        smachpy.StateMachine.add("INNER", inner, {"ok": "Z", "preempted": "Z"})
+        smachpy.StateMachine.add("Z", Work())
+    sm.events = []
+    sm.subscribe(sm.events.append)
+    return sm
+
+
+def at(clock, *commands):
+    for when, command in commands:
+        clock.call_later(when, command)
+
+
+def entered(sm):
+    return [e.path for e in sm.events if isinstance(e, Entered)]
+
+
+def test_pause_holds_before_the_next_state_and_resume_goes_on(clock):
+    sm = mission()
+    seen = []
+    at(
+        clock,
+        (0.5, sm.control.pause),
+        (5.0, lambda: seen.append((sm.control.waiting(), sm.control.is_paused()))),
+        (9.0, sm.control.resume),
+    )
+    assert sm.execute() == "ok"
+    assert clock.now() == 9.0 + 3.0
+    assert seen == [(("/P/INNER",), True)]
+    assert [type(e) for e in sm.events if isinstance(e, (Paused, Resumed))] == [Paused, Resumed]
+
+
+def test_pause_before_the_run_holds_at_the_first_state(clock):
+    sm = mission()
+    sm.control.pause()
+    at(clock, (4.0, sm.control.resume))
+    assert sm.execute() == "ok"
+    assert clock.now() == 8.0
+
+
+def test_pause_that_cancels_runs_the_state_again(clock):
+    sm = mission()
+    at(clock, (0.5, lambda: sm.control.pause(running="cancel")), (2.0, sm.control.resume))
+    assert sm.execute() == "ok"
+    assert sm["A"].runs == 2
+    assert clock.now() == 2.0 + 4.0
+
+
+def test_step_lets_one_state_run(clock):
+    sm = mission()
+    sm.control.pause()
+    waits = []
+    for when in (1.0, 4.0, 7.0):
+        at(clock, (when, lambda: waits.append(sm.control.waiting())), (when, sm.control.step))
+    at(clock, (20.0, sm.control.resume))
+    assert sm.execute() == "ok"
+    assert waits == [("/P/A",), ("/P/INNER",), ("/P/INNER/X",)]
+
+
+def test_breakpoint_on_a_state_and_on_an_edge(clock):
+    sm = mission()
+    sm.control.add_breakpoint("/P/INNER/Y")
+    sm.control.add_breakpoint("/P/A", "ok")
+    seen = []
+    for when in (3.0, 8.0):
+        at(clock, (when, lambda: seen.append(sm.control.waiting())), (when, sm.control.resume))
+    assert sm.execute() == "ok"
+    assert seen == [("/P/INNER",), ("/P/INNER/Y",)]
+    assert sm.control.breakpoints() == (("/P/A", "ok"), ("/P/INNER/Y", None))
+    sm.control.remove_breakpoint("/P/INNER/Y")
+    sm.control.remove_breakpoint("/P/A", "ok")
+    before = clock.now()
+    assert sm.execute() == "ok"
+    assert clock.now() - before == 4.0
+
+
+def test_preempt_while_paused_ends_the_mission(clock):
+    sm = mission()
+    at(clock, (0.5, sm.control.pause), (3.0, sm.request_preempt))
+    assert sm.execute() == "preempted"
+    assert clock.now() == 3.0
+    sm.control.resume()
+    assert sm.execute() == "ok"
+
+
+def test_jump_preempts_what_runs_and_goes_there(clock):
+    sm = mission()
+    at(clock, (0.5, lambda: sm.control.jump("/P/Z")))
+    assert sm.execute() == "ok"
+    assert clock.now() == 1.5
+    assert entered(sm) == ["/P/A", "/P/Z"]
+    assert [e.label for e in sm.events if isinstance(e, Jumped)] == ["Z"]
+
+
+def test_jump_inside_a_sub_machine(clock):
+    sm = mission()
+    at(clock, (1.5, lambda: sm.control.jump("/P/INNER/Y")))
+    assert sm.execute() == "ok"
+    assert clock.now() == 3.5
+
+
+def test_force_outcome_of_a_leaf_and_of_a_sub_machine(clock):
+    sm = mission()
+    at(clock, (0.5, lambda: sm.control.force_outcome("/P/A", "failed")))
+    assert sm.execute() == "failed"
+    assert clock.now() == 0.5
+    assert [e.outcome for e in sm.events if isinstance(e, OutcomeForced)] == ["failed"]
+    at(clock, (1.5, lambda: sm.control.force_outcome("/P/INNER", "failed")))
+    assert sm.execute() == "failed"
+    assert clock.now() == 2.0
+
+
+def test_preempt_of_a_sub_machine_follows_its_transition(clock):
+    sm = mission()
+    at(clock, (1.5, lambda: sm.control.preempt("/P/INNER")))
+    assert sm.execute() == "ok"
+    assert clock.now() == 2.5
+    at(clock, (0.5, lambda: sm.control.preempt("/P")))
+    assert sm.execute() == "preempted"
+
+
+def test_commands_in_a_concurrence_and_an_iterator(clock):
+    loop = smachpy.Iterator(["ok", "preempted"], [], [], it=range(3), exhausted_outcome="ok")
+    loop.set_contained_state("EACH", Work(), loop_outcomes=["ok", "failed"])
+    both = smachpy.Concurrence(
+        ["ok", "failed", "preempted"], "ok", outcome_map={"failed": {"W": "failed"}}, name="C"
+    )
+    both.add("LOOP", loop)
+    both.add("W", Work(100.0))
+    seen = []
+    at(
+        clock,
+        (0.5, lambda: seen.append(both.control.active())),
+        (0.5, lambda: both.control.force_outcome("/C/LOOP/EACH", "failed")),
+        (1.0, lambda: both.control.force_outcome("/C/W", "failed")),
+    )
+    assert both.execute() == "failed"
+    assert clock.now() == 2.5
+    assert seen == [("/C/LOOP", "/C/LOOP/EACH", "/C/W")]
+
+
+def test_pause_holds_the_branches_of_a_concurrence(clock):
+    both = smachpy.Concurrence(["ok", "preempted"], "ok", name="C")
+    both.add("V", Work())
+    both.add("W", Work())
+    both.control.pause()
+    seen = []
+    at(
+        clock,
+        (2.0, lambda: seen.append(sorted(both.control.waiting()))),
+        (3.0, both.control.resume),
+    )
+    assert both.execute() == "ok"
+    assert seen == [["/C/V", "/C/W"]]
+    assert clock.now() == 4.0
+
+
+def test_commands_for_what_does_not_run_say_what_does(clock):
+    sm = mission()
+    errors = []
+
+    def wrong():
+        for command in (
+            lambda: sm.control.force_outcome("/P/B", "ok"),
+            lambda: sm.control.force_outcome("/P/A", "okk"),
+            lambda: sm.control.jump("/P/NOWHERE"),
+            lambda: sm.control.jump("/Q/A"),
+            lambda: sm.control.preempt("/P/Z"),
+        ):
+            with pytest.raises(ControlError) as caught:
+                command()
+            errors.append(caught.value)
+
+    at(clock, (0.5, wrong))
+    assert sm.execute() == "ok"
+    assert len(errors) == 5
+    assert errors[0].active == ("/P/A",)
+    assert "Did you mean '/P/A'" in str(errors[0])
+    with pytest.raises(ControlError):
+        sm.control.force_outcome("/P/A", "ok")
+
+
+def test_a_second_run_is_controlled_too(clock):
+    sm = mission()
+    sm.execute()
+    at(clock, (0.5, sm.control.pause), (5.0, sm.control.resume))
+    before = clock.now()
+    sm.execute()
+    assert clock.now() - before == 5.0 - 0.0 + 3.0

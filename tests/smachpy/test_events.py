@@ -1,0 +1,177 @@
+"""The event stream: order, nesting, listeners that fail, records."""
+
+from __future__ import annotations
+
+import logging
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import smachpy
+from smachpy import events
+from smachpy.events import (
+    CallbackFailed,
+    Entered,
+    Failed,
+    Finished,
+    Iterated,
+    Left,
+    Started,
+    from_record,
+    to_record,
+)
+
+
+def say(outcome, *outcomes):
+    return smachpy.CBState(lambda ud: outcome, outcomes=[outcome, *outcomes])
+
+
+def nested():
+    inner = smachpy.StateMachine(["ok"])
+    inner.add("X", say("ok"))
+    loop = smachpy.Iterator(["ok"], [], [], it="ab", exhausted_outcome="ok")
+    loop.set_contained_state("EACH", say("next"))
+    sm = smachpy.StateMachine(["ok"], name="P")
+    sm.add("INNER", inner, {"ok": "LOOP"})
+    sm.add("LOOP", loop)
+    return sm
+
+
+def test_events_of_a_run_in_order(clock):
+    sm = nested()
+    heard = []
+    sm.subscribe(heard.append)
+    sm.execute()
+    assert [(type(e).__name__, e.path, *e[3:]) for e in heard] == [
+        ("Started", "/P", ("INNER",)),
+        ("Entered", "/P/INNER"),
+        ("Entered", "/P/INNER/X"),
+        ("Left", "/P/INNER/X", "ok"),
+        ("Left", "/P/INNER", "ok"),
+        ("Entered", "/P/LOOP"),
+        ("Iterated", "/P/LOOP", 0),
+        ("Entered", "/P/LOOP/EACH"),
+        ("Left", "/P/LOOP/EACH", "next"),
+        ("Iterated", "/P/LOOP", 1),
+        ("Entered", "/P/LOOP/EACH"),
+        ("Left", "/P/LOOP/EACH", "next"),
+        ("Left", "/P/LOOP", "ok"),
+        ("Finished", "/P", "ok"),
+    ]
+    assert all(e.t == 0.0 and e.stamp_ns == clock.time_ns() for e in heard)
+
+
+def test_listeners_of_a_sub_machine_hear_that_part_only():
+    sm = nested()
+    heard = []
+    sm["INNER"].subscribe(heard.append)
+    sm.execute()
+    assert {e.path for e in heard} == {"/P/INNER/X"}
+
+
+def test_unsubscribe_and_subscribe_in_mid_run():
+    sm = smachpy.StateMachine(["ok"])
+    heard = []
+    sm.add("A", say("ok"), {"ok": "B"})
+    sm.add("B", say("ok"), {"ok": "C"})
+    sm.add("C", say("ok"))
+    forget = []
+    sm["A"].execute = lambda ud: forget.append(sm.subscribe(heard.append)) or "ok"
+    sm["C"].execute = lambda ud: forget[0]() or "ok"
+    sm.execute()
+    assert [(type(e), e.path[-1]) for e in heard] == [(Entered, "B"), (Left, "B"), (Entered, "C")]
+
+
+def test_a_raising_listener_hurts_nobody(caplog):
+    sm = nested()
+    heard = []
+
+    def fail(event):
+        raise ValueError("listener")
+
+    sm.subscribe(fail)
+    sm.subscribe(heard.append)
+    with caplog.at_level(logging.ERROR):
+        assert sm.execute() == "ok"
+    assert len(heard) == 14
+    assert "listener" in caplog.text
+
+
+def test_failures_are_events():
+    def fail(ud):
+        raise ValueError("motor")
+
+    sm = smachpy.StateMachine(["ok"], name="P")
+    sm.add("A", smachpy.CBState(fail, outcomes=["ok"]))
+    sm.register_start_cb(lambda *a: 1 / 0)
+    heard = []
+    sm.subscribe(heard.append)
+    with pytest.raises(smachpy.InvalidUserCodeError):
+        sm.execute()
+    assert [e.error for e in heard if isinstance(e, Failed)] == ["ValueError: motor"]
+    (failed,) = [e for e in heard if isinstance(e, CallbackFailed)]
+    assert (failed.path, failed.error) == ("/P", "ZeroDivisionError: division by zero")
+    assert heard[-1][3:] == (None,)
+    assert isinstance(heard[0], Started)
+    assert isinstance(heard[-1], Finished)
+
+
+def test_scopes_publish_from_any_thread(clock):
+    heard = []
+
+    class Sends(smachpy.State):
+        def execute(self, userdata):
+            scope = self._scope()
+            task = clock.spawn(
+                lambda: scope.emit(events.GoalSent, "move_base", "id-1", "there"), name="elsewhere"
+            )
+            task.join()
+            return "ok"
+
+    sm = smachpy.StateMachine(["ok"], name="P")
+    sm.add("A", Sends(["ok"]))
+    sm.subscribe(heard.append)
+    sm.execute()
+    (sent,) = [e for e in heard if isinstance(e, events.GoalSent)]
+    assert (sent.path, sent.action, sent.goal_id, sent.goal) == (
+        "/P/A",
+        "move_base",
+        "id-1",
+        "there",
+    )
+
+
+texts = st.text(max_size=5)
+anything = st.none() | st.integers() | texts | st.lists(st.integers()) | st.builds(object)
+
+
+@given(st.sampled_from(events.EVENT_TYPES), st.data())
+def test_events_survive_a_record(kind, data):
+    fields = [data.draw(texts), 1.5, 17]
+    for name in kind._fields[3:]:
+        fields.append(("A",) if name == "initial" else data.draw(texts))
+    event = kind(*fields)
+    record = to_record(event)
+    assert record["kind"] == kind.__name__
+    assert from_record(record) == event
+    assert type(from_record(record)) is kind
+
+
+@given(anything)
+def test_records_are_plain_whatever_the_value(value):
+    import json
+
+    json.dumps(to_record(events.UserdataWritten("/P/A", 0.0, 0, "k", value)))
+
+
+@pytest.mark.parametrize(
+    "record", [{}, {"kind": "Nope"}, {"kind": "Left", "path": "/"}, {"kind": "Left", "x": 1}]
+)
+def test_records_of_nothing_are_told(record):
+    with pytest.raises(ValueError, match="event record"):
+        from_record(record)
+
+
+def test_iterated_counts_from_zero():
+    assert Iterated("/P", 0.0, 0, 3).number == 3

@@ -1,0 +1,249 @@
+"""Timeout, retry, exceptions, hooks, coroutines and functions as states."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+
+import pytest
+
+import smachpy
+from actionlib_core.clock import current_clock
+from smachpy.events import Retried, TimedOut
+
+
+class Waits(smachpy.State):
+    def __init__(self, seconds, **options):
+        super().__init__(["ok", "preempted"], **options)
+        self.seconds = seconds
+
+    def execute(self, userdata):
+        return "preempted" if self.sleep(self.seconds) else "ok"
+
+
+class Fails(smachpy.State):
+    """Fails so often, then is 'ok'."""
+
+    def __init__(self, times, error=ValueError("motor"), **options):
+        super().__init__(["ok", "aborted"], **options)
+        self.left = times
+        self.error = error
+        self.runs = 0
+
+    def execute(self, userdata):
+        self.runs += 1
+        if self.left:
+            self.left -= 1
+            if isinstance(self.error, Exception):
+                raise self.error
+            return self.error
+        return "ok"
+
+
+def run(state, *, path=()):
+    sm = smachpy.StateMachine([*state.get_registered_outcomes()])
+    sm.add("A", state)
+    events = []
+    sm.subscribe(events.append)
+    return sm.execute(), events
+
+
+def test_timeout_ends_with_aborted_or_the_given_outcome(clock):
+    outcome, events = run(Waits(10.0, timeout=2.0))
+    assert outcome == "aborted"
+    assert clock.now() == 2.0
+    assert [(e.path, e.timeout) for e in events if isinstance(e, TimedOut)] == [("/SM_ROOT/A", 2.0)]
+    assert run(Waits(10.0, timeout=2.0, timeout_outcome="late"))[0] == "late"
+
+
+def test_timeout_leaves_a_finished_state_alone(clock):
+    assert run(Waits(1.0, timeout=2.0))[0] == "ok"
+    current_clock().sleep(5.0)
+
+
+def test_timeout_of_a_state_that_ignores_it_comes_after_the_grace(clock):
+    logging.disable(logging.CRITICAL)
+
+    class Deaf(smachpy.State):
+        def execute(self, userdata):
+            current_clock().sleep(1000.0)
+            return "ok"
+
+    state = Deaf(["ok"], timeout=2.0, preempt_timeout=3.0)
+    try:
+        assert run(state)[0] == "aborted"
+    finally:
+        logging.disable(logging.NOTSET)
+    assert clock.now() == 5.0
+    assert not state.preempt_requested()
+
+
+def test_timeout_of_a_container_and_of_the_root(clock):
+    inner = smachpy.StateMachine(["ok", "preempted"], timeout=2.0, timeout_outcome="late")
+    inner.add("W", Waits(10.0))
+    assert run(inner)[0] == "late"
+    assert inner.execute() == "late"
+    assert clock.now() == 4.0
+
+
+def test_timeout_in_a_concurrence_ends_that_branch_only(clock):
+    both = smachpy.Concurrence(["done", "mixed"], "done", outcome_map={"mixed": {"A": "aborted"}})
+    both.add("A", Waits(10.0, timeout=1.0))
+    both.add("B", Waits(3.0))
+    assert both.execute() == "mixed"
+    assert clock.now() == 3.0
+
+
+@pytest.mark.parametrize("spec", [3, (3,), (3, 0.0), smachpy.Retry(3, on=("aborted",))])
+def test_retry_on_an_outcome(spec):
+    state = Fails(2, "aborted", retry=spec)
+    outcome, events = run(state)
+    assert (outcome, state.runs) == ("ok", 3)
+    assert [(e.attempt, e.reason) for e in events if isinstance(e, Retried)] == [
+        (1, "aborted"),
+        (2, "aborted"),
+    ]
+
+
+def test_retry_on_an_exception_backs_off_twice_as_long_each_time(clock):
+    state = Fails(3, retry=(4, 1.0, [ValueError]))
+    assert run(state)[0] == "ok"
+    assert clock.now() == 1.0 + 2.0 + 4.0
+
+
+def test_retry_gives_up(clock):
+    assert run(Fails(9, "aborted", retry=3))[0] == "aborted"
+    with pytest.raises(smachpy.InvalidUserCodeError, match="motor"):
+        run(Fails(9, retry=(3, 0.0, ValueError)))
+
+
+def test_a_preempt_ends_the_waiting_for_the_next_attempt(clock):
+    state = Fails(9, "aborted", retry=(5, 100.0))
+    sm = smachpy.StateMachine(["ok", "aborted"])
+    sm.add("A", state)
+    clock.call_later(3.0, sm.request_preempt)
+    assert sm.execute() == "aborted"
+    assert clock.now() == 3.0
+    assert state.runs == 1
+
+
+def test_exceptions_become_outcomes():
+    assert run(Fails(1, on_exception={ValueError: "aborted"}))[0] == "aborted"
+    assert run(Fails(1, KeyError("x"), on_exception={LookupError: "lost"}))[0] == "lost"
+    with pytest.raises(smachpy.InvalidUserCodeError):
+        run(Fails(1, on_exception={OSError: "aborted"}))
+
+
+def test_exceptions_of_children_become_outcomes_of_the_container():
+    inner = smachpy.StateMachine(["ok", "aborted"], on_exception={ValueError: "broken"})
+    inner.add("F", Fails(1))
+    assert run(inner)[0] == "broken"
+
+
+def test_hooks_run_around_the_state():
+    heard = []
+    state = smachpy.State(["ok"])
+    state.execute = lambda ud: heard.append("run") or "ok"
+    state.on_enter = lambda ud: heard.append("enter")
+    state.on_exit = lambda ud, outcome: heard.append(("exit", outcome))
+    assert run(state)[0] == "ok"
+    assert heard == ["enter", "run", ("exit", "ok")]
+
+
+def test_hooks_may_be_methods_and_failures_name_them():
+    class Hooked(smachpy.State):
+        def on_enter(self, userdata):
+            raise ValueError("door")
+
+        def execute(self, userdata):
+            return "ok"
+
+    with pytest.raises(smachpy.InvalidUserCodeError, match=r"/SM_ROOT/A: hook on_enter.*door"):
+        run(Hooked(["ok"]))
+
+
+def test_unknown_options_are_told():
+    with pytest.raises(TypeError, match=r"unknown arguments \['timeuot'\]"):
+        smachpy.State(["ok"], timeuot=1)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"timeout": -1.0}, {"retry": 0}, {"retry": "x"}, {"retry": (1, -1.0)}, {"retry": (1, 0, 5)}],
+)
+def test_options_without_meaning_are_told(options):
+    with pytest.raises((smachpy.InvalidStateError, TypeError)):
+        smachpy.State(["ok"], **options)
+
+
+def test_async_states_use_the_clock(clock):
+    class Drives(smachpy.State):
+        async def execute(self, userdata):
+            await asyncio.sleep(5.0)
+            return "ok"
+
+    assert run(Drives(["ok"]))[0] == "ok"
+    assert clock.now() == 5.0
+
+
+def test_async_states_raise_as_others_do(clock):
+    class Drives(smachpy.State):
+        async def execute(self, userdata):
+            raise ValueError("motor")
+
+    with pytest.raises(smachpy.InvalidUserCodeError, match="motor"):
+        run(Drives(["ok"]))
+
+
+def test_async_states_with_timeout(clock):
+    class Drives(smachpy.State):
+        async def execute(self, userdata):
+            await asyncio.sleep(500.0)
+            return "ok"
+
+    assert run(Drives(["ok"], timeout=2.0))[0] == "aborted"
+    assert clock.now() == 2.0
+
+
+def test_functions_become_states(clock):
+    @smachpy.state(outcomes=["charged", "preempted"], io_keys=["level"])
+    def charge(userdata):
+        """Charge the battery."""
+        state = smachpy.current_state()
+        if state.sleep(1.0):
+            return "preempted"
+        userdata.level += 1
+        return "charged"
+
+    sm = smachpy.StateMachine(["charged", "preempted"])
+    sm.userdata.level = 0
+    sm.add("CHARGE", charge)
+    assert sm.execute() == "charged"
+    assert sm.userdata.level == 1
+    assert charge.__doc__ == "Charge the battery."
+    clock.call_later(0.5, sm.request_preempt)
+    assert sm.execute() == "preempted"
+
+
+def test_async_functions_become_states(clock):
+    @smachpy.state(outcomes=["ok"], timeout=1.0)
+    async def drive(userdata):
+        await asyncio.sleep(5.0)
+        return "ok"
+
+    assert run(drive)[0] == "aborted"
+
+
+def test_cb_interface_on_callbacks():
+    @smachpy.cb_interface(outcomes=["ok"], input_keys=["x"], output_keys=["y"])
+    def double(ud, factor, *, plus):
+        ud.y = ud.x * factor + plus
+        return "ok"
+
+    state = smachpy.CBState(double, [2], {"plus": 1}, outcomes=["other"])
+    assert state.get_registered_outcomes() == ("other", "ok")
+    sm = smachpy.StateMachine(["ok", "other"])
+    sm.userdata.x = 4
+    sm.add("A", state)
+    sm.execute()
+    assert sm.userdata.y == 9

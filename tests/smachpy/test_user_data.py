@@ -1,0 +1,413 @@
+"""Userdata: windows, read-only values, typed fields, who wrote what."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import pickle
+from collections import Counter, OrderedDict, defaultdict, deque, namedtuple
+from typing import Literal, TypedDict
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import smachpy
+from smachpy.events import UserdataWritten
+from smachpy.user_data import get_const
+
+
+@dataclasses.dataclass
+class Pose:
+    x: float = 0.0
+    tags: list = dataclasses.field(default_factory=list)
+
+    def moved(self, dx):
+        return Pose(self.x + dx, list(self.tags))
+
+    def move(self, dx):
+        self.x += dx
+
+
+class Slotted:
+    __slots__ = ("__private", "a", "b")
+
+    def __init__(self):
+        self.a = [1]
+        self.__private = 7
+
+    def private(self):
+        return self.__private
+
+
+class Plain:
+    def __init__(self):
+        self.values = {"k": [1, 2]}
+
+    def total(self):
+        return sum(self.values["k"])
+
+    def __len__(self):
+        return 3
+
+    def __getitem__(self, i):
+        return self.values["k"][i]
+
+
+def through_a_state(value, body, **keys):
+    """Let `body` have `value` as an input-only key of a state."""
+    sm = smachpy.StateMachine(["ok"])
+    sm.userdata.v = value
+
+    def run(ud):
+        body(ud.v)
+        return "ok"
+
+    sm.add("A", smachpy.CBState(run, outcomes=["ok"], input_keys=["v"], **keys))
+    return sm
+
+
+@pytest.mark.parametrize(
+    ("value", "change"),
+    [
+        ([1, 2], lambda v: v.append(3)),
+        ([3, 1], lambda v: v.sort()),
+        ([[1]], lambda v: v[0].append(2)),
+        ({"a": [1]}, lambda v: v["a"].append(2)),
+        ({"a": 1}, lambda v: v.update(b=2)),
+        ({1, 2}, lambda v: v.add(3)),
+        (bytearray(b"ab"), lambda v: v.extend(b"c")),
+        (deque([1]), lambda v: v.popleft()),
+        (OrderedDict(a=1), lambda v: v.pop("a")),
+        (defaultdict(list, a=[1]), lambda v: v["a"].append(2)),
+        (Counter("ab"), lambda v: v.update("c")),
+        (([1],), lambda v: v[0].append(2)),
+        (namedtuple("P", "a b")([1], 2), lambda v: v.a.append(2)),
+        (Pose(), lambda v: setattr(v, "x", 5.0)),
+        (Pose(), lambda v: v.move(1.0)),
+        (Pose(tags=["a"]), lambda v: v.tags.append("b")),
+        (Slotted(), lambda v: v.a.append(2)),
+        (Slotted(), lambda v: setattr(v, "a", 2)),
+        (Plain(), lambda v: v.values["k"].append(3)),
+        (Plain(), lambda v: delattr(v, "values")),
+    ],
+)
+def test_input_only_values_cannot_be_changed(value, change):
+    before = copy.deepcopy(value)
+    sm = through_a_state(value, change)
+    with pytest.raises(smachpy.ReadOnlyError, match="io_keys"):
+        sm.execute()
+    after = sm.userdata.v
+    assert after is value
+    if not isinstance(value, (Slotted, Plain)):
+        assert after == before
+
+
+def test_read_only_values_are_what_they_were():
+    def look(v):
+        assert isinstance(v, list)
+        assert len(v) == 3
+        assert v == [1, [2], Pose(1.0)]
+        assert [1, [2], Pose(1.0)] == v
+        assert list(v) == v
+        assert v[1:] == [[2], Pose(1.0)]
+        assert isinstance(v[2], Pose)
+        assert v[2].moved(1.0) == Pose(2.0)
+        assert v[2] == Pose(1.0)
+        assert dataclasses.asdict(v[2]) == {"x": 1.0, "tags": []}
+        assert dataclasses.replace(v[2], x=3.0) == Pose(3.0)
+        assert repr(v[2]) == repr(Pose(1.0))
+        assert sorted(v, key=str)
+
+    through_a_state([1, [2], Pose(1.0)], look).execute()
+
+
+def test_read_only_objects_have_their_methods_length_and_items():
+    def look(v):
+        assert isinstance(v, Plain)
+        assert (v.total(), len(v), v[1]) == (3, 3, 2)
+
+    through_a_state(Plain(), look).execute()
+
+    def look_slotted(v):
+        assert (v.a, v.private(), hasattr(v, "b")) == ([1], 7, False)
+
+    through_a_state(Slotted(), look_slotted).execute()
+
+
+def test_copies_of_read_only_values_can_be_changed():
+    def change(v):
+        for made in (copy.copy(v), copy.deepcopy(v), pickle.loads(pickle.dumps(v)), list(v)):
+            made.append(1)
+            assert type(made) is list
+        pose = copy.deepcopy(v[0])
+        pose.x = 9.0
+
+    value = [Pose()]
+    through_a_state(value, change).execute()
+    assert value == [Pose()]
+
+
+def test_handles_are_handed_out_as_they_are():
+    import threading
+
+    lock = threading.Lock()
+    seen = []
+    through_a_state(lock, seen.append).execute()
+    assert seen == [lock]
+    through_a_state(print, seen.append).execute()
+    assert seen[1] is print
+
+
+def test_arrays_are_read_only_views():
+    numpy = pytest.importorskip("numpy")
+    array = numpy.zeros(3)
+
+    def change(v):
+        assert isinstance(v, numpy.ndarray)
+        v[0] = 1.0
+
+    with pytest.raises(smachpy.InvalidUserCodeError, match="read-only"):
+        through_a_state(array, change).execute()
+    assert array[0] == 0.0
+
+
+def test_a_value_read_and_written_on_is_the_original_again():
+    original = [Pose()]
+
+    def hand_on(ud):
+        ud.out = ud.v
+        ud.pair = (ud.v[0], 1)
+        return "ok"
+
+    sm = smachpy.StateMachine(["ok"])
+    sm.userdata.v = original
+    sm.add(
+        "A",
+        smachpy.CBState(hand_on, outcomes=["ok"], input_keys=["v"], output_keys=["out", "pair"]),
+        {"ok": "B"},
+    )
+
+    def change(ud):
+        ud.out.append(1)
+        ud.pair[0].x = 5.0
+        return "ok"
+
+    sm.add("B", smachpy.CBState(change, outcomes=["ok"], io_keys=["out", "pair"]))
+    sm.execute()
+    assert sm.userdata.out is original
+    assert original[0].x == 5.0
+
+
+def test_io_keys_may_be_changed_in_place():
+    sm = smachpy.StateMachine(["ok"])
+    sm.userdata.v = [1]
+    change = smachpy.CBState(lambda ud: ud.v.append(2) or "ok", outcomes=["ok"], io_keys=["v"])
+    sm.add("A", change)
+    sm.execute()
+    assert sm.userdata.v == [1, 2]
+
+
+def test_what_a_container_gets_as_input_only_is_read_only_inside_it():
+    inner = smachpy.StateMachine(["ok"], input_keys=["v"])
+    inner.add("A", smachpy.CBState(lambda ud: ud.v.append(2), outcomes=["ok"], io_keys=["v"]))
+    sm = smachpy.StateMachine(["ok"])
+    sm.userdata.v = [1]
+    sm.add("INNER", inner)
+    with pytest.raises(smachpy.ReadOnlyError):
+        sm.execute()
+
+
+json_like = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.text()
+    | st.binary()
+    | st.floats(allow_nan=False),
+    lambda inner: (
+        st.lists(inner)
+        | st.dictionaries(st.text(), inner)
+        | st.tuples(inner, inner)
+        | st.frozensets(st.integers())
+        | st.sets(st.integers())
+    ),
+    max_leaves=20,
+)
+
+
+@given(json_like)
+def test_read_only_views_equal_their_originals(value):
+    view = get_const(value)
+    assert view == value
+    assert isinstance(view, type(value))
+    assert copy.deepcopy(view) == value
+    from smachpy._core.readonly import writable
+
+    assert writable(view) == value
+    assert get_const(view) == value
+
+
+# -- windows -----------------------------------------------------------------------------------
+
+
+def test_userdata_as_attributes_and_items():
+    ud = smachpy.UserData()
+    ud.x = 1
+    ud["y"] = 2
+    assert (ud["x"], ud.y, "x" in ud, "z" in ud, ud.keys()) == (1, 2, True, False, ["x", "y"])
+    del ud.x
+    del ud["y"]
+    assert ud.keys() == []
+    with pytest.raises(KeyError):
+        del ud.x
+    ud._private = 3
+    assert ud._private == 3
+    assert ud.keys() == []
+
+
+def test_update_extract_and_merge():
+    ud = smachpy.UserData()
+    ud.update({"a": 1, "b": [2]})
+    part = ud.extract(["a", "b", "none"], {"here": "a"})
+    assert (part.here, part.b) == (1, [2])
+    assert part.b is not ud.b
+    other = smachpy.UserData()
+    other.merge(ud, ["a", "b"], {"a": "there"})
+    assert (other.there, other.b) == (1, [2])
+    assert copy.copy(ud).a == 1
+
+
+def test_windows_into_windows():
+    ud = smachpy.UserData()
+    ud.x = 1
+    outer = smachpy.Remapper(ud, ["y"], ["y"], {"y": "x"})
+    inner = smachpy.Remapper(outer, ["z"], ["z"], {"z": "y"})
+    inner.z = inner.z + 1
+    assert ud.x == 2
+    inner.update({"z": 7})
+    assert inner["z"] == 7
+    with pytest.raises(smachpy.UserDataKeyError):
+        inner.y
+    with pytest.raises(smachpy.UserDataKeyError):
+        inner.y = 1
+
+
+def test_declared_but_missing_key_says_its_name_in_the_container():
+    sm = smachpy.StateMachine(["ok"], name="P")
+    sm.userdata.goals = 1
+    read = smachpy.CBState(lambda ud: ud.goal, outcomes=["ok"], input_keys=["goal"])
+    sm.add("A", read, remapping={"goal": "gaols"})
+    with pytest.raises(smachpy.UserDataKeyError, match=r"/P/A.*'gaols' \(remapped from 'goal'\)"):
+        sm.execute()
+
+
+def test_constants_are_the_states_own():
+    seen = []
+    sm = smachpy.StateMachine(["ok"])
+    for label, value in (("A", 1), ("B", 2)):
+        read = smachpy.CBState(lambda ud: seen.append(ud.speed) or "ok", outcomes=["ok"])
+        sm.add(label, read, {"ok": "B"} if label == "A" else None, constants={"speed": value})
+    sm.execute()
+    sm.reset_userdata()
+    sm.execute()
+    assert seen == [1, 2, 1, 2]
+
+
+def test_writes_are_events_with_path_key_and_value():
+    def write(ud):
+        ud.out = 5
+        ud["out"] = 6
+        return "ok"
+
+    sm = smachpy.StateMachine(["ok"], name="P")
+    state = smachpy.CBState(write, outcomes=["ok"], output_keys=["out"])
+    sm.add("A", state, remapping={"out": "result"})
+    events = []
+    sm.subscribe(events.append)
+    sm.execute()
+    written = [e for e in events if isinstance(e, UserdataWritten)]
+    assert [(e.path, e.key, e.value) for e in written] == [
+        ("/P/A", "result", 5),
+        ("/P/A", "result", 6),
+    ]
+
+
+# -- typed userdata ----------------------------------------------------------------------------
+
+
+@dataclasses.dataclass
+class Mission:
+    battery: float = 1.0
+    goals: list[str] = dataclasses.field(default_factory=list)
+    mode: Literal["slow", "fast"] = "slow"
+    note: str | None = None
+    required: int = dataclasses.field(default=0)
+
+
+class MissionDict(TypedDict, total=False):
+    battery: float
+    goals: list[str]
+
+
+def test_typed_userdata_has_the_defaults_and_goes_back_to_them():
+    sm = smachpy.StateMachine(["ok"], userdata_type=Mission)
+    assert (sm.userdata.battery, sm.userdata.goals, sm.userdata.note) == (1.0, [], None)
+    sm.userdata.battery = 0.5
+    sm.userdata.goals.append("dock")
+    sm.reset_userdata()
+    assert (sm.userdata.battery, sm.userdata.goals) == (1.0, [])
+
+
+@pytest.mark.parametrize(
+    ("key", "good", "bad"),
+    [
+        ("battery", 1, "full"),
+        ("goals", ["a"], ("a",)),
+        ("mode", "fast", "warp"),
+        ("note", None, 3),
+        ("note", "x", b"x"),
+    ],
+)
+def test_typed_userdata_checks_what_is_written(key, good, bad):
+    sm = smachpy.StateMachine(["ok"], userdata_type=Mission)
+    sm.userdata[key] = good
+    with pytest.raises(smachpy.UserDataTypeError) as caught:
+        sm.userdata[key] = bad
+    assert (caught.value.key, caught.value.value) == (key, bad)
+
+
+def test_typed_userdata_knows_its_keys():
+    for kind in (Mission, MissionDict):
+        sm = smachpy.StateMachine(["ok"], userdata_type=kind)
+        with pytest.raises(smachpy.UserDataKeyError, match="Did you mean 'battery'"):
+            sm.userdata.batery = 1.0
+
+
+def test_typed_userdata_is_checked_with_the_machine():
+    sm = smachpy.StateMachine(["ok"], userdata_type=Mission)
+    read = smachpy.CBState(lambda ud: "ok", outcomes=["ok"], input_keys=["batery"])
+    with pytest.raises(smachpy.InconsistentMachineError, match="no field of Mission.*'battery'"):
+        with sm:
+            smachpy.StateMachine.add("A", read, constants={"speed": 1})
+
+
+def test_states_write_typed_userdata():
+    sm = smachpy.StateMachine(["ok"], userdata_type=Mission)
+
+    def write(ud):
+        ud.battery = "low"
+        return "ok"
+
+    sm.add("A", smachpy.CBState(write, outcomes=["ok"], output_keys=["battery"]))
+    with pytest.raises(smachpy.UserDataTypeError, match="'low'"):
+        sm.execute()
+
+
+def test_userdata_type_without_fields_is_told():
+    class Nothing:
+        pass
+
+    for kind in (Nothing, int):
+        with pytest.raises(smachpy.InvalidStateError, match="userdata_type"):
+            smachpy.StateMachine(["ok"], userdata_type=kind)
