@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from actionlib_core.clock import Event
     from actionlib_core.exceptions import TypeMismatchError
     from actionlib_core.node import Node
-    from actionlib_core.transport import Presence
+    from actionlib_core.transport import Closable, Presence
 
 logger = logging.getLogger("actionlib_core")
 
@@ -49,8 +49,14 @@ class NameWatch:
         self._waiters: list[Event] = []
         self._closed = False
         kind = next(iter(self._kinds)) if len(self._kinds) == 1 else None
+        self._watch: Closable | None = None
         self._forget = node.on_close(self.close)
-        self._watch = node.transport.watch_alive(token_pattern(kind, own.name), self._on_presence)
+        try:
+            pattern = token_pattern(kind, own.name)
+            self._watch = node.transport.watch_alive(pattern, self._on_presence)
+        except BaseException:
+            self._forget()
+            raise
 
     def ends(self, kind: Kind | None = None, *, any_type: bool = False) -> list[Endpoint]:
         """Return the ends there are now: of `kind` or all, of our type or any."""
@@ -115,7 +121,8 @@ class NameWatch:
         """Stop following; those who wait are woken."""
         self._closed = True
         self._forget()
-        self._watch.close()
+        if self._watch is not None:
+            self._watch.close()
         self._wake()
 
     def _wake(self) -> None:

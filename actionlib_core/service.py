@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core._callbacks import CallbackQueue
 from actionlib_core._name_watch import NameWatch
-from actionlib_core.clock._serial import report_thread_exception
 from actionlib_core.exceptions import (
     ActionlibError,
     NodeError,
@@ -114,8 +113,7 @@ class Service(_ServiceEnd):
         NodeError: the node is closed.
 
     Threads: each call of the handler has a thread of the node's clock, so calls may overlap, block,
-        and call services themselves. An exception goes to the caller, and to
-        `threading.excepthook`.
+        and call services themselves. An exception goes to the caller, and to the log.
     """
 
     def __init__(
@@ -130,8 +128,12 @@ class Service(_ServiceEnd):
         self.handler = handler
         self._calls = CallbackQueue(self.node, f"service /{self.resolved_name}")
         transport = self.node.transport
-        self._parts.append(transport.queryable(self.resolved_name, self._on_query))
-        self._parts.append(transport.declare_alive(token_key(self._own)))
+        try:
+            self._parts.append(transport.queryable(self.resolved_name, self._on_query))
+            self._parts.append(transport.declare_alive(token_key(self._own)))
+        except BaseException:
+            self.close()
+            raise
 
     def shutdown(self, reason: str = "") -> None:
         """Stop answering; as `close`.
@@ -162,9 +164,9 @@ class Service(_ServiceEnd):
         try:
             response = self._respond(self.handler(self.request_class.from_bytes(query.payload)))
             query.reply(response.to_bytes(), encoding_of(self.service_class))
-        except Exception as error:  # noqa: BLE001  a border: told to the caller, and reported here
+        except Exception as error:
+            logger.exception("service /%s: the handler raised", self.resolved_name)
             _fail(query, error)
-            report_thread_exception()
         finally:
             query.finish()
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from actionlib_core.interfaces import Message
     from actionlib_core.node import Node
     from actionlib_core.time import Duration
-    from actionlib_core.transport import Closable, Sample
+    from actionlib_core.transport import Closable, PublisherPort, Sample
 
 M = TypeVar("M", bound="Message")
 
@@ -94,8 +94,14 @@ class _TopicEnd:
         for part in reversed(self._parts):
             part.close()
 
-    def _announce(self) -> None:
-        self._parts.append(self.node.transport.declare_alive(token_key(self._own)))
+    def _join(self, declare: Callable[[], Closable]) -> None:
+        """Declare our end and show its token; all of it, or nothing and the error."""
+        try:
+            self._parts.append(declare())
+            self._parts.append(self.node.transport.declare_alive(token_key(self._own)))
+        except BaseException:
+            self.unregister()
+            raise
 
     def __enter__(self) -> Self:
         return self
@@ -145,11 +151,14 @@ class Publisher(_TopicEnd):
         super().__init__(name, data_class, node)
         self.queue_size = queue_size
         self.latch = latch
-        self._port = self.node.transport.publisher(
-            self.resolved_name, encoding_of(data_class), Quality(express=True, latch=latch)
-        )
-        self._parts.append(self._port)
-        self._announce()
+        self._port: PublisherPort
+        self._join(self._declare)
+
+    def _declare(self) -> PublisherPort:
+        quality = Quality(express=True, latch=self.latch)
+        encoding = encoding_of(self.data_class)
+        self._port = self.node.transport.publisher(self.resolved_name, encoding, quality)
+        return self._port
 
     def publish(self, *args: Any, **kwargs: Any) -> None:
         """Send a message, or one made from the arguments: `publish("hello")`, `publish(data=1)`.
@@ -217,8 +226,7 @@ class Subscriber(_TopicEnd, Generic[M]):
         self._waiting: deque[Sample] = deque()
         self._dropped = 0
         self._calls = CallbackQueue(self.node, f"topic {self.name}")
-        self._parts.append(self.node.transport.subscribe(self.resolved_name, self._on_sample))
-        self._announce()
+        self._join(lambda: self.node.transport.subscribe(self.resolved_name, self._on_sample))
 
     @property
     def dropped(self) -> int:
@@ -280,24 +288,23 @@ def wait_for_message(
 
     Blocks: see `timeout`.
     """
-    found: list[M] = []
-
-    def keep(message: M) -> None:
-        found.append(message)
-        subscriber.wake()
-
-    subscriber = _OneMessage(topic, topic_type, keep, node=node)
-    with subscriber:
-        return subscriber.take(found, to_seconds(timeout))
+    with _OneMessage(topic, topic_type, node) as subscriber:
+        return subscriber.take(to_seconds(timeout))
 
 
 class _OneMessage(Subscriber[M]):
     """A subscriber that is waited for."""
 
-    def wake(self) -> None:
+    def __init__(self, topic: str, topic_type: type[M], node: Node | None) -> None:
+        self._found: list[M] = []
+        super().__init__(topic, topic_type, self._keep, node=node)
+
+    def _keep(self, message: M) -> None:
+        self._found.append(message)
         self._ends.wake()
 
-    def take(self, found: list[M], timeout: float | None) -> M:
+    def take(self, timeout: float | None) -> M:
+        found = self._found
         self._ends.wait(lambda: bool(found) or self._mismatch() is not None, timeout)
         if found:
             return found[0]

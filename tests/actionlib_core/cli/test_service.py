@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 import sys
-import threading
 
 import pytest
 
@@ -86,9 +85,7 @@ def test_bad_input_is_told_with_exit_code_2(cli, grip, capsys):
         assert text in capsys.readouterr().err
 
 
-def test_handlers_error_is_shown(cli, nodes, capsys, monkeypatch):
-    monkeypatch.setattr(threading, "excepthook", lambda _: None)
-
+def test_handlers_error_is_shown(cli, nodes, capsys):
     def handler(request):
         raise ValueError("the gripper is open")
 
