@@ -1,0 +1,263 @@
+"""The action commands, typed into one process on a network in memory."""
+
+from __future__ import annotations
+
+import io
+import json
+import threading
+
+import pytest
+
+from actionlib_core import Abort, Preempted, Reject, server
+from actionlib_core.action_server import ActionServer
+from actionlib_core.cli import main
+from actionlib_core.clock import RealClock
+from actionlib_core.interfaces.actionlib import msg
+from actionlib_core.node import Node
+from actionlib_core.transport.memory import MemoryNetwork
+
+
+@server("robot/count", msg.TestAction)
+def count(goal, ctx):
+    if goal.goal < 0:
+        raise Reject("only forward")
+    if goal.goal == 7:
+        raise Abort("seven")
+    for number in range(goal.goal):
+        ctx.feedback(msg.TestFeedback(number))
+        if goal.goal > 100 and ctx.sleep(10.0):
+            raise Preempted("stopped")
+    return msg.TestResult(2 * goal.goal)
+
+
+class Shell:
+    """Runs commands and tells what they printed."""
+
+    def __init__(self, network, clock, capsys):
+        self.clock = clock
+        self.node = Node("shell", transport=network.session(), clock=clock)
+        self._capsys = capsys
+
+    def __call__(self, *argv, code=0):
+        self._capsys.readouterr()
+        assert main(argv, node=self.node) == code
+        out, err = self._capsys.readouterr()
+        return out if not code else out + err
+
+    def json(self, *argv, code=0):
+        return json.loads(self(*argv, "--json", code=code))
+
+
+@pytest.fixture
+def network(clock):
+    return MemoryNetwork(clock)
+
+
+@pytest.fixture
+def shell(network, clock, capsys):
+    return Shell(network, clock, capsys)
+
+
+@pytest.fixture
+def counting(network, clock):
+    node = Node("counter", transport=network.session(), clock=clock)
+    with count.start(node=node):
+        yield node
+    node.close()
+
+
+def test_list(shell, counting):
+    assert shell("list") == "/robot/count\n"
+    assert shell("list", "-t") == "/robot/count [actionlib/action/Test]\n"
+    assert shell("list", "-c") == "1\n"
+    assert shell.json("list") == [{"name": "/robot/count", "types": ["actionlib/action/Test"]}]
+
+
+def test_list_of_nothing(shell):
+    assert shell("list") == ""
+
+
+def test_info(shell, counting):
+    assert shell("info", "/robot/count", "-t") == (
+        "Action: /robot/count\nAction clients: 0\nAction servers: 1\n"
+        "    /counter [actionlib/action/Test]\n"
+    )
+    assert shell("info", "robot/count", "-c").endswith("Action servers: 1\n")
+    assert shell.json("info", "robot/count")["servers"][0]["node"] == "/counter"
+
+
+def test_type_and_find(shell, counting):
+    assert shell("type", "robot/count") == "actionlib/action/Test\n"
+    for name in ("actionlib/Test", "actionlib/action/Test", "actionlib/TestAction"):
+        assert shell("find", name) == "/robot/count\n"
+    assert shell("find", "actionlib/TestRequest", "-c") == "0\n"
+
+
+def test_send_goal_with_feedback(shell, counting):
+    out = shell("send_goal", "robot/count", "{goal: 2}", "-f")
+    goal_id = out.partition("ID: ")[2].partition("\n")[0]
+    assert goal_id.startswith("/shell-")
+    assert out == (
+        "Waiting for an action server to become available...\n"
+        "Sending goal:\n    goal: 2\n\n"
+        f"Goal accepted with ID: {goal_id}\n\n"
+        "Feedback:\n    feedback: 0\n\n"
+        "Feedback:\n    feedback: 1\n\n"
+        "Result:\n    result: 4\n\n"
+        "Goal finished with status: SUCCEEDED\n"
+    )
+
+
+def test_send_goal_ends_that_are_no_success(shell, counting):
+    out = shell("send_goal", "robot/count", "actionlib/Test", "{goal: -1}", code=1)
+    assert out.endswith("Goal was rejected. only forward\n")
+    out = shell("send_goal", "robot/count", "{goal: 7}", code=1)
+    assert out.endswith("Goal finished with status: ABORTED (seven)\n")
+
+
+def test_send_goal_json_and_stdin(shell, counting, monkeypatch):
+    monkeypatch.setattr("sys.stdin", io.StringIO("goal: 1\n"))
+    lines = shell("send_goal", "robot/count", "--stdin", "-f", "--json").splitlines()
+    events = [json.loads(line) for line in lines]
+    assert [event["event"] for event in events] == ["accepted", "feedback", "result"]
+    assert events[-1]["status"] == "SUCCEEDED"
+    assert events[-1]["result"] == {"result": 2}
+
+
+def test_send_goal_timeouts(shell, counting):
+    out = shell("send_goal", "robot/count", "{goal: 1000}", "--timeout", "3", code=1)
+    assert "Canceling goal...\nGoal canceled.\n" in out
+    assert "Goal finished with status: PREEMPTED (stopped)" in out
+    assert "not over within 3 s" in out
+    out = shell("send_goal", "nobody", "{}", "--timeout", "3", code=2)
+    assert "action '/nobody': got no server within 3 s" in out
+
+
+@pytest.mark.parametrize(
+    ("argv", "text"),
+    [
+        (["send_goal", "robot/count", "{gaol: 1}"], "Did you mean 'goal'"),
+        (["send_goal", "robot/count", "{goal: 1", "}"], "got 2 goals"),
+        (["send_goal", "robot/count", "actionlib/Tset", "{}"], "actionlib/Tset"),
+        (["send_goal", "robot//count", "{}"], "'//' is not allowed"),
+        (["cancel", "robot/count"], "got no ID, --all or --before"),
+        (["cancel", "robot/count", "x", "--all"], "--all beside ID"),
+        (["cancel", "robot/count", "--before", "noon"], "expected seconds since the epoch"),
+        (["info", "nobody"], "Try 'actionlib list'"),
+        (["goal", "list", "nobody"], "got no server"),
+    ],
+)
+def test_mistakes_fit_on_a_screen(shell, counting, argv, text):
+    out = shell(*argv, code=2)
+    assert text in out
+    assert "Traceback" not in out
+    assert "Traceback" in shell("--debug", *argv, code=2)
+
+
+def test_unknown_command_exits_with_2(shell, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(["lsit"], node=shell.node)
+    assert caught.value.code == 2
+    assert "--help" in capsys.readouterr().err
+
+
+def test_goals_are_listed_shown_and_cancelled(shell, network, clock):
+    from actionlib_core.action_client import ActionClient
+
+    node = Node("keeper", transport=network.session(), clock=clock)
+    ActionServer(
+        "keep",
+        msg.TestAction,
+        lambda handle: handle.set_accepted("yours"),
+        lambda handle: handle.set_canceled(msg.TestResult(5), "as you wish"),
+        node=node,
+    )
+    client = ActionClient("keep", msg.TestAction, node=node)
+    assert client.wait_for_server(1.0)
+    first = client.send_goal(msg.TestGoal(1))
+    clock.sleep(1.0)
+    second = client.send_goal(msg.TestGoal(2))
+    clock.sleep(1.0)
+    ids = [goal["id"] for goal in shell.json("goal", "list", "keep")]
+    assert ids == [first.get_goal_id(), second.get_goal_id()]
+    assert shell("goal", "list", "keep", "-c") == "2\n"
+    assert f"{ids[0]} ACTIVE 1000000000.000 yours\n" in shell("goal", "list", "keep")
+    assert "Status: ACTIVE" in shell("goal", "info", "keep", ids[0])
+    assert shell("cancel", "keep", "--before", "1000000000.5") == (
+        f"Cancel requested for goal {ids[0]}\n"
+    )
+    assert first.wait(1.0)
+    assert shell.json("cancel", "keep", "--all") == {"cancelled": [ids[1]]}
+    assert second.wait(1.0)
+    assert "remembers the cancel" in shell("cancel", "keep", "unknown-1")
+    clock.sleep(1.0)
+    shown = shell("goal", "info", "keep", ids[0], code=0)
+    assert "Status: PREEMPTED" in shown
+    assert "Status: LOST" in shell("goal", "info", "keep", "never-1-1.1", code=1)
+    node.close()
+
+
+def test_echo_prints_what_passes(shell, counting, clock, capsys):
+    def later():
+        clock.sleep(1.0)
+        main(["send_goal", "robot/count", "{goal: 1}", "--json"], node=shell.node)
+
+    clock.spawn(later, name="later")
+    out = shell("echo", "robot/count", "--timeout", "5", "--json")
+    topics = [json.loads(line).get("topic") for line in out.splitlines()]
+    assert [topic for topic in topics if topic] == ["goal", "feedback", "result"]
+
+
+def test_server_by_hand(capsys, monkeypatch):
+    from actionlib_core.cli import server as module
+    from actionlib_core.simple_action_client import SimpleActionClient
+
+    clock = RealClock()
+    network = MemoryNetwork(clock)
+    node = Node("hand", transport=network.session(), clock=clock)
+    came = threading.Event()
+
+    class Operator:
+        """Standard input: answers goals as they come."""
+
+        def __iter__(self):
+            assert came.wait(10)
+            yield "1 feedback {feedback: 3}\n"
+            yield "accept fine\n"
+            yield "nonsense\n"
+            yield "1 feedback {feedback: 3}\n"
+            yield "list\n"
+            yield "succeed {result: 8}\n"
+            yield "succeed\n"
+            done.wait(10)
+            yield "quit\n"
+
+    class Watched(module.Desk):
+        def on_goal(self, handle):
+            super().on_goal(handle)
+            came.set()
+
+    seen, done = [], threading.Event()
+    monkeypatch.setattr("sys.stdin", Operator())
+    monkeypatch.setattr(module, "Desk", Watched)
+    client = SimpleActionClient(
+        "byhand", msg.TestAction, node=Node("c", transport=network.session(), clock=clock)
+    )
+
+    def drive():
+        assert client.wait_for_server(10)
+        client.send_goal(msg.TestGoal(1), feedback_cb=lambda f: seen.append(f.feedback))
+        client.wait_for_result(10)
+        done.set()
+
+    thread = threading.Thread(target=drive)
+    thread.start()
+    assert main(["server", "byhand", "actionlib/Test"], node=node) == 0
+    thread.join(10)
+    out, err = capsys.readouterr()
+    assert client.get_state() == 3
+    assert client.get_result().result == 8
+    assert seen[-1] == 3
+    assert "Goal 1 (" in out
+    assert "1 ACTIVE" in out
+    assert "got 'nonsense'; expected one of" in err
