@@ -225,7 +225,8 @@ class ActionServerWrapper:
         outputs = container.get_registered_output_keys()
         self._fill_userdata(goal)
         for key in (self._feedback_key, self._result_key):
-            container.userdata[key] = self.userdata[key]
+            if key in outputs or _is_used(container, key):
+                container.userdata[key] = self.userdata[key]
         self._feedback_sent = self.userdata[self._feedback_key].to_bytes()
         return container.execute(Remapper(self.userdata, inputs, outputs))
 
@@ -307,3 +308,13 @@ class ActionServerWrapper:
             keys = {self._feedback_key, *self._feedback_slots_map.values()}
             if event.key in keys and self._executing:
                 self.publish_feedback(self.wrapped_container.userdata)
+
+
+def _is_used(container: Container, key: str) -> bool:
+    """Tell whether a child of `container` reads or writes `key`."""
+    for label, child in container.get_children().items():
+        names = container._remappings.get(label, {})  # noqa: SLF001  there is no other way to ask
+        keys = {*child.get_registered_input_keys(), *child.get_registered_output_keys()}
+        if key in {names.get(own, own) for own in keys}:
+            return True
+    return False

@@ -18,6 +18,7 @@ from smachpy import log
 from smachpy._runtime.messages import Incoming, Outgoing, UserCallback, raise_problems
 from smachpy._runtime.wakeup import Wakeup
 from smachpy.state import State
+from smachpy.util import is_shutdown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -159,6 +160,8 @@ class ServiceState(State):
         return self._finish(ud, call)
 
     def _finish(self, ud: Any, call: _Call) -> str:
+        if call.error is not None and (self._is_preempted() or is_shutdown()):
+            return "preempted"
         if isinstance(call.error, (ServiceException, WaitTimeoutError)):
             scope = self._scope()
             where = f"ServiceState {self._service_name!r}" if scope is None else scope.path

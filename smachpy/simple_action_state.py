@@ -198,10 +198,15 @@ class SimpleActionState(State):
             exchange = GoalExchange(client, wake, self._scope(), run)
             self._exchange = exchange
             wait_s = self._server_wait_s
-            exchange.send(goal, ack_timeout=None if wait_s is None else max(wait_s, SHORTEST_ACK_S))
-            exchange.follow(
-                self.preempt_requested, lambda feedback: self._on_feedback(ud, feedback)
-            )
+            wait_s = None if wait_s is None else max(wait_s, SHORTEST_ACK_S)
+            try:
+                exchange.send(goal, ack_timeout=wait_s)
+                exchange.follow(
+                    self.preempt_requested, lambda feedback: self._on_feedback(ud, feedback)
+                )
+            except BaseException:  # KeyboardInterrupt and the like: nobody waits for the goal now
+                exchange.cancel()
+                raise
         return self._finish(ud, exchange)
 
     def _is_preempted(self) -> bool:

@@ -72,17 +72,13 @@ class GoalExchange:
             TypeMismatchError: the server is of another type.
             TransportError: the node is closed.
         """
-        try:
-            machine = self._client.manager.send(
-                *self._client.pack(goal),
-                on_transition=self._note_transition,
-                on_feedback=self._note_feedback,
-                ack_timeout=ack_timeout,
-                created=self._note_created,
-            )
-        except BaseException:  # interrupted half-way: the goal may be out
-            self.cancel()
-            raise
+        machine = self._client.manager.send(
+            *self._client.pack(goal),
+            on_transition=self._note_transition,
+            on_feedback=self._note_feedback,
+            ack_timeout=ack_timeout,
+            created=self._note_created,
+        )
         self.goal_id = machine.goal.id
         self._emit(GoalSent, self.goal_id, goal)
 
@@ -98,32 +94,28 @@ class GoalExchange:
 
         Blocks: until then; a preempt or `exec_timeout` bounds it by `preempt_timeout`.
         """
-        failure: BaseException | None = None
-        try:
-            while True:
-                self._wake.clear()
-                over = self._over  # before the feedback: what was sent before the end is seen
-                try:
-                    self._deliver_feedback(None if failure else on_feedback)
-                except Exception as error:  # noqa: BLE001  raised again when the goal has ended
-                    failure = error
-                    self.run.on_failure()
-                if preempt_requested():
-                    self.run.on_preempt()
-                if over:
-                    self._note_end()
-                if self._act():
-                    break
-                self._wake.wait_until(self.run.deadline)
-        except BaseException:
-            self.cancel()  # KeyboardInterrupt and the like: nobody waits for the goal any more
-            raise
+        failure: Exception | None = None
+        while True:
+            self._wake.clear()
+            over = self._over  # before the feedback: what was sent before the end is seen
+            try:
+                self._deliver_feedback(None if failure else on_feedback)
+            except Exception as error:  # noqa: BLE001  raised again when the goal has ended
+                failure = error
+                self.run.on_failure()
+            if preempt_requested():
+                self.run.on_preempt()
+            if over:
+                self._note_end()
+            if self._act():
+                break
+            self._wake.wait_until(self.run.deadline)
         self._emit(GoalDone, self.goal_id, self.run.status, self.run.text, self.result)
         if failure is not None:
             raise failure
 
     def cancel(self) -> None:
-        """Ask the server to end the goal."""
+        """Ask the server to end the goal, if it was sent and has not ended."""
         machine = self._machine
         if machine is not None and not machine.goal.over:
             machine.manager.cancel(machine)

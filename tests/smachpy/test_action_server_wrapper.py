@@ -286,3 +286,15 @@ def test_wrong_arguments_are_all_named_at_once(world):
     assert "Did you mean 'done'?" in text
     assert "aborted_outcomes: got 'failed', which is in succeeded_outcomes too" in text
     assert "result_slots_map: got field 'reslt'" in text
+
+
+def test_keys_that_nobody_uses_are_not_made(world):
+    machine = StateMachine(["done"])
+    with machine:
+        machine.add("A", CBState(lambda ud: "done", outcomes=["done"]))
+    world.wrap(machine, aborted_outcomes=[], preempted_outcomes=[])
+    client = world.client()
+    world.send(client, 1)
+    assert client.wait_for_result(5.0)
+    assert client.get_state() == GoalStatus.SUCCEEDED
+    assert machine.userdata.keys() == []

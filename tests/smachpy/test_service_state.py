@@ -246,3 +246,15 @@ def test_it_describes_itself(world):
         "type": "std_srvs/SetBool",
         "timeout": "4 s -> aborted",
     }
+
+
+def test_a_program_that_ends_during_a_call_without_limit_preempts(world):
+    from actionlib_core.shutdown import Shutdown, use_shutdown
+
+    world.serve(100.0)
+    with use_shutdown(Shutdown()) as shutdown:
+        machine = world.machine(world.state(timeout=None))
+        world.clock.call_later(3.0, shutdown.request)
+        assert machine.execute() == "preempted"
+        assert world.clock.now() == 3.0
+    world.clock.sleep(200.0)
