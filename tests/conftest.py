@@ -16,8 +16,9 @@ from actionlib_core.clock import VirtualClock, use_clock
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-# Test runs on one machine do not find each other, and neither do their processes.
-os.environ.setdefault("SMACHPY_DOMAIN", str(1 + os.getpid() % 9999))
+# Test runs on one machine, and the workers of one run, do not find each other's processes.
+if "SMACHPY_DOMAIN" not in os.environ or "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ["SMACHPY_DOMAIN"] = str(1 + os.getpid() % 9999)
 
 # Threads that a clock keeps for a few seconds, without work.
 CACHED = {"idle", "clock-timers"}
