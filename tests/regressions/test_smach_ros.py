@@ -176,3 +176,59 @@ def test_smach_ros_started_a_thread_in_the_constructor():
     before = threading.active_count()
     SimpleActionState("do", Action)
     assert threading.active_count() == before
+
+
+@pytest.mark.parametrize("error", ["recalled", "lost"])
+def test_smach_ros_called_a_preempt_aborted_when_the_goal_was_recalled_or_lost(world, error):
+    def cancel(handle):
+        if error == "recalled":
+            handle.set_canceled(Result(7))
+        else:
+            world.robot.transport.kill()
+
+    server = ActionServer("do", Action, lambda h: None, cancel, False, node=world.robot)
+    server.start()
+    state = world.state()
+    world.clock.call_later(1.0, state.request_preempt)
+    assert state.execute(UserData()) == "preempted"
+    assert world.clock.now() == 1.0
+
+
+def test_smach_ros_waited_for_ever_after_exec_timeout(world):
+    ActionServer("do", Action, lambda h: h.set_accepted(), node=world.robot)
+    state = world.state(exec_timeout=2.0, preempt_timeout=3.0)
+    assert state.execute(UserData()) == "aborted"
+    assert world.clock.now() == 5.0
+
+
+def test_smach_ros_gave_none_as_the_result_of_a_lost_goal(world):
+    ActionServer("do", Action, lambda h: h.set_accepted(), node=world.robot)
+    world.clock.call_later(1.0, world.robot.transport.kill)
+    seen = []
+    state = world.state(result_cb=lambda ud, status, result: seen.append(result.result))
+    assert state.execute(UserData()) == "aborted"
+    assert seen == [0]
+
+
+def test_smach_ros_service_states_waited_for_ever(world):
+    from actionlib_core.interfaces.std_srvs.srv import Trigger
+    from smachpy import ServiceState
+
+    assert ServiceState("absent", Trigger, node=world.mission).execute(UserData()) == "aborted"
+    assert world.clock.now() == 60.0
+
+
+def test_smach_ros_wrapped_what_a_condition_raised_in_text_only(world):
+    from smachpy import ConditionState, InvalidUserCodeError
+
+    def broken(userdata):
+        raise LookupError("no map")
+
+    with pytest.raises(LookupError, match="no map"):
+        ConditionState(broken).execute(UserData())
+    machine = StateMachine(["true", "false", "preempted"])
+    with machine:
+        machine.add("LOOK", ConditionState(broken))
+    with pytest.raises(InvalidUserCodeError, match=r"/SM_ROOT/LOOK") as raised:
+        machine.execute()
+    assert isinstance(raised.value.__cause__, LookupError)
