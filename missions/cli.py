@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from missions.maps import OFFICE_MAP, OFFICE_ROBOT
+from missions.move_base.geometry import finite
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,7 +27,8 @@ def register_run(subparsers: Any) -> None:
         "run",
         help="run a mission",
         description="Run a mission to its end and show it in the terminal. Exit codes: 0 it "
-        "succeeded, 1 it ended otherwise, 2 bad input, 130 Ctrl-C (the mission was preempted).",
+        "succeeded, 1 it ended otherwise, 2 bad input; the mission was preempted: 130 by Ctrl-C, "
+        "143 by SIGTERM.",
     )
     parser.add_argument(
         "target", metavar="MISSION", help="a name of `smachpy list`, module:factory, or a .py file"
@@ -70,7 +72,11 @@ def register_run(subparsers: Any) -> None:
         "--config", type=Path, default=OFFICE_ROBOT, metavar="FILE", help="its parameters"
     )
     robot.add_argument(
-        "--pose", type=float, nargs=3, metavar=("X", "Y", "YAW"), help="where it starts [m, m, rad]"
+        "--pose",
+        type=finite,
+        nargs=3,
+        metavar=("X", "Y", "YAW"),
+        help="where it starts [m, m, rad]",
     )
     parser.set_defaults(run=_run)
 
@@ -105,6 +111,7 @@ def _run(args: argparse.Namespace) -> int:
         plain=args.plain,
         success=tuple(args.success),
         server_timeout=args.server_timeout,
+        debug=args.debug,
     )
     return run_mission(load_target(args.target), options)
 

@@ -4,26 +4,30 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import inspect
 import signal
+import sys
+import traceback
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final, get_args, get_type_hints
 
 import viz
 from actionlib_core import shutdown
+from actionlib_core.clock import current_clock
 from actionlib_core.node import get_node
 from actionlib_core.presence import Kind, parse_token, token_pattern
 from missions.exceptions import MissionError
 from missions.maps import OFFICE_MAP, OFFICE_ROBOT
 from missions.recorder import TrackRecorder
 from missions.robot_process import RobotProcess
-from smachpy import describe
+from smachpy import InvalidUserCodeError, describe
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
     from actionlib_core.node import Node
-    from actionlib_core.transport import Presence
+    from actionlib_core.transport import Closable, Presence
     from smachpy.container import Container
     from smachpy.introspection import StateRecord
     from smachpy.targets import Target
@@ -51,6 +55,7 @@ class RunOptions:
         success: Outcomes that count as success; empty takes 'succeeded', or all that do not sound
             like a failure.
         server_timeout: How long to wait for the action servers that the mission needs [s].
+        debug: Show the traceback of a mission that raises.
     """
 
     inputs: Mapping[str, object] = field(default_factory=dict)
@@ -61,7 +66,8 @@ class RunOptions:
     out: Path | None = None
     plain: bool = False
     success: tuple[str, ...] = ()
-    server_timeout: float = 5.0
+    server_timeout: float = 10.0
+    debug: bool = False
 
 
 def run_mission(target: Target, options: RunOptions) -> int:
@@ -81,7 +87,7 @@ def run_mission(target: Target, options: RunOptions) -> int:
     recorder = TrackRecorder()
     with contextlib.ExitStack() as stack:
         ending = stack.enter_context(shutdown.handle_signals())
-        waiter = _ServerWait(get_node(), needed)
+        waiter = _ServerWait(needed)
         stack.callback(waiter.close)
         stack.callback(ending.on_shutdown(waiter.wake))
         robot = None
@@ -90,13 +96,13 @@ def run_mission(target: Target, options: RunOptions) -> int:
             robot = RobotProcess((*arguments, *options.robot_arguments), on_exit=waiter.wake)
             stack.enter_context(robot)
         if options.out is not None:
-            _load_artists()
+            _prepare(options.out)
         if not waiter.wait(options.server_timeout, robot):
             return _signal_exit(ending)
         stack.callback(machine.subscribe(recorder.on_event))
         view = stack.enter_context(viz.TerminalView(record, plain=options.plain))
         stack.callback(machine.subscribe(view.on_event))
-        outcome = _execute(machine, view)
+        outcome = _execute(machine, view, debug=options.debug)
         if robot is not None:
             robot.let_go()
         if options.out is not None:
@@ -110,13 +116,13 @@ def build(target: Target, inputs: Mapping[str, object]) -> Container:
     """Make the machine: inputs become arguments of its function where it has such, else userdata.
 
     Raises:
-        MissionError: an input is neither.
+        MissionError: an input is neither, or of a wrong type.
     """
-    import inspect
-
     thing = target.thing
     parameters = inspect.signature(thing).parameters if inspect.isfunction(thing) else {}
-    machine = target.build(**{k: v for k, v in inputs.items() if k in parameters})
+    hints = get_type_hints(thing) if parameters else {}
+    arguments = {k: _fit(k, v, hints.get(k)) for k, v in inputs.items() if k in parameters}
+    machine = target.build(**arguments)
     known = {*parameters, *machine.get_registered_input_keys(), *machine.userdata.keys()}
     for key, value in inputs.items():
         if key not in known:
@@ -127,6 +133,19 @@ def build(target: Target, inputs: Mapping[str, object]) -> Container:
         if key not in parameters:
             machine.userdata[key] = value
     return machine
+
+
+def _fit(name: str, value: object, hint: Any) -> object:
+    """Return an input as a parameter of type `hint` takes it."""
+    kinds = tuple(kind for kind in get_args(hint) or (hint,) if isinstance(kind, type))
+    if not kinds or isinstance(value, kinds):
+        return value
+    if float in kinds and isinstance(value, int):
+        return float(value)
+    if str in kinds:
+        return str(value)
+    expected = " or ".join(kind.__name__ for kind in kinds)
+    raise MissionError(f"--input {name}: got {value!r}; expected {expected}.")
 
 
 def needed_servers(record: StateRecord) -> set[str]:
@@ -165,7 +184,6 @@ def write_pictures(
     out = options.out
     assert out is not None
     try:
-        out.mkdir(parents=True, exist_ok=True)
         viz.render(machine, out / f"{name}.svg", run=history)
         if recorder.has_goals:
             from missions.move_base.config import load_config
@@ -176,23 +194,40 @@ def write_pictures(
             picture = out / f"{name}_track.png"
             recorder.draw(picture, load_map(options.map), dock=dock, title=title)
     except OSError as error:
-        raise MissionError(
-            f"--out {out}: cannot write: {error.strerror or error}; expected a folder for pictures."
-        ) from error
+        raise _cannot_write(out, error) from error
 
 
-def _load_artists() -> None:
-    """Import what draws, while the robot's process starts: at the end somebody waits."""
+def _cannot_write(out: Path, error: OSError) -> MissionError:
+    why = error.strerror or str(error)
+    return MissionError(f"--out {out}: got {why!r}; expected a folder to write pictures to.")
+
+
+def _prepare(out: Path) -> None:
+    """Make the folder for pictures and import what draws, while the robot's process starts.
+
+    Raises:
+        MissionError: there can be no such folder.
+    """
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _cannot_write(out, error) from error
     importlib.import_module("viz.drawing")
     importlib.import_module("missions.move_base.track")
 
 
-def _execute(machine: Container, view: viz.TerminalView) -> str | None:
+def _execute(machine: Container, view: viz.TerminalView, *, debug: bool) -> str | None:
+    """Run it; None when its own code raised, which is said here."""
     outcome: str | None = None
     try:
         outcome = machine.execute()
-    finally:
-        view.print_summary(outcome)
+    except InvalidUserCodeError as error:
+        view.close()
+        if debug:
+            traceback.print_exception(error)
+        else:
+            sys.stderr.write(f"smachpy: {error}\n")
+    view.print_summary(outcome)
     return outcome
 
 
@@ -204,14 +239,19 @@ def _signal_exit(ending: shutdown.Shutdown) -> int:
 class _ServerWait:
     """Waits until every needed action has a server, or something makes waiting pointless."""
 
-    def __init__(self, node: Node, names: set[str]) -> None:
-        self._clock = node.clock
-        self._wake = node.clock.event()
+    def __init__(self, names: set[str]) -> None:
+        self._clock = current_clock()
+        self._wake = self._clock.event()
+        self._missing: dict[str, str] = {}
+        self._watches: list[Closable] = []
+        if names:
+            self._watch(get_node(), names)
+
+    def _watch(self, node: Node, names: set[str]) -> None:
         self._missing = {node.resolve(name, "action name"): name for name in names}
-        self._watches = [
-            node.transport.watch_alive(token_pattern(Kind.ACTION_SERVER, full), self._on_presence)
-            for full in list(self._missing)
-        ]
+        for full in list(self._missing):
+            pattern = token_pattern(Kind.ACTION_SERVER, full)
+            self._watches.append(node.transport.watch_alive(pattern, self._on_presence))
 
     def wake(self) -> None:
         """Look again whether to go on waiting; from any thread."""
@@ -236,7 +276,7 @@ class _ServerWait:
                 robot.check()
             left = deadline - self._clock.now()
             if left <= 0:
-                raise MissionError(_missing_text(sorted(self._missing.values()), timeout))
+                raise MissionError(_missing_text(list(self._missing.values()), timeout))
             self._wake.wait(left)
             self._wake.clear()
         return not shutdown.requested()
@@ -249,7 +289,7 @@ class _ServerWait:
 
 
 def _missing_text(names: list[str], timeout: float) -> str:
-    listed = ", ".join(repr(name) for name in names)
+    listed = ", ".join(repr(name) for name in sorted(names))
     what, be = ("action", "has") if len(names) == 1 else ("actions", "have")
     text = f"{what} {listed}: {be} no server after {timeout:g} s; expected one."
     if set(names) <= {"move_base", "charge"}:

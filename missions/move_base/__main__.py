@@ -15,7 +15,7 @@ from actionlib_core.exceptions import ActionlibError
 from missions.exceptions import MissionError, NavigationError
 from missions.maps import OFFICE_MAP, OFFICE_ROBOT
 from missions.move_base.config import SimConfig, load_config
-from missions.move_base.geometry import Pose2D, wrap_angle
+from missions.move_base.geometry import Pose2D, finite, wrap_angle
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -114,7 +114,11 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--map", type=Path, default=OFFICE_MAP, help="map_server YAML file")
     parser.add_argument("--config", type=Path, default=OFFICE_ROBOT, help="its parameters, YAML")
     parser.add_argument(
-        "--pose", type=float, nargs=3, metavar=("X", "Y", "YAW"), help="where it starts [m, m, rad]"
+        "--pose",
+        type=finite,
+        nargs=3,
+        metavar=("X", "Y", "YAW"),
+        help="where it starts [m, m, rad]",
     )
     parser.add_argument("--namespace", default="", help="in front of its names, robot_1 say")
     parser.add_argument("--parameters", action="store_true", help="list all parameters and end")

@@ -51,3 +51,15 @@ def yaw_of(x: float, y: float, z: float, w: float) -> float:
 def quaternion_of(yaw: float) -> tuple[float, float, float, float]:
     """Return the quaternion (x, y, z, w) of a heading [rad]."""
     return 0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)
+
+
+def finite(text: str) -> float:
+    """Read a number of the command line that is neither infinite nor none at all.
+
+    Raises:
+        ValueError: it is not.
+    """
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(text)
+    return value

@@ -25,6 +25,8 @@ Command = tuple[float, float]  # speed [m/s], turn rate [rad/s]
 STOP: Final[Command] = (0.0, 0.0)
 _LOOK_EVERY: Final = 4  # control steps between two looks around
 _CREEP_OUT: Final = 0.5  # [m] of a way that may lead out of somewhere too narrow
+_LATE_FACTOR: Final = 20.0  # a drive may take so many times its shortest time
+_LATE_SECONDS: Final = 60.0  # and this [s] besides
 _SEARCH_RATE: Final = 0.7  # share of the turn rate used to look around
 
 
@@ -68,8 +70,8 @@ def brake(robot: Robot) -> Generator[Command]:
 def _follow(robot: Robot, way: list[Point], goal: Pose2D) -> Generator[Command, None, bool]:
     """Follow a way; whether the goal was reached (else the way is blocked, or it bumped)."""
     follower = Follower(way, goal, robot.config.robot, robot.config.control)
-    count = 0
-    while True:
+    count, longest = 0, _longest(robot, follower.remaining)
+    while count < longest:
         command = follower.command(robot.body)
         if follower.stage is Stage.DONE:
             return True
@@ -81,6 +83,18 @@ def _follow(robot: Robot, way: list[Point], goal: Pose2D) -> Generator[Command, 
             costmap = robot.planner.costmap
             if not _is_clear(costmap, list(follower.rest())):
                 return False
+    raise NavigationError(f"no progress: {longest * _dt(robot):.0f} s were not enough for this way")
+
+
+def _longest(robot: Robot, distance: float) -> float:
+    """Return the control steps after which a drive over `distance` metres has gone wrong."""
+    limits = robot.config.robot
+    seconds = distance / limits.max_speed + 2.0 * math.pi / limits.max_turn_rate
+    return (_LATE_FACTOR * seconds + _LATE_SECONDS) / _dt(robot)
+
+
+def _dt(robot: Robot) -> float:
+    return 1.0 / robot.config.control.rate
 
 
 def _is_clear(costmap: Costmap, way: list[Point]) -> bool:

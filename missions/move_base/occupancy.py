@@ -133,7 +133,7 @@ def _read_image(
     except OSError as error:
         reason = f" ({error.strerror})" if error.strerror else f" ({error})"
         raise broken(f"'{path}'{reason}", "a readable PGM (P2, P5) or PNG file") from error
-    except ValueError as error:
+    except (ValueError, Image.DecompressionBombError) as error:
         raise broken(f"'{path}' ({error})", "a whole PGM (P2, P5) or PNG file") from error
     if pixels.shape[2] in {1, 3}:
         return pixels.mean(axis=2), None

@@ -171,6 +171,9 @@ def test_a_robot_that_is_killed_ends_the_mission(far):
         (["run", "patrol", "-i", "waypoints=nowhere.yaml"], "nowhere.yaml: got"),
         (["run", "patrol", "-i", "speed=3"], "no such input; expected one of"),
         (["run", "patrol", "-i", "speed"], "expected KEY=VALUE"),
+        (["run", "patrol", "-i", "rounds=many"], "expected int"),
+        (["run", "patrol", "--out", "/dev/null/x"], "expected a folder"),
+        (["run", "patrol", "--start-robot", "--pose", "nan", "0", "0"], "invalid finite value"),
         (["run", "patrol", "--server-timeout", "0.3"], "Try --start-robot"),
         (["run", "patrol", "--start-robot", "--map", "nowhere.yaml"], "nowhere.yaml: got"),
         (["run", "patrol", "--start-robot", "--pose", "0", "0", "0"], "Try --pose X Y YAW"),
@@ -182,6 +185,27 @@ def test_bad_input_is_one_screen_without_traceback(arguments, text, tmp_path):
     assert text in done.stderr
     assert "Traceback" not in done.stderr
     assert len(done.stderr.splitlines()) < 20
+
+
+def test_a_mission_that_raises_ends_with_1(tmp_path):
+    (tmp_path / "broken.py").write_text(
+        "import smachpy\n"
+        "@smachpy.state(outcomes=['done'])\n"
+        "def look(userdata):\n"
+        "    return 1 / 0\n"
+        "def mission():\n"
+        "    sm = smachpy.StateMachine(outcomes=['done'])\n"
+        "    with sm:\n"
+        "        smachpy.StateMachine.add('LOOK', look)\n"
+        "    return sm\n"
+    )
+    done = run("run", "broken.py", "--plain", cwd=tmp_path)
+    assert done.returncode == 1
+    assert "division by zero" in done.stderr
+    assert "Traceback" not in done.stderr
+    done = run("run", "broken.py", "--plain", "--debug", cwd=tmp_path)
+    assert done.returncode == 1
+    assert "Traceback" in done.stderr
 
 
 def test_two_robots_of_one_name(files):

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 import smachpy
@@ -50,6 +52,35 @@ def test_an_unknown_input_names_the_known_ones():
         MissionError, match=r"--input sped: .* expected one of \['places', 'speed'\]"
     ):
         build(target(lambda speed=1: machine(places=[])), {"sped": 1})
+
+
+@pytest.mark.parametrize(
+    ("value", "fitted"), [(3, 3.0), (2.5, 2.5), ("fast", None), ([1], None), (None, None)]
+)
+def test_inputs_must_fit_the_parameters(value, fitted):
+    seen = []
+
+    def factory(speed: float = 1.0):
+        seen.append(speed)
+        return machine()
+
+    if fitted is None:
+        with pytest.raises(MissionError, match=r"--input speed: got .*; expected float"):
+            build(target(factory), {"speed": value})
+    else:
+        build(target(factory), {"speed": value})
+        assert seen == [fitted]
+
+
+def test_a_text_parameter_takes_what_looks_like_a_number():
+    seen = []
+
+    def factory(path: str | Path = "x"):
+        seen.append(path)
+        return machine()
+
+    build(target(factory), {"path": 3})
+    assert seen == ["3"]
 
 
 @pytest.mark.parametrize(
