@@ -37,37 +37,35 @@ inside = Inside()
 
 
 class Gate:
-    """Lets callbacks run until it is shut, and knows when the last one has returned."""
+    """Lets callbacks run until it is shut, and knows when the last one has returned.
+
+    Who enters puts itself down before it looks whether the gate is shut, and who shuts it does so
+    before looking who is down; list operations are atomic, so no lock is needed.
+    """
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._running: dict[int, int] = {}
+        self._running: list[int] = []
         self._shut = False
-        self._idle = RealClock().event()
+        self._left = RealClock().event()
 
     def enter(self) -> bool:
         """Tell whether a callback may start; it then ends with `leave`."""
         me = threading.get_ident()
-        with self._lock:
-            if self._shut:
-                return False
-            self._running[me] = self._running.get(me, 0) + 1
-            return True
+        self._running.append(me)
+        if self._shut:
+            self.leave()
+            return False
+        return True
 
     def leave(self) -> None:
         """Note the end of a callback."""
-        me = threading.get_ident()
-        with self._lock:
-            left = self._running.pop(me) - 1
-            if left:
-                self._running[me] = left
+        self._running.remove(threading.get_ident())
         if self._shut:
-            self._idle.set()
+            self._left.set()
 
     def shut(self) -> None:
         """Let no callback start from now on."""
-        with self._lock:
-            self._shut = True
+        self._shut = True
 
     def wait_idle(self, timeout: float) -> None:
         """Wait until no callback runs, not counting one that this thread is in itself.
@@ -76,12 +74,12 @@ class Gate:
         """
         deadline = RealClock.now() + timeout
         me = threading.get_ident()
-        while RealClock.now() < deadline:
-            self._idle.clear()
-            with self._lock:
-                if not self._running.keys() - {me}:
-                    return
-            self._idle.wait(deadline - RealClock.now())
+        while True:
+            self._left.clear()
+            left = deadline - RealClock.now()
+            if left <= 0 or all(runner == me for runner in tuple(self._running)):
+                return
+            self._left.wait(left)
 
 
 class Inlet:

@@ -73,19 +73,18 @@ class Publisher(Declared):
         self._source = zenoh.SourceInfo(self._port.id, 0)
         self._keep(self._port)
 
-    def put(self, payload: bytes) -> None:
-        self._put(payload, None)
-
-    def _put(self, payload: bytes, attachment: bytes | None) -> None:
+    def put(self, payload: bytes, attachment: bytes | None = None) -> None:
         if self._inlet.closed:
             raise TransportError(
                 f"{self._key}: the publisher is closed. Try sending before the node is closed."
             )
+        inside.depth += 1  # as `with inside`, in half the time
         try:
-            with inside:
-                self._port.put(payload, source_info=self._source, attachment=attachment)
+            self._port.put(payload, source_info=self._source, attachment=attachment)
         except zenoh.ZError as error:
             raise TransportError(f"{self._key}: cannot send: {error}") from error
+        finally:
+            inside.depth -= 1
 
     def matching(self) -> bool:
         if self._inlet.closed:
@@ -116,12 +115,12 @@ class LatchedPublisher(Publisher):
         self._keep(session.declare_queryable(self._own_key, _direct(self._on_query)))
         self._keep(session.liveliness().declare_token(self._own_key))
 
-    def put(self, payload: bytes) -> None:
+    def put(self, payload: bytes, attachment: bytes | None = None) -> None:
         with self._lock:
             self._count += 1
             attachment = pack_numbers(self._number, self._count)
             self._last = payload, attachment
-        self._put(payload, attachment)
+        super().put(payload, attachment)
 
     def _on_query(self, query: zenoh.Query) -> None:
         # Inline is right here: it calls nothing foreign and takes no lock.
@@ -146,7 +145,9 @@ class Subscriber(Declared):
         super().__init__(transport)
         self._key = key
         self._callback = callback
-        self._filter = LatchFilter()
+        self._filter = LatchFilter() if history else None
+        self._encoding = zenoh.Encoding("")
+        self._encoding_text = ""
         self._latched: set[str] = set()
         session = transport.session
         self._keep(session.declare_subscriber(key, _direct(self._on_sample)))
@@ -160,12 +161,21 @@ class Subscriber(Declared):
         self._inlet.take(self._deliver, raw)
 
     def _deliver(self, raw: zenoh.Sample) -> None:
-        if raw.kind != zenoh.SampleKind.PUT:
+        payload = raw.payload.to_bytes()
+        if not payload and raw.kind != zenoh.SampleKind.PUT:
             return
-        sample = _convert_sample(raw)
-        numbers = raw.attachment
-        if numbers is None or self._filter.take_live(sample.source, numbers.to_bytes()):
+        encoding = raw.encoding
+        if encoding != self._encoding:  # comparing is cheaper than converting
+            self._encoding_text = _convert_encoding(encoding)
+            self._encoding = encoding
+        sample = Sample(self._key, payload, self._encoding_text, _source_of(raw))
+        if self._filter is None or self._is_news(self._filter, raw, sample.source):
             self._callback(sample)
+
+    @staticmethod
+    def _is_news(latched: LatchFilter, raw: zenoh.Sample, source: str) -> bool:
+        numbers = raw.attachment
+        return numbers is None or latched.take_live(source, numbers.to_bytes())
 
     def _on_token(self, token: zenoh.Sample) -> None:
         self._inlet.take(self._note_token, token)
@@ -198,7 +208,7 @@ class Subscriber(Declared):
     def _deliver_last(self, raw: zenoh.Sample) -> None:
         source = str(raw.key_expr).rsplit("/", 2)[1]
         numbers = b"" if raw.attachment is None else raw.attachment.to_bytes()
-        if self._filter.take_asked(source, numbers):
+        if self._filter is not None and self._filter.take_asked(source, numbers):
             encoding = _convert_encoding(raw.encoding)
             self._callback(Sample(self._key, raw.payload.to_bytes(), encoding, source))
 
@@ -337,14 +347,9 @@ def _convert_encoding(raw: zenoh.Encoding) -> str:
     return "" if text == _PLAIN else text
 
 
-def _convert_sample(raw: zenoh.Sample) -> Sample:
-    source = raw.source_info
-    return Sample(
-        str(raw.key_expr),
-        raw.payload.to_bytes(),
-        _convert_encoding(raw.encoding),
-        "" if source is None else str(source.source_id.zid),
-    )
+def _source_of(raw: zenoh.Sample) -> str:
+    info = raw.source_info
+    return "" if info is None else str(info.source_id.zid)
 
 
 def _convert_reply(raw: zenoh.Reply) -> Reply | None:
