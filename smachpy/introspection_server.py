@@ -30,6 +30,8 @@ from actionlib_core.interfaces.std_msgs.msg import Header
 from actionlib_core.node import get_node
 from actionlib_core.time import Time
 from actionlib_core.topic import Publisher, Subscriber
+from actionlib_core.transport import Quality
+from actionlib_core.wire import encoding_of
 from smachpy import log
 from smachpy._runtime.pace import Pace
 from smachpy.container import Container
@@ -44,6 +46,7 @@ if TYPE_CHECKING:
 
     from actionlib_core.node import Node
     from actionlib_core.time import Duration
+    from actionlib_core.transport import PublisherPort
     from smachpy.events import Event
     from smachpy.state import State
 
@@ -72,6 +75,61 @@ LONGEST_VALUE = 10_000
 """Userdata values with more elements are shown by their size."""
 
 
+class _Topic:
+    """A topic on which each container keeps a last message for those who come later.
+
+    Threads: each container's messages come from one thread at a time.
+    """
+
+    def __init__(self, name: str, message_class: Any, node: Node) -> None:
+        self.node = node
+        self._end = Publisher(name, message_class, node=node)  # shows that we are there
+        self._message_class = message_class
+        self._ports: dict[str, PublisherPort] = {}
+
+    def publish(self, path: str, fields: dict[str, Any]) -> None:
+        """Send a message of the container at `path`.
+
+        Raises:
+            TransportError: the node is closed.
+        """
+        port = self._ports.get(path)
+        if port is None:
+            port = self._ports[path] = self.node.transport.publisher(
+                self._end.resolved_name,
+                encoding_of(self._message_class),
+                Quality(express=True, latch=True),
+            )
+        stamp = Time(0, self.node.clock.time_ns())
+        port.put(self._message_class(header=Header(stamp=stamp), **fields).to_bytes())
+
+    def close(self) -> None:
+        """Leave the topic."""
+        for port in self._ports.values():
+            port.close()
+        self._end.unregister()
+
+
+class _Topics:
+    """What containers are shown on, and the thread that sends.
+
+    Attributes:
+        structure: Children and transitions.
+        status: What is active.
+        executor: Sends.
+    """
+
+    def __init__(self, server_name: str, node: Node) -> None:
+        self.structure = _Topic(server_name + STRUCTURE_TOPIC, SmachContainerStructure, node)
+        self.status = _Topic(server_name + STATUS_TOPIC, SmachContainerStatus, node)
+        self.executor = SerialExecutor(node.clock, f"introspection {server_name}")
+
+    def close(self) -> None:
+        """Leave the topics."""
+        self.structure.close()
+        self.status.close()
+
+
 class ContainerProxy:
     """Shows one container; `IntrospectionServer` makes one for each.
 
@@ -94,7 +152,6 @@ class ContainerProxy:
         update_rate: float | Duration = 2.0,
         *,
         node: Node | None = None,
-        executor: SerialExecutor | None = None,
     ) -> None:
         if not isinstance(container, Container):
             raise InvalidStateError(
@@ -105,9 +162,8 @@ class ContainerProxy:
         self._container = container
         self._path = path
         self._node = node
-        self._executor = executor
-        self._structure: Publisher | None = None
-        self._status: Publisher | None = None
+        self._own_topics: _Topics | None = None
+        self._topics: _Topics | None = None
         self._commands: Subscriber[Any] | None = None
         self._pace: Pace | None = None
         self._unsubscribe: Callable[[], None] | None = None
@@ -115,50 +171,44 @@ class ContainerProxy:
         self._info = "Initial state"
         self._sent: dict[str, Any] = {}
 
-    def start(self, *, obey: bool = True) -> None:
-        """Send structure and status, and from now on what changes; a second call does nothing.
-
-        Args:
-            obey: Take commands that choose the initial state.
-        """
-        if self._pace is not None:
+    def start(self) -> None:
+        """Show and obey, from now on; a second call does nothing."""
+        if self._topics is not None:
             return
         node = get_node() if self._node is None else self._node
-        if self._executor is None:
-            self._executor = SerialExecutor(node.clock, f"introspection {self._path}")
-        self._pace = Pace(node.clock, self._executor, self._update, STATUS_INTERVAL_S)
-        name = self._server_name
-        self._structure = Publisher(
-            name + STRUCTURE_TOPIC, SmachContainerStructure, latch=True, node=node
+        self._own_topics = _Topics(self._server_name, node)
+        self.show(self._own_topics)
+        self._commands = Subscriber(
+            self._server_name + INIT_TOPIC, SmachContainerInitialStatusCmd, self.obey, node=node
         )
-        self._status = Publisher(name + STATUS_TOPIC, SmachContainerStatus, latch=True, node=node)
+        self._forget = node.on_close(self.stop)  # the newest are closed first: before our topics
+
+    def show(self, topics: _Topics) -> None:
+        """Send structure and status on `topics`, and from now on what changes."""
+        self._topics = topics
+        clock = topics.status.node.clock
+        self._pace = Pace(clock, topics.executor, self._update, STATUS_INTERVAL_S)
         self._update()
         self._unsubscribe = self._container.subscribe(self._on_event)
-        if obey:
-            self._commands = Subscriber(
-                name + INIT_TOPIC, SmachContainerInitialStatusCmd, self.obey, node=node
-            )
-        self._forget = node.on_close(self.stop)  # the newest are closed first: before our topics
 
     def stop(self) -> None:
         """Send the last status and leave the topics; a second call does nothing."""
-        pace, self._pace = self._pace, None
-        if pace is None:
+        topics, pace = self._topics, self._pace
+        if topics is None or pace is None:
             return
         pace.close()
-        if self._forget is not None:
-            self._forget()
-        if self._unsubscribe is not None:
-            self._unsubscribe()
+        for end in (self._forget, self._unsubscribe):
+            if end is not None:
+                end()
         if self._commands is not None:
             self._commands.unregister()
-        if self._executor is not None:
-            self._executor.join(STOP_S)
+        topics.executor.join(STOP_S)
         self._update()
-        for publisher in (self._structure, self._status):
-            if publisher is not None:
-                publisher.unregister()
+        self._topics = self._pace = self._forget = self._unsubscribe = self._commands = None
         self._sent.clear()
+        if self._own_topics is not None:
+            self._own_topics.close()
+            self._own_topics = None
 
     def obey(self, command: Any) -> bool:
         """Carry out a SmachContainerInitialStatusCmd; whether it was for this container.
@@ -192,9 +242,9 @@ class ContainerProxy:
     def _update(self) -> None:
         """Send what has changed."""
         structure = self._describe_structure()
-        if structure != self._sent.get("structure"):
+        if self._topics is not None and structure != self._sent.get("structure"):
             self._sent["structure"] = structure
-            self._publish(self._structure, structure)
+            self._topics.structure.publish(self._path, structure)
         self._send_status(self._info, only_changes=True)
 
     def _send_status(self, info: str, *, only_changes: bool = False) -> None:
@@ -204,15 +254,10 @@ class ContainerProxy:
             if self._pace is not None:
                 self._pace.mark()
             return
-        if only_changes and status == self._sent.get("status"):
+        if self._topics is None or (only_changes and status == self._sent.get("status")):
             return
         self._sent["status"] = status
-        self._publish(self._status, status | {"info": info})
-
-    def _publish(self, publisher: Publisher | None, fields: dict[str, Any]) -> None:
-        if publisher is not None:
-            stamp = Time(0, publisher.node.clock.time_ns())
-            publisher.publish(header=Header(stamp=stamp), **fields)
+        self._topics.status.publish(self._path, status | {"info": info})
 
     def _describe_structure(self) -> dict[str, Any]:
         edges = list(self._container.get_internal_edges())
@@ -271,7 +316,7 @@ class IntrospectionServer:
         self._controlled = control
         self._control: ControlServer | None = None
         self._node = node
-        self._executor: SerialExecutor | None = None
+        self._topics: _Topics | None = None
         self._proxies: list[ContainerProxy] = []
         self._feed: Feed | None = None
         self._commands: Subscriber[Any] | None = None
@@ -287,10 +332,10 @@ class IntrospectionServer:
             return
         node = get_node() if self._node is None else self._node
         self._node = node
-        self._executor = SerialExecutor(node.clock, f"introspection {self._server_name}")
         self.construct(self._server_name, self._state, self._path)
+        self._topics = _Topics(self._server_name, node)
         for proxy in self._proxies:
-            proxy.start(obey=False)
+            proxy.show(self._topics)
         assert isinstance(self._state, Container)
         if self._controlled:
             self._control = ControlServer(self._server_name, self._state, self._path, node)
@@ -317,14 +362,14 @@ class IntrospectionServer:
         if self._feed is not None:
             self._feed.close()
         self.clear()
+        if self._topics is not None:
+            self._topics.close()
 
     def construct(self, server_name: str, state: State, path: str) -> None:
         """Make the proxies of a container and of all below it; `start` does it."""
         if not isinstance(state, Container):
             return
-        self._proxies.append(
-            ContainerProxy(server_name, state, path, node=self._node, executor=self._executor)
-        )
+        self._proxies.append(ContainerProxy(server_name, state, path, node=self._node))
         for label, child in state.get_children().items():
             self.construct(server_name, child, f"{path}/{label}")
 
