@@ -39,7 +39,7 @@ FONTS = Path(__file__).with_name("fonts")
 END = "// end of graph"
 """A comment line after every DOT text, by which a reader of a stream tells them apart."""
 
-_JSON_END = "\n}\n"
+_JSON_END = b"\n}\n"
 _REAL = RealClock()  # `dot` runs in real time, whatever clock the machine has
 
 T = TypeVar("T")
@@ -167,14 +167,14 @@ class _Layouts:
         if not texts:
             return []
         try:
-            output = self._exchange(_joined(texts), len(texts)).decode("utf-8")
+            output = self._exchange(_joined(texts), len(texts))
         except _CrashError:
             self._stop()
             self._start()
             half = len(texts) // 2
             return [*self.run(texts[:half]), *self.run(texts[half:])] if half else [None]
         decoder = json.JSONDecoder(strict=False)
-        return [decoder.decode(page + "}") for page in output.split(_JSON_END)[:-1]]
+        return [decoder.decode(f"{page.decode()}}}") for page in output.split(_JSON_END)[:-1]]
 
     def _start(self) -> None:
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115  closed by `_stop`
@@ -216,8 +216,9 @@ class _Layouts:
                     raise _TooSlowError
                 for key, _ in ready:
                     if key.fileobj is self._out:
+                        seen = max(len(output) - len(_JSON_END) + 1, 0)
                         output += self._read()
-                        found = output.count(_JSON_END.encode())
+                        found += output.count(_JSON_END, seen)
                     else:
                         data = self._write(data)
                         if not data:

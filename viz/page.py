@@ -38,6 +38,13 @@ CORNER = 6
 """Radius of its corners [points]."""
 
 
+# What a layout depends on; leaving the looks out halves the time it takes to write and read.
+_SIZES = frozenset(
+    {"arrowsize", "fixedsize", "fontname", "fontsize", "height", "label", "margin", "peripheries"}
+    | {"shape", "weight", "width"}
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Try:
     """A way to lay a container out; of several the one with the shortest arrows is kept.
@@ -91,19 +98,19 @@ def page_text(box: Box, how: Try, theme: Theme, pages: Mapping[int, Page]) -> st
     """Return a container as DOT text; `pages` has the containers inside, by `id`."""
     dot = graphviz.Digraph(graph_attr={**style.graph(theme), "label": box.attributes["label"]})
     dot.attr("graph", labelloc="t", pad="0", splines="line" if how.plain else "true")
-    dot.attr("node", **style.node_defaults(theme))
-    dot.attr("edge", **style.edge_defaults(theme))
+    dot.attr("node", **_sizes(style.node_defaults(theme)))
+    dot.attr("edge", **_sizes(style.edge_defaults(theme)))
     assert box.entry is not None
     dot.node(box.entry.name, label="", shape="point", width="0.03", height="0.03")
     for child in box.boxes:
         dot.node(child.name, **_block(child, pages.get(id(child)), loop_room(box, child)))
     for vertex in box.joins:
-        dot.node(vertex.name, **vertex.attributes)
+        dot.node(vertex.name, **_sizes(vertex.attributes))
     if box.pills:
         with dot.subgraph() as bottom:
             bottom.attr(rank="sink")
             for vertex in box.pills:
-                bottom.node(vertex.name, **vertex.attributes)
+                bottom.node(vertex.name, **_sizes(vertex.attributes))
     loops = {arrow.name for child in box.boxes for arrow in _loops(box, child)}
     for arrow in sorted(box.arrows, key=lambda arrow: how.back_first and not arrow.back):
         if arrow.name not in loops:
@@ -114,7 +121,7 @@ def page_text(box: Box, how: Try, theme: Theme, pages: Mapping[int, Page]) -> st
 def _block(child: Box, page: Page | None, room: tuple[int, int]) -> Mapping[str, str]:
     """The node that stands for a child: itself, or a table of the size of its page and loops."""
     if page is None:
-        return child.attributes
+        return _sizes(child.attributes)
     right, below = room
     width = page.width + right
     rows = [
@@ -126,7 +133,11 @@ def _block(child: Box, page: Page | None, room: tuple[int, int]) -> Mapping[str,
         rows.append(f'<td fixedsize="true" width="{width}" height="{below}"></td>')
     table = '<table border="0" cellborder="0" cellspacing="0" cellpadding="0">'
     body = "".join(f"<tr>{row}</tr>" for row in rows)
-    return {"label": f"<{table}{body}</table>>", "margin": "0", "shape": "plain", "style": ""}
+    return {"label": f"<{table}{body}</table>>", "margin": "0", "shape": "plain"}
+
+
+def _sizes(attributes: Mapping[str, str]) -> dict[str, str]:
+    return {name: value for name, value in attributes.items() if name in _SIZES}
 
 
 def _loops(box: Box, child: Box) -> list[Arrow]:
@@ -195,7 +206,7 @@ def _write_arrow(dot: graphviz.Digraph, box: Box, arrow: Arrow, how: Try) -> Non
     tail, head = _end(arrow.tail, box, f"s{towards}"), _end(arrow.head, box, how.side)
     if how.plain:
         tail, head = tail.partition(":")[0], head.partition(":")[0]
-    attributes = {**arrow.attributes, "id": arrow.name}
+    attributes = {**_sizes(arrow.attributes), "id": arrow.name}
     if arrow.back:
         dot.edge(head, tail, dir="back", **attributes)
     else:
