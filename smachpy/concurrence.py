@@ -39,19 +39,17 @@ __all__ = ["Concurrence", "Rule", "all_of", "any_of", "n_of"]
 class _Plan:
     """A concurrence, compiled."""
 
-    __slots__ = ("steps", "userdata")
+    __slots__ = ("epoch", "steps", "userdata")
 
     def __init__(self, concurrence: Concurrence) -> None:
+        self.epoch = 0
         self.userdata = concurrence.userdata
         self.steps = [concurrence._make_step(label) for label in concurrence._states]  # noqa: SLF001
         for step in self.steps:
             step.next = dict.fromkeys(step.state.get_registered_outcomes())
 
-    def is_stale(self, concurrence: Concurrence) -> bool:
-        return self.userdata is not concurrence.userdata or any(
-            step.interface != step.state._interface  # noqa: SLF001
-            for step in self.steps
-        )
+    def is_stale(self) -> bool:
+        return any(step.is_stale() for step in self.steps)
 
 
 class Concurrence(Container):

@@ -19,7 +19,7 @@ from smachpy.exceptions import (
     InvalidStateError,
     did_you_mean,
 )
-from smachpy.state import State
+from smachpy.state import EPOCH, State
 from smachpy.user_data import UserData, reset, typed_userdata
 
 if TYPE_CHECKING:
@@ -202,20 +202,19 @@ class Container(Openable, Callbacks, State):
         parent = FRAME.get()
         if parent is None:
             return execute_root(self, parent_ud)
-        return self._run(Frame(self, parent.here(), parent.run, parent), parent_ud)
+        return self._run(Frame(self, parent), parent_ud)
 
     def _run(self, frame: Frame, parent_ud: UserData | Remapper | None) -> str:
         """Run in `frame`: copy the keys, call the callbacks, run the children."""
         plan = self._plan
-        if plan is None or plan.is_stale(self):
-            plan = self._plan = self._compile(frame)
-        with self._lock:
-            if self._frame is not None:
-                raise InvalidStateError(
-                    f"{frame.path}: execute: got a second call while it runs; expected one run "
-                    "at a time."
-                )
-            self._frame = frame
+        if plan is None or plan.userdata is not self.userdata or plan.epoch != EPOCH.value:
+            plan = self._plan = self._current_plan(frame, plan)
+        if self._frame is not None:
+            raise InvalidStateError(
+                f"{frame.path}: execute: got a second call while it runs; expected one run at a "
+                "time."
+            )
+        self._frame = frame
         token = FRAME.set(frame)
         try:
             if self._listeners:
@@ -228,7 +227,21 @@ class Container(Openable, Callbacks, State):
             return outcome
         finally:
             FRAME.reset(token)
-            self._leave(frame)
+            # Whoever passes a preempt on sets its mark first and looks at the frame then; here
+            # it is the other way round, so one of the two always sees the other.
+            if self._frame is frame:
+                self._frame = None
+            self._answered = frame.answered
+            if self._preempt_requested or frame.told is not None or self._end_waiters:
+                self._leave(frame)
+
+    def _current_plan(self, frame: Frame, plan: Any) -> Any:
+        """Return a plan for the states as they are now."""
+        epoch = EPOCH.value
+        if plan is None or plan.userdata is not self.userdata or plan.is_stale():
+            plan = self._compile(frame)
+        plan.epoch = epoch
+        return plan
 
     def _compile(self, frame: Frame) -> Any:
         """Return this container's plan.
@@ -248,14 +261,14 @@ class Container(Openable, Callbacks, State):
     def _leave(self, frame: Frame) -> None:
         """Forget the run; with it ends the preempt that belonged to it."""
         with self._lock:
-            if self._frame is frame:
-                self._frame = None
+            if frame.dead:
+                return
+            if self._frame is None:
                 self._preempt_requested = False
                 for ended in self._end_waiters:
                     ended.set()
-            self._answered = frame.answered
             told = frame.told
-            if told is not None and not frame.dead:
+            if told is not None:
                 disarm(frame)
                 told.state.recall_preempt()
 
@@ -298,7 +311,9 @@ class Container(Openable, Callbacks, State):
     def _stop_child(self, frame: Frame, step: Step, override: Any = None) -> bool:
         """Ask the child of `step` to stop, but not this container; tell whether it ran."""
         with self._lock:
-            if frame.step is not step or frame.dead:
+            frame.told = step  # first the mark, then the look: see the end of `_run`
+            if frame.step is not step or frame.dead or self._frame is None:
+                disarm(frame)
                 return False
             frame.override = override
             self._tell(frame, step)

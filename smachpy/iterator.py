@@ -41,18 +41,17 @@ __all__ = ["Iterator"]
 class _Plan:
     """An iterator, compiled: its step and what each outcome of the child does."""
 
-    __slots__ = ("breaks", "outcomes", "step", "userdata")
+    __slots__ = ("breaks", "epoch", "outcomes", "step", "userdata")
 
     def __init__(self, iterator: Iterator, step: Step) -> None:
+        self.epoch = 0
         self.userdata = iterator.userdata
         self.step = step
         self.breaks = iterator._breaks()  # noqa: SLF001  one module
         self.outcomes = frozenset(step.state.get_registered_outcomes())
 
-    def is_stale(self, iterator: Iterator) -> bool:
-        step = self.step
-        changed = step.interface != step.state._interface  # noqa: SLF001
-        return changed or self.userdata is not iterator.userdata
+    def is_stale(self) -> bool:
+        return self.step.is_stale()
 
 
 class Iterator(Container):

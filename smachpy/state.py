@@ -27,6 +27,15 @@ Grace: TypeAlias = float | Literal["inherit"] | None
 RetrySpec: TypeAlias = "Retry | tuple[int, float, Iterable[str | type[BaseException]]] | int"
 
 
+class _Epoch:
+    """Counts changes of states' interfaces, so that nobody has to look at every state."""
+
+    value = 0
+
+
+EPOCH = _Epoch()
+
+
 class StateOptions(TypedDict, total=False):
     """What any state can be told beyond SMACH; all are off by default.
 
@@ -117,6 +126,7 @@ class State:
         """Add outcomes."""
         self._outcomes = unique_names((*self._outcomes, *unique_names(new_outcomes, "outcomes")))
         self._interface += 1
+        EPOCH.value += 1
 
     def get_registered_outcomes(self) -> tuple[str, ...]:
         """Return the outcomes, in the order of their declaration."""
@@ -132,6 +142,7 @@ class State:
         """Add keys that are read."""
         self._input_keys = unique_names((*self._input_keys, *unique_names(keys, "input_keys")))
         self._interface += 1
+        EPOCH.value += 1
 
     def get_registered_input_keys(self) -> tuple[str, ...]:
         """Return the keys that are read."""
@@ -141,6 +152,7 @@ class State:
         """Add keys that are written."""
         self._output_keys = unique_names((*self._output_keys, *unique_names(keys, "output_keys")))
         self._interface += 1
+        EPOCH.value += 1
 
     def get_registered_output_keys(self) -> tuple[str, ...]:
         """Return the keys that are written."""

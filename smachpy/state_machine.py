@@ -42,7 +42,7 @@ __all__ = ["StateMachine"]
 class _Plan:
     """A state machine, compiled."""
 
-    __slots__ = ("all_steps", "steps", "userdata")
+    __slots__ = ("epoch", "steps", "userdata")
 
     def __init__(self, machine: StateMachine) -> None:
         self.userdata = machine.userdata
@@ -58,15 +58,10 @@ class _Plan:
                 elif where in ends:
                     following[outcome] = ends[where]
             self.steps[child.label].next = following
-        self.all_steps = tuple(self.steps.values())
+        self.epoch = 0
 
-    def is_stale(self, machine: StateMachine) -> bool:
-        if self.userdata is not machine.userdata:
-            return True
-        for step in self.all_steps:  # noqa: SIM110  any() costs twice as much here
-            if step.interface != step.state._interface:  # noqa: SLF001
-                return True
-        return False
+    def is_stale(self) -> bool:
+        return any(step.is_stale() for step in self.steps.values())
 
 
 class StateMachine(Container):
@@ -298,33 +293,28 @@ class StateMachine(Container):
         if self._start_cbs:
             self.call_start_cbs()
         label, self._next_initial = self._next_initial or self._initial_state_label, None
-        if frame.run.logged:
-            log.loginfo(f"{frame.path}: starting in {label!r}, keys {self.userdata.keys()}")
         assert label is not None
-        last, outcome = self._run_steps(frame, plan.steps[label])
-        if frame.run.logged:
+        logged = frame.run.logged
+        if logged:
+            log.loginfo(f"{frame.path}: starting in {label!r}, keys {self.userdata.keys()}")
+        following: Following = plan.steps[label]
+        while not following.final:
+            try:
+                following = self._loop(frame, following)
+            except Interruption:
+                if frame.dead:
+                    raise
+                following = self._follow(frame, frame.step, "preempted")
+        last, outcome = frame.step.label, following.outcome
+        if logged:
             log.loginfo(f"{frame.path}: {last!r} ended it with {outcome!r}")
         if self._termination_cbs:
             frame.step = None
             self.call_termination_cbs([last], outcome)
         return outcome
 
-    def _run_steps(self, frame: Frame, step: Step) -> tuple[str, str]:
-        """Run from `step` on; return the last label and the machine's outcome."""
-        while True:
-            try:
-                return self._loop(frame, step)
-            except Interruption:
-                if frame.dead:
-                    raise
-                last: Step = frame.step
-                following = self._follow(frame, last, "preempted")
-                if following.final:
-                    return last.label, following.outcome
-                step = following
-
-    def _loop(self, frame: Frame, step: Step) -> tuple[str, str]:
-        """Run step after step; return the last label and the machine's outcome.
+    def _loop(self, frame: Frame, step: Step) -> End:
+        """Run step after step; return how the machine ends, with the last step in the frame.
 
         This is the hot path. While nobody watches, waits or asks for a preempt, a transition is
         one call, one look-up and a few flags.
@@ -333,7 +323,12 @@ class StateMachine(Container):
         try:
             while True:
                 frame.step = step
-                if self._preempt_requested or run.watched or self._transition_cbs:
+                if (
+                    self._preempt_requested
+                    or run.watched
+                    or frame.told is not None
+                    or self._transition_cbs
+                ):
                     following = self._careful(frame, step)
                 else:
                     outcome = step.execute(step.userdata)
@@ -346,7 +341,7 @@ class StateMachine(Container):
                     else:
                         following = step.next[outcome]
                 if following.final:
-                    return step.label, following.outcome
+                    return following
                 step = following
         except SmachError:
             raise
@@ -356,6 +351,8 @@ class StateMachine(Container):
     def _careful(self, frame: Frame, step: Step) -> Following:
         """Run one step with everything that may want to know of it."""
         run = frame.run
+        if frame.told is not None:
+            self._forget_told(frame, step)
         if run.control is not None:
             run.control.pass_gate(frame, step)
         if run.has_shutdown_check and is_shutdown():
@@ -371,6 +368,15 @@ class StateMachine(Container):
             if self._transition_cbs:
                 self.call_transition_cbs()
         return following
+
+    def _forget_told(self, frame: Frame, step: Step) -> None:
+        """Forget a request that reached the last step just when it had ended."""
+        with self._lock:
+            told = frame.told
+            if told is not None and told is not step:
+                disarm(frame)
+                frame.override = None
+                told.state.recall_preempt()
 
     def _preempted(self, frame: Frame, step: Step) -> End:
         """End because of a preempt; `step` was not started, or finished in vain."""

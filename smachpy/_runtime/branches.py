@@ -31,12 +31,17 @@ class Branch(Frame):
         task: The task that runs it.
     """
 
-    __slots__ = ("ended", "error", "group", "outcome", "task")
+    path = ""
 
     def __init__(self, group: Group, step: Step) -> None:
         frame = group.frame
-        super().__init__(frame.container, frame.path, frame.run, frame.parent, step)
+        self.container = frame.container
+        self.parent = frame.parent
+        self.run = frame.run
+        self.step = step
         self.boundary = self
+        self.thread = frame.thread
+        self.path = frame.path
         self.group = group
         self.outcome: str | None = None
         self.error: BaseException | None = None

@@ -69,7 +69,6 @@ class Frame:
     """One running container, or one branch of a concurrence.
 
     Attributes:
-        path: Path of the container.
         step: What runs now: anything with `label` and `state`; None between runs.
         told: The step whose state was asked to stop.
         answered: The container ends because a preempt was taken up.
@@ -81,38 +80,36 @@ class Frame:
         dead: The thread was left behind.
     """
 
-    __slots__ = (
-        "answered",
-        "boundary",
-        "container",
-        "dead",
-        "injected",
-        "override",
-        "parent",
-        "path",
-        "run",
-        "step",
-        "thread",
-        "told",
-        "watch",
-    )
+    # Entering a container is a hot path: what is rarely set stands here, not in __init__.
+    container: Container
+    parent: Frame | None
+    run: Run
+    boundary: Any
+    thread: int
+    step: Any
+    told: Any = None
+    watch: Any = None
+    override: Override | None = None
+    answered = False
+    injected = False
+    dead = False
 
-    def __init__(
-        self, container: Container, path: str, run: Run, parent: Frame | None, step: Any = None
-    ) -> None:
+    def __init__(self, container: Container, parent: Frame) -> None:
         self.container = container
-        self.path = path
-        self.run = run
         self.parent = parent
-        self.step = step
-        self.told: Any = None
-        self.watch: Any = None
-        self.override: Override | None = None
-        self.answered = False
-        self.injected = False
-        self.dead = False
-        self.boundary: Any = None if parent is None else parent.boundary
-        self.thread = threading.get_ident()
+        self.run = parent.run
+        self.boundary = parent.boundary
+        self.thread = parent.thread
+        self.step = None
+        self._above = parent.step  # what the parent runs while this frame lives: this container
+
+    @property
+    def path(self) -> str:
+        """Path of the container."""
+        parent = self.parent
+        assert parent is not None
+        above = self._above
+        return parent.path if above is None else f"{parent.path}/{above.label}"
 
     def here(self) -> str:
         """Return the path of the state that runs now."""
@@ -168,6 +165,21 @@ class Frame:
     def _listener_failed(self, listener: object, error: BaseException, event: Event) -> None:
         name = getattr(listener, "__qualname__", None) or repr(listener)
         log.log_exception(f"{self.path}: listener {name} raised {error!r} on {event!r}", error)
+
+
+class RootFrame(Frame):
+    """The frame of a root; its path begins all others."""
+
+    path = ""
+
+    def __init__(self, container: Container, run: Run, boundary: Any) -> None:
+        self.container = container
+        self.parent = None
+        self.run = run
+        self.boundary = boundary
+        self.thread = threading.get_ident()
+        self.step = None
+        self.path = f"/{container.name or 'SM_ROOT'}"
 
 
 class Scope:

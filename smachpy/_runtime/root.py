@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import _signal  # type: ignore[import-not-found]  # `signal` without its enums, 20 us a run
 import signal
 import threading
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from actionlib_core import shutdown
 from actionlib_core.clock import RealClock, current_clock
-from smachpy._runtime.frame import Frame, Run
+from smachpy._runtime.frame import RootFrame, Run
 from smachpy._runtime.guarded import guarded
 from smachpy._runtime.interrupt import Interruption, use_signals
 from smachpy.events import Finished, Started
@@ -20,10 +21,6 @@ if TYPE_CHECKING:
     from actionlib_core.clock import Event
     from smachpy.container import Container
     from smachpy.user_data import Remapper, UserData
-
-# The functions without the enums around them, which cost more than entering a container.
-_get_signal: Any = getattr(signal.getsignal, "__wrapped__", signal.getsignal)
-_set_signal: Any = getattr(signal.signal, "__wrapped__", signal.signal)
 
 
 def execute_root(root: Container, parent_ud: UserData | Remapper | None) -> str:
@@ -59,8 +56,7 @@ def _run_root(
     root: Container, parent_ud: UserData | Remapper | None, boundary: _Boundary | None
 ) -> str:
     run = Run(current_clock())
-    frame = Frame(root, f"/{root.name or 'SM_ROOT'}", run, None)
-    frame.boundary = boundary
+    frame = RootFrame(root, run, boundary)
     control = root._control  # noqa: SLF001  one machinery
     if control is not None:
         control.attach(run)
@@ -77,7 +73,7 @@ def _run_root(
     return outcome
 
 
-def _run_in(root: Container, frame: Frame, parent_ud: UserData | Remapper | None) -> str:
+def _run_in(root: Container, frame: RootFrame, parent_ud: UserData | Remapper | None) -> str:
     """Run `root` in `frame`, with its options around it if it has any."""
     run = partial(root._run, frame)  # noqa: SLF001  one machinery
     outcome: str = guarded(root, run)(parent_ud)
@@ -157,16 +153,16 @@ class _CtrlC:
     @classmethod
     def install(cls, stop: _Stop) -> _CtrlC | None:
         """Handle Ctrl-C, unless the program does so itself; in the main thread."""
-        if _get_signal(signal.SIGINT) is not signal.default_int_handler:
+        if _signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
             return None
         made = cls(stop)
-        _set_signal(signal.SIGINT, made)
+        _signal.signal(signal.SIGINT, made)
         return made
 
     def remove(self) -> None:
         """Give Ctrl-C back to Python, unless somebody else has taken it meanwhile."""
-        if _get_signal(signal.SIGINT) is self:
-            _set_signal(signal.SIGINT, signal.default_int_handler)
+        if _signal.getsignal(signal.SIGINT) is self:
+            _signal.signal(signal.SIGINT, signal.default_int_handler)
 
     def __call__(self, number: int, _stack: FrameType | None) -> None:
         if self._seen:

@@ -58,6 +58,10 @@ class Step:
         self.execute: Callable[[Any], Any] = runner_of(state)
         self.next: dict[str, Any] = {}
 
+    def is_stale(self) -> bool:
+        """Tell whether the child's interface has changed."""
+        return self.interface != self.state._interface  # noqa: SLF001  one machinery
+
     def watched_userdata(self, frame: Frame) -> Remapper:
         """Return a window that reports each write."""
         return _WatchedRemapper(self.userdata, frame)

@@ -129,7 +129,7 @@ def test_an_undeclared_read_raises_with_path_key_and_declared_keys():
     sm = machine(name="PATROL")
     sm.userdata.goal = 1
     sm.add("A", smach.CBState(lambda ud: ud.goal, outcomes=["done"], input_keys=["gaol"]))
-    with pytest.raises(smach.InvalidUserCodeError, match="/PATROL/A.*declared input keys"):
+    with pytest.raises(smach.InvalidUserCodeError, match=r"/PATROL/A.*declared input keys"):
         sm.execute()
 
 
@@ -228,9 +228,11 @@ def test_add_auto_keeps_explicit_transitions():
 
 def test_an_inconsistent_machine_raises_all_its_problems_at_once():
     sm = machine(name="PATROL")
-    with pytest.raises(smach.InvalidTransitionError) as caught, sm:
-        smach.StateMachine.add("DRIVE", Say("sucess", "lost"), {"sucess": "DOKC"})
-        smach.StateMachine.add("DOCK", Say("done"), {"dnoe": "done"})
+    sm.open()
+    smach.StateMachine.add("DRIVE", Say("sucess", "lost"), {"sucess": "DOKC"})
+    smach.StateMachine.add("DOCK", Say("done"), {"dnoe": "done"})
+    with pytest.raises(smach.InvalidTransitionError) as caught:
+        sm.close()
     assert len(caught.value.problems) == 3
     assert "Did you mean 'DOCK'" in str(caught.value)
     assert "Did you mean 'done'" in str(caught.value)
@@ -314,7 +316,7 @@ def test_an_unknown_outcome_names_path_and_outcomes(answer):
     inner, outer = machine(), machine(name="PATROL")
     inner.add("LEAF", smach.CBState(lambda ud: answer, outcomes=["done"]))
     outer.add("INNER", inner)
-    with pytest.raises(smach.InvalidTransitionError, match="/PATROL/INNER/LEAF.*unknown outcome"):
+    with pytest.raises(smach.InvalidTransitionError, match=r"/PATROL/INNER/LEAF.*unknown outcome"):
         outer.execute()
 
 

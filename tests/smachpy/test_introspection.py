@@ -111,8 +111,8 @@ def test_inconsistent_and_empty_machines_are_described_too():
             r"\$\.kind",
         ),
         (
-            '{"path": "/A", "label": "A", "kind": "state", "type_name": "T", "outcomes": [],'
-            ' "children": [{}]}',
+            '{"path": "/", "label": "A", "kind": "state", "type_name": "T", "outcomes": [], '
+             '"children": [{}]}',
             r"\$\.children\[0\]",
         ),
     ],

@@ -24,10 +24,10 @@ class Waits(smachpy.State):
 class Fails(smachpy.State):
     """Fails so often, then is 'ok'."""
 
-    def __init__(self, times, error=ValueError("motor"), **options):
+    def __init__(self, times, error=None, **options):
         super().__init__(["ok", "aborted"], **options)
         self.left = times
-        self.error = error
+        self.error = error or ValueError("motor")
         self.runs = 0
 
     def execute(self, userdata):

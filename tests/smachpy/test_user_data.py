@@ -5,8 +5,8 @@ from __future__ import annotations
 import copy
 import dataclasses
 import pickle
-from collections import Counter, OrderedDict, defaultdict, deque, namedtuple
-from typing import Literal, TypedDict
+from collections import Counter, OrderedDict, defaultdict, deque
+from typing import Literal, NamedTuple, TypedDict
 
 import pytest
 from hypothesis import given
@@ -27,6 +27,11 @@ class Pose:
 
     def move(self, dx):
         self.x += dx
+
+
+class Pair(NamedTuple):
+    a: list
+    b: int
 
 
 class Slotted:
@@ -82,7 +87,7 @@ def through_a_state(value, body, **keys):
         (defaultdict(list, a=[1]), lambda v: v["a"].append(2)),
         (Counter("ab"), lambda v: v.update("c")),
         (([1],), lambda v: v[0].append(2)),
-        (namedtuple("P", "a b")([1], 2), lambda v: v.a.append(2)),
+        (Pair([1], 2), lambda v: v.a.append(2)),
         (Pose(), lambda v: setattr(v, "x", 5.0)),
         (Pose(), lambda v: v.move(1.0)),
         (Pose(tags=["a"]), lambda v: v.tags.append("b")),
@@ -387,7 +392,7 @@ def test_typed_userdata_knows_its_keys():
 def test_typed_userdata_is_checked_with_the_machine():
     sm = smachpy.StateMachine(["ok"], userdata_type=Mission)
     read = smachpy.CBState(lambda ud: "ok", outcomes=["ok"], input_keys=["batery"])
-    with pytest.raises(smachpy.InconsistentMachineError, match="no field of Mission.*'battery'"):
+    with pytest.raises(smachpy.InconsistentMachineError, match=r"no field of Mission.*'battery'"):
         with sm:
             smachpy.StateMachine.add("A", read, constants={"speed": 1})
 
