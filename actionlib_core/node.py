@@ -16,7 +16,7 @@ import sys
 import threading
 from contextvars import ContextVar
 from pathlib import PurePath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from actionlib_core.clock import RealClock, current_clock
 from actionlib_core.clock._serial import report_thread_exception
@@ -27,7 +27,7 @@ from actionlib_core.presence import Endpoint, Kind, token_key
 from actionlib_core.shutdown import current_shutdown
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Hashable, Iterator, Sequence
     from pathlib import Path
     from types import TracebackType
     from typing import Self
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from actionlib_core.config import Config
     from actionlib_core.names import NameArguments
     from actionlib_core.transport import Closable, Transport
+
+T = TypeVar("T")
 
 
 class Node:
@@ -81,6 +83,8 @@ class Node:
         self.transport: Transport = transport if transport is not None else _open_zenoh(config)
         self._lock = threading.Lock()
         self._entities = itertools.count(1)
+        self._shared_lock = threading.Lock()  # held while something is made
+        self._shared: dict[Hashable, Any] = {}
         self._closers: dict[int, Callable[[], object]] = {}
         self._closed = False
 
@@ -130,6 +134,21 @@ class Node:
             TransportError: the session is closed.
         """
         return self.transport.declare_alive(token_key(self.endpoint(kind, name, type_name, md5)))
+
+    def shared(self, key: Hashable, make: Callable[[], T]) -> T:
+        """Return what was made under `key` on this node, made now when it was not.
+
+        For what many short-lived objects can share; it is theirs to close it with `on_close`.
+
+        Args:
+            key: Identifies it.
+            make: Makes it, at most once per key and node.
+        """
+        with self._shared_lock:
+            if key not in self._shared:
+                self._shared[key] = make()
+            made: T = self._shared[key]
+            return made
 
     def on_close(self, closer: Callable[[], object]) -> Callable[[], None]:
         """Call `closer` when the node closes, the newest first, before the network is left.

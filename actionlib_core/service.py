@@ -64,24 +64,14 @@ class _ServiceEnd:
         self.type = service_class._type
         self.md5sum = service_class._md5sum
         self._own = self.node.endpoint(Kind.SERVICE, self.resolved_name, self.type, self.md5sum)
-        self._servers = NameWatch(self.node, self._own, {Kind.SERVICE})
-        self._parts: list[Closable] = [self._servers]
         self._closed = False
-        self._forget = self.node.on_close(self.close)
 
-    @property
-    def mismatches(self) -> list[TypeMismatchError]:
-        """The ends of this service that have another type, as errors; each was logged once."""
-        return self._servers.mismatches
+    def _watch(self) -> NameWatch:
+        return NameWatch(self.node, self._own, {Kind.SERVICE})
 
     def close(self) -> None:
         """Leave the service; a second call does nothing."""
-        if self._closed:
-            return
-        self._closed = True
-        self._forget()
-        for part in reversed(self._parts):
-            part.close()
+        raise NotImplementedError
 
     def __enter__(self) -> Self:
         return self
@@ -126,6 +116,9 @@ class Service(_ServiceEnd):
     ) -> None:
         super().__init__(name, service_class, node)
         self.handler = handler
+        self._servers = self._watch()
+        self._parts: list[Closable] = [self._servers]
+        self._forget = self.node.on_close(self.close)
         self._calls = CallbackQueue(self.node, f"service /{self.resolved_name}")
         transport = self.node.transport
         try:
@@ -134,6 +127,20 @@ class Service(_ServiceEnd):
         except BaseException:
             self.close()
             raise
+
+    @property
+    def mismatches(self) -> list[TypeMismatchError]:
+        """Other servers and callers of another type, as errors; each was logged once."""
+        return self._servers.mismatches
+
+    def close(self) -> None:
+        """Stop answering; a second call does nothing."""
+        if self._closed:
+            return
+        self._closed = True
+        self._forget()
+        for part in reversed(self._parts):
+            part.close()
 
     def shutdown(self, reason: str = "") -> None:
         """Stop answering; as `close`.
@@ -236,6 +243,18 @@ class ServiceProxy(_ServiceEnd):
         self.persistent = persistent
         self.headers = headers
         self.timeout = to_seconds(timeout)
+        # Programs make proxies as they need them and never close them, so they share what lasts.
+        key = ("service", self.resolved_name, self.type, self.md5sum)
+        self._servers = self.node.shared(key, self._watch)
+
+    @property
+    def mismatches(self) -> list[TypeMismatchError]:
+        """The servers of another type, as errors; each was logged once."""
+        return self._servers.mismatches
+
+    def close(self) -> None:
+        """Make later calls fail; a second call does nothing."""
+        self._closed = True
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Call the service; see `call`."""
@@ -286,12 +305,14 @@ class ServiceProxy(_ServiceEnd):
             )
 
     def _wait_for_server(self, timeout: float | None) -> bool:
+        if self._closed:
+            raise NodeError(f"/{self.resolved_name}: not called: the proxy is closed.")
         self._servers.wait(lambda: bool(self._servers.ends(any_type=True)), timeout)
         if self._servers.ends():
             return True
         if self.mismatches:
             raise self.mismatches[0]
-        if self._closed or self.node.closed or (timeout is None and requested()):
+        if self.node.closed or (timeout is None and requested()):
             raise NodeError(
                 f"/{self.resolved_name}: not called: the node was closed or the program is to end."
             )
@@ -348,7 +369,7 @@ class ServiceProxy(_ServiceEnd):
             return ServiceLostError(
                 self.resolved_name, "the server died or left before it answered."
             )
-        if self._closed or self.node.closed or timeout is None:
+        if self.node.closed or timeout is None:
             return NodeError(
                 f"/{self.resolved_name}: no answer: the node was closed or the program is to end."
             )

@@ -235,6 +235,27 @@ def test_closed_node_ends_the_call(nodes, clock):
     assert clock.now() == pytest.approx(5.0)
 
 
+def test_proxies_of_one_service_share_what_lasts(nodes, network):
+    server, caller = nodes
+    Service("who", Trigger, lambda _: (True, ""), node=server)
+    ServiceProxy("who", Trigger, node=caller)()
+    before = len(network.watchers)
+    for _ in range(20):
+        ServiceProxy("who", Trigger, node=caller)()
+    assert len(network.watchers) == before
+
+
+def test_closed_proxy_does_not_call(nodes):
+    server, caller = nodes
+    calls = []
+    Service("reset", Empty, calls.append, node=server)
+    with ServiceProxy("reset", Empty, node=caller) as proxy:
+        proxy()
+    with pytest.raises(NodeError, match="closed"):
+        proxy()
+    assert len(calls) == 1
+
+
 @pytest.mark.zenoh
 def test_services_over_zenoh():
     def handler(request):

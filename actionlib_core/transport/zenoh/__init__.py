@@ -126,7 +126,11 @@ class ZenohTransport:
     ) -> Asking:
         asking = self._declare(lambda: Asking(self, on_reply, on_done), check_key(key))
         callback = handlers.Callback(asking.take_reply, asking.take_done, indirect=False)
-        self._get(key, callback, payload, encoding, timeout, asking.token)
+        try:
+            self._get(key, callback, payload, encoding, timeout, asking.token)
+        except TransportError:
+            asking.close()
+            raise
         return asking
 
     def ask(
@@ -216,19 +220,20 @@ class ZenohTransport:
 
         Blocks: for one exchange, `ACCESS_S` at most.
         """
-        answers: list[Permissions] = []
+        answers: list[Reply] = []
         done = self.clock.event()
         question = {"session": self._session_id, "user": self.config.user}
         asking = self.query(
             ACCESS_KEY,
             json.dumps(question).encode(),
             timeout=ACCESS_S,
-            on_reply=lambda reply: answers.append(decode_permissions(reply.payload)),
+            on_reply=answers.append,
             on_done=done.set,
         )
         done.wait(ACCESS_S)
         asking.close()
-        return answers[0] if answers else None
+        told = [decode_permissions(reply.payload) for reply in answers if not reply.error]
+        return told[0] if told else None
 
     def _check_access(self, key: str) -> None:
         permissions = self._permissions

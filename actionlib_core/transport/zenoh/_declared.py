@@ -5,6 +5,7 @@ Each keeps its zenoh objects until it is closed, so that no finalizer undeclares
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
@@ -50,7 +51,8 @@ class Declared:
         self._inlet.closed = True
         if self._transport.forget(self):
             for handle in reversed(self._handles):
-                with inside:
+                # It fails only when the session was closed meanwhile, which undeclares all.
+                with inside, contextlib.suppress(zenoh.ZError):
                     handle.undeclare()
 
 
