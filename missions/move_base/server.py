@@ -68,6 +68,7 @@ class RobotServer:
         self._steps = 0
         self._next = 0.0
         self._closing = self._clock.event()
+        self._wake = self._clock.event()
         self._charge_wake = self._clock.event()
         self._housekeeper: Task | None = None
         self._odom = Publisher("odom", Odometry, latch=True, node=self._node)
@@ -78,6 +79,7 @@ class RobotServer:
         self._charge = SimpleActionServer(
             "charge", ChargeAction, self._fill, auto_start=False, node=self._node
         )
+        self._move.register_preempt_callback(self._wake.set)
         self._charge.register_preempt_callback(self._charge_wake.set)
 
     def start(self) -> None:
@@ -97,6 +99,7 @@ class RobotServer:
         Blocks: until the robot's threads have seen it, two seconds at most.
         """
         self._closing.set()
+        self._wake.set()
         self._charge_wake.set()
         self._move.stop()
         self._charge.stop()
@@ -128,6 +131,7 @@ class RobotServer:
                 return
             self._step(command)
             self._check_health()
+        self._catch_up()
         self._publish_odometry()
         self._move.set_succeeded(text="arrived")
 
@@ -138,21 +142,27 @@ class RobotServer:
             if self._closing.is_set():
                 return
             self._step(STOP)
+        self._catch_up()
         self._publish_odometry()
 
     def _step(self, command: Command) -> None:
-        """Let one control period pass.
+        """Drive for one control period; now and then let time catch up and report.
 
-        Blocks: until it has.
+        Blocks: until the time that was driven has passed, less when the goal is to stop.
         """
         self._robot.step(self._next, self._dt, command)
         self._next += self._dt
         self._steps += 1
         if self._steps % self._feedback_every == 0:
+            self._catch_up()
             self._report()
+
+    def _catch_up(self) -> None:
         wait = self._next - self._clock.now()
         if wait > 0.0:
-            self._closing.wait(wait)
+            self._wake.wait(wait)
+            if not self._closing.is_set():
+                self._wake.clear()
         elif wait < -_LATE:
             self._next -= wait
 
