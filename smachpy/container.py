@@ -138,11 +138,10 @@ class Container(Openable, Callbacks, State):
         """
         ended = self._clock().event()
         with self._lock:
-            if self._frame is None:
-                return True
             self._end_waiters = (*self._end_waiters, ended)
         try:
-            return ended.wait(timeout)
+            # First the mark, then the look: see the end of `_run`.
+            return self._frame is None or ended.wait(timeout)
         finally:
             with self._lock:
                 self._end_waiters = tuple(e for e in self._end_waiters if e is not ended)

@@ -360,8 +360,12 @@ class StateMachine(Container):
         if self._preempt_requested:
             return self._preempted(frame, step)
         outcome = run_watched(frame, step) if run.watched else step.execute(step.userdata)
-        following = self._follow(frame, step, outcome)
-        if not following.final:
+        following: Following
+        if self._preempt_requested or frame.told is not None or step.state.preempt_requested():
+            following = self._follow(frame, step, outcome)
+        else:
+            following = self._following(frame, step, outcome)
+        if not following.final and (self._transition_cbs or run.logged):
             frame.step = following
             if run.logged:
                 log.loginfo(f"{frame.path}: {step.label!r} -{outcome}-> {following.label!r}")

@@ -93,6 +93,7 @@ class Frame:
     answered = False
     injected = False
     dead = False
+    _path: str | None = None
 
     def __init__(self, container: Container, parent: Frame) -> None:
         self.container = container
@@ -106,10 +107,13 @@ class Frame:
     @property
     def path(self) -> str:
         """Path of the container."""
-        parent = self.parent
-        assert parent is not None
-        above = self._above
-        return parent.path if above is None else f"{parent.path}/{above.label}"
+        path = self._path
+        if path is None:
+            parent = self.parent
+            assert parent is not None
+            above = self._above
+            path = self._path = parent.path if above is None else f"{parent.path}/{above.label}"
+        return path
 
     def here(self) -> str:
         """Return the path of the state that runs now."""

@@ -37,9 +37,20 @@ class Step:
         userdata: Its window into the container's userdata.
         next: Outcome -> what comes then.
         interface: The child's interface version that this was compiled from.
+        writes: It may write userdata.
     """
 
-    __slots__ = ("execute", "interface", "label", "names", "next", "state", "userdata")
+    __slots__ = (
+        "_base",
+        "_path",
+        "execute",
+        "interface",
+        "label",
+        "next",
+        "state",
+        "userdata",
+        "writes",
+    )
     final: ClassVar[Literal[False]] = False
 
     def __init__(
@@ -48,7 +59,8 @@ class Step:
         self.label = label
         self.state = state
         self.interface = state._interface  # noqa: SLF001  one machinery
-        self.names = dict(remapping)
+        self.writes = bool(state.get_registered_output_keys())
+        self._base = self._path = ""
         self.userdata = Remapper(
             userdata,
             state.get_registered_input_keys(),
@@ -62,9 +74,19 @@ class Step:
         """Tell whether the child's interface has changed."""
         return self.interface != self.state._interface  # noqa: SLF001  one machinery
 
+    def path_in(self, frame: Frame) -> str:
+        """Return the child's path."""
+        base = frame.path
+        if base is not self._base:
+            self._base = base
+            self._path = f"{base}/{self.label}"
+        return self._path
+
     def watched_userdata(self, frame: Frame) -> Remapper:
-        """Return a window that reports each write."""
-        return _WatchedRemapper(self.userdata, frame)
+        """Return a window that reports each write; the plain one if nothing may be written."""
+        if not self.writes:
+            return self.userdata
+        return _WatchedRemapper(self.userdata, frame, self.path_in(frame))
 
 
 Following: TypeAlias = Step | End
@@ -76,12 +98,12 @@ class _WatchedRemapper(Remapper):
     __slots__ = ("_scope_of",)
     _scope_of: tuple[Frame, str]
 
-    def __init__(self, original: Remapper, frame: Frame) -> None:
+    def __init__(self, original: Remapper, frame: Frame, path: str) -> None:
         set_slot = object.__setattr__
         set_slot(self, "_data", original._data)  # noqa: SLF001  one class
         set_slot(self, "_input", original._input)  # noqa: SLF001  one class
         set_slot(self, "_output", original._output)  # noqa: SLF001  one class
-        set_slot(self, "_scope_of", (frame, frame.here()))
+        set_slot(self, "_scope_of", (frame, path))
 
     def __setitem__(self, key: str, item: Any) -> None:
         super().__setitem__(key, item)
@@ -95,9 +117,17 @@ class _WatchedRemapper(Remapper):
         self[name] = value
 
 
+_new = tuple.__new__  # half the time of a NamedTuple's own
+
+
 def run_watched(frame: Frame, step: Step) -> Any:
     """Run a step and publish that it was entered and left."""
-    frame.emit(Entered)
+    run = frame.run
+    clock = run.clock
+    path = step.path_in(frame)
+    if run.pending:
+        run.flush()
+    frame.publish(_new(Entered, (path, clock.now(), clock.time_ns())))
     try:
         outcome = step.execute(step.watched_userdata(frame))
     except Exception as error:
@@ -106,7 +136,9 @@ def run_watched(frame: Frame, step: Step) -> Any:
     except Interruption:
         frame.emit(Left, "preempted")
         raise
-    frame.emit(Left, outcome)
-    if frame.run.control is not None:
-        frame.run.control.note_outcome(frame, step, outcome)
+    if run.pending:
+        run.flush()
+    frame.publish(_new(Left, (path, clock.now(), clock.time_ns(), outcome)))
+    if run.control is not None:
+        run.control.note_outcome(frame, step, outcome)
     return outcome
