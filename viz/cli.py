@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from smachpy.cli import UsageError
 
 if TYPE_CHECKING:
-    import argparse
-
     from smachpy.introspection import StateRecord
 
 FORMATS = "svg, png, pdf, dot, json, mmd or txt"
@@ -25,8 +24,6 @@ def register_render(
     subparsers: argparse._SubParsersAction[argparse.ArgumentParser],
 ) -> None:
     """Add the subcommand."""
-    import argparse
-
     parser = subparsers.add_parser(
         "render",
         help="draw a state machine into a file",
@@ -63,10 +60,9 @@ def register_render(
 
 
 def _depth(text: str) -> int:
-    depth = int(text)
-    if depth < 1:
-        raise ValueError(text)
-    return depth
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"got {text!r}; expected a number from 1")
+    return int(text)
 
 
 def _run(args: argparse.Namespace) -> int:

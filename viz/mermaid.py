@@ -74,4 +74,4 @@ class _Writer:
 
 
 def _text(text: str) -> str:
-    return shorten(text).translate(_ESCAPES)
+    return shorten(text).translate(_ESCAPES) or "\u00a0"  # Mermaid refuses empty names

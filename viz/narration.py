@@ -106,7 +106,7 @@ class Narrator:
         goal = self._history.goal(event.goal_id)
         if goal is None:
             return None
-        self._told = {event.goal_id: event.t}
+        self._told[event.goal_id] = event.t
         goal.feedback = event.feedback
         progress = progress_of(goal)
         words = [shorten(event.action)]
@@ -119,6 +119,7 @@ class Narrator:
         return self._line(event, Text("  ".join(words), "dim"))
 
     def _goal_done(self, event: ev.GoalDone) -> Text | None:
+        self._told.pop(event.goal_id, None)
         if event.status == "SUCCEEDED" or not event.text:
             return None
         words = f"{shorten(event.action)} {shorten(event.status)}: {_error(event.text)}"

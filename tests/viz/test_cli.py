@@ -90,10 +90,11 @@ def test_bad_requests_end_with_2_and_say_why(
 
 
 @pytest.mark.parametrize("depth", ["0", "x"])
-def test_a_depth_is_a_number_from_one(mission, depth):
+def test_a_depth_is_a_number_from_one(mission, depth, capsys):
     with pytest.raises(SystemExit) as caught:
         main(["render", mission, "-o", "m.svg", "--depth", depth])
     assert caught.value.code == 2
+    assert f"got '{depth}'; expected a number from 1" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("text", [None, "{", '{"path": 1}'])

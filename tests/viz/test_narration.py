@@ -80,3 +80,16 @@ def test_the_end_of_the_run_is_told(tell):
     assert tell(ev.Finished("/PATROL", 105.0, 0, None)) == [
         "    5.00  PATROL  ended: exception  5.0 s"
     ]
+
+
+def test_goals_side_by_side_have_a_line_each(tell):
+    for goal in ("g", "h"):
+        tell(ev.GoalSent(GO, 100.0, 0, "move_base", goal, None))
+    lines = tell(
+        *(
+            ev.GoalFeedback(GO, 100.0 + i / 10, 0, "move_base", goal, Message(percent=float(i)))
+            for i in range(40)
+            for goal in ("g", "h")
+        )
+    )
+    assert len(lines) == 2

@@ -53,3 +53,8 @@ def test_mermaid_text_has_no_marks_of_its_own_in_names(build):
     (line,) = viz.picture(record, "mmd").decode().splitlines()[1:]
     name = re.fullmatch(r'  state "(.*)" as s0', line)[1]
     assert not set(re.sub(r"#\d+;", "", name)) & set('"[]{}<>;:%#')
+
+
+def test_mermaid_gets_no_empty_name(build):
+    record = build.rooted(build.leaf(" "))
+    assert 'state "\u00a0" as s0' in viz.picture(record, "mmd").decode()
