@@ -263,7 +263,9 @@ class Exchange(Entry):
 
     def limit(self, timeout: float) -> None:
         """End the exchange `timeout` [s] from now."""
-        self._timer = self.network.clock.call_later(timeout, self._time_out)
+        with self.network.lock:
+            if self._waiting:
+                self._timer = self.network.clock.call_later(timeout, self._time_out)
 
     def _time_out(self) -> None:
         with self.network.lock:

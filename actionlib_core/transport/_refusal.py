@@ -1,15 +1,37 @@
-"""Why a router does not let us in, in words: zenoh itself only says that time is over."""
+"""Why a network cannot be joined, in words: zenoh itself says little, or nothing."""
 
 from __future__ import annotations
 
+import ipaddress
 import socket
 import ssl
 from typing import TYPE_CHECKING
+
+from actionlib_core.exceptions import ConfigError
 
 if TYPE_CHECKING:
     from actionlib_core.config import Config, Tls
 
 PROBE_S = 1.0  # longest wait for an answer of the other side
+
+
+def check_interface(config: Config) -> None:
+    """Check that the interface of `discovery` is there; zenoh would find nobody, in silence.
+
+    Raises:
+        ConfigError: it is not.
+    """
+    names = [name for _, name in socket.if_nameindex()]
+    if config.discovery in {*names, "auto", "off"}:
+        return
+    try:
+        ipaddress.ip_address(config.discovery)
+    except ValueError:
+        raise ConfigError(
+            "configuration",
+            f"discovery: no such network interface: got {config.discovery!r}; expected one of "
+            f"{sorted(names)}, its address, 'auto' or 'off'.",
+        ) from None
 
 
 def explain_refusal(config: Config) -> str:

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, TypeVar
 import zenoh
 from zenoh import handlers
 
-from actionlib_core.clock import RealClock, SerialExecutor
+from actionlib_core.clock import RealClock, SerialExecutor, current_clock
 from actionlib_core.config import Config, load_config
 from actionlib_core.exceptions import AccessDeniedError, TransportError
 from actionlib_core.transport import Presence, Quality, Reply, Sample
@@ -36,7 +36,7 @@ from actionlib_core.transport._access import (
 )
 from actionlib_core.transport._inlet import Gate, inside
 from actionlib_core.transport._keys import check_key, compile_pattern
-from actionlib_core.transport._refusal import explain_refusal
+from actionlib_core.transport._refusal import check_interface, explain_refusal
 from actionlib_core.transport._zenoh_config import zenoh_settings
 from actionlib_core.transport.zenoh._declared import (
     Asking,
@@ -80,7 +80,8 @@ class ZenohTransport:
 
     def __init__(self, config: Config | None = None) -> None:
         self.config = load_config(config)
-        self.clock = RealClock()
+        clock = current_clock()
+        self.clock = clock if isinstance(clock, RealClock) else RealClock()
         self.gate = Gate()
         self.numbers = itertools.count(1)
         self._lock = threading.Lock()
@@ -137,7 +138,12 @@ class ZenohTransport:
         self, key: str, on_reply: Callable[[zenoh.Reply], None], on_done: Callable[[], None]
     ) -> None:
         """Ask without giving the question to anybody to hold; for the declarations here."""
-        self._get(key, handlers.Callback(on_reply, on_done, indirect=False), b"", "", ASK_S, None)
+        callback = handlers.Callback(on_reply, on_done, indirect=False)
+        try:
+            self._get(key, callback, b"", "", ASK_S, None)
+        except TransportError:
+            if not self._closed:
+                raise
 
     def _get(
         self,
@@ -196,10 +202,11 @@ class ZenohTransport:
             if self._closed:
                 return
             self._closed = True
-            self._declared.clear()
         self.gate.shut()
         _leave(self.clock, self.session)
         self.gate.wait_idle(IDLE_S)
+        # Not earlier: what zenoh's objects do when they are dropped is nothing after the session.
+        self._declared.clear()
         _open_transports.pop(self, None)
 
     def forget(self, entry: Declared) -> bool:
@@ -260,14 +267,16 @@ class ZenohTransport:
 
 
 def _open(config: Config) -> zenoh.Session:
+    check_interface(config)
     raw = zenoh.Config()
-    for path, value in zenoh_settings(config).items():
-        raw.insert_json5(path, json.dumps(value))
     try:
+        for path, value in zenoh_settings(config).items():
+            raw.insert_json5(path, json.dumps(value))
         return zenoh.open(raw)
     except zenoh.ZError as error:
-        reached = not config.connect or "Unable to connect" not in str(error)
-        why = str(error) if reached else explain_refusal(config)
+        text = str(error).partition(" at /")[0]  # without the line of zenoh's source
+        reached = not config.connect or "Unable to connect" not in text
+        why = text if reached else explain_refusal(config)
         raise TransportError(f"cannot join the network as {config.mode}: {why}") from error
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from actionlib_core.clock import RealClock
 from actionlib_core.config import Config, load_config
-from actionlib_core.exceptions import TransportError
+from actionlib_core.exceptions import ConfigError, TransportError
 from actionlib_core.transport import Quality
 from actionlib_core.transport.zenoh import ZenohTransport
 
@@ -240,6 +240,28 @@ def test_unreachable_router_is_named():
 def test_taken_endpoint_is_named(router):
     with pytest.raises(TransportError, match="cannot join the network as router"):
         ZenohTransport(Config(mode="router", listen=(router,), discovery="off"))
+
+
+@pytest.mark.parametrize(
+    ("fields", "text"),
+    [
+        (
+            {"discovery": "eth77"},
+            "discovery: no such network interface: got 'eth77'; expected one of",
+        ),
+        ({"listen": ("foo/bar",)}, "cannot join the network as peer: .*foo"),
+        ({"listen": ("tcp/127.0.0.1:99999",)}, "cannot join the network as peer"),
+        (
+            {"connect": ("tcp/127.0.0.1:x",), "connect_timeout": 0.1},
+            "cannot join the network as peer",
+        ),
+    ],
+)
+def test_what_cannot_work_is_an_error(fields, text):
+    with pytest.raises((ConfigError, TransportError), match=text) as caught:
+        ZenohTransport(Config(**fields))
+    assert "/root/" not in str(caught.value)
+    assert ".rs:" not in str(caught.value)
 
 
 def test_domains_do_not_meet():
