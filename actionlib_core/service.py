@@ -253,8 +253,9 @@ class ServiceProxy(_ServiceEnd):
         return self._servers.mismatches
 
     def close(self) -> None:
-        """Make later calls fail; a second call does nothing."""
+        """Make later calls fail, and those under way at once; a second call does nothing."""
         self._closed = True
+        self._servers.wake()
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Call the service; see `call`."""
@@ -305,9 +306,9 @@ class ServiceProxy(_ServiceEnd):
             )
 
     def _wait_for_server(self, timeout: float | None) -> bool:
+        self._servers.wait(lambda: self._closed or bool(self._servers.ends(any_type=True)), timeout)
         if self._closed:
             raise NodeError(f"/{self.resolved_name}: not called: the proxy is closed.")
-        self._servers.wait(lambda: bool(self._servers.ends(any_type=True)), timeout)
         if self._servers.ends():
             return True
         if self.mismatches:
@@ -354,7 +355,7 @@ class ServiceProxy(_ServiceEnd):
         asked = set(self._servers.ends())
 
         def over() -> bool:
-            return bool(replies or done) or asked.isdisjoint(self._servers.ends())
+            return bool(replies or done or self._closed) or asked.isdisjoint(self._servers.ends())
 
         try:
             in_time = self._servers.wait(over, timeout)
@@ -365,6 +366,8 @@ class ServiceProxy(_ServiceEnd):
         raise self._explain_silence(timeout, in_time=in_time)
 
     def _explain_silence(self, timeout: float | None, *, in_time: bool) -> ActionlibError:
+        if self._closed:
+            return NodeError(f"/{self.resolved_name}: no answer: the proxy was closed.")
         if in_time:
             return ServiceLostError(
                 self.resolved_name, "the server died or left before it answered."

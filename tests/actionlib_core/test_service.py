@@ -299,3 +299,18 @@ def test_server_that_leaves_ends_a_call_over_zenoh():
         assert clock.now() - start < 5
         release.set()
         assert task.join(10)
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_closing_a_proxy_ends_its_call_at_once(clock, there):
+    network = MemoryNetwork(clock)
+    with Node("robot", transport=network.session(), clock=clock) as robot:
+        if there:
+            Service("slow", SetBool, lambda request: clock.sleep(50.0) or {}, node=robot)
+        with Node("desk", transport=network.session(), clock=clock) as desk:
+            proxy = ServiceProxy("slow", SetBool, timeout=None, node=desk)
+            clock.call_later(3.0, proxy.close)
+            with pytest.raises(NodeError, match=r"the proxy (is|was) closed"):
+                proxy.wait_for_service() if not there else proxy.call(True)
+            assert clock.now() == 3.0
+            clock.sleep(100.0)
