@@ -53,7 +53,7 @@ def blocks_of(page: Path) -> list[Block]:
 
 
 def run_python(page: Path, block: Block, namespace: dict) -> None:
-    code = compile("\n" * (block.line - 1) + block.text, str(page), "exec")
+    code = compile("\n" * (block.line - 1) + block.text, str(page), "exec", dont_inherit=True)
     exec(code, namespace)
 
 
