@@ -36,7 +36,7 @@ class Simulation:
 
 
 @contextlib.contextmanager
-def _simulate(clock, grid, config, *, namespace="", pose=None):
+def _simulate(grid, clock, config, *, namespace="", pose=None):
     network = MemoryNetwork(clock)
     with (
         Node("robot", transport=network.session(), clock=clock, namespace=namespace) as robot_node,
@@ -54,9 +54,15 @@ def _simulate(clock, grid, config, *, namespace="", pose=None):
 
 
 @pytest.fixture
-def simulate(clock, office):
-    """`with simulate(config) as simulation`: any robot on the office floor."""
-    return partial(_simulate, clock, office)
+def simulate_on(office):
+    """`with simulate_on(clock, config) as simulation`: any robot on the office floor."""
+    return partial(_simulate, office)
+
+
+@pytest.fixture
+def simulate(simulate_on, clock):
+    """`with simulate(config) as simulation`: on the test's clock."""
+    return partial(simulate_on, clock)
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ import itertools
 
 import pytest
 
+from actionlib_core.clock import VirtualClock, use_clock
 from missions.exceptions import InputFileError
 from missions.maps import OFFICE_WAYPOINTS
 from missions.patrol import patrol
@@ -102,3 +103,12 @@ def test_a_long_patrol_charges_whenever_it_must(clock, simulate, office_robot):
 def test_a_broken_waypoint_file_is_refused_before_anything_moves(tmp_path):
     with pytest.raises(InputFileError, match=r"nowhere\.yaml"):
         patrol(waypoints=tmp_path / "nowhere.yaml")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_it_succeeds_whoever_goes_first(seed, simulate_on, office_robot):
+    with VirtualClock(seed) as clock, use_clock(clock), simulate_on(clock, office_robot):
+        machine = patrol()
+        events = record(machine)
+        assert machine.execute() == "succeeded"
+    assert [e.status for e in goals(events)].count("PREEMPTED") == 1
