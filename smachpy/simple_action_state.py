@@ -155,7 +155,6 @@ class SimpleActionState(State):
         self._server_wait_s = to_seconds(server_wait_timeout)
         self.preempt_timeout = None if self._preempt_s is None else self._preempt_s + MARGIN_S
         self._node = node
-        self._client: ActionClient[Any] | None = None
         self._exchange: GoalExchange | None = None
         raise_problems(self, action_name, [*self._problems()])
         self._goal.declare(self)
@@ -216,13 +215,11 @@ class SimpleActionState(State):
         return True
 
     def _get_client(self) -> ActionClient[Any]:
-        """Return the client on the node in force, made when there is none yet."""
+        """Return the client on the node in force, which all states of the action share."""
         node = self._node if self._node is not None else get_node()
-        if self._client is None or self._client.node is not node or node.closed:
-            if self._client is not None:
-                self._client.stop()
-            self._client = ActionClient(self._action_name, self._types.action, node=node)
-        return self._client
+        action = self._types.action
+        key = ("action client", node.resolve(self._action_name, "action name"), action)
+        return node.shared(key, lambda: ActionClient(self._action_name, action, node=node))
 
     def _on_feedback(self, ud: Any, feedback: Any) -> None:
         if self._feedback_key is not None:

@@ -649,3 +649,12 @@ def test_a_new_node_gets_a_new_client(world):
             assert state.execute(UserData()) == "succeeded"
             assert state.execute(UserData()) == "succeeded"
         node.close()
+
+
+def test_states_of_one_action_share_a_client(world):
+    from actionlib_core.presence import Kind, list_endpoints
+
+    world.serve(count)
+    for _ in range(5):
+        assert world.state(goal=Goal(1)).execute(UserData()) == "succeeded"
+    assert len(list_endpoints(world.robot.transport, kind=Kind.ACTION_CLIENT)) == 1
