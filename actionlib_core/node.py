@@ -39,6 +39,12 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+_NO_ZENOH = (
+    "{what}: the clock is not the real one, so a session on zenoh does not fit; expected one on "
+    "the same clock. Try use_node(Node(..., clock=clock, "
+    "transport=MemoryNetwork(clock).session()))."
+)
+
 
 class Node:
     """A named participant of the network.
@@ -55,6 +61,7 @@ class Node:
 
     Raises:
         InvalidNameError: the name or the namespace breaks the ROS rules.
+        NodeError: there is no transport, but a clock that zenoh does not run on.
         TransportError: no network session could be opened.
 
     Threads: every method may be called from any thread.
@@ -79,6 +86,8 @@ class Node:
         self._remappings = self.arguments.remappings(
             name, namespace=self.namespace, node=self.full_name
         )
+        if transport is None and not isinstance(self.clock, RealClock):
+            raise NodeError(_NO_ZENOH.format(what=f"node {self.full_name}"))
         self._owns_transport = transport is None
         self.transport: Transport = transport if transport is not None else _open_zenoh(config)
         self._lock = threading.Lock()
@@ -305,11 +314,7 @@ def get_node() -> Node:
     if node is not None:
         return node
     if not isinstance(current_clock(), RealClock):
-        raise NodeError(
-            "no node in use: the clock is not the real one, so the default node on zenoh does not "
-            "fit; expected a node on the same clock. Try use_node(Node(..., transport="
-            "MemoryNetwork(clock).session(), clock=clock))."
-        )
+        raise NodeError(_NO_ZENOH.format(what="no node in use"))
     return _default.get()
 
 

@@ -108,6 +108,11 @@ def test_no_default_node_on_a_virtual_clock():
         get_node()
 
 
+def test_no_zenoh_on_a_virtual_clock(clock):
+    with pytest.raises(NodeError, match="node nav: the clock is not the real one"):
+        Node("nav")
+
+
 def run(code, *arguments, **environment):
     return subprocess.run(
         [sys.executable, "-c", code, *arguments],

@@ -91,7 +91,10 @@ class Publisher(Declared):
     def matching(self) -> bool:
         if self._inlet.closed:
             return False
-        status: Any = self._port.matching_status  # zenoh's stub says bool
+        try:
+            status: Any = self._port.matching_status  # zenoh's stub says bool
+        except zenoh.ZError:  # the session is closed
+            return False
         return bool(status.matching)
 
 
@@ -230,13 +233,13 @@ class ZenohQuery:
     def reply(self, payload: bytes, encoding: str = "") -> None:
         raw = self._raw
         if raw is not None:
-            with inside:
+            with inside, contextlib.suppress(zenoh.ZError):  # finished, or nobody is there any more
                 raw.reply(self.key, payload, encoding=encoding or None, express=True)
 
     def reply_error(self, text: str) -> None:
         raw = self._raw
         if raw is not None:
-            with inside:
+            with inside, contextlib.suppress(zenoh.ZError):
                 raw.reply_err(text.encode(), encoding=_ERROR)
 
     def finish(self) -> None:
@@ -282,7 +285,8 @@ class Asking(Declared):
         super().__init__(transport)
         self._on_reply = on_reply
         self._on_done = on_done
-        self.token = zenoh.CancellationToken()
+        # Dropped when it is over: the token knows the callbacks, which know this object.
+        self.token: zenoh.CancellationToken | None = zenoh.CancellationToken()
 
     def take_reply(self, raw: zenoh.Reply) -> None:
         self._inlet.take(self._deliver, raw)
@@ -296,14 +300,16 @@ class Asking(Declared):
             self._on_reply(reply)
 
     def _finish(self, _: None) -> None:
+        self.token = None
         if self._transport.forget(self):
             self._on_done()
 
     def close(self) -> None:
         self._inlet.closed = True
-        if self._transport.forget(self):
+        token, self.token = self.token, None
+        if self._transport.forget(self) and token is not None:
             with inside:
-                self.token.cancel()  # type: ignore[no-untyped-call]  # zenoh's stub
+                token.cancel()  # type: ignore[no-untyped-call]  # zenoh's stub
 
 
 class Watcher(Declared):
