@@ -58,8 +58,8 @@ class VirtualClock:
     Args:
         seed: Picks the interleaving.
         rate: Virtual seconds per real second, for watching a run; None jumps at once.
-        choose: Called with a number n of participants and callbacks that can go on, n > 1, gives
-            the index of the next one, in place of `seed`; to go through interleavings one by one.
+        choose: Called with the names of the participants and callbacks that can go on, at least
+            two, gives the index of the next one; to go through interleavings one by one.
 
     Attributes:
         limit: When time would pass this [s], the wait of the thread that made the clock raises
@@ -76,13 +76,13 @@ class VirtualClock:
         seed: int | None = None,
         *,
         rate: float | None = None,
-        choose: Callable[[int], int] | None = None,
+        choose: Callable[[list[str]], int] | None = None,
     ) -> None:
         if rate is not None and not rate > 0:
             raise ValueError(f"virtual clock: rate: got {rate!r}; expected a number over 0.")
         self.seed = seed
         self.rate = rate
-        self._pick = choose or _picker(seed)
+        self._choose_by = choose or _picker(seed)
         self.limit: float | None = None
         self._now = 0.0
         self._stepped = time.monotonic()
@@ -346,7 +346,9 @@ class VirtualClock:
         if not self._ready:
             self._jump()
         if self._ready:
-            return self._ready.pop(self._pick(len(self._ready)) if len(self._ready) > 1 else 0)
+            if len(self._ready) == 1:
+                return self._ready.pop()
+            return self._ready.pop(self._choose_by(self._ready_names()))
         if self._owner in self._waits:
             waits = name_waits(self._waits)
             over = self.limit is not None and self._next_due() is not None
@@ -355,6 +357,9 @@ class VirtualClock:
             self._ready.clear()
             return self._owner
         return None
+
+    def _ready_names(self) -> list[str]:
+        return [ready.name for ready in self._ready]
 
     def _is_past(self, due: float) -> bool:
         return self.limit is not None and due > self.limit
@@ -422,7 +427,8 @@ def _describe(event: VirtualEvent | None, deadline: float | None) -> str:
     return what if deadline is None else f"{what} (until {deadline:.6g} s)"
 
 
-def _picker(seed: int | None) -> Callable[[int], int]:
+def _picker(seed: int | None) -> Callable[[list[str]], int]:
     if seed is None:
         return lambda _: 0
-    return random.Random(seed).randrange  # noqa: S311  no secret
+    pick = random.Random(seed).randrange  # noqa: S311  no secret
+    return lambda names: pick(len(names))

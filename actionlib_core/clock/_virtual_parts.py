@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import _thread
 import threading
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from actionlib_core.clock._real import RealEvent
 from actionlib_core.clock._serial import report_thread_exception
@@ -152,6 +152,12 @@ class VirtualTimer:
 
     def __init__(self, callback: Callable[[], object]) -> None:
         self.callback: Callable[[], object] | None = callback
+
+    @property
+    def name(self) -> str:
+        callback: Any = self.callback
+        callback = getattr(callback, "func", callback)  # of a partial
+        return str(getattr(callback, "__qualname__", "a callback"))
 
     def cancel(self) -> None:
         self.callback = None

@@ -1,0 +1,1 @@
+"""Deciding which runs to try: choices in, the next choices out."""

@@ -1,0 +1,231 @@
+"""Mission coverage: which states, outcomes, edges, preempt points and timeouts the tests ran."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from smachpy.events import Entered, Finished, Left, Preempted, PreemptRequested, TimedOut
+from smachpy.introspection import StateRecord
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from smachpy.testing.runs import Run
+
+KINDS = ("states", "outcomes", "edges", "preempts", "timeouts")
+
+
+@dataclass(slots=True)
+class Measured:
+    """What was run of one machine.
+
+    Attributes:
+        record: The machine.
+        runs: Number of runs.
+        taken: Kind ("states", ...) -> item -> how often.
+    """
+
+    record: StateRecord
+    runs: int = 0
+    taken: dict[str, dict[str, int]] = field(default_factory=lambda: {kind: {} for kind in KINDS})
+
+    @property
+    def name(self) -> str:
+        """The machine's path."""
+        return self.record.path
+
+    def items(self, kind: str) -> list[str]:
+        """Return everything of a kind that could be run."""
+        return _ITEMS[kind](self.record)
+
+    def missed(self, kind: str) -> list[str]:
+        """Return what was not run."""
+        return [item for item in self.items(kind) if item not in self.taken[kind]]
+
+    def counts(self, kind: str) -> tuple[int, int]:
+        """Return how many items of a kind were run, of how many."""
+        items = self.items(kind)
+        return sum(item in self.taken[kind] for item in items), len(items)
+
+    @property
+    def percent(self) -> float:
+        """Share of all items that were run [%]."""
+        pairs = [self.counts(kind) for kind in KINDS]
+        total = sum(total for _, total in pairs)
+        return 100.0 * sum(run for run, _ in pairs) / total if total else 100.0
+
+    def count(self, kind: str, item: str, number: int = 1) -> None:
+        """Note that an item was run."""
+        taken = self.taken[kind]
+        taken[item] = taken.get(item, 0) + number
+
+
+class Coverage:
+    """What was run of all machines of a test session."""
+
+    def __init__(self) -> None:
+        self._machines: dict[str, Measured] = {}
+
+    @property
+    def machines(self) -> list[Measured]:
+        """The machines, by name."""
+        return sorted(self._machines.values(), key=lambda machine: machine.name)
+
+    def add(self, run: Run) -> None:
+        """Take a run in."""
+        measured = self._of(run.record)
+        measured.runs += 1
+        active: dict[str, None] = {}
+        leaves = {state.path for state in run.record.walk() if not state.is_container}
+        for event in run.events:
+            if isinstance(event, Entered):
+                active[event.path] = None
+                measured.count("states", event.path)
+            elif isinstance(event, Left):
+                active.pop(event.path, None)
+                measured.count("outcomes", f"{event.path} -{event.outcome}->")
+                measured.count("edges", f"{event.path} -{event.outcome}->")
+            elif isinstance(event, Finished):
+                measured.count("states", event.path)
+                measured.count("outcomes", f"{event.path} -{event.outcome}->")
+            elif isinstance(event, TimedOut):
+                measured.count("timeouts", event.path)
+            elif isinstance(event, PreemptRequested):
+                if event.path in leaves and event.path in active:
+                    measured.count("preempts", event.path)
+            elif isinstance(event, Preempted) and event.label:
+                measured.count("preempts", f"{event.path}/{event.label}")
+
+    def merge(self, other: Coverage) -> None:
+        """Take over what another process measured."""
+        for found in other.machines:
+            measured = self._of(found.record)
+            measured.runs += found.runs
+            for kind, items in found.taken.items():
+                for item, number in items.items():
+                    measured.count(kind, item, number)
+
+    def _of(self, record: StateRecord) -> Measured:
+        key = _key(record)
+        if key not in self._machines:
+            self._machines[key] = Measured(record)
+        return self._machines[key]
+
+    # -- reports -------------------------------------------------------------------------------
+
+    def table(self) -> str:
+        """Return the figures for a terminal."""
+        if not self._machines:
+            return "no mission ran"
+        rows: list[tuple[str, ...]] = [("machine", "runs", *KINDS, "all")]
+        for machine in self.machines:
+            cells = ["{}/{}".format(*machine.counts(kind)) for kind in KINDS]
+            rows.append((machine.name, str(machine.runs), *cells, f"{machine.percent:.0f} %"))
+        widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+        lines = [
+            "  ".join(
+                cell.ljust(width) if i == 0 else cell.rjust(width)
+                for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+            )
+            for row in rows
+        ]
+        missed = [
+            f"{machine.name}: {kind} not run: {_list(machine.missed(kind))}"
+            for machine in self.machines
+            for kind in KINDS
+            if machine.missed(kind)
+        ]
+        return "\n".join([*lines, *missed])
+
+    def summary(self) -> dict[str, Any]:
+        """Return the figures as plain data, for JSON."""
+        return {
+            "machines": [
+                {
+                    "name": machine.name,
+                    "runs": machine.runs,
+                    "percent": round(machine.percent, 2),
+                    **{
+                        kind: {
+                            "run": machine.counts(kind)[0],
+                            "total": machine.counts(kind)[1],
+                            "missed": machine.missed(kind),
+                            "times": machine.taken[kind],
+                        }
+                        for kind in KINDS
+                    },
+                }
+                for machine in self.machines
+            ]
+        }
+
+    def to_json(self) -> str:
+        """Return everything, to be merged elsewhere."""
+        return json.dumps([[asdict(m.record), m.runs, m.taken] for m in self.machines])
+
+    @classmethod
+    def from_json(cls, text: str) -> Coverage:
+        """Rebuild what `to_json` returned."""
+        coverage = cls()
+        for record, runs, taken in json.loads(text):
+            made = StateRecord.from_json(json.dumps(record))
+            coverage._machines[_key(made)] = Measured(made, runs, taken)
+        return coverage
+
+
+def _key(record: StateRecord) -> str:
+    """Return what tells machines apart: name and structure, whatever stands in for its states."""
+    return hashlib.sha256(_bare(record).to_json().encode()).hexdigest()
+
+
+def _bare(record: StateRecord) -> StateRecord:
+    children = tuple(_bare(child) for child in record.children)
+    return replace(record, type_name="", doc="", details=(), children=children)
+
+
+def _list(items: Iterable[str]) -> str:
+    shown = list(items)
+    most = 8
+    more = f", and {len(shown) - most} more" if len(shown) > most else ""
+    return ", ".join(shown[:most]) + more
+
+
+def _states(record: StateRecord) -> list[str]:
+    return [state.path for state in record.walk()]
+
+
+def _outcomes(record: StateRecord) -> list[str]:
+    return [f"{state.path} -{outcome}->" for state in record.walk() for outcome in state.outcomes]
+
+
+def _edges(record: StateRecord) -> list[str]:
+    return [
+        f"{state.path}/{edge.source} -{edge.outcome}->"
+        for state in record.walk()
+        for edge in state.transitions
+    ]
+
+
+def _preempts(record: StateRecord) -> list[str]:
+    """Leaves that take time: those that can end 'preempted'."""
+    return [
+        state.path
+        for state in record.walk()
+        if not state.is_container and "preempted" in state.outcomes
+    ]
+
+
+def _timeouts(record: StateRecord) -> list[str]:
+    return [state.path for state in record.walk() if "timeout" in dict(state.details)]
+
+
+_ITEMS = {
+    "states": _states,
+    "outcomes": _outcomes,
+    "edges": _edges,
+    "preempts": _preempts,
+    "timeouts": _timeouts,
+}

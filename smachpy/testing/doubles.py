@@ -1,0 +1,134 @@
+"""Stand-ins for states, and putting them in their places."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING, Any
+
+from smachpy.container import Container
+from smachpy.exceptions import SmachError
+from smachpy.introspection import describe
+from smachpy.state import State
+from smachpy.testing.runs import find_path
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+
+class DoubleError(SmachError):
+    """A stand-in does not fit the state it stands for."""
+
+
+class Double(State):
+    """Stands for a state: the same outcomes, keys and options, and a script for what it does.
+
+    Args:
+        state: The state.
+        outcomes: What it returns, run after run; the last one is repeated.
+        duration: How long each run takes [s]; a preempt ends it early.
+        writes: Userdata that it writes.
+        execute: Does the work in place of the script; called with the userdata.
+
+    Attributes:
+        runs: How often it ran.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        outcomes: Iterable[str] = (),
+        *,
+        duration: float = 0.0,
+        writes: Mapping[str, Any] | None = None,
+        execute: Callable[[Any], str] | None = None,
+    ) -> None:
+        known = state.get_registered_outcomes()
+        super().__init__(
+            known, state.get_registered_input_keys(), state.get_registered_output_keys()
+        )
+        self._stands_for = state
+        self._script = deque(outcomes)
+        self._duration = duration
+        self._writes = dict(writes or {})
+        self._work = execute
+        self.runs = 0
+        for option in ("timeout", "timeout_outcome", "preempt_timeout", "retry"):
+            setattr(self, option, getattr(state, option))
+        for option in ("on_exception", "on_enter", "on_exit"):
+            setattr(self, option, getattr(state, option))
+        self._check(known)
+
+    def _check(self, known: tuple[str, ...]) -> None:
+        name = type(self._stands_for).__name__
+        unknown = [outcome for outcome in self._script if outcome not in known]
+        if unknown:
+            raise DoubleError(
+                f"double of {name}: outcomes: got {unknown}; expected some of {list(known)}."
+            )
+        keys = sorted(set(self._writes) - set(self._output_keys))
+        if keys:
+            raise DoubleError(
+                f"double of {name}: writes: got {keys}; expected some of its output keys "
+                f"{list(self._output_keys)}."
+            )
+        if self._work is None and not self._script:
+            raise DoubleError(f"double of {name}: outcomes: got none; expected at least one.")
+
+    def execute(self, ud: Any) -> str:
+        """Follow the script."""
+        self.runs += 1
+        if self._work is not None:
+            return self._work(ud)
+        if self._duration > 0 and self.sleep(self._duration) and "preempted" in self._outcomes:
+            self.service_preempt()
+            return "preempted"
+        for key, value in self._writes.items():
+            ud[key] = value
+        return self._script[0] if len(self._script) == 1 else self._script.popleft()
+
+    def describe_details(self) -> Any:
+        """Return those of the state it stands for."""
+        return self._stands_for.describe_details()
+
+
+class Places:
+    """Exchanges states of machines, and puts everything back."""
+
+    def __init__(self) -> None:
+        self._before: list[tuple[Container, str, State]] = []
+
+    def put(self, root: Container, path: str, make: Callable[[State], State]) -> State:
+        """Put what `make` gives for the state at `path` in its place.
+
+        Raises:
+            UnknownStateError: there is no such state.
+            DoubleError: it is the root.
+        """
+        record = describe(root)
+        labels = find_path(record, path).split("/")[2:]
+        if not labels:
+            raise DoubleError(f"replace: got the root {record.path}; expected a state in it.")
+        container = root
+        for label in labels[:-1]:
+            inner = container[label]
+            assert isinstance(inner, Container)
+            container = inner
+        return self.exchange(container, labels[-1], make)
+
+    def exchange(self, container: Container, label: str, make: Callable[[State], State]) -> State:
+        """Put what `make` gives for a child in its place."""
+        state = container[label]
+        double = make(state)
+        self._before.append((container, label, state))
+        _place(container, label, double)
+        return double
+
+    def restore(self) -> None:
+        """Put the states back."""
+        while self._before:
+            _place(*self._before.pop())
+
+
+def _place(container: Container, label: str, state: State) -> None:
+    container._states[label] = state  # noqa: SLF001  one house
+    container._plan = None  # noqa: SLF001  compiled from the states

@@ -1,0 +1,88 @@
+"""What the scripted ends of a test have in common: a node of their own, on a failing network."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.node import Node
+from actionlib_core.transport.faulty import DELIVERED, DROPPED, FaultyTransport
+
+if TYPE_CHECKING:
+    from actionlib_core.transport._faults import Fate
+    from smachpy.testing.kit import MissionKit
+
+LOST: Fate = DROPPED
+TWICE: Fate = (0.0, 0.0)
+
+
+class ScriptedEnd:
+    """One scripted server or topic: a process of its own, as far as the mission can see.
+
+    Attributes:
+        name: Its name on the network.
+        errors: What went otherwise than the script says; the run fails with it.
+    """
+
+    def __init__(self, kit: MissionKit, name: str) -> None:
+        self.name = name
+        self.errors: list[str] = []
+        self._kit = kit
+        self._clock = kit.clock
+        self._fates: dict[str, deque[Fate]] = {}
+        self._join()
+
+    def _join(self) -> None:
+        """Join the network as a new process."""
+        self._session = self._kit.network.session()
+        transport = FaultyTransport(self._session, self._fate, clock=self._clock)
+        self._link = transport
+        word = self.name.strip("/").replace("/", "_")
+        self.node = Node(f"{word}_double", transport=transport, clock=self._clock)
+
+    def _fate(self, key: str, _number: int) -> Fate:
+        fates = self._fates.get(key.rpartition("/")[2])
+        return fates.popleft() if fates else DELIVERED
+
+    def _doom(self, word: str, fate: Fate = LOST, count: int = 1) -> None:
+        """Give the next messages on keys that end with `word` this fate."""
+        self._fates.setdefault(word, deque()).extend([fate] * count)
+
+    def cut(self, seconds: float | None = None) -> None:
+        """Cut its link to the network, for `seconds` or until `restore`."""
+        self._link.cut(seconds)
+
+    def restore(self) -> None:
+        """Mend the link."""
+        self._link.restore()
+
+    def kill(self) -> None:
+        """Die as a process does that gets SIGKILL."""
+        self._session.kill()
+
+    def verify(self) -> None:
+        """Fail if something went otherwise than the script says."""
+        __tracebackhide__ = True
+        if self.errors:
+            errors, self.errors = self.errors, []
+            raise AssertionError("\n".join(errors))
+
+    def close(self) -> None:
+        """Leave the network."""
+        if not self._session.killed:
+            self.node.close()
+
+
+def as_message(kind: Any, value: Any, what: str) -> Any:
+    """Return a message of class `kind` from one, from a dict of its fields, or from None.
+
+    Raises:
+        TypeError: it is something else.
+    """
+    if value is None:
+        return kind()
+    if isinstance(value, kind):
+        return value
+    if isinstance(value, dict):
+        return kind(**value)
+    raise TypeError(f"{what}: got {value!r}; expected {kind._type}, a dict of its fields, or None.")

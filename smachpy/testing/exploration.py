@@ -1,0 +1,444 @@
+"""Running a mission over everything that can happen, and the shortest run that goes wrong."""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import inspect
+import logging
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.clock import Deadlock, RealClock, VirtualClock
+from smachpy.container import Container
+from smachpy.events import Abandoned, Finished, PreemptRequested
+from smachpy.exceptions import SmachError
+from smachpy.introspection import describe
+from smachpy.testing._core.search import Choice, Search
+from smachpy.testing.action_choices import serve_actions
+from smachpy.testing.doubles import Places
+from smachpy.testing.explorers import Explorer, Options, kept_by
+from smachpy.testing.kit import MissionKit, TimeLimitError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from pathlib import Path
+    from typing import Self
+
+    from smachpy.testing.runs import Run
+
+LIMIT_S = 3600.0
+_COMPUTER = RealClock()  # for the time of the computer: `time` is a mission's while it runs
+SHRINKING_RUNS = 300
+_OUTSIDE = frozenset({"monitor", "condition", "service"})
+FAULTS = frozenset({"hang", "raise", "deaf"})
+
+
+class ReplayError(SmachError):
+    """A run to be repeated came to another choice than the one that was noted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Counterexample:
+    """A run that breaks an invariant.
+
+    Attributes:
+        reason: What is wrong with it.
+        run: The run.
+        choices: What was chosen in it, as texts for `replay`.
+        script: A program that repeats it.
+        picture: The machine with this run; None when nothing that draws is installed.
+    """
+
+    reason: str
+    run: Run
+    choices: tuple[str, ...]
+    script: str
+    picture: Path | None = None
+
+    def __str__(self) -> str:
+        shown = "" if self.picture is None else f"\npicture: {self.picture}"
+        return f"{self.reason}\n{self.run.explain()}{shown}\nTo repeat it:\n\n{self.script}"
+
+
+@dataclass(frozen=True, slots=True)
+class Exploration:
+    """What `explore` found.
+
+    Attributes:
+        ok: Whether every run kept all invariants.
+        runs: Number of runs, those for shrinking left out.
+        exhaustive: Whether there are no further runs: every choice was tried in every situation.
+        stopped_by: Why it is not: "max_runs", "max_time", "max_depth" or "counterexample".
+        counterexample: A shortest run that breaks an invariant.
+        seconds: How long it took.
+    """
+
+    ok: bool
+    runs: int
+    exhaustive: bool
+    stopped_by: str
+    counterexample: Counterexample | None
+    seconds: float
+
+    def __bool__(self) -> bool:
+        return self.ok
+
+    def __str__(self) -> str:
+        extent = "all there are" if self.exhaustive else f"stopped by {self.stopped_by}"
+        head = f"{self.runs} runs in {self.seconds:.1f} s, {extent}"
+        if self.counterexample is None:
+            return f"{head}: no counterexample"
+        return f"{head}: {self.counterexample}"
+
+
+def explore(
+    machine: Container | Callable[[], Container],
+    *,
+    max_runs: int = 1_000,
+    max_time: float = 10.0,
+    max_depth: int = 60,
+    max_steps: int = 200,
+    invariants: Iterable[Callable[[Run], object]] = (),
+    faults: Iterable[str] = (),
+    preempts: int = 1,
+    interleavings: bool = True,
+    grace: float = 10.0,
+    keep: Iterable[str] = (),
+    writes: Mapping[str, Mapping[str, Any]] | None = None,
+    real_actions: bool = False,
+    userdata: Mapping[str, Any] | None = None,
+    folder: Callable[[], Path] | None = None,
+    on_run: Callable[[Run], object] | None = None,
+) -> Exploration:
+    """Run a mission over every leaf outcome, preempt point, fault and interleaving.
+
+    Every leaf is stood in for by a double that takes one second and ends with each of its outcomes
+    in turn. Runs with few unusual choices come first. Without invariants of your own, situations
+    that are equal (active states, outcomes, items, userdata, tasks that can go on) are entered
+    once, which makes machines with loops finite; what states keep elsewhere is not seen. An own
+    invariant may look at the whole past, so then every sequence of choices is a case of its own.
+
+    These always hold, or are reported: the mission ends; it does not raise; after a preempt it ends
+    within `grace`; no goal is left running.
+
+    Args:
+        machine: A container, or a function that makes one; needed when its items run out.
+        max_runs: Most runs.
+        max_time: Longest time [s of the computer].
+        max_depth: Choices of a run after this many are not varied.
+        max_steps: Leaves in a run; with more it counts as one that never ends.
+        invariants: Called with each run; false or an AssertionError is a counterexample.
+        faults: "hang": any leaf may never finish; "raise": may raise; "deaf": may ignore a preempt.
+            Leaves with a timeout, and watchers beside others, hang anyway.
+        preempts: Preempts per run, at most.
+        interleavings: Whether to vary who goes on first.
+        grace: Longest time from a preempt to the end [s].
+        keep: Leaves (paths or ends of paths) that stay as they are.
+        writes: Leaf (path) -> userdata that its double writes.
+        real_actions: Only services, monitors and conditions are stood in for. Scripted servers do
+            to each goal all that servers do: succeed, abort, reject, accept late, die, come back,
+            lose the result, deliver twice, ignore a cancel.
+        userdata: Put into the machine's userdata before each run.
+        folder: Gives the folder for the picture.
+        on_run: Called with each run, for coverage.
+
+    Raises:
+        ValueError: there is no such fault.
+    """
+    unknown = sorted(set(faults) - FAULTS)
+    if unknown:
+        raise ValueError(f"explore: faults: got {unknown}; expected some of {sorted(FAULTS)}.")
+    own = tuple(invariants)
+    options = Options(
+        frozenset(faults), preempts, interleavings, max_steps, dict(writes or {}), merges=not own
+    )
+    begun = _COMPUTER.now()
+    search = Search(max_depth)
+    with _Runner(machine, options, tuple(keep), userdata, real_actions=real_actions) as runner:
+        judge = _Judge(runner, own, grace)
+        runs = 0
+        stopped_by = ""
+        found: tuple[str, Run] | None = None
+        while found is None and (told := search.next()) is not None:
+            if runs >= max_runs or _COMPUTER.now() - begun > max_time:
+                stopped_by = "max_runs" if runs >= max_runs else "max_time"
+                break
+            run, error = runner.run(told)
+            runs += 1
+            if on_run is not None:
+                on_run(run)
+            reason = judge.reason(run, error)
+            if reason is not None:
+                found = (reason, run)
+            else:
+                search.took(told, runner.explorer.choices)
+        example = None if found is None else judge.shrink(*found)
+    stopped_by = "counterexample" if example else stopped_by or ("max_depth" * search.is_cut)
+    if example is not None:
+        example = _drawn(example, folder)
+    seconds = _COMPUTER.now() - begun
+    return Exploration(example is None, runs, not stopped_by, stopped_by, example, seconds)
+
+
+def replay(
+    machine: Container | Callable[[], Container],
+    choices: Sequence[str],
+    *,
+    faults: Iterable[str] = (),
+    preempts: int = 1,
+    interleavings: bool = True,
+    max_steps: int = 200,
+    keep: Iterable[str] = (),
+    writes: Mapping[str, Mapping[str, Any]] | None = None,
+    real_actions: bool = False,
+    userdata: Mapping[str, Any] | None = None,
+) -> Run:
+    """Repeat a run of `explore`.
+
+    Args:
+        machine: As in `explore`, and so all others.
+        choices: Those of the counterexample; what comes after them goes as usual.
+        faults: See there.
+        preempts: See there.
+        interleavings: See there.
+        max_steps: See there.
+        keep: See there.
+        writes: See there.
+        real_actions: See there.
+        userdata: See there.
+
+    Raises:
+        ReplayError: the machine has changed.
+        Exception: what the run raised.
+    """
+    options = Options(frozenset(faults), preempts, interleavings, max_steps, dict(writes or {}))
+    with _Runner(machine, options, tuple(keep), userdata, real_actions=real_actions) as runner:
+        run, error = runner.run(choices)
+    if error is not None:
+        raise error
+    return run
+
+
+class _Runner:
+    """Runs a machine again and again, each time from the same beginning."""
+
+    def __init__(
+        self,
+        machine: Container | Callable[[], Container],
+        options: Options,
+        keep: tuple[str, ...],
+        userdata: Mapping[str, Any] | None,
+        *,
+        real_actions: bool,
+    ) -> None:
+        self.source = machine
+        self.options = options
+        self.keep = keep
+        self.userdata = dict(userdata or {})
+        self.real_actions = real_actions
+        self._places = Places()
+        self._machine: Container | None = None
+        self._snapshot: list[tuple[Container, dict[str, Any]]] = []
+        self._around = contextlib.ExitStack()
+
+    def __enter__(self) -> Self:
+        with contextlib.ExitStack() as around:
+            # Put on the clock once for all runs: each of them only adds its own clock.
+            clock = around.enter_context(VirtualClock())
+            around.enter_context(clock.patched())
+            around.enter_context(_silence())
+            self._prepare()
+            self._around = around.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._around.close()
+        self._places.restore()
+        self._restore_userdata()
+
+    def _prepare(self) -> None:
+        """Make the machine, and put doubles into it."""
+        source = self.source
+        machine = source if isinstance(source, Container) else source()
+        self._machine = machine
+        self.explorer = Explorer(machine, self.options)
+        self._snapshot = [(c, dict(c.userdata._data)) for c in _containers(machine)]  # noqa: SLF001
+        named = kept_by(self.keep)
+
+        def kept(path: str, state: Any) -> bool:
+            return named(path, state) or (self.real_actions and state.kind not in _OUTSIDE)
+
+        self.explorer.stand_in(self._places, machine, describe(machine).path, kept)
+
+    def _restore_userdata(self) -> None:
+        for container, data in self._snapshot:
+            container.userdata._data.clear()  # noqa: SLF001  one house
+            container.userdata._data.update(copy.deepcopy(data))  # noqa: SLF001
+
+    def run(self, told: Sequence[int | str]) -> tuple[Run, Exception | None]:
+        """Run once; what it raised comes back with the run."""
+        machine = self._machine
+        if not isinstance(self.source, Container) and self.explorer.choices:
+            self._prepare()  # a new machine for each run
+            machine = self._machine
+        assert machine is not None
+        self._restore_userdata()
+        self.explorer.begin(told)
+        runs: list[Run] = []
+        unsubscribe = machine.subscribe(self.explorer.on_event)
+        error: Exception | None = None
+        # A kit for each run: what still waits in one must not reach into the next.
+        with MissionKit(choose=self.explorer.turn, on_run=runs.append) as kit:
+            kit.draws = False
+            if self.real_actions:
+                serve_actions(kit, machine, self.explorer)
+            try:
+                kit(machine, copy.deepcopy(self.userdata), limit=LIMIT_S)
+            except Exception as caught:  # noqa: BLE001  judged by the caller
+                error = caught
+            finally:
+                unsubscribe()
+        if self.explorer.mismatch:
+            raise ReplayError(self.explorer.mismatch) from error
+        return runs[0], error
+
+
+@contextlib.contextmanager
+def _silence() -> Iterator[None]:
+    """Keep the log quiet: what goes wrong in a run is its verdict's business."""
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logging.disable(before)
+
+
+def _containers(container: Container) -> Iterator[Container]:
+    yield container
+    for child in container.get_children().values():
+        if isinstance(child, Container):
+            yield from _containers(child)
+
+
+@dataclass(slots=True)
+class _Judge:
+    """Tells good runs from bad ones, and finds the shortest bad one."""
+
+    runner: _Runner
+    own: tuple[Callable[[Run], object], ...]
+    grace: float
+    kind: str = field(default="", init=False)
+
+    def reason(self, run: Run, error: Exception | None) -> str | None:
+        """Return what is wrong with a run."""
+        if isinstance(error, Deadlock | TimeLimitError) or self.runner.explorer.too_long:
+            return f"it never ends{f': {error}' if error is not None else ''}"
+        if error is not None:
+            kind = "" if isinstance(error, SmachError) else f"{type(error).__name__}: "
+            return f"it raises: {kind}{error}"
+        asked = [event.t for event in run.events if isinstance(event, PreemptRequested)]
+        ended = [event.t for event in run.events if isinstance(event, Finished)]
+        left = [event.path for event in run.events if isinstance(event, Abandoned)]
+        root = run.record.path
+        first = [e.t for e in run.events if isinstance(e, PreemptRequested) and e.path == root]
+        if asked and first and ended and (left or ended[-1] - first[0] > self.grace):
+            took = ended[-1] - first[0]
+            who = f", {', '.join(left)} ignored it" if left else ""
+            return f"a preempt takes {took:g} s{who}; expected at most {self.grace:g} s"
+        if run.goals_left:
+            return f"goals are left running: {', '.join(run.goals_left)}"
+        return self._own_reason(run)
+
+    def _own_reason(self, run: Run) -> str | None:
+        for invariant in self.own:
+            name = getattr(invariant, "__name__", repr(invariant))
+            try:
+                kept = invariant(run)
+            except AssertionError as error:
+                return f"invariant {name}: {error}"
+            if kept is False:
+                return f"invariant {name} does not hold"
+        return None
+
+    def shrink(self, reason: str, run: Run) -> Counterexample:
+        """Return the shortest run that can be found that is wrong in the same way."""
+        kind = reason[:12]
+        best = run, reason, list(self.runner.explorer.choices)
+        tries = 0
+        better = True
+        while better and tries < SHRINKING_RUNS:
+            better = False
+            for told in _simpler(best[2]):
+                tries += 1
+                if tries >= SHRINKING_RUNS:
+                    break
+                try:
+                    found, error = self.runner.run(told)
+                except ReplayError:
+                    continue  # there is no such run
+                why = self.reason(found, error)
+                choices = list(self.runner.explorer.choices)
+                if why is None or why[:12] != kind or _size(found, choices) >= _size(run, best[2]):
+                    continue
+                run, best, better = found, (found, why, choices), True
+                break
+        run, reason, choices = best
+        texts = tuple(str(choice) for choice in _without_usual_end(choices))
+        return Counterexample(reason, run, texts, _script(self.runner, texts, reason))
+
+
+def _simpler(choices: list[Choice]) -> Iterator[tuple[int, ...]]:
+    """Yield beginnings of runs that may be shorter, the shortest first."""
+    picks = tuple(choice.picked for choice in choices)
+    for number, choice in enumerate(choices):
+        for other in range(len(choice.options)):
+            if other != choice.picked:
+                yield (*picks[:number], other)
+                if number + 1 < len(picks):
+                    yield (*picks[:number], other, *picks[number + 1 :][:1])
+
+
+def _size(run: Run, choices: list[Choice]) -> tuple[int, int]:
+    return len(run.path), sum(choice.picked != 0 for choice in choices)
+
+
+def _without_usual_end(choices: list[Choice]) -> list[Choice]:
+    """Return the choices up to the last that is not the usual one."""
+    unusual = [number for number, choice in enumerate(choices) if choice.picked]
+    return choices[: unusual[-1] + 1] if unusual else []
+
+
+def _script(runner: _Runner, choices: tuple[str, ...], reason: str) -> str:
+    """Return a program that repeats a run."""
+    source: Any = runner.source
+    if inspect.isfunction(source) and "<locals>" not in source.__qualname__:
+        make = f"from {source.__module__} import {source.__name__} as machine"
+    else:
+        make = "machine = ...  # the machine, or a function that makes it"
+    options = runner.options
+    arguments = [
+        f"faults={sorted(options.faults)!r}" if options.faults else "",
+        f"preempts={options.preempts}" if options.preempts != 1 else "",
+        "" if options.interleavings else "interleavings=False",
+        f"max_steps={options.most_steps}" if options.most_steps != Options().most_steps else "",
+        f"keep={list(runner.keep)!r}" if runner.keep else "",
+        f"writes={dict(options.writes)!r}" if options.writes else "",
+        "real_actions=True" if runner.real_actions else "",
+        f"userdata={runner.userdata!r}" if runner.userdata else "",
+    ]
+    extra = "".join(f"    {argument},\n" for argument in arguments if argument)
+    listed = "".join(f"        {choice!r},\n" for choice in choices)
+    first = reason.splitlines()[0]
+    return (
+        f"# {first}\nfrom smachpy.testing import replay\n\n{make}\n\n"
+        f"run = replay(\n    machine,\n    [\n{listed}    ],\n{extra})\nprint(run.explain())\n"
+    )
+
+
+def _drawn(example: Counterexample, folder: Callable[[], Path] | None) -> Counterexample:
+    if folder is None:
+        return example
+    picture = example.run.draw(folder() / f"{example.run.record.label}-counterexample.svg")
+    return Counterexample(example.reason, example.run, example.choices, example.script, picture)

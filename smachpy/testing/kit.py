@@ -1,0 +1,414 @@
+"""A mission under test: virtual time, a network in memory, stand-ins, preempts at will."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import tempfile
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from actionlib_core.clock import Deadlock, TimeLimit, VirtualClock, use_clock
+from actionlib_core.node import Node, use_node
+from actionlib_core.shutdown import Shutdown, use_shutdown
+from actionlib_core.transport.memory import MemoryNetwork
+from smachpy.events import Entered, Event
+from smachpy.exceptions import SmachError
+from smachpy.introspection import describe
+from smachpy.testing.doubles import Double, Places
+from smachpy.testing.runs import Run, find_path
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from types import TracebackType
+    from typing import Self
+
+    from smachpy.container import Container
+    from smachpy.introspection import StateRecord
+    from smachpy.testing.action_servers import ScriptedActionServer
+    from smachpy.testing.ends import ScriptedEnd
+    from smachpy.testing.exploration import Exploration
+    from smachpy.testing.service_servers import ScriptedService
+    from smachpy.testing.topics import ScriptedTopic
+
+LIMIT_S = 6 * 3600.0
+
+
+class TimeLimitError(SmachError):
+    """A mission under test ran longer than the limit.
+
+    Attributes:
+        run: The run up to there.
+    """
+
+    def __init__(self, run: Run, limit: float) -> None:
+        self.run = run
+        active = ", ".join(run.active) or "nothing"
+        super().__init__(
+            f"{run.record.path}: it still ran after {limit:g} s, in {active}; expected an end. "
+            f"Try mission(..., limit=...).\n{run.explain()}"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Trigger:
+    """Something to do during the next run.
+
+    Attributes:
+        act: What.
+        at: When [s after the start], or None.
+        on: When the state at this path begins, or None.
+        after: So long after that [s].
+        visit: At the how many-th time.
+    """
+
+    act: Callable[[Container], object]
+    at: float | None
+    on: str | None
+    after: float
+    visit: int
+
+
+class MissionKit:
+    """Runs machines in virtual time on a network in memory; the `mission` fixture is one.
+
+    Use it as a context manager; inside, its clock, node and shutdown are the current ones.
+
+    Args:
+        seed: Picks the interleaving; None takes turns.
+        rate: Virtual seconds per real second, for watching; None: as fast as it goes.
+        choose: As for `VirtualClock`.
+        folder: Gives the folder for pictures of failed runs; called when one is drawn.
+        on_run: Called with every run, for coverage.
+
+    Attributes:
+        clock: The clock.
+        network: The network; more sessions may join.
+        node: The mission's node.
+        shutdown: The end of the program, requested by `interrupt`.
+        draws: Whether runs that raise are drawn.
+        on_run: See above.
+    """
+
+    def __init__(
+        self,
+        *,
+        seed: int | None = None,
+        rate: float | None = None,
+        choose: Callable[[list[str]], int] | None = None,
+        folder: Callable[[], Path] | None = None,
+        on_run: Callable[[Run], object] | None = None,
+    ) -> None:
+        self.seed = seed
+        self.clock = VirtualClock(seed, rate=rate, choose=choose)
+        self.network = MemoryNetwork(self.clock)
+        self.transport = self.network.session()
+        self.node = Node("mission", transport=self.transport, clock=self.clock)
+        self.shutdown = Shutdown()
+        self.draws = True
+        self._folder = folder or _temporary_folder
+        self.on_run = on_run
+        self._places = Places()
+        self._triggers: list[_Trigger] = []
+        self._replacements: list[tuple[str, Callable[[Any], Double], list[Double]]] = []
+        self._servers: list[ScriptedEnd] = []
+        self._stack = contextlib.ExitStack()
+
+    def __enter__(self) -> Self:
+        self._stack.enter_context(self.clock)
+        self._stack.enter_context(use_clock(self.clock))
+        self._stack.enter_context(use_node(self.node))
+        self._stack.enter_context(use_shutdown(self.shutdown))
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._places.restore()
+        try:
+            for server in reversed(self._servers):
+                server.close()
+            self.node.close()
+        finally:
+            self._stack.close()
+
+    # -- running -------------------------------------------------------------------------------
+
+    def __call__(
+        self,
+        machine: Container,
+        userdata: Mapping[str, Any] | None = None,
+        *,
+        limit: float = LIMIT_S,
+    ) -> Run:
+        """Run `machine` to its end.
+
+        Args:
+            machine: Any container.
+            userdata: Values put into its userdata before.
+            limit: Longest run on the test's clock [s].
+
+        Raises:
+            Deadlock: everything waits and nothing can ever go on.
+            TimeLimitError: it did not end in time.
+            SmachError: a state raised, or the machine does not hold together; as `execute`.
+            AssertionError: a scripted server got a goal that the script does not provide for.
+        """
+        for name, make, made in self._replacements:
+            made.append(self._places.put(machine, name, make))  # type: ignore[arg-type]
+        self._replacements.clear()
+        for key, value in (userdata or {}).items():
+            machine.userdata[key] = value
+        record = describe(machine)
+        triggers, self._triggers = self._triggers, []
+        watch = _Watch(self, machine, record, triggers)
+        self.clock.limit = self.clock.now() + limit
+        try:
+            with self.clock.patched(), watch.installed():
+                outcome, error = self._execute(machine)
+        finally:
+            self.clock.limit = None
+        run = self._finish(machine, record, watch, outcome)
+        if error is not None:
+            _reraise(error, run, limit, draws=self.draws)
+        for server in self._servers:
+            server.verify()
+        return run
+
+    def _execute(self, machine: Container) -> tuple[str | None, BaseException | None]:
+        """Run the machine here, or beside a running event loop, which cannot be entered twice."""
+
+        def execute() -> tuple[str | None, BaseException | None]:
+            try:
+                return machine.execute(), None
+            except Exception as error:  # noqa: BLE001  raised again, with what the run did
+                return None, error
+
+        try:
+            asyncio.get_running_loop()
+        except RuntimeError:
+            return execute()
+        found: list[tuple[str | None, BaseException | None]] = []
+        try:
+            self.clock.spawn(lambda: found.append(execute()), name="mission").join()
+        except (Deadlock, TimeLimit) as error:
+            return None, error
+        return found[0]
+
+    def _finish(
+        self, machine: Container, record: StateRecord, watch: _Watch, outcome: str | None
+    ) -> Run:
+        data = {key: machine.userdata[key] for key in machine.userdata.keys()}  # noqa: SIM118
+        duration = self.clock.now() - watch.started
+        run = Run(record, outcome, tuple(watch.events), data, duration, self.seed, self._folder)
+        if self.on_run is not None:
+            self.on_run(run)
+        return run
+
+    # -- stand-ins -----------------------------------------------------------------------------
+
+    def replace(
+        self,
+        path: str,
+        outcomes: Iterable[str] = (),
+        *,
+        duration: float = 0.0,
+        writes: Mapping[str, Any] | None = None,
+        execute: Callable[[Any], str] | None = None,
+    ) -> list[Double]:
+        """Put a double in the place of a state, from the next run to the end of the test.
+
+        Args:
+            path: Path of the state, or the end of it that only it has.
+            outcomes: What it returns, run after run; the last one is repeated.
+            duration: How long each run takes [s]; a preempt ends it early with 'preempted'.
+            writes: Userdata that it writes.
+            execute: A function of the userdata in place of all this.
+
+        Returns:
+            A list that holds the double once the run has begun.
+
+        Raises:
+            UnknownStateError, DoubleError: it does not fit the machine; from the run.
+        """
+        made: list[Double] = []
+        script = tuple(outcomes)
+
+        def make(state: Any) -> Double:
+            return Double(state, script, duration=duration, writes=writes, execute=execute)
+
+        self._replacements.append((path, make, made))
+        return made
+
+    # -- preempts ------------------------------------------------------------------------------
+
+    def preempt(
+        self,
+        *,
+        at: float | None = None,
+        on: str | None = None,
+        after: float = 0.0,
+        visit: int = 1,
+    ) -> None:
+        """Preempt the next run.
+
+        Args:
+            at: So long [s] after its start.
+            on: While this state (path, or the end of one) runs: as soon as it waits.
+            after: With `on`: so long [s] after the state began.
+            visit: With `on`: at its how many-th visit.
+
+        Raises:
+            ValueError: neither or both of `at` and `on`.
+        """
+        self._add(lambda machine: machine.request_preempt(), at, on, after, visit)
+
+    def interrupt(
+        self,
+        *,
+        at: float | None = None,
+        on: str | None = None,
+        after: float = 0.0,
+        visit: int = 1,
+    ) -> None:
+        """End the program during the next run, as Ctrl-C does: shutdown, and the preempt with it.
+
+        Arguments and errors as `preempt`; with neither `at` nor `on` it comes at once.
+        """
+
+        def interrupt(machine: Container) -> None:
+            self.shutdown.request("interrupted by the test")
+            machine.request_preempt()
+
+        self._add(interrupt, 0.0 if at is None and on is None else at, on, after, visit)
+
+    def _add(
+        self,
+        act: Callable[[Container], object],
+        at: float | None,
+        on: str | None,
+        after: float,
+        visit: int,
+    ) -> None:
+        if (at is None) == (on is None):
+            raise ValueError(f"preempt: got at={at!r} and on={on!r}; expected one of them.")
+        self._triggers.append(_Trigger(act, at, on, after, visit))
+
+    # -- the world around ----------------------------------------------------------------------
+
+    def action_server(self, name: str, action_class: Any) -> ScriptedActionServer:
+        """Offer an action that does what the test says."""
+        from smachpy.testing.action_servers import ScriptedActionServer
+
+        server = ScriptedActionServer(self, name, action_class)
+        self._servers.append(server)
+        return server
+
+    def service_server(self, name: str, service_class: Any) -> ScriptedService:
+        """Offer a service that does what the test says."""
+        from smachpy.testing.service_servers import ScriptedService
+
+        server = ScriptedService(self, name, service_class)
+        self._servers.append(server)
+        return server
+
+    def topic(self, name: str, message_class: Any) -> ScriptedTopic:
+        """Write to a topic, and keep what comes on it."""
+        from smachpy.testing.topics import ScriptedTopic
+
+        end = ScriptedTopic(self, name, message_class)
+        self._servers.append(end)
+        return end
+
+    # -- all runs ------------------------------------------------------------------------------
+
+    def explore(self, machine: Any, **options: Any) -> Exploration:
+        """Run a mission over everything that can happen; see `exploration.explore`."""
+        from smachpy.testing.exploration import explore
+
+        return explore(machine, folder=self._folder, on_run=self.on_run, **options)
+
+
+class _Watch:
+    """Sees one run: keeps its events and pulls the triggers."""
+
+    def __init__(
+        self,
+        kit: MissionKit,
+        machine: Container,
+        record: StateRecord,
+        triggers: list[_Trigger],
+    ) -> None:
+        self._clock = kit.clock
+        self._machine = machine
+        self._waiting = [(t, None if t.on is None else find_path(record, t.on)) for t in triggers]
+        self._visits: dict[str, int] = {}
+        self.events: list[Event] = []
+        self.started = self._clock.now()
+
+    @contextlib.contextmanager
+    def installed(self) -> Iterator[None]:
+        timers = [
+            self._clock.call_later(trigger.at, partial(trigger.act, self._machine))
+            for trigger, _ in self._waiting
+            if trigger.at is not None
+        ]
+        unsubscribe = self._machine.subscribe(self._on_event)
+        try:
+            yield
+        finally:
+            unsubscribe()
+            for timer in timers:
+                timer.cancel()
+
+    def _on_event(self, event: Event) -> None:
+        self.events.append(event)
+        if not self._waiting or not isinstance(event, Entered):
+            return
+        count = self._visits[event.path] = self._visits.get(event.path, 0) + 1
+        for trigger, path in self._waiting:
+            if path == event.path and trigger.visit == count:
+                self._clock.call_later(trigger.after, partial(trigger.act, self._machine))
+
+
+def _reraise(error: BaseException, run: Run, limit: float, *, draws: bool) -> NoReturn:
+    """Raise what ended a run, a deadlock as itself, with the run as a note."""
+    cause: BaseException | None = error
+    while cause is not None and not isinstance(cause, Deadlock | TimeLimit):
+        cause = cause.__cause__
+    if isinstance(cause, TimeLimit):
+        raise TimeLimitError(run, limit) from cause
+    chosen = error if cause is None else cause
+    picture = run.draw() if draws else None
+    if run.active:
+        chosen.add_note("active: " + ", ".join(run.active))
+    chosen.add_note(run.explain())
+    if picture is not None:
+        chosen.add_note(f"picture: {picture}")
+    raise chosen
+
+
+def _temporary_folder() -> Path:
+    return Path(tempfile.mkdtemp(prefix="smachpy-"))
+
+
+@contextlib.contextmanager
+def mission_kit(
+    *, seed: int | None = None, rate: float | None = None, folder: Path | None = None
+) -> Iterator[MissionKit]:
+    """Test missions without pytest.
+
+    `with mission_kit() as mission: run = mission(machine)`
+
+    Args:
+        seed: Picks the interleaving.
+        rate: Virtual seconds per real second.
+        folder: For pictures of failed runs.
+    """
+    with MissionKit(seed=seed, rate=rate, folder=None if folder is None else lambda: folder) as kit:
+        yield kit

@@ -1,0 +1,155 @@
+"""The pytest plugin: fixtures for missions, and mission coverage. No conftest needed.
+
+Importing it imports neither the network nor the drawing; the fixtures do, when a test asks.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from smachpy.testing.action_servers import ScriptedActionServer
+    from smachpy.testing.coverage import Coverage
+    from smachpy.testing.kit import MissionKit
+    from smachpy.testing.service_servers import ScriptedService
+    from smachpy.testing.topics import ScriptedTopic
+
+WORKER_KEY = "smachpy_mission_coverage"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the options."""
+    group = parser.getgroup("missions", "robot missions")
+    group.addoption("--mission-seed", type=int, help="interleaving of the missions under test")
+    group.addoption(
+        "--mission-rate", type=float, help="virtual seconds per real second, to watch missions"
+    )
+    group.addoption(
+        "--mission-coverage", action="store_true", help="measure what the tests run of the missions"
+    )
+    group.addoption(
+        "--mission-coverage-fail-under",
+        type=float,
+        metavar="PERCENT",
+        help="fail when a machine's coverage is lower",
+    )
+    group.addoption("--mission-coverage-json", metavar="FILE", help="write the coverage as JSON")
+    group.addoption(
+        "--mission-coverage-html", metavar="FILE", help="write tables and heat pictures as HTML"
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Start measuring, if it is wanted."""
+    wanted = (
+        "mission_coverage",
+        "mission_coverage_fail_under",
+        "mission_coverage_json",
+        "mission_coverage_html",
+    )
+    if any(config.getoption(name) for name in wanted):
+        from smachpy.testing.coverage import Coverage
+
+        config.pluginmanager.register(_Measuring(config, Coverage()), "mission-coverage")
+
+
+class _Measuring:
+    """Collects the coverage of this process, and that of xdist's workers."""
+
+    def __init__(self, config: pytest.Config, coverage: Coverage) -> None:
+        self.coverage = coverage
+        self._config = config
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_testnodedown(self, node: Any) -> None:
+        """Take over what a worker measured."""
+        from smachpy.testing.coverage import Coverage
+
+        found = getattr(node, "workeroutput", {}).get(WORKER_KEY)
+        if found is not None:
+            self.coverage.merge(Coverage.from_json(found))
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        """Hand the coverage on, or write it and judge it."""
+        output = getattr(self._config, "workeroutput", None)
+        if output is not None:
+            output[WORKER_KEY] = self.coverage.to_json()
+            return
+        self._write()
+        if session.exitstatus == pytest.ExitCode.OK and self._below():
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+    def _write(self) -> None:
+        file = self._config.getoption("mission_coverage_json")
+        if file:
+            Path(file).write_text(json.dumps(self.coverage.summary(), indent=2) + "\n", "utf-8")
+        file = self._config.getoption("mission_coverage_html")
+        if file:
+            from smachpy.testing.coverage_page import write_page
+
+            write_page(self.coverage, Path(file))
+
+    def _below(self) -> list[str]:
+        least = self._config.getoption("mission_coverage_fail_under")
+        if least is None:
+            return []
+        if not self.coverage.machines:
+            return [f"mission coverage: no mission ran; expected at least {least:g} %"]
+        return [
+            f"mission coverage: {machine.name}: {machine.percent:.0f} %; "
+            f"expected at least {least:g} %"
+            for machine in self.coverage.machines
+            if machine.percent < least
+        ]
+
+    def pytest_terminal_summary(self, terminalreporter: Any) -> None:
+        """Show the table."""
+        if getattr(self._config, "workeroutput", None) is not None:
+            return
+        terminalreporter.section("mission coverage")
+        terminalreporter.write_line(self.coverage.table())
+        for line in self._below():
+            terminalreporter.write_line(f"FAIL {line}", red=True)
+
+
+@pytest.fixture
+def mission(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[MissionKit]:
+    """Run machines in virtual time, on a network in memory, beside scripted servers."""
+    from smachpy.testing.kit import MissionKit
+
+    option: Callable[[str], Any] = request.config.getoption
+    measuring = request.config.pluginmanager.get_plugin("mission-coverage")
+    with MissionKit(
+        seed=option("mission_seed"),
+        rate=option("mission_rate"),
+        folder=lambda: tmp_path_factory.mktemp("mission"),
+        on_run=None if measuring is None else measuring.coverage.add,
+    ) as kit:
+        yield kit
+
+
+@pytest.fixture
+def action_server(mission: MissionKit) -> Callable[[str, Any], ScriptedActionServer]:
+    """Offer an action that does what the test says: `action_server("dock", DockAction)`."""
+    return mission.action_server
+
+
+@pytest.fixture
+def service_server(mission: MissionKit) -> Callable[[str, Any], ScriptedService]:
+    """Offer a service that does what the test says: `service_server("dock", Trigger)`."""
+    return mission.service_server
+
+
+@pytest.fixture
+def topic(mission: MissionKit) -> Callable[[str, Any], ScriptedTopic]:
+    """Write to a topic and keep what comes on it: `topic("battery", BatteryState)`."""
+    return mission.topic

@@ -1,0 +1,244 @@
+"""A run of a mission in a test: what happened, and assertions that say it when they fail."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import EllipsisType
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from smachpy.events import Abandoned, Entered, Failed, Finished, GoalDone, GoalSent, Left, TimedOut
+from smachpy.exceptions import SmachError, did_you_mean
+from smachpy.pictures import draw_run
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from smachpy.events import Event
+    from smachpy.introspection import StateRecord
+
+Pattern: TypeAlias = str | EllipsisType
+
+
+class UnknownStateError(SmachError):
+    """A test names a state that the machine does not have."""
+
+
+def find_path(record: StateRecord, name: str) -> str:
+    """Return the path of the state that `name` means: a path, or the end of one.
+
+    Raises:
+        UnknownStateError: no state, or more than one.
+    """
+    paths = [state.path for state in record.walk()]
+    if name in paths:
+        return name
+    found = [path for path in paths if path.endswith("/" + name.strip("/"))]
+    if len(found) == 1:
+        return found[0]
+    known = [*paths, *(path.rpartition("/")[2] for path in paths)]
+    what = f"it means {found}" if found else "there is none"
+    raise UnknownStateError(
+        f"{record.path}: state {name!r}: {what}; expected one of {paths}."
+        f"{did_you_mean(name, known)}"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What one run of a machine did.
+
+    Attributes:
+        record: The machine.
+        outcome: Its outcome.
+        events: All events, in order.
+        userdata: The machine's userdata after the run.
+        duration: How long it took on the test's clock [s].
+        seed: The interleaving it had; None: in turn.
+        folder: Gives the folder for pictures.
+    """
+
+    record: StateRecord
+    outcome: str | None
+    events: tuple[Event, ...]
+    userdata: dict[str, Any]
+    duration: float
+    seed: int | None = None
+    folder: Callable[[], Path] = field(default=Path.cwd, repr=False)
+
+    # -- what happened -------------------------------------------------------------------------
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Paths of the states that were entered, containers too, in order."""
+        return tuple(event.path for event in self.events if isinstance(event, Entered))
+
+    @property
+    def path(self) -> tuple[str, ...]:
+        """Paths of the leaves that were entered, in order."""
+        leaves = {state.path for state in self.record.walk() if not state.is_container}
+        return tuple(path for path in self.states if path in leaves)
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Paths of the states that ran at the end: none, unless the run broke off in them."""
+        events = list(self.events)
+        while self.outcome is None and events and isinstance(events[-1], Failed | Finished):
+            events.pop()  # what raised there ended all of them
+        active: dict[str, None] = {}
+        for event in events:
+            if isinstance(event, Entered):
+                active[event.path] = None
+            elif isinstance(event, Left | Failed):
+                active.pop(event.path, None)
+        return tuple(active)
+
+    @property
+    def goals_left(self) -> tuple[str, ...]:
+        """Ids of the goals that were sent and have not ended."""
+        sent = {event.goal_id: None for event in self.events if isinstance(event, GoalSent)}
+        done = {event.goal_id for event in self.events if isinstance(event, GoalDone)}
+        return tuple(goal_id for goal_id in sent if goal_id not in done)
+
+    def visits(self, state: str) -> int:
+        """Return how often a state was entered; `state` is a path or the end of one."""
+        return self.states.count(find_path(self.record, state))
+
+    def outcomes(self, state: str) -> tuple[str, ...]:
+        """Return the outcomes of a state, in order."""
+        path = find_path(self.record, state)
+        return tuple(e.outcome for e in self.events if isinstance(e, Left) and e.path == path)
+
+    def timed_out(self, state: str) -> bool:
+        """Tell whether a state ran into its timeout."""
+        path = find_path(self.record, state)
+        return any(isinstance(e, TimedOut) and e.path == path for e in self.events)
+
+    def abandoned(self) -> tuple[str, ...]:
+        """Return the paths of the states that ignored a preempt and were left behind."""
+        return tuple(event.path for event in self.events if isinstance(event, Abandoned))
+
+    # -- assertions ----------------------------------------------------------------------------
+
+    def assert_outcome(self, *expected: str) -> None:
+        """Fail unless the run ended with (one of) `expected`."""
+        if self.outcome not in expected:
+            wanted = " or ".join(map(repr, expected))
+            self._fail(f"outcome: got {self.outcome!r}; expected {wanted}.")
+
+    def assert_path(self, expected: Sequence[Pattern]) -> None:
+        """Fail unless exactly these leaves ran, in this order.
+
+        Args:
+            expected: Paths or ends of paths; `...` stands for any leaves, also none.
+        """
+        names = [x if isinstance(x, EllipsisType) else self._leaf(x) for x in expected]
+        if not _matches(self.path, names):
+            lines = ["...   " if isinstance(x, EllipsisType) else x for x in names]
+            diff = list(difflib.ndiff(lines, self.path))
+            text = "\n".join("  " + line for line in diff if not line.startswith("?"))
+            self._fail(f"path (- expected, + got):\n{text}")
+
+    def assert_visited(self, *states: str) -> None:
+        """Fail unless all these states ran."""
+        missing = [state for state in states if not self.visits(state)]
+        if missing:
+            self._fail(f"states: {missing} did not run.")
+
+    def assert_not_visited(self, *states: str) -> None:
+        """Fail if one of these states ran."""
+        ran = [state for state in states if self.visits(state)]
+        if ran:
+            self._fail(f"states: {ran} ran; expected not.")
+
+    def assert_userdata(self, **expected: object) -> None:
+        """Fail unless these keys have these values at the end."""
+        missing = object()
+        wrong = {
+            key: self.userdata.get(key, missing)
+            for key, value in expected.items()
+            if self.userdata.get(key, missing) != value
+        }
+        if wrong:
+            lines = [
+                f"  {key}: got {'no value' if got is missing else repr(got)}; "
+                f"expected {expected[key]!r}"
+                for key, got in wrong.items()
+            ]
+            self._fail("userdata:\n" + "\n".join(lines))
+
+    def assert_duration(self, *, at_most: float, at_least: float = 0.0) -> None:
+        """Fail unless the run took that long [s]."""
+        if not at_least <= self.duration <= at_most:
+            self._fail(
+                f"duration: got {self.duration:g} s; expected {at_least:g} to {at_most:g} s."
+            )
+
+    def draw(self, file: Path | str | None = None) -> Path | None:
+        """Write the machine with this run; without `file` into the test's folder.
+
+        Returns:
+            The file, or None when nothing that draws is installed.
+        """
+        if file is None:
+            folder = self.folder()
+            number = sum(1 for _ in folder.glob(f"{self.record.label}-*.svg")) + 1
+            file = folder / f"{self.record.label}-{number}.svg"
+        return draw_run(self.record, self.events, Path(file))
+
+    def explain(self) -> str:
+        """Return the run in a few lines."""
+        lines = [f"run of {self.record.path}: {self.outcome!r} after {self.duration:g} s"]
+        lines += [f"  {line}" for line in _summary(self.events)]
+        if self.seed is not None:
+            lines.append(f"  seed {self.seed}")
+        return "\n".join(lines)
+
+    def _leaf(self, name: str) -> str:
+        return find_path(self.record, name)
+
+    def _fail(self, text: str) -> None:
+        __tracebackhide__ = True
+        picture = self.draw()
+        shown = "" if picture is None else f"\npicture: {picture}"
+        raise AssertionError(f"{text}\n{self.explain()}{shown}")
+
+
+def _summary(events: Iterable[Event]) -> list[str]:
+    """Return one line per state that ended, and what else matters."""
+    lines: list[str] = []
+    start: float | None = None
+    for event in events:
+        start = event.t if start is None else start
+        if isinstance(event, Left):
+            lines.append(f"{event.t - start:8.3f}  {event.path} -{event.outcome}->")
+        elif not isinstance(event, Entered) and type(event).__name__ in _WORTH_TELLING:
+            fields = ", ".join(
+                f"{k}={v}" for k, v in list(event._asdict().items())[3:] if k != "stack"
+            )
+            lines.append(
+                f"{event.t - start:8.3f}  {event.path} {type(event).__name__} {fields}".rstrip()
+            )
+    most = 60
+    return (
+        [*lines[:20], f"   ... {len(lines) - 40} more", *lines[-20:]]
+        if len(lines) > most
+        else lines
+    )
+
+
+_WORTH_TELLING = frozenset(
+    {"Failed", "PreemptRequested", "Preempted", "Abandoned", "TimedOut", "Retried", "GoalDone"}
+)
+
+
+def _matches(path: Sequence[str], wanted: Sequence[Pattern]) -> bool:
+    """Tell whether a path is as wanted; `...` stands for any number of steps."""
+    ends = {0}
+    for pattern in wanted:
+        if isinstance(pattern, EllipsisType):
+            ends = set(range(min(ends), len(path) + 1)) if ends else set()
+        else:
+            ends = {end + 1 for end in ends if end < len(path) and path[end] == pattern}
+    return len(path) in ends

@@ -1,0 +1,286 @@
+"""All runs of a mission: what is planted is found, shortened and can be repeated."""
+
+from __future__ import annotations
+
+import pytest
+
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
+from smachpy import CBState, Concurrence, Iterator, SimpleActionState, State, StateMachine
+from smachpy.testing import explore, mission_kit, replay
+
+
+class Leaf(State):
+    def __init__(self, *outcomes, **options):
+        super().__init__(outcomes or ("done", "preempted"), **options)
+
+    def execute(self, ud):
+        raise AssertionError("the explorer has put a double in my place")
+
+
+def sound():
+    sm = StateMachine(["done", "failed", "preempted"], name="M")
+    with sm:
+        sm.add("A", Leaf("done", "failed", "preempted"), {"done": "B"})
+        sm.add("B", Leaf("done", "again", "preempted"), {"again": "A"})
+    return sm
+
+
+def test_a_sound_machine_is_explored_to_the_end():
+    found = explore(sound())
+    assert found
+    assert found.ok, found
+    assert found.exhaustive
+    assert found.stopped_by == ""
+    assert found.runs > 8
+    assert "all there are: no counterexample" in str(found)
+
+
+def test_the_machine_is_as_it_was_afterwards():
+    sm = sound()
+    before = dict(sm.get_children())
+    sm.userdata.x = [1]
+    explore(sm)
+    assert sm.get_children() == before
+    assert sm.userdata.x == [1]
+
+
+def test_bounds_say_that_there_is_more():
+    found = explore(sound(), max_runs=3)
+    assert (found.ok, found.exhaustive, found.runs, found.stopped_by) == (
+        True,
+        False,
+        3,
+        "max_runs",
+    )
+    found = explore(sound(), max_time=0.0)
+    assert (found.exhaustive, found.stopped_by) == (False, "max_time")
+    found = explore(sound(), max_depth=1)
+    assert (found.exhaustive, found.stopped_by) == (False, "max_depth")
+
+
+def test_an_invariant_of_one_s_own_and_the_shortest_run_that_breaks_it():
+    sm = StateMachine(["done", "preempted"], name="M")
+    with sm:
+        sm.add("SPIN", Leaf("again", "on"), {"again": "SPIN", "on": "PICK"})
+        sm.add("PICK", Leaf("picked", "missed"), {"picked": "CARRY", "missed": "SPIN"})
+        sm.add("CARRY", Leaf("dropped", "held"), {"dropped": "SPIN", "held": "done"})
+
+    def never_drops(run):
+        return "dropped" not in run.outcomes("CARRY")
+
+    found = explore(sm, invariants=[never_drops], preempts=0)
+    assert not found.ok
+    example = found.counterexample
+    assert "never_drops" in example.reason
+    assert "-dropped->" in example.run.explain()
+    assert example.run.path[:3] == ("/M/SPIN", "/M/PICK", "/M/CARRY")
+    assert "'/M/SPIN: on'" in example.script
+    assert replay(sm, example.choices, preempts=0).outcomes("CARRY")[0] == "dropped"
+
+
+def test_the_script_repeats_the_run(tmp_path):
+    def says_failed(run):
+        assert run.outcome != "failed", "it failed"
+
+    found = explore(broken_machine, invariants=[says_failed])
+    script = found.counterexample.script.replace(broken_machine.__module__, "planted")
+    assert f"from {broken_machine.__module__} import broken_machine as machine" in (
+        found.counterexample.script
+    )
+    space = {}
+    import sys
+    import types
+
+    module = types.ModuleType("planted")
+    module.broken_machine = broken_machine
+    sys.modules["planted"] = module
+    try:
+        exec(script, space)
+    finally:
+        del sys.modules["planted"]
+    assert space["run"].outcome == "failed"
+
+
+def broken_machine():
+    return sound()
+
+
+def test_the_picture_of_a_counterexample(mission):
+    found = mission.explore(sound, invariants=[lambda run: run.outcome != "failed"])
+    assert "<svg" in found.counterexample.picture.read_text()
+    assert str(found.counterexample.picture) in str(found)
+
+
+# -- planted bugs ----------------------------------------------------------------------------------
+
+
+def reason(found):
+    assert not found.ok
+    return found.counterexample.reason
+
+
+def test_a_loop_with_no_way_out():
+    sm = StateMachine(["done"], name="M")
+    with sm.opened(check=False):
+        sm.add("A", Leaf("ok", "odd"), {"ok": "done", "odd": "B"})
+        sm.add("B", Leaf("ok"), {"ok": "B"})
+    found = explore(sm, preempts=0)
+    assert reason(found).startswith("it never ends")
+    assert found.counterexample.choices[0] == "/M/A: odd"
+
+
+def test_a_watcher_that_nobody_calls_off():
+    both = Concurrence(["done", "preempted"], "done", name="C")
+    watcher = Leaf("heard", "preempted")
+    watcher.__class__ = type("Watcher", (Leaf,), {"kind": "monitor"})
+    with both:
+        both.add("GO", Leaf())
+        both.add("WATCH", watcher)
+    found = explore(both, preempts=0)
+    assert reason(found).startswith("it never ends")
+    assert any("never finishes" in choice for choice in found.counterexample.choices)
+    both._child_termination_cb = lambda _: True
+    assert explore(both, preempts=0).ok
+
+
+def test_a_state_that_hangs_is_found_when_it_is_asked_for():
+    assert explore(sound(), faults=["hang"]).counterexample.reason.startswith("it never ends")
+    assert explore(sound()).ok
+
+
+def test_an_exception_that_nobody_catches():
+    assert "raised by the test" in reason(explore(sound(), faults=["raise"]))
+    sm = StateMachine(["done", "preempted"], name="M")
+    with sm:
+        sm.add("A", Leaf("done", "preempted", on_exception={RuntimeError: "done"}))
+    assert explore(sm, faults=["raise"]).ok
+
+
+def test_a_state_that_ignores_its_preempt():
+    found = explore(sound(), faults=["deaf"])
+    assert "a preempt takes 10 s, /M/" in reason(found)
+
+
+def test_a_mission_that_goes_on_after_a_preempt():
+    sm = StateMachine(["done", "preempted"], name="M")
+    with sm:
+        sm.add("DRIVE", Leaf("done", "preempted"), {"preempted": "WANDER"})
+        for number in range(20):
+            label = f"W{number}" if number else "WANDER"
+            sm.add(label, Leaf("done"), {"done": f"W{number + 1}" if number < 19 else "done"})
+    found = explore(sm)
+    assert "a preempt takes 20 s" in reason(found)
+    assert found.counterexample.choices == ("/M/DRIVE: is preempted",)
+
+
+def test_a_timeout_is_reached():
+    sm = StateMachine(["done", "late", "preempted"], name="M")
+    with sm:
+        sm.add("A", Leaf(timeout=5.0, timeout_outcome="late"), {"late": "B"})
+        sm.add("B", Leaf("done", "stuck"), {"stuck": "B"})
+    found = explore(sm, invariants=[lambda run: not run.timed_out("A")])
+    assert "/M/A: never finishes" in found.counterexample.choices
+
+
+def test_an_order_that_only_one_interleaving_has():
+    both = Concurrence(["done"], "done", name="C")
+    with both:
+        both.add("A", Leaf("done"))
+        both.add("B", Leaf("done"))
+
+    def a_ends_first(run):
+        ended = [e.path for e in run.events if type(e).__name__ == "Left"]
+        return ended.index("/C/A") < ended.index("/C/B")
+
+    found = explore(both, preempts=0, invariants=[a_ends_first])
+    assert any(choice.startswith("turn: ") for choice in found.counterexample.choices)
+    assert explore(both, preempts=0, invariants=[a_ends_first], interleavings=False).ok
+
+
+def test_userdata_that_is_wrong_on_one_path():
+    def count(ud):
+        ud.n += 1
+        return "more" if ud.n < 3 else "done"
+
+    sm = StateMachine(["done", "preempted"], name="M")
+    sm.userdata.n = 0
+    with sm:
+        sm.add("COUNT", CBState(count, outcomes=["more", "done"], io_keys=["n"]), {"more": "TRY"})
+        sm.add("TRY", Leaf("ok", "again"), {"ok": "COUNT", "again": "TRY"})
+    found = explore(sm, keep=["COUNT"], preempts=0, invariants=[lambda run: run.userdata["n"] == 3])
+    assert found.ok
+    found = explore(sm, keep=["COUNT"], preempts=0)
+    assert found.exhaustive
+    found = explore(
+        sm, keep=["COUNT"], userdata={"n": 2}, invariants=[lambda run: run.visits("TRY") > 0]
+    )
+    assert not found.ok
+
+
+def test_doubles_write_what_they_are_told():
+    sm = StateMachine(["done"], name="M")
+    with sm:
+        sm.add("FIND", Leaf("done", output_keys=["pose"]), {"done": "USE"})
+        sm.add("USE", CBState(lambda ud: ud.pose, outcomes=["done"], input_keys=["pose"]))
+    assert "pose" in reason(explore(sm, keep=["USE"], preempts=0))
+    assert explore(sm, keep=["USE"], preempts=0, writes={"/M/FIND": {"pose": "done"}}).ok
+
+
+def test_items_of_an_iterator_are_part_of_the_situation():
+    each = Iterator(["done"], [], [], it=range(3), it_label="i", exhausted_outcome="done")
+    each.name = "I"
+    with each:
+        Iterator.set_contained_state("DO", Leaf("ok", "bad"), ["ok", "bad"])
+    found = explore(each, preempts=0)
+    assert found.exhaustive
+    assert found.runs == 4  # at each of three items the other outcome, once
+
+
+def drive():
+    sm = StateMachine(["succeeded", "aborted", "preempted"], name="M")
+    with sm:
+        state = SimpleActionState("move_base", MoveBaseAction, exec_timeout=60.0)
+        sm.add("DRIVE", state)
+    return sm
+
+
+def test_everything_that_servers_do():
+    found = explore(drive, real_actions=True, preempts=0, interleavings=False)
+    assert found.ok, found
+    assert found.exhaustive
+    assert found.runs == 9
+
+    def never_lost(run):
+        return all(getattr(event, "status", "") != "LOST" for event in run.events)
+
+    found = explore(
+        drive, real_actions=True, preempts=0, interleavings=False, invariants=[never_lost]
+    )
+    assert found.counterexample.choices == ("server move_base: dies",)
+
+
+def test_an_unknown_fault():
+    with pytest.raises(ValueError, match="deaf"):
+        explore(sound(), faults=["gremlins"])
+
+
+def test_a_machine_that_has_changed_cannot_be_replayed():
+    with pytest.raises(Exception, match="Has the machine changed"):
+        replay(sound(), ["/M/A: vanished"])
+
+
+def test_explored_runs_are_the_same_twice():
+    def verdict():
+        found = explore(
+            sound, invariants=[lambda run: run.outcome != "failed" or run.visits("B") < 1]
+        )
+        return found.runs, found.counterexample.choices, found.counterexample.run.explain()
+
+    assert len({verdict() for _ in range(3)}) == 1
+
+
+def test_exploring_costs_little():
+    with mission_kit() as mission:
+        found = mission.explore(sound(), max_runs=1000, max_time=60, invariants=[lambda run: True])
+    assert found.ok
+    assert found.runs / found.seconds > 40  # three hundred on an idle computer

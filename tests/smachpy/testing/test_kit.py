@@ -1,0 +1,334 @@
+"""Running machines in tests: virtual time, doubles, preempts, assertions."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+
+import pytest
+
+from actionlib_core import shutdown
+from actionlib_core.clock import Deadlock, RealClock, current_clock
+from smachpy import CBState, Concurrence, InvalidUserCodeError, State, StateMachine
+from smachpy.testing import (
+    DoubleError,
+    MissionTestCase,
+    TimeLimitError,
+    UnknownStateError,
+    mission_kit,
+)
+
+
+class Wait(State):
+    def __init__(self, seconds=10.0):
+        super().__init__(["done", "preempted"], output_keys=["waited"])
+        self.seconds = seconds
+
+    def execute(self, ud):
+        if self.sleep(self.seconds):
+            return "preempted"
+        ud.waited = self.seconds
+        return "done"
+
+
+def two_waits():
+    sm = StateMachine(["done", "failed", "preempted"], name="M")
+    with sm:
+        sm.add("A", Wait(), {"done": "B"})
+        sm.add("B", Wait(20.0))
+    return sm
+
+
+def test_a_run_says_what_happened(mission):
+    run = mission(two_waits())
+    assert run.outcome == "done"
+    assert run.path == run.states == ("/M/A", "/M/B")
+    assert run.duration == 30
+    assert run.userdata == {"waited": 20}
+    assert run.visits("A") == 1
+    assert run.outcomes("/M/B") == ("done",)
+    assert [type(event).__name__ for event in run.events][:: len(run.events) - 1] == [
+        "Started",
+        "Finished",
+    ]
+    assert run.active == run.goals_left == run.abandoned() == ()
+    assert not run.timed_out("A")
+
+
+def test_assertions_that_hold(mission):
+    run = mission(two_waits())
+    run.assert_outcome("done", "failed")
+    run.assert_path(["A", "/M/B"])
+    run.assert_path(["A", ...])
+    run.assert_path([..., "B"])
+    run.assert_path([..., "A", ..., "B", ...])
+    run.assert_visited("A", "B")
+    run.assert_userdata(waited=20)
+    run.assert_duration(at_least=30, at_most=30)
+
+
+@pytest.mark.parametrize(
+    ("check", "said"),
+    [
+        (lambda run: run.assert_outcome("failed"), "outcome: got 'done'; expected 'failed'"),
+        (lambda run: run.assert_path(["A"]), "+ /M/B"),
+        (lambda run: run.assert_path([..., "A"]), "+ /M/B"),
+        (lambda run: run.assert_path(["B", "A"]), "- /M/A"),
+        (lambda run: run.assert_not_visited("A"), "['A'] ran; expected not"),
+        (lambda run: run.assert_userdata(waited=1, x=2), "x: got no value; expected 2"),
+        (lambda run: run.assert_duration(at_most=1), "got 30 s; expected 0 to 1 s"),
+    ],
+)
+def test_a_failed_assertion_tells_the_run_and_names_a_picture(mission, check, said):
+    run = mission(two_waits())
+    with pytest.raises(AssertionError) as caught:
+        check(run)
+    text = str(caught.value)
+    assert said in text
+    assert "10.000  /M/A -done->" in text
+    picture = text[text.index("picture: ") + 9 :]
+    with open(picture, encoding="utf-8") as file:
+        assert "<svg" in file.read()
+
+
+def test_a_wrong_name_is_no_failed_assertion(mission):
+    run = mission(two_waits())
+    with pytest.raises(UnknownStateError, match="Did you mean"):
+        run.assert_visited("AA")
+
+
+def test_userdata_is_put_in_before(mission):
+    sm = StateMachine(["done"])
+    with sm:
+        sm.add("A", CBState(lambda ud: ud.x, outcomes=["done"], input_keys=["x"]))
+    assert mission(sm, userdata={"x": "done"}).outcome == "done"
+
+
+def test_user_code_that_waits_by_itself_is_in_virtual_time(mission):
+    def wait(ud):
+        time.sleep(3600)
+        threading.Event().wait(3600)
+        return "done"
+
+    sm = StateMachine(["done"])
+    with sm:
+        sm.add("A", CBState(wait, outcomes=["done"]))
+    begun = time.monotonic()
+    assert mission(sm).duration == 7200
+    assert time.monotonic() - begun < 60
+    assert isinstance(RealClock().now(), float)
+
+
+# -- doubles ---------------------------------------------------------------------------------------
+
+
+def test_a_double_takes_a_state_s_place_for_the_test():
+    sm = two_waits()
+    original = sm["A"]
+    with mission_kit() as mission:
+        made = mission.replace("/M/A", outcomes=["done", "preempted"], writes={"waited": 1})
+        mission.replace("B", outcomes=["done"], duration=5)
+        assert mission(sm).duration == 5
+        run = mission(sm)
+        assert run.outcome == "preempted"
+        assert run.outcomes("A") == ("preempted",)
+        assert made[0].runs == 2
+        assert sm["A"] is made[0]
+    assert sm["A"] is original
+
+
+def test_a_double_with_a_function(mission):
+    mission.replace("A", execute=lambda ud: "preempted")
+    assert mission(two_waits()).outcome == "preempted"
+
+
+def test_a_double_keeps_options_and_details_of_its_state(mission):
+    sm = StateMachine(["done", "late"], name="M")
+    with sm:
+        sm.add("A", Wait(1), {"preempted": "done"})
+        sm["A"].timeout = 5.0
+        sm["A"].timeout_outcome = "late"
+        sm["A"].register_outcomes(["late"])
+    mission.replace("A", outcomes=["done"], duration=60)
+    run = mission(sm)
+    assert run.outcome == "late"
+    assert run.duration == 5
+    assert run.timed_out("A")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "said"),
+    [
+        ({"path": "X", "outcomes": ["done"]}, UnknownStateError, "'X'"),
+        ({"path": "A", "outcomes": ["odd"]}, DoubleError, "odd"),
+        ({"path": "A"}, DoubleError, "at least one"),
+        ({"path": "A", "outcomes": ["done"], "writes": {"x": 1}}, DoubleError, "output keys"),
+        ({"path": "/M", "outcomes": ["done"]}, DoubleError, "the root"),
+    ],
+)
+def test_doubles_that_do_not_fit(mission, arguments, error, said):
+    mission.replace(**arguments)
+    with pytest.raises(error, match=said):
+        mission(two_waits())
+
+
+# -- preempts --------------------------------------------------------------------------------------
+
+
+def test_preempt_at_a_time(mission):
+    mission.preempt(at=15)
+    run = mission(two_waits())
+    assert (run.outcome, run.duration) == ("preempted", 15)
+    assert mission(two_waits()).outcome == "done"  # it was for one run
+
+
+def test_preempt_on_a_state(mission):
+    mission.preempt(on="/M/B", after=3)
+    assert mission(two_waits()).duration == 13
+    mission.preempt(on="B")
+    assert mission(two_waits()).duration == 10
+
+
+def test_preempt_on_a_later_visit(mission):
+    sm = StateMachine(["preempted"])
+    with sm:
+        sm.add("A", Wait(), {"done": "A"})
+    mission.preempt(on="A", visit=4, after=1)
+    assert mission(sm).duration == 31
+
+
+def test_interrupt_is_a_shutdown_and_a_preempt(mission):
+    mission.interrupt(on="A", after=2)
+    run = mission(two_waits())
+    assert (run.outcome, run.duration) == ("preempted", 2)
+    assert shutdown.requested()
+
+
+def test_neither_at_nor_on(mission):
+    with pytest.raises(ValueError, match="one of them"):
+        mission.preempt()
+
+
+# -- runs that go wrong ----------------------------------------------------------------------------
+
+
+def test_a_deadlock_names_the_active_states(mission):
+    def stuck(ud):
+        current_clock().event("a call").wait()
+
+    sm = StateMachine(["done"], name="M")
+    with sm:
+        sm.add("A", CBState(stuck, outcomes=["done"]))
+    with pytest.raises(Deadlock, match="a call") as caught:
+        mission(sm)
+    assert "active: /M/A" in caught.value.__notes__
+
+
+def test_a_deadlock_in_a_concurrence(mission):
+    both = Concurrence(["done"], "done", name="C")
+    with both:
+        both.add("A", CBState(lambda ud: current_clock().event("never").wait(), outcomes=["done"]))
+        both.add("B", Wait())
+    with pytest.raises(Deadlock) as caught:
+        mission(both)
+    assert caught.value.waits["/C/A"] == "never"
+
+
+def test_a_run_that_never_ends_is_told_from_a_long_one(mission):
+    sm = StateMachine(["preempted"], name="M")
+    with sm:
+        sm.add("A", Wait(), {"done": "A"})
+    with pytest.raises(TimeLimitError, match="still ran after 95 s, in /M/A") as caught:
+        mission(sm, limit=95)
+    assert caught.value.run.visits("A") == 10
+
+
+def test_a_state_that_raises(mission):
+    sm = StateMachine(["done"], name="M")
+    with sm:
+        sm.add("A", CBState(lambda ud: 1 / 0, outcomes=["done"]))
+    with pytest.raises(InvalidUserCodeError) as caught:
+        mission(sm)
+    assert any("picture: " in note for note in caught.value.__notes__)
+
+
+# -- elsewhere than in a plain pytest function -----------------------------------------------------
+
+
+def test_inside_an_event_loop(mission):
+    class Sleeper(State):
+        async def execute(self, ud):
+            await asyncio.sleep(60)
+            return "done"
+
+    sm = StateMachine(["done", "preempted"], name="M")
+    with sm:
+        sm.add("A", Sleeper(["done"]), {"done": "B"})
+        sm.add("B", Wait())
+
+    async def test():
+        return mission(sm)
+
+    assert asyncio.run(test()).duration == 70
+
+
+def test_a_deadlock_inside_an_event_loop(mission):
+    sm = StateMachine(["done"], name="M")
+    with sm:
+        sm.add("A", CBState(lambda ud: current_clock().event("x").wait(), outcomes=["done"]))
+
+    async def test():
+        with pytest.raises(Deadlock):
+            mission(sm)
+
+    asyncio.run(test())
+
+
+class TestWithUnittest(MissionTestCase):
+    def test_mission(self):
+        self.mission.preempt(at=1)
+        assert self.mission(two_waits()).duration == 1
+
+
+def test_seeds_give_the_same_events_twice():
+    def events(seed):
+        both = Concurrence(["done"], "done", name="C")
+        with both:
+            for label in "ABC":
+                both.add(label, Wait())
+        with mission_kit(seed=seed) as mission:
+            return [(type(e).__name__, e.path, e.t) for e in mission(both).events]
+
+    first = [events(seed) for seed in range(100)]
+    assert first == [events(seed) for seed in range(100)]
+    assert len({tuple(run) for run in first}) > 3
+
+
+def test_ten_thousand_transitions_cost_little_more_than_in_real_time():
+    left = [0]
+
+    def step(ud):
+        left[0] -= 1
+        return "again" if left[0] else "done"
+
+    sm = StateMachine(["done"], name="M")
+    with sm:
+        sm.add("A", CBState(step, outcomes=["again", "done"]), {"again": "A"})
+
+    def cost(run):
+        best = 1e9
+        for _ in range(3):
+            left[0] = 10_000
+            begun = time.perf_counter()
+            run()
+            best = min(best, time.perf_counter() - begun)
+        return best
+
+    # With the same listener: a mission under test is always watched.
+    events = []
+    unsubscribe = sm.subscribe(events.append)
+    real = cost(sm.execute)
+    unsubscribe()
+    with mission_kit() as mission:
+        assert cost(lambda: mission(sm)) < 5 * real

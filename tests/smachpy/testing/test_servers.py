@@ -1,0 +1,298 @@
+"""Scripted action servers, services and topics, with their faults."""
+
+from __future__ import annotations
+
+import pytest
+
+from actionlib_core.interfaces.move_base_msgs.msg import (
+    MoveBaseAction,
+    MoveBaseFeedback,
+    MoveBaseGoal,
+)
+from actionlib_core.interfaces.std_msgs.msg import String
+from actionlib_core.interfaces.std_srvs.srv import Trigger, TriggerResponse
+from smachpy import MonitorState, ServiceState, SimpleActionState, StateMachine
+from smachpy.events import GoalDone, GoalFeedback
+
+
+def drive(**options):
+    sm = StateMachine(["succeeded", "aborted", "preempted"], name="M")
+    with sm:
+        sm.add("DRIVE", SimpleActionState("move_base", MoveBaseAction, **options))
+    return sm
+
+
+def drive_twice():
+    sm = StateMachine(["succeeded", "aborted", "preempted"], name="M")
+    with sm:
+        sm.add("A", SimpleActionState("move_base", MoveBaseAction), {"succeeded": "B"})
+        sm.add("B", SimpleActionState("move_base", MoveBaseAction))
+    return sm
+
+
+def status(run):
+    return [event.status for event in run.events if isinstance(event, GoalDone)]
+
+
+@pytest.fixture
+def server(action_server):
+    return action_server("move_base", MoveBaseAction)
+
+
+def test_without_a_script_every_goal_succeeds(mission, server):
+    run = mission(drive_twice())
+    assert run.outcome == "succeeded"
+    assert server.goals == [MoveBaseGoal(), MoveBaseGoal()]
+
+
+def test_replies_in_order_then_the_default(mission, server):
+    server.reply(duration=5)
+    server.reply(status="aborted", text="blocked")
+    server.default_result(duration=1)
+    assert mission(drive_twice()).outcome == "aborted"
+    run = mission(drive_twice())
+    assert (run.outcome, run.duration) == ("succeeded", 2)
+
+
+def test_feedback_is_spread_over_the_duration(mission, server):
+    server.reply(duration=10, feedback=[MoveBaseFeedback(), {}])
+    run = mission(drive())
+    times = [event.t for event in run.events if isinstance(event, GoalFeedback)]
+    assert times == [5, 10]
+
+
+def test_a_reply_for_some_goals(mission, server):
+    server.reply_conditionally(
+        lambda goal: goal.target_pose.header.frame_id == "map", status="aborted"
+    )
+    goal = MoveBaseGoal()
+    assert mission(drive(goal=goal)).outcome == "succeeded"
+    goal.target_pose.header.frame_id = "map"
+    assert mission(drive(goal=goal)).outcome == "aborted"
+
+
+def test_a_reply_of_one_s_own(mission, server):
+    def reply(handle):
+        handle.set_accepted()
+        mission.clock.sleep(7)
+        handle.set_succeeded()
+
+    server.custom_reply(reply)
+    assert mission(drive()).duration == 7
+
+
+def test_a_goal_too_many_fails_the_run(mission, server):
+    server.reply()
+    with pytest.raises(AssertionError, match="goal number 2 came; expected 1"):
+        mission(drive_twice())
+
+
+def test_a_goal_can_be_awaited_beside_the_mission(mission, server):
+    server.default_result(duration=5)
+    seen = []
+
+    def watch():
+        server.await_goal(timeout=10)
+        seen.append(mission.clock.now())
+        with pytest.raises(AssertionError, match="no goal came within 10 s"):
+            server.await_goal(timeout=10)
+        seen.append(mission.clock.now())
+
+    task = mission.clock.spawn(watch, name="watch")
+    mission(drive())
+    task.join()
+    assert seen == [0, 10]
+
+
+def test_a_cancelled_goal_ends_early(mission, server):
+    server.reply(duration=100)
+    mission.preempt(at=30)
+    run = mission(drive())
+    assert (run.outcome, run.duration, status(run)) == ("preempted", 30, ["PREEMPTED"])
+    assert len(server.cancelled) == 1
+
+
+@pytest.mark.parametrize("word", ["statos", ""])
+def test_an_unknown_status(server, word):
+    with pytest.raises(ValueError, match="succeeded"):
+        server.reply(status=word)
+
+
+def test_a_result_of_another_type(server):
+    with pytest.raises(TypeError, match="MoveBaseResult"):
+        server.reply(result=3)
+
+
+# -- faults of action servers ----------------------------------------------------------------------
+
+
+def test_never_answers(mission, server):
+    server.never_answer()
+    run = mission(drive(exec_timeout=30.0, preempt_timeout=5.0))
+    assert run.outcome == "aborted"
+    assert run.duration <= 40
+
+
+def test_never_finishes(mission, server):
+    server.never_finish()
+    assert mission(drive(exec_timeout=30.0)).duration == 30
+    server.never_finish(ignore_cancel=True)
+    run = mission(drive(exec_timeout=30.0, preempt_timeout=5.0))
+    assert (run.outcome, run.duration) == ("aborted", 35)
+
+
+def test_accepts_late(mission, server):
+    server.accept_late(20, duration=5)
+    assert mission(drive()).duration == 25
+
+
+def test_rejects(mission, server):
+    server.reject("no map")
+    run = mission(drive())
+    assert (run.outcome, status(run)) == ("aborted", ["REJECTED"])
+
+
+def test_dies_while_active(mission, server):
+    server.die(after=3)
+    run = mission(drive())
+    assert (run.outcome, status(run), run.duration) == ("aborted", ["LOST"], 3)
+
+
+def test_dies_and_comes_back(mission, server):
+    server.die(after=3, back_after=10)
+    server.default_result()
+    sm = StateMachine(["succeeded", "preempted"], name="M")
+    with sm:
+        sm.add("DRIVE", SimpleActionState("move_base", MoveBaseAction), {"aborted": "DRIVE"})
+    run = mission(sm)
+    assert run.outcome == "succeeded"
+    assert run.visits("DRIVE") == 2
+    assert run.duration >= 13
+
+
+def test_loses_the_result(mission, server):
+    server.lose_result(duration=4)
+    run = mission(drive())
+    assert (run.outcome, status(run)) == ("succeeded", ["SUCCEEDED"])
+
+
+def test_delivers_twice(mission, server):
+    server.deliver_twice(duration=4, feedback=[{}])
+    run = mission(drive_twice_after(server))
+    assert run.outcome == "succeeded"
+    assert status(run) == ["SUCCEEDED", "SUCCEEDED"]
+
+
+def drive_twice_after(server):
+    server.default_result()
+    return drive_twice()
+
+
+def test_ignores_a_cancel(mission, server):
+    server.ignore_cancel(duration=50)
+    mission.preempt(at=10)
+    run = mission(drive())
+    assert run.duration == 50
+    assert status(run) == ["SUCCEEDED"]
+
+
+def test_a_server_preempts_by_itself(mission, server):
+    server.reply(status="preempted")
+    run = mission(drive())
+    assert (run.outcome, status(run)) == ("aborted", ["PREEMPTED"])
+
+
+# -- services --------------------------------------------------------------------------------------
+
+
+def call(**options):
+    sm = StateMachine(["succeeded", "aborted", "preempted"], name="M")
+    with sm:
+        sm.add("CALL", ServiceState("dock", Trigger, **options))
+    return sm
+
+
+def test_a_service_answers_in_order(mission, service_server):
+    server = service_server("dock", Trigger)
+    server.reply(TriggerResponse(success=True), duration=3)
+    server.reply({"message": "again"})
+    run = mission(call(response_slots=["success"]))
+    assert (run.outcome, run.duration, run.userdata["success"]) == ("succeeded", 3, True)
+    assert mission(call(response_slots=["message"])).userdata["message"] == "again"
+    with pytest.raises(AssertionError, match="request number 3 came"):
+        mission(call())
+    assert len(server.requests) == 3
+
+
+def test_a_service_without_a_script(mission, service_server):
+    service_server("dock", Trigger)
+    assert mission(call()).outcome == "succeeded"
+
+
+def test_a_service_made_by_hand(mission, service_server):
+    service_server("dock", Trigger).custom_reply(lambda request: TriggerResponse(message="mine"))
+    assert mission(call(response_slots=["message"])).userdata["message"] == "mine"
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+@pytest.mark.parametrize("fault", ["fail", "die"])
+def test_a_service_that_fails(mission, service_server, fault):
+    server = service_server("dock", Trigger)
+    getattr(server, fault)()
+    server.default_response()
+    assert mission(call()).outcome == "aborted"
+    if fault == "die":
+        server.come_back()
+    assert mission(call()).outcome == "succeeded"
+
+
+def test_a_service_that_never_answers(mission, service_server):
+    service_server("dock", Trigger).never_answer()
+    run = mission(call(timeout=12.0))
+    assert (run.outcome, run.duration) == ("aborted", 12)
+
+
+# -- topics ----------------------------------------------------------------------------------------
+
+
+def watch():
+    sm = StateMachine(["heard", "valid", "invalid", "preempted"], name="M")
+    state = MonitorState("chatter", String, lambda ud, msg: msg.data != "stop")
+    with sm:
+        sm.add("WATCH", state, {"invalid": "heard"})
+    return sm
+
+
+def test_a_topic_at_moments_that_the_test_says(mission, topic):
+    chatter = topic("chatter", String)
+    chatter.publish_every(2, [{"data": "go"}, {"data": "go"}, {"data": "stop"}], start=1)
+    assert mission(watch()).duration == 5
+    assert [message.data for message in chatter.received] == ["go", "go", "stop"]
+
+
+def test_a_latched_topic(mission, topic):
+    topic("chatter", String).publish(data="stop", latch=True)
+    assert mission(watch()).duration == 0
+
+
+def test_faults_of_a_topic(mission, topic):
+    chatter = topic("chatter", String)
+    chatter.lose()
+    chatter.delay(4)
+    chatter.publish_at(1, data="stop")
+    chatter.publish_at(2, data="stop")
+    assert mission(watch()).duration == 6
+    chatter.deliver_twice()
+    chatter.publish_at(1, data="stop")
+    mission(watch())
+    mission.clock.sleep(10)
+    assert len(chatter.received) == 3
+
+
+def test_a_cut_link(mission, server):
+    server.default_result(duration=60)
+    server.cut()
+    mission.clock.call_later(5, server.restore)
+    run = mission(drive())
+    assert run.outcome == "succeeded"
+    assert run.duration >= 65
