@@ -230,7 +230,7 @@ class SimpleActionState(State):
     def _finish(self, ud: Any, exchange: GoalExchange) -> str:
         """Hand the result on and choose the outcome."""
         run, result = exchange.run, exchange.result
-        if run.preempted:
+        if run.outcome == PREEMPTED:  # else the goal was done first, and the preempt is still due
             self.service_preempt()
         if result is not None:
             self._result.store(ud, result)
