@@ -5,7 +5,7 @@
         machine.execute()
 
 The first SIGINT or SIGTERM requests the shutdown; the second SIGINT raises KeyboardInterrupt as
-Python does by default, a third ends the process at once.
+Python does by default, a third ends the process at once; the second SIGTERM ends it at once.
 
 Tests use a `Shutdown` of their own (`use_shutdown`) and request it by hand.
 """
@@ -180,6 +180,9 @@ class _SignalHandler:
         elif number == signal.SIGINT:
             signal.signal(signal.SIGINT, signal.SIG_DFL)
             raise KeyboardInterrupt
+        else:
+            signal.signal(number, signal.SIG_DFL)
+            signal.raise_signal(number)
 
     def _relay(self) -> None:
         self._wake.wait()

@@ -45,8 +45,10 @@ def is_shutdown() -> bool:
 def set_preempt_handler(sc: State, *, timeout: float | None = 60.0) -> None:
     """Preempt `sc` when the program is to end, and let it finish before the network is left.
 
-    A machine that runs is preempted by the program's shutdown anyway; this makes the program wait
-    for one that runs in another thread, so that its goals are cancelled and not left running.
+    A machine that runs is preempted by Ctrl-C and by the program's shutdown anyway. This makes the
+    program wait for one that runs in another thread, so that its goals are cancelled and not left
+    running; and, when called in the main thread, it makes SIGTERM a request to end as Ctrl-C is,
+    unless the program handles that itself.
 
     Args:
         sc: A container, or a state.
@@ -64,8 +66,29 @@ def set_preempt_handler(sc: State, *, timeout: float | None = 60.0) -> None:
                 log.logerr(f"{sc!r} still runs {timeout} s after its preempt; it is left behind.")
 
     current = shutdown.current_shutdown()
+    forget = _handle_sigterm()
+    if forget is not None:
+        current.at_exit(forget)
     current.on_shutdown(stop)
     current.at_exit(stop)
+
+
+def _handle_sigterm() -> Callable[[], object] | None:
+    """Let SIGTERM request the program's end; returns how to undo that, None if it was not done."""
+    import contextlib
+    import signal
+    import threading
+
+    from actionlib_core.clock import RealClock, current_clock
+    from actionlib_core.shutdown import handle_signals
+
+    real = isinstance(current_clock(), RealClock)
+    main = threading.current_thread() is threading.main_thread()
+    if not (real and main and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL):
+        return None
+    handling = contextlib.ExitStack()
+    handling.enter_context(handle_signals((signal.SIGTERM,)))
+    return handling.close
 
 
 def set_shutdown_check(cb: Callable[[], bool]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 
@@ -138,3 +139,50 @@ def test_a_program_that_ends_stops_its_machine():
         [sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=30, check=True
     )
     assert (result.stdout, result.stderr) == ("stopped\n", "")
+
+
+TERMINATED = (
+    PROGRAM.replace("started.wait()", "started.wait(); print('ready', flush=True)")
+    + """
+from actionlib_core import shutdown
+shutdown.event().wait()
+"""
+)
+IN_MAIN = (
+    PROGRAM.replace("started.set()", "print('ready', flush=True)").split("threading.Thread(")[0]
+    + """
+print(machine.execute(), flush=True)
+"""
+)
+
+
+@pytest.mark.parametrize(
+    ("program", "said"), [(TERMINATED, "stopped\n"), (IN_MAIN, "stopped\npreempted\n")]
+)
+def test_sigterm_stops_the_machine_and_lets_the_program_end(program, said):
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout.readline() == "ready\n"
+        process.send_signal(signal.SIGTERM)
+        assert process.communicate(timeout=30) == (said, "")
+        assert process.returncode == 0
+
+
+DEAF = IN_MAIN.replace("self.wait_preempt()", "self._clock().sleep(60.0)").replace(
+    "super().__init__(", "super().__init__(preempt_timeout=None, outcomes="
+)
+
+
+def test_a_second_sigterm_ends_the_process():
+    with subprocess.Popen(
+        [sys.executable, "-c", DEAF], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout.readline() == "ready\n"
+        while process.poll() is None:
+            process.send_signal(signal.SIGTERM)
+            try:
+                process.wait(0.2)
+            except subprocess.TimeoutExpired:
+                continue
+        assert process.returncode == -signal.SIGTERM
