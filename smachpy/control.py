@@ -177,7 +177,7 @@ class Control:
         run.control = self
         self._run = run
         if self._paused or self._breakpoints:
-            run.watched = True
+            run.watched = run.careful = True
 
     def pass_gate(self, frame: Frame, step: Step) -> None:
         """Hold the machine before `step` while it is paused.
@@ -234,7 +234,7 @@ class Control:
             run = self._run = frame.run
             run.control = self
         if run is not None:
-            run.watched = True
+            run.watched = run.careful = True
 
     # -- finding -------------------------------------------------------------------------------
 

@@ -325,13 +325,16 @@ class StateMachine(Container):
                 frame.step = step
                 if (
                     self._preempt_requested
-                    or run.watched
                     or frame.told is not None
                     or self._transition_cbs
+                    or run.careful
                 ):
                     following = self._careful(frame, step)
                 else:
-                    outcome = step.execute(step.userdata)
+                    if run.watched:
+                        outcome = run_watched(frame, step)
+                    else:
+                        outcome = step.execute(step.userdata)
                     if (
                         self._preempt_requested
                         or frame.told is not None

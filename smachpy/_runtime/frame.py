@@ -30,21 +30,29 @@ class Run:
 
     Attributes:
         clock: The clock of the run.
-        watched: Somebody wants to see or to control each transition. The inner loops look at this
-            and nothing else.
+        watched: Somebody wants to see each transition.
+        careful: Somebody wants more than to see them: a log, an operator, a shutdown check.
         logged: Transitions go to the log.
         has_shutdown_check: `set_shutdown_check` was called.
         control: The operator's control, once somebody asked for it.
         pending: Events that were noted while a lock was held, to be published without it.
     """
 
-    __slots__ = ("clock", "control", "has_shutdown_check", "logged", "pending", "watched")
+    __slots__ = (
+        "careful",
+        "clock",
+        "control",
+        "has_shutdown_check",
+        "logged",
+        "pending",
+        "watched",
+    )
 
     def __init__(self, clock: Clock) -> None:
         self.clock = clock
         self.logged = log.is_info_wanted()
         self.has_shutdown_check = has_shutdown_check()
-        self.watched = self.logged or self.has_shutdown_check
+        self.watched = self.careful = self.logged or self.has_shutdown_check
         self.control: Control | None = None
         self.pending: deque[tuple[Frame, Event]] = deque()
 
@@ -183,7 +191,7 @@ class RootFrame(Frame):
         self.boundary = boundary
         self.thread = threading.get_ident()
         self.step = None
-        self.path = f"/{container.name or 'SM_ROOT'}"
+        self.path = self._path = f"/{container.name or 'SM_ROOT'}"
 
 
 class Scope:

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from smachpy.user_data import UserData
 
 
+_new = tuple.__new__  # half the time of a NamedTuple's own
+
+
 class End:
     """The container ends with this outcome."""
 
@@ -43,6 +46,7 @@ class Step:
     __slots__ = (
         "_base",
         "_path",
+        "_window",
         "execute",
         "interface",
         "label",
@@ -61,6 +65,7 @@ class Step:
         self.interface = state._interface  # noqa: SLF001  one machinery
         self.writes = bool(state.get_registered_output_keys())
         self._base = self._path = ""
+        self._window: _WatchedRemapper | None = None
         self.userdata = Remapper(
             userdata,
             state.get_registered_input_keys(),
@@ -74,6 +79,13 @@ class Step:
         """Tell whether the child's interface has changed."""
         return self.interface != self.state._interface  # noqa: SLF001  one machinery
 
+    def cut_off(self) -> None:
+        """Let a thread that was left behind in this child get no further, and write nothing."""
+        self.next = _Nowhere()
+        self.userdata._revoke()  # noqa: SLF001  one machinery
+        if self._window is not None:
+            self._window._revoke()  # noqa: SLF001  one machinery
+
     def path_in(self, frame: Frame) -> str:
         """Return the child's path."""
         base = frame.path
@@ -83,10 +95,21 @@ class Step:
         return self._path
 
     def watched_userdata(self, frame: Frame) -> Remapper:
-        """Return a window that reports each write; the plain one if nothing may be written."""
-        if not self.writes:
-            return self.userdata
-        return _WatchedRemapper(self.userdata, frame, self.path_in(frame))
+        """Return a window that reports each write."""
+        window = self._window
+        if window is None or window._scope_of[0] is not frame:  # noqa: SLF001  its own module
+            window = self._window = _WatchedRemapper(self.userdata, frame, self.path_in(frame))
+        return window
+
+
+class _Nowhere(dict[str, Any]):
+    """The transitions of a child that was left behind: every one ends its thread."""
+
+    def __missing__(self, _key: object) -> Any:
+        raise Interruption
+
+    def __contains__(self, _key: object) -> bool:
+        raise Interruption
 
 
 Following: TypeAlias = Step | End
@@ -110,26 +133,24 @@ class _WatchedRemapper(Remapper):
         frame, path = self._scope_of
         if frame.run.watched:
             clock = frame.run.clock
-            name = self._output[key]
-            frame.publish(UserdataWritten(path, clock.now(), clock.time_ns(), name, item))
+            fields = (path, clock.now(), clock.time_ns(), self._output[key], item)
+            frame.publish(_new(UserdataWritten, fields))
 
     def __setattr__(self, name: str, value: Any) -> None:
         self[name] = value
-
-
-_new = tuple.__new__  # half the time of a NamedTuple's own
 
 
 def run_watched(frame: Frame, step: Step) -> Any:
     """Run a step and publish that it was entered and left."""
     run = frame.run
     clock = run.clock
-    path = step.path_in(frame)
+    path = step._path if step._base is frame._path else step.path_in(frame)  # noqa: SLF001
     if run.pending:
         run.flush()
     frame.publish(_new(Entered, (path, clock.now(), clock.time_ns())))
     try:
-        outcome = step.execute(step.watched_userdata(frame))
+        window = step.watched_userdata(frame) if step.writes else step.userdata
+        outcome = step.execute(window)
     except Exception as error:
         frame.emit(Failed, f"{type(error).__name__}: {error}")
         raise

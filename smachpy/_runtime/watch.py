@@ -139,8 +139,7 @@ def bury(frame: Frame, boundary: Any) -> None:
         container = above.container
         step = above.step
         if step is not None:
-            step.next = _Nowhere()
-            step.userdata._revoke()  # noqa: SLF001  one machinery
+            step.cut_off()
             step.state.recall_preempt()
         with container._lock:  # noqa: SLF001  one machinery
             container._plan = None  # noqa: SLF001
@@ -150,20 +149,6 @@ def bury(frame: Frame, boundary: Any) -> None:
         if above is boundary:
             return
         above = above.parent
-
-
-class _Nowhere(dict[str, Any]):
-    """The transitions of a state that was left behind: every one ends its thread."""
-
-    def __missing__(self, _key: object) -> Any:
-        from smachpy._runtime.interrupt import Interruption
-
-        raise Interruption
-
-    def __contains__(self, _key: object) -> bool:
-        from smachpy._runtime.interrupt import Interruption
-
-        raise Interruption
 
 
 def stack_of(ident: int) -> str:

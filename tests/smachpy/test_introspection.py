@@ -112,7 +112,7 @@ def test_inconsistent_and_empty_machines_are_described_too():
         ),
         (
             '{"path": "/", "label": "A", "kind": "state", "type_name": "T", "outcomes": [], '
-             '"children": [{}]}',
+            '"children": [{}]}',
             r"\$\.children\[0\]",
         ),
     ],

@@ -186,6 +186,41 @@ def test_preempt_at_every_line_of_the_machinery(watched):
     assert cuts["done"] > 3
 
 
+def test_preempts_from_another_thread_at_any_moment_never_stick():
+    """Real threads, switched as often as Python can."""
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        sm = nested_and_deaf()
+        go, asked = threading.Semaphore(0), threading.Semaphore(0)
+
+        def ask():
+            for n in range(400):
+                go.acquire()
+                for _ in range(n % 40):
+                    pass
+                sm.request_preempt()
+                asked.release()
+
+        thread = threading.Thread(target=ask)
+        thread.start()
+        outcomes = Counter()
+        for _ in range(400):
+            go.release()
+            outcome = sm.execute()
+            asked.acquire()
+            if sm.preempt_requested():  # it came when the run was over: it is for the next one
+                outcomes["late"] += 1
+                assert sm.execute() == "preempted"
+            outcomes[outcome] += 1
+            assert_clean(sm)
+            assert sm.execute() == "done"
+        thread.join()
+    finally:
+        sys.setswitchinterval(interval)
+    assert outcomes["preempted"]
+
+
 def test_preempt_before_execute_runs_no_child_and_holds_for_one_run():
     leaf = Deaf()
     sm = chain(leaf)
