@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
 import smachpy
@@ -101,18 +103,20 @@ def test_inconsistent_and_empty_machines_are_described_too():
     assert describe(smachpy.Sequence(["ok"], "ok")).kind == "sequence"
 
 
+PLAIN = {"path": "/A", "label": "A", "kind": "state", "type_name": "T", "outcomes": []}
+
+
 @pytest.mark.parametrize(
     ("text", "where"),
     [
         ("[]", r"\$: got list"),
         ("{}", "missing fields"),
         (
-            '{"path": "/A", "label": "A", "kind": "x", "type_name": "T", "outcomes": []}',
+            json.dumps({**PLAIN, "kind": "x"}),
             r"\$\.kind",
         ),
         (
-            '{"path": "/", "label": "A", "kind": "state", "type_name": "T", "outcomes": [], '
-            '"children": [{}]}',
+            json.dumps({**PLAIN, "children": [{}]}),
             r"\$\.children\[0\]",
         ),
     ],

@@ -195,7 +195,7 @@ def test_preempts_from_another_thread_at_any_moment_never_stick():
         go, asked = threading.Semaphore(0), threading.Semaphore(0)
 
         def ask():
-            for n in range(400):
+            for n in range(150):
                 go.acquire()
                 for _ in range(n % 40):
                     pass
@@ -205,7 +205,7 @@ def test_preempts_from_another_thread_at_any_moment_never_stick():
         thread = threading.Thread(target=ask)
         thread.start()
         outcomes = Counter()
-        for _ in range(400):
+        for _ in range(150):
             go.release()
             outcome = sm.execute()
             asked.acquire()

@@ -1,0 +1,112 @@
+"""Programs that a strict type checker must accept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TypedDict
+
+import smachpy
+from smachpy import (
+    CBState,
+    Concurrence,
+    Iterator,
+    Retry,
+    Sequence,
+    State,
+    StateMachine,
+    UserData,
+    any_of,
+    cb_interface,
+)
+from smachpy.events import Entered, Event, Left
+from smachpy.introspection import StateRecord, describe
+
+
+@dataclass
+class Mission:
+    battery: float = 1.0
+    goals: list[str] = field(default_factory=list)
+
+
+class Shared(TypedDict):
+    level: int
+
+
+class Drive(State):
+    def __init__(self) -> None:
+        super().__init__(
+            outcomes=["arrived", "preempted"],
+            io_keys=["goals"],
+            timeout=5.0,
+            retry=Retry(2, 0.5, ("aborted", OSError)),
+            on_exception={OSError: "aborted"},
+            preempt_timeout=None,
+        )
+
+    def execute(self, ud: Mission) -> str:
+        goal: str = ud.goals.pop()
+        return "preempted" if self.sleep(len(goal)) else "arrived"
+
+
+class Old(smachpy.State):
+    def __init__(self) -> None:
+        smachpy.State.__init__(self, ["ok"], ["x"], ["y"], ["z"])
+
+    def execute(self, userdata: UserData) -> str:
+        return "ok"
+
+
+class Cancelled(State):
+    async def execute(self, ud: UserData) -> str:
+        return "ok"
+
+
+@smachpy.state(outcomes=["done"], input_keys=["level"], retry=3)
+def look(userdata: UserData) -> str:
+    return "done"
+
+
+@cb_interface(outcomes=["done"], input_keys=["level"])
+def callback(userdata: UserData, factor: int) -> str:
+    return "done"
+
+
+def listen(event: Event) -> None:
+    if isinstance(event, Left):
+        outcome: str = event.outcome
+        print(event.path, outcome)
+    elif isinstance(event, Entered):
+        print(event.t + 1.0)
+
+
+def build() -> StateMachine:
+    sm = StateMachine(outcomes=["done", "preempted"], name="P", userdata_type=Mission)
+    with sm:
+        StateMachine.add("DRIVE", Drive(), {"arrived": "LOOK", "aborted": None}, {"goals": "goals"})
+        StateMachine.add("LOOK", look, transitions={"done": "CALL"}, constants={"level": 1})
+        StateMachine.add_auto("CALL", CBState(callback, [2]), ["done"])
+    sm.add("LAST", smachpy.state.State(["done"]))
+    sm.subscribe(listen)()
+    sm.control.pause(running="cancel")
+    record: StateRecord = describe(sm)
+    print(record.children)
+    return sm
+
+
+def build_others() -> str:
+    both = Concurrence(
+        ["done", "low"],
+        "done",
+        outcome_map={"low": any_of({"A": ["x", "y"]}), "done": {"A": "z"}},
+        child_termination_cb=lambda outcomes: outcomes["A"] == "x",
+        userdata_type=Shared,
+    )
+    with both:
+        state: State = Concurrence.add("A", Old(), {"x": "y"})
+    steps = Sequence(["ok"], connector_outcome="ok")
+    with steps:
+        Sequence.add("ONE", state)
+    loop = Iterator(["done"], [], [], it=range(3), exhausted_outcome="done")
+    with loop:
+        Iterator.set_contained_state("EACH", steps, loop_outcomes=["ok"])
+    return loop.execute(UserData())
