@@ -58,6 +58,7 @@ def register_run(subparsers: Any) -> None:
         metavar="S",
         help="how long to wait for the mission's action servers [s] (default: %(default)g)",
     )
+    _add_watching(parser)
     robot = parser.add_argument_group("the simulated robot")
     robot.add_argument(
         "--start-robot",
@@ -81,6 +82,18 @@ def register_run(subparsers: Any) -> None:
     parser.set_defaults(run=_run)
 
 
+def _add_watching(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("watching")
+    group.add_argument("--view", action="store_true", help="show it in a browser while it runs")
+    group.add_argument(
+        "--port", type=int, default=8080, help="of that page; 0 takes any (default: %(default)s)"
+    )
+    group.add_argument(
+        "--control", action="store_true", help="let viewers pause, step, jump and preempt"
+    )
+    group.add_argument("--record", type=Path, metavar="FILE", help="write the run to a file")
+
+
 def _list(_args: argparse.Namespace) -> int:
     from rich.console import Console
     from rich.table import Table
@@ -98,6 +111,7 @@ def _list(_args: argparse.Namespace) -> int:
 
 def _run(args: argparse.Namespace) -> int:
     from missions.runner import RunOptions, run_mission
+    from missions.watching import Watching
     from smachpy.targets import load_target
 
     pose: Sequence[float] = args.pose or ()
@@ -112,6 +126,7 @@ def _run(args: argparse.Namespace) -> int:
         success=tuple(args.success),
         server_timeout=args.server_timeout,
         debug=args.debug,
+        watching=Watching(record=args.record, view=args.view, port=args.port, control=args.control),
     )
     return run_mission(load_target(args.target), options)
 

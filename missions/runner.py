@@ -20,6 +20,7 @@ from missions.exceptions import MissionError
 from missions.maps import OFFICE_MAP, OFFICE_ROBOT
 from missions.recorder import TrackRecorder
 from missions.robot_process import RobotProcess
+from missions.watching import Watching, watched
 from smachpy import InvalidUserCodeError, describe
 
 if TYPE_CHECKING:
@@ -56,6 +57,7 @@ class RunOptions:
             like a failure.
         server_timeout: How long to wait for the action servers that the mission needs [s].
         debug: Show the traceback of a mission that raises.
+        watching: Who else may see it, and the file that it is written to.
     """
 
     inputs: Mapping[str, object] = field(default_factory=dict)
@@ -68,6 +70,7 @@ class RunOptions:
     success: tuple[str, ...] = ()
     server_timeout: float = 10.0
     debug: bool = False
+    watching: Watching = field(default_factory=Watching)
 
 
 def run_mission(target: Target, options: RunOptions) -> int:
@@ -100,13 +103,15 @@ def run_mission(target: Target, options: RunOptions) -> int:
         if not waiter.wait(options.server_timeout, robot):
             return _signal_exit(ending)
         stack.callback(machine.subscribe(recorder.on_event))
+        stack.enter_context(watched(target.name, machine, record.path, options.watching))
         view = stack.enter_context(viz.TerminalView(record, plain=options.plain))
         stack.callback(machine.subscribe(view.on_event))
         outcome = _execute(machine, view, debug=options.debug)
         if robot is not None:
             robot.let_go()
         if options.out is not None:
-            write_pictures(target.name, machine, view.history, recorder, outcome, options)
+            files = write_pictures(target.name, machine, view.history, recorder, outcome, options)
+            sys.stdout.write(f"\nWritten: {', '.join(map(str, files))}\n")
         if ending.requested():
             return _signal_exit(ending)
     return EXIT_SUCCESS if outcome in good_outcomes(record, options) else EXIT_OTHER_OUTCOME
@@ -175,8 +180,11 @@ def write_pictures(
     recorder: TrackRecorder,
     outcome: str | None,
     options: RunOptions,
-) -> None:
+) -> list[Path]:
     """Write `<out>/<name>.svg`, and `<out>/<name>_track.png` if the robot had places to go to.
+
+    Returns:
+        The files.
 
     Raises:
         MissionError: a file cannot be written.
@@ -184,7 +192,7 @@ def write_pictures(
     out = options.out
     assert out is not None
     try:
-        viz.render(machine, out / f"{name}.svg", run=history)
+        files = [viz.render(machine, out / f"{name}.svg", run=history)]
         if recorder.has_goals:
             from missions.move_base.config import load_config
             from missions.move_base.occupancy import load_map
@@ -193,8 +201,10 @@ def write_pictures(
             title = f"{name}: {outcome}"
             picture = out / f"{name}_track.png"
             recorder.draw(picture, load_map(options.map), dock=dock, title=title)
+            files.append(picture)
     except OSError as error:
         raise _cannot_write(out, error) from error
+    return files
 
 
 def _cannot_write(out: Path, error: OSError) -> MissionError:

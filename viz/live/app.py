@@ -211,9 +211,9 @@ class Viewer:
         name = request.query_params.get("machine", "")
         try:
             command = await request.json()
-            if not isinstance(command, dict):
-                raise TypeError(command)
-        except (ValueError, TypeError):
+        except ValueError:
+            command = None
+        if not isinstance(command, dict):
             text = "command: got no JSON object; expected one."
             return JSONResponse({"ok": False, "text": text}, status_code=400)
         try:

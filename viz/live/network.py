@@ -102,7 +102,9 @@ class Link:
         self._closed = False
         server = f"/{name}"
         self._client = ControlClient(server, node) if control else None
-        self._history = ServiceProxy(server + HISTORY_SERVICE, Trigger, timeout=HISTORY_S, node=node)
+        self._history = ServiceProxy(
+            server + HISTORY_SERVICE, Trigger, timeout=HISTORY_S, node=node
+        )
         self._topics = (
             Subscriber(server + EVENTS_TOPIC, String, self._take, node=node),
             Subscriber(server + DESCRIPTION_TOPIC, String, self._take_description, node=node),

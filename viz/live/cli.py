@@ -1,0 +1,131 @@
+"""`smachpy view`: every running machine, in a browser."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Any
+
+from smachpy.cli import UsageError
+
+if TYPE_CHECKING:
+    import argparse
+
+    from viz.live.machines import Machines
+
+EXAMPLES = """examples:
+  smachpy view                         every machine that runs on this network
+  smachpy view --control               with pause, step, jump, preempt
+  smachpy view run.jsonl               a recorded run
+  smachpy view --runs runs/            with the statistics of recorded runs on the graph
+"""
+PORT = 8080
+
+
+def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the subcommand."""
+    import argparse
+
+    parser = subparsers.add_parser(
+        "view",
+        help="watch running machines in a browser",
+        description="Serve a page that shows every machine on the network while it runs.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("files", metavar="FILE", nargs="*", help="recorded runs to show as well")
+    parser.add_argument(
+        "--host", default="127.0.0.1", help="where to listen (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--port", type=int, default=PORT, help="0 takes any free port (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--auto-focus", action="store_true", help="pages follow the active states from the start"
+    )
+    parser.add_argument(
+        "--control", action="store_true", help="allow commands, with the token in the address"
+    )
+    parser.add_argument(
+        "--runs", metavar="DIR", action="append", default=[], help="recorded runs for statistics"
+    )
+    parser.add_argument("--tui", action="store_true", help="show it in this terminal instead")
+    parser.add_argument("--child", action="store_true", help=argparse.SUPPRESS)
+    parser.set_defaults(run=_run)
+
+
+def _run(args: argparse.Namespace) -> int:
+    from actionlib_core.node import get_node
+    from viz.live.machines import Machines
+    from viz.live.network import Network
+
+    machines = Machines()
+    _load(machines, args.files)
+    network = Network(get_node(), machines, control=args.control)
+    try:
+        if args.tui:
+            return _show_in_terminal(machines, network, control=args.control)
+        return _serve(args, machines, network)
+    finally:
+        network.close()
+
+
+def _serve(args: argparse.Namespace, machines: Machines, network: Any) -> int:
+    try:
+        from viz.live.app import Viewer
+        from viz.live.server import PageServer
+    except ModuleNotFoundError as error:
+        raise UsageError(
+            f"smachpy view: package {error.name!r} is missing. Try: pip install 'smachpy[web]'"
+        ) from error
+    from viz.live.security import make_token
+    from viz.runs.statistics import StatisticsOfFiles
+
+    token = make_token() if args.control else None
+    viewer = Viewer(
+        machines,
+        token=token,
+        send=network.send if token else None,
+        follow=args.auto_focus,
+        statistics=StatisticsOfFiles(args.runs).of,
+        hosts=(args.host,),
+    )
+    server = PageServer(viewer, args.host, args.port)
+    print(server.address + (f"#token={token}" if token else ""), flush=True)
+    if args.child:
+        _end_with_parent(server)
+    server.serve_here()
+    return 0
+
+
+def _load(machines: Machines, files: list[str]) -> None:
+    from viz.runs.recording import find_recordings, read_recording
+
+    for path in find_recordings(files):
+        recording = read_recording(path)
+        machine = machines.obtain(path.name)
+        machine.recorded = True
+        machine.reset(recording.history(), limit=len(recording.events) + 1)
+
+
+def _end_with_parent(server: Any) -> None:
+    """Stop when standard input ends, which it does however the parent ends."""
+    from actionlib_core.clock import current_clock
+
+    def wait() -> None:
+        while sys.stdin.read(1):
+            pass
+        server.stop()
+
+    current_clock().spawn(wait, name="parent watch")
+
+
+def _show_in_terminal(machines: Machines, network: Any, *, control: bool) -> int:
+    try:
+        from viz.live.tui import MissionApp
+    except ModuleNotFoundError as error:
+        raise UsageError(
+            f"smachpy view --tui: package {error.name!r} is missing. "
+            "Try: pip install 'smachpy[tui]'"
+        ) from error
+    MissionApp(machines, network.send if control else None).run()
+    return 0

@@ -1,0 +1,97 @@
+"""`smachpy view` as a child process that never outlives its parent, nor holds it up."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+from smachpy.exceptions import SmachError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from types import TracebackType
+    from typing import Self
+
+_GRACE_S = 1.5
+_LAST_GRACE_S = 0.5
+
+
+class ViewerError(SmachError):
+    """The viewer could not be started; the text is what it said."""
+
+
+class ViewerProcess:
+    """Runs the viewer; a context manager.
+
+    It finds the machine over the network as any other viewer does, so that nothing it does, or
+    fails to do, reaches the mission.
+
+    Args:
+        arguments: Further arguments of `smachpy view`.
+
+    Attributes:
+        address: Of the page, with the token of its commands if it takes any.
+
+    Raises:
+        ViewerError: it could not start; when entered.
+    """
+
+    def __init__(self, arguments: Sequence[str] = ()) -> None:
+        self._command = [sys.executable, "-m", "smachpy.cli", "view", "--child", *arguments]
+        self._process: subprocess.Popen[str] | None = None
+        self.address = ""
+
+    def __enter__(self) -> Self:
+        self._process = subprocess.Popen(  # noqa: S603  our own interpreter and module
+            self._command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+            start_new_session=True,
+        )
+        assert self._process.stdout is not None
+        self.address = self._process.stdout.readline().strip()
+        if not self.address:
+            assert self._process.stderr is not None
+            said = self._process.stderr.read().strip()
+            self.stop()
+            raise ViewerError(said.removeprefix("smachpy: ") or "the viewer ended at once")
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.stop()
+
+    @property
+    def pid(self) -> int:
+        """The process id."""
+        assert self._process is not None
+        return self._process.pid
+
+    def stop(self) -> None:
+        """End the process; a second call does nothing.
+
+        Blocks: until it has ended, 2 s at most.
+        """
+        process, self._process = self._process, None
+        if process is None:
+            return
+        for stream in (process.stdin, process.stdout, process.stderr):
+            if stream is not None:
+                stream.close()
+        try:
+            process.wait(_GRACE_S)
+        except subprocess.TimeoutExpired:
+            process.terminate()
+            try:
+                process.wait(_LAST_GRACE_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()

@@ -1,0 +1,199 @@
+"""`smachpy runs`: what recorded runs say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from smachpy.cli import UsageError
+
+if TYPE_CHECKING:
+    import argparse
+
+    from rich.console import Console
+
+    from viz.runs.recording import Recording
+
+EXAMPLES = """examples:
+  smachpy run patrol --record runs/1.jsonl    record a run
+  smachpy runs list runs/                     what there is
+  smachpy runs show runs/1.jsonl              what happened in it
+  smachpy runs show runs/                     what all of them add up to
+  smachpy runs compare old.jsonl new.jsonl    two runs, or two versions of a machine
+  smachpy runs export runs/1.jsonl -o 1.html  a page that opens without a server
+  smachpy runs export runs/1.jsonl -o 1.mcap  for Foxglove
+  smachpy view runs/1.jsonl                   see it again in the browser
+"""
+MOST_PROBLEMS = 20
+
+
+def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the subcommand."""
+    import argparse
+
+    parser = subparsers.add_parser(
+        "runs",
+        help="list, show, compare and export recorded runs",
+        description="Work with the files of `smachpy run --record`.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    actions = parser.add_subparsers(metavar="ACTION", required=True)
+    one = actions.add_parser("list", help="one line per run")
+    one.add_argument("places", nargs="*", default=["."], metavar="FILE|DIR")
+    one.set_defaults(run=_list)
+    show = actions.add_parser("show", help="states, times and transitions of one run or many")
+    show.add_argument("places", nargs="+", metavar="FILE|DIR")
+    show.set_defaults(run=_show)
+    two = actions.add_parser("compare", help="how the second differs from the first")
+    two.add_argument("first", metavar="FILE|DIR")
+    two.add_argument("second", metavar="FILE|DIR")
+    two.set_defaults(run=_compare)
+    export = actions.add_parser("export", help="as a page (.html), for Foxglove (.mcap), a picture")
+    export.add_argument("file", metavar="FILE")
+    export.add_argument(
+        "-o",
+        "--output",
+        required=True,
+        metavar="FILE",
+        help="the ending names the format: html, mcap, or that of a picture",
+    )
+    export.add_argument(
+        "--runs", metavar="DIR", action="append", default=[], help="runs for the page's statistics"
+    )
+    export.set_defaults(run=_export)
+
+
+def _list(args: argparse.Namespace) -> int:
+    from rich.table import Table
+
+    from viz.runs.recording import find_recordings, read_recording
+
+    table = Table(box=None, pad_edge=False)
+    for title in ("file", "machine", "began", "time", "outcome", "events"):
+        table.add_column(title, no_wrap=True, justify="right" if title == "events" else "left")
+    for path in find_recordings(args.places):
+        table.add_row(*_line(read_recording(path)))
+    _console().print(table)
+    return 0
+
+
+def _line(recording: Recording) -> tuple[str, ...]:
+    from datetime import UTC, datetime
+
+    events = recording.events
+    began = datetime.fromtimestamp(recording.stamp_ns / 1e9, UTC)
+    took = (events[-1]["stamp_ns"] - events[0]["stamp_ns"]) / 1e9 if events else 0.0
+    ends = [event.get("outcome") or "exception" for event in events if event["kind"] == "Finished"]
+    return (
+        str(recording.path),
+        recording.record.label,
+        began.strftime("%Y-%m-%d %H:%M:%S"),
+        f"{took:.1f} s",
+        ends[-1] if ends else "not finished",
+        str(len(events)),
+    )
+
+
+def _read(place: str) -> list[Recording]:
+    from viz.runs.recording import find_recordings, read_recording
+
+    found = [read_recording(path) for path in find_recordings([place])]
+    if not found:
+        raise UsageError(f"smachpy runs: {place!r}: got no recordings; expected *.jsonl files.")
+    return found
+
+
+def _show(args: argparse.Namespace) -> int:
+    from rich.table import Table
+
+    from viz.runs.statistics import count, never_taken
+
+    recordings = [one for place in args.places for one in _read(place)]
+    console = _console()
+    for label in dict.fromkeys(one.record.label for one in recordings):
+        group = [one for one in recordings if one.record.label == label]
+        record, statistics = group[-1].record, count(group)
+        ended = ", ".join(f"{outcome} x{n}" for outcome, n in statistics.outcomes.items())
+        console.print(f"{label}: {statistics.runs} run(s); {ended or 'none has ended'}")
+        table = Table(box=None, pad_edge=False)
+        for title in ("state", "visits", "median", "95 %", "failed", "outcomes"):
+            table.add_column(title, justify="left" if title in {"state", "outcomes"} else "right")
+        for state in record.walk():
+            if state.path in statistics.states:
+                table.add_row(*_row(state.path, statistics.states[state.path].to_json()))
+        console.print(table)
+        untaken = never_taken(record, statistics)
+        if untaken:
+            console.print(f"never taken: {len(untaken)} transition(s)")
+            for path, outcome in untaken[:MOST_PROBLEMS]:
+                console.print(f"  {path}  {outcome}", markup=False)
+    return 0
+
+
+def _row(path: str, numbers: dict[str, Any]) -> tuple[str, ...]:
+    return (
+        path,
+        str(numbers["visits"]),
+        _seconds(numbers["median"]),
+        _seconds(numbers["p95"]),
+        f"{numbers['failures']:.0%}",
+        " ".join(f"{outcome} x{n}" for outcome, n in numbers["outcomes"].items()),
+    )
+
+
+def _seconds(value: float | None) -> str:
+    return "" if value is None else f"{value:.3f} s"
+
+
+def _compare(args: argparse.Namespace) -> int:
+    from viz.runs.statistics import compare
+
+    difference = compare(_read(args.first), _read(args.second))
+    console = _console()
+    lines = [f"+ {path}" for path in difference.added]
+    lines += [f"- {path}" for path in difference.removed]
+    lines += [f"moved {old} -> {new}" for old, new in difference.moved]
+    lines += [f"leads elsewhere: {path} {outcome}" for path, outcome in difference.rewired]
+    for path, (old, new) in difference.changed.items():
+        lines.append(
+            f"{path or '(the whole)'}: median {_seconds(old['median'])} -> "
+            f"{_seconds(new['median'])}, failed {old['failures']:.0%} -> {new['failures']:.0%}"
+        )
+    console.print("\n".join(lines or ["no notable difference"]), markup=False)
+    return 0
+
+
+def _export(args: argparse.Namespace) -> int:
+    from viz.runs.recording import read_recording
+
+    recording = read_recording(args.file)
+    output = Path(args.output)
+    if output.suffix == ".html":
+        from viz.runs.html import standalone_page
+
+        output.write_text(standalone_page(recording, args.runs), encoding="utf-8")
+    elif output.suffix == ".mcap":
+        from viz.runs.mcap import write_mcap
+
+        write_mcap(recording, output)
+    else:
+        from smachpy.events import from_record
+        from viz.drawing import render
+        from viz.history import History
+
+        history = History()
+        for event in recording.events:
+            history.on_event(from_record({k: v for k, v in event.items() if k != "seq"}))
+        render(recording.record, output, run=history)
+    print(output)
+    return 0
+
+
+def _console() -> Console:
+    import sys
+
+    from rich.console import Console
+
+    wide = None if sys.stdout.isatty() else 160
+    return Console(highlight=False, width=wide)

@@ -1,0 +1,37 @@
+"""A recorded run as one HTML file that opens without a server."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+from viz.live import page
+from viz.live.machines import Machine
+from viz.runs.statistics import StatisticsOfFiles
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+    from viz.runs.recording import Recording
+
+
+def standalone_page(recording: Recording, runs: Iterable[str | Path] = ()) -> str:
+    """Return the page.
+
+    Args:
+        recording: The run.
+        runs: Recorded runs for the statistics on the graph.
+
+    Raises:
+        RecordingError: a file of `runs` cannot be read.
+    """
+    machine = Machine(recording.path.name, lambda _machine: None)
+    machine.recorded = True
+    machine.reset(recording.history(), limit=len(recording.events) + 1)
+    run = {
+        "model": page.model(recording.record),
+        "snap": json.loads(machine.snapshot()[1]),
+        "statistics": StatisticsOfFiles(runs).of(recording.record.label),
+    }
+    return page.standalone(run, recording.record.label)

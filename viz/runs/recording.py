@@ -1,0 +1,256 @@
+"""One run, one file: JSON lines, appended as it happens, so that a crash leaves a readable file.
+
+The first line is the header: `format` "smachpy-run", `version`, `machine` (a
+`smachpy.introspection.StateRecord`), `stamp_ns` and `base`, the `smachpy.run_state.RunState` before
+the first event, or null. Every further line is an event (`smachpy.events.to_record`) with a number
+`seq` without gaps. A last line that was cut off by a crash is left out when reading.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import threading
+from collections import deque
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.clock import SerialExecutor, current_clock
+from smachpy import log
+from smachpy.events import to_record
+from smachpy.exceptions import SmachError
+from smachpy.introspection import StateRecord, describe
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+    from typing import Self, TextIO
+
+    from smachpy.container import Container
+    from smachpy.events import Event
+
+FORMAT = "smachpy-run"
+VERSION = 1
+WAITING_EVENTS = 100_000
+"""When the disk hangs, so many events wait for it; further ones are dropped and counted."""
+
+CLOSE_S = 2.0
+
+
+class RecordingError(SmachError):
+    """A recording cannot be written or read.
+
+    Attributes:
+        path: The file.
+    """
+
+    def __init__(self, path: str | Path, problem: str) -> None:
+        self.path = str(path)
+        super().__init__(f"recording {str(path)!r}: {problem}")
+
+
+@dataclass(slots=True)
+class Recording:
+    """A run that was read from a file.
+
+    Attributes:
+        path: The file.
+        record: The machine.
+        stamp_ns: When the recording began.
+        base: What happened before, None when it began with the run.
+        events: The records.
+        cut: Whether the file ends in the middle of a line.
+    """
+
+    path: Path
+    record: StateRecord
+    stamp_ns: int
+    base: dict[str, Any] | None
+    events: list[dict[str, Any]] = field(default_factory=list)
+    cut: bool = False
+
+    def history(self) -> dict[str, Any]:
+        """Return it in the shape in which servers tell their history (`smachpy.feed`)."""
+        return {
+            "epoch": f"file {self.path.name} {self.stamp_ns}",
+            "description": asdict(self.record),
+            "base": self.base,
+            "events": self.events,
+            "problems": [],
+            "control": None,
+        }
+
+
+class Recorder:
+    """Writes the events of a machine to a file; a context manager.
+
+    Args:
+        path: The file; it must not exist yet.
+        machine: The machine.
+
+    Raises:
+        RecordingError: the file exists or cannot be made.
+
+    Threads: the machine never waits for the disk; another thread writes.
+    """
+
+    def __init__(self, path: str | Path, machine: Container) -> None:
+        self._path = Path(path)
+        clock = current_clock()
+        self._executor = SerialExecutor(clock, f"recording {self._path.name}")
+        self._lock = threading.Lock()
+        self._numbers = itertools.count(1)
+        self._waiting: deque[str] = deque()
+        self._scheduled = False
+        self._failed = False
+        self.dropped = 0
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            self._file: TextIO = self._path.open("x", encoding="utf-8")
+            self._file.write(header_line(describe(machine), clock.time_ns()))
+            self._file.flush()
+        except FileExistsError as error:
+            raise RecordingError(
+                path, "the file exists; expected a new name, runs are never overwritten."
+            ) from error
+        except OSError as error:
+            raise RecordingError(path, f"cannot write: {error.strerror or error}.") from error
+        self._unsubscribe: Callable[[], None] = machine.subscribe(self.on_event)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Write what waits and close the file; a second call does nothing.
+
+        Blocks: 2 s at most.
+        """
+        self._unsubscribe()
+        if not self._executor.join(CLOSE_S) or self._file.closed:
+            return
+        try:
+            self._file.close()
+        except OSError as error:
+            self._fail(error)
+        if self.dropped:
+            log.logwarn(f"recording {str(self._path)!r}: {self.dropped} events were dropped.")
+
+    def on_event(self, event: Event) -> None:
+        """Take one event in."""
+        record = to_record(event)
+        with self._lock:
+            if self._failed or len(self._waiting) >= WAITING_EVENTS:
+                self.dropped += 1
+                return
+            self._waiting.append(event_line(record | {"seq": next(self._numbers)}))
+            scheduled, self._scheduled = self._scheduled, True
+        if not scheduled:
+            self._executor.submit(self._write)
+
+    def _write(self) -> None:
+        with self._lock:
+            lines = list(self._waiting)
+            self._waiting.clear()
+            self._scheduled = False
+        try:
+            self._file.write("".join(lines))
+            self._file.flush()
+        except OSError as error:
+            self._fail(error)
+
+    def _fail(self, error: OSError) -> None:
+        with self._lock:
+            failed, self._failed = self._failed, True
+        if not failed:
+            log.logerr(f"recording {str(self._path)!r}: ends here: {error.strerror or error}.")
+
+
+def header_line(record: StateRecord, stamp_ns: int, base: dict[str, Any] | None = None) -> str:
+    """Return the first line of a file."""
+    header = {
+        "format": FORMAT,
+        "version": VERSION,
+        "stamp_ns": stamp_ns,
+        "machine": asdict(record),
+        "base": base,
+    }
+    return json.dumps(header) + "\n"
+
+
+def event_line(record: dict[str, Any]) -> str:
+    """Return the line of an event."""
+    return json.dumps(record) + "\n"
+
+
+def recording_lines(
+    record: StateRecord, events: list[dict[str, Any]], base: dict[str, Any] | None
+) -> Iterator[str]:
+    """Yield the lines of a file that holds these events."""
+    stamp_ns = events[0]["stamp_ns"] if events else 0
+    yield header_line(record, stamp_ns, base)
+    yield from (event_line({**event, "seq": i}) for i, event in enumerate(events, 1))
+
+
+def read_recording(path: str | Path) -> Recording:
+    """Read a file.
+
+    Raises:
+        RecordingError: it cannot be read, or a line before the last is no event; names the line.
+    """
+    path = Path(path)
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
+    except OSError as error:
+        raise RecordingError(path, f"cannot read: {error.strerror or error}.") from error
+    recording = _read_header(path, lines[0])
+    whole = lines[1:-1]  # what follows the last line's end was cut off, or is empty
+    recording.cut = bool(lines[-1]) and len(lines) > 1
+    for number, line in enumerate(whole, 2):
+        recording.events.append(_read_event(path, number, line))
+    for seq, event in enumerate(recording.events, 1):
+        event["seq"] = seq
+    return recording
+
+
+def _read_header(path: Path, line: str) -> Recording:
+    try:
+        header = json.loads(line)
+        if header["format"] != FORMAT or header["version"] != VERSION:
+            raise ValueError(f"format {header['format']!r} version {header['version']!r}")  # noqa: TRY301
+        record = StateRecord.from_json(json.dumps(header["machine"]))
+        return Recording(path, record, int(header["stamp_ns"]), header.get("base"))
+    except (ValueError, KeyError, TypeError) as error:
+        raise RecordingError(
+            path, f"line 1: got no header ({error}); expected a file of `smachpy run --record`."
+        ) from error
+
+
+def _read_event(path: Path, number: int, line: str) -> dict[str, Any]:
+    try:
+        event: dict[str, Any] = json.loads(line)
+        str(event["kind"]), str(event["path"]), int(event["stamp_ns"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise RecordingError(
+            path, f"line {number}: got {line[:60]!r} ({error}); expected an event."
+        ) from error
+    return event
+
+
+def find_recordings(places: Iterable[str | Path]) -> list[Path]:
+    """Return the files that are named, and those in the folders that are named, by time.
+
+    Raises:
+        RecordingError: there is no such file or folder.
+    """
+    found: list[Path] = []
+    for place in map(Path, places):
+        if place.is_dir():
+            found += sorted(place.glob("*.jsonl"))
+        elif place.is_file():
+            found.append(place)
+        else:
+            raise RecordingError(place, "no such file or folder; expected recorded runs.")
+    return found

@@ -1,0 +1,233 @@
+// What is behind the picture: the selected state, who is asked to stop, goals, userdata, the log.
+import { h } from "preact";
+import { useState } from "preact/hooks";
+import htm from "htm";
+import * as store from "viewer/store";
+import { ms } from "viewer/fold";
+import { KIND_NAMES, outcomeClass } from "viewer/model";
+import { span } from "viewer/diagram";
+import { StateControls } from "viewer/controls";
+import { coverage, failureShare } from "viewer/statistics";
+
+const html = htm.bind(h);
+const FLASH_MS = 900;
+const LOG_LINES = 120;
+const SHORT = 160;
+
+const Section = ({ title, count, children }) =>
+  html`<section><h2>${title}${count != null && html` <span class="number">${count}</span>`}</h2>${children}</section>`;
+const State = ({ path, page }) => {
+  const name = store.model.value?.get(path)?.name ?? path.split("/").at(-1);
+  return html`<button class="link" title=${path} onClick=${() => page.goTo(path)}>${name}</button>`;
+};
+
+export function Inspector({ page }) {
+  store.tick.value;
+  const model = store.model.value;
+  if (!model) return html`<aside class="inspector"></aside>`;
+  const data = store.shown(), now = store.nowMs();
+  return html`<aside class="inspector" aria-label="details">
+    ${store.gap.value && html`<p class="hint">This page could not follow; what happened before is not in the timeline.</p>`}
+    <${Selected} page=${page} data=${data} now=${now} model=${model} />
+    <${Preempts} page=${page} data=${data} now=${now} model=${model} />
+    <${Goals} page=${page} data=${data} now=${now} />
+    <${Userdata} page=${page} data=${data} now=${now} />
+    <${Difference} page=${page} />
+    <${Numbers} data=${data} />
+    <${Problems} page=${page} />
+    <${Log} page=${page} />
+  </aside>`;
+}
+
+function Selected({ page, data, now, model }) {
+  const node = model.get(store.selected.value);
+  if (!node) return null;
+  const state = data.states[node.path];
+  const active = state?.since != null;
+  const keys = model.keys[node.path];
+  const inside = keys ? new Map(keys.remapping) : null;
+  const key = (k) => html`<code>${k}${inside.has(k) && inside.get(k) !== k ? html` \u2190 ${inside.get(k)}` : ""}</code> `;
+  const recorded = store.statistics.value?.states?.[node.path];
+  const facts = [
+    ["kind", `${KIND_NAMES[node.kind] ?? node.kind} (${node.type_name})`], ...node.details,
+    ["visits", state?.visits ?? 0],
+    state?.visits > 0 && ["time inside", span(state.seconds + (active ? (now - ms(state.since)) / 1000 : 0))],
+    active && ["runs for", span((now - ms(state.since)) / 1000)],
+    state?.attempt > 1 && ["attempt", state.attempt],
+    recorded && ["recorded runs", `median ${span(recorded.median ?? 0)}, 95 % under ${span(recorded.p95 ?? 0)}, ${Math.round(recorded.failures * 100)} % failed of ${recorded.visits}`],
+  ].filter(Boolean);
+  return html`<${Section} title=${node.name}>
+    ${node.doc && html`<p class="doc">${node.doc}</p>`}
+    <dl class="facts">${facts.map(([k, v]) => html`<dt>${k}</dt><dd>${v}</dd>`)}
+      ${keys?.inputs.length > 0 && html`<dt>reads</dt><dd>${keys.inputs.map(key)}</dd>`}
+      ${keys?.outputs.length > 0 && html`<dt>writes</dt><dd>${keys.outputs.map(key)}</dd>`}
+    </dl>
+    ${state?.error && html`<p class="error">${state.error}</p>`}
+    <ul class="outcomes">${node.outcomes.map((o) => {
+      const edge = node.parent?.links.find((l) => l.source === node.label && l.outcomes.includes(o));
+      return html`<li><span class=${`pill-text ${outcomeClass(o)}`}>${o}</span><span>${edge ? ` \u2192 ${edge.target}` : ""}</span>
+        <span class="times">${state?.outcomes?.[o] ? `\u00d7${state.outcomes[o]}` : ""}</span></li>`;
+    })}</ul>
+    <${StateControls} node=${node} state=${state} />
+  <//>`;
+}
+
+// A preempt as something that takes time: who was asked, who has answered, who holds it up.
+function Preempts({ page, data, now, model }) {
+  const asked = model.order.filter((n) => data.states[n.path]?.since != null && data.states[n.path].preempt);
+  if (!asked.length) return null;
+  const first = Math.min(...asked.map((n) => ms(data.states[n.path].preempt)));
+  const answered = store.run.spans.filter((s) => s.preempt != null && s.preempt >= first - 1 && s.to !== null && s.to <= now);
+  const holds = asked.filter((n) => !asked.some((other) => other.path.startsWith(n.path + "/")));
+  const whole = Math.max(now - first, 1);
+  const bar = (from, to, kind) => html`<i class=${kind} style=${{ left: `${((from - first) / whole) * 100}%`, width: `${Math.max(1.5, ((to - from) / whole) * 100)}%` }}></i>`;
+  return html`<${Section} title="Preempt">
+    <p class="hint">Asked ${span((now - first) / 1000)} ago, first at <${State} path=${asked.find((n) => ms(data.states[n.path].preempt) === first)?.path ?? asked[0].path} page=${page} />.
+      ${" "}${holds.length ? html`Held up by ${holds.map((n, i) => html`${i > 0 ? ", " : ""}<b><${State} path=${n.path} page=${page} /></b>`)}.` : ""}</p>
+    <div class="waterfall">
+      ${answered.slice(-8).map((s) => html`<div><${State} path=${s.path} page=${page} /><span>${bar(s.preempt, s.to, "success")}</span><small>\u2713 ${span((s.to - s.preempt) / 1000)}</small></div>`)}
+      ${asked.map((n) => html`<div><${State} path=${n.path} page=${page} /><span>${bar(ms(data.states[n.path].preempt), now, "preempted")}</span>
+        <small>${holds.includes(n) ? "\u25a0 " : ""}${span((now - ms(data.states[n.path].preempt)) / 1000)}</small></div>`)}
+    </div><//>`;
+}
+
+function Goals({ page, data, now }) {
+  const goals = Object.entries(data.goals).map(([id, g]) => ({ id, ...g }))
+    .filter((g) => g.ended == null || now - ms(g.ended) < 60_000)
+    .sort((a, b) => (a.ended ?? Infinity) < (b.ended ?? Infinity) ? 1 : -1).slice(0, 6);
+  return html`<${Section} title="Goals">
+    ${!goals.length && html`<p class="hint">none</p>`}
+    ${goals.map((g) => {
+      const kind = g.ended == null ? "active" : outcomeClass(g.status === "REJECTED" || g.status === "LOST" ? "failed" : g.status);
+      const part = g.ended != null && g.status === "SUCCEEDED" ? 1 : g.progress?.fraction;
+      const until = g.ended != null ? ms(g.ended) : now;
+      return html`<div class=${`goal ${kind}`} key=${g.id} title=${g.id}>
+        <div class="head"><${State} path=${g.path} page=${page} /><span class="action">${g.action}</span>
+          <span class="times">${g.attempt > 1 ? `attempt ${g.attempt} \u00b7 ` : ""}${span((until - ms(g.since)) / 1000)}</span></div>
+        <div class=${`bar ${part == null && g.ended == null ? "unknown" : ""}`} role="progressbar" aria-valuenow=${part == null ? undefined : Math.round(part * 100)}>
+          <i style=${{ width: `${Math.round((part ?? (g.ended != null ? 1 : 0)) * 100)}%` }}></i></div>
+        <div class="text"><span class=${`pill-text ${kind}`}>${g.ended == null ? "active" : g.status.toLowerCase()}</span>
+          ${" "}${g.text || [g.progress?.distance != null ? `${g.progress.distance.toFixed(2)} m left` : "", g.progress?.text ?? ""].filter(Boolean).join(" \u00b7 ")}
+          ${part != null && g.ended == null ? html`<span class="times">${Math.round(part * 100)} %</span>` : ""}</div>
+        <${More} label="goal" value=${g.goal} /></div>`;
+    })}<//>`;
+}
+
+function More({ label, value }) {
+  const [open, setOpen] = useState(false);
+  if (value == null) return null;
+  return html`<details open=${open} onToggle=${(e) => setOpen(e.target.open)}><summary>${label}</summary>${open && html`<pre>${pretty(value)}</pre>`}</details>`;
+}
+
+const plain = (value) => value?.$msg ? { [value.$msg]: value.fields } : value;
+const pretty = (value) => JSON.stringify(value, (_k, v) => (v && v.$msg ? v.fields : v), 1).replace(/"([a-z_0-9]+)":/gi, "$1:").slice(0, 20_000);
+export function brief(value) {
+  const text = typeof value === "string" ? value
+    : JSON.stringify(plain(value), (_k, v) => (v && v.$msg ? v.fields : typeof v === "number" && !Number.isInteger(v) ? Number(v.toPrecision(6)) : v));
+  return text ?? "";
+}
+
+function Userdata({ page, data, now }) {
+  const all = Object.entries(data.userdata).sort(([a], [b]) => (a < b ? -1 : 1));
+  const [open, setOpen] = useState(null);
+  const several = new Set(all.map(([, entry]) => entry.container)).size > 1;
+  let container = null;
+  return html`<${Section} title="Userdata" count=${all.length || null}>
+    ${!all.length && html`<p class="hint">nothing written yet</p>`}
+    <table class="userdata"><tbody>${all.slice(0, 200).map(([id, entry]) => {
+      const text = brief(entry.value);
+      const fresh = now - ms(entry.at) < FLASH_MS;
+      const first = several && entry.container !== container;
+      container = entry.container;
+      return html`${first && html`<tr class="group"><th colspan="2" title=${container}>${container.split("/").slice(-2).join(" \u203a ")}</th></tr>`}<tr key=${id} class=${fresh ? "fresh" : ""} onClick=${() => setOpen(open === id ? null : id)}>
+        <th scope="row" title=${entry.container}>${entry.key}</th>
+        <td><code>${open === id ? html`<pre>${pretty(entry.value)}</pre>` : text.slice(0, SHORT)}${open !== id && text.length > SHORT ? "\u2026" : ""}</code>
+          <small>by <${State} path=${entry.writer} page=${page} /> ${clock(entry.at, data)}</small></td></tr>`;
+    })}</tbody></table><//>`;
+}
+
+const clock = (ns, data) => {
+  const t = (ms(ns) - (ms(data.started) ?? store.run.first() ?? ms(ns))) / 1000;
+  return `at ${t.toFixed(t < 100 ? 2 : 0)} s`;
+};
+
+// What the transition at the cursor changed.
+function Difference({ page }) {
+  if (store.cursor.value === null) return null;
+  const run = store.run, at = run.indexAt(store.cursor.value);
+  let from = at - 1;
+  while (from > 0 && !["Left", "Failed", "Finished", "Started"].includes(run.events[from]?.kind)) from--;
+  let before = from - 1;
+  while (before > 0 && !["Left", "Failed", "Started"].includes(run.events[before]?.kind)) before--;
+  const changes = run.events.slice(Math.max(0, before), at).filter((e) => e.kind === "UserdataWritten").slice(-8);
+  const old = run.after(Math.max(0, before)).userdata;
+  return html`<${Section} title="Changed by this transition">
+    ${!changes.length && html`<p class="hint">no userdata was written</p>`}
+    ${changes.map((e) => {
+      const container = e.path.slice(0, e.path.lastIndexOf("/"));
+      const was = old[`${container} ${e.key}`];
+      return html`<div class="diff"><b>${e.key}</b> <del>${was ? brief(was.value).slice(0, 60) : "unset"}</del> <ins>${brief(e.value).slice(0, 60)}</ins> <small>by <${State} path=${e.path} page=${page} /></small></div>`;
+    })}<//>`;
+}
+
+function Numbers({ data }) {
+  if (store.heat.value === "none") return null;
+  const { taken, all } = coverage();
+  const recorded = store.statistics.value;
+  const bad = Object.values(data.states).reduce((n, s) => n + failureShare(s.outcomes) * 0, 0);
+  void bad;
+  return html`<${Section} title="Numbers"><dl class="facts">
+    <dt>transitions taken</dt><dd>${taken} of ${all} (${all ? Math.round((taken / all) * 100) : 0} %)</dd>
+    ${recorded && html`<dt>recorded runs</dt><dd>${recorded.runs}, median ${span(recorded.median ?? 0)}</dd>
+      <dt>they ended</dt><dd>${Object.entries(recorded.outcomes).map(([o, n]) => html`<span class=${`pill-text ${outcomeClass(o)}`}>${o} \u00d7${n}</span> `)}</dd>`}
+  </dl><//>`;
+}
+
+function Problems({ page }) {
+  const found = store.problems.value;
+  if (!found.length) return null;
+  return html`<${Section} title="Problems of the machine" count=${found.length}>
+    <ul class="problems">${found.slice(0, 30).map((p) => html`<li class=${p.severity}><${State} path=${p.path} page=${page} /> ${p.text}</li>`)}</ul><//>`;
+}
+
+const LINES = {
+  Started: () => ["started", "active"], Finished: (e) => [`ended: ${e.outcome ?? "exception"}`, outcomeClass(e.outcome ?? "exception")],
+  Left: (e) => [e.outcome, outcomeClass(e.outcome)], Failed: (e) => [e.error, "failure"],
+  PreemptRequested: () => ["asked to stop", "preempted"], Abandoned: (e) => [`left behind after ${e.grace} s`, "failure"],
+  TimedOut: (e) => [`timeout of ${e.timeout} s`, "preempted"], Retried: (e) => [`again: ${e.reason}`, "preempted"],
+  Iterated: (e) => [`item ${e.number + 1}`, "other"], CallbackFailed: (e) => [`${e.callback}: ${e.error}`, "failure"],
+  Paused: (e) => [`paused (${e.reason})`, "waiting"], Resumed: () => ["goes on", "active"], Jumped: (e) => [`sent to ${e.label}`, "waiting"],
+  OutcomeForced: (e) => [`forced: ${e.outcome}`, "waiting"], GoalSent: (e) => [`goal to ${e.action}`, "active"],
+  GoalDone: (e) => [`${e.action}: ${e.status.toLowerCase()} ${e.text}`, outcomeClass(e.status)],
+  UserdataWritten: (e) => [`${e.key} = ${brief(e.value).slice(0, 60)}`, "other"],
+};
+const GROUPS = { all: null, transitions: ["Started", "Finished", "Left", "Failed"], goals: ["GoalSent", "GoalDone"],
+  userdata: ["UserdataWritten"], trouble: ["Failed", "PreemptRequested", "Abandoned", "TimedOut", "Retried", "CallbackFailed"] };
+
+function Log({ page }) {
+  const [text, setText] = useState("");
+  const run = store.run, kinds = GROUPS[store.logFilter.value];
+  const end = store.cursor.value === null ? run.events.length : run.indexAt(store.cursor.value);
+  const begun = ms(store.shown().started) ?? run.first();
+  const lines = [];
+  const wanted = text.toLowerCase();
+  for (let i = end - 1; i >= 0 && lines.length < LOG_LINES && end - i < 6000; i--) {
+    const e = run.events[i];
+    if (!(e.kind in LINES) || (kinds && !kinds.includes(e.kind)) || (!kinds && e.kind === "UserdataWritten")) continue;
+    const [words, kind] = LINES[e.kind](e);
+    if (wanted && !`${e.path} ${words}`.toLowerCase().includes(wanted)) continue;
+    const edge = e.kind === "Left" ? target(e) : "";
+    lines.push(html`<li key=${e.seq} onClick=${() => { if (store.cursor.value !== null) store.seek(ms(e.stamp_ns)); }}>
+      <time>${((ms(e.stamp_ns) - begun) / 1000).toFixed(2)}</time><${State} path=${e.path} page=${page} /> <span class=${`word ${kind}`}>${words}</span>${edge}</li>`);
+  }
+  return html`<${Section} title="Log"><div class="filter">
+    <select aria-label="kinds" value=${store.logFilter.value} onChange=${(e) => { store.logFilter.value = e.target.value; }}>${Object.keys(GROUPS).map((g) => html`<option value=${g}>${g}</option>`)}</select>
+    <input aria-label="filter the log" placeholder="filter" value=${text} onInput=${(e) => setText(e.target.value)} /></div>
+    <ol class="log">${lines}</ol><//>`;
+}
+
+function target(e) {
+  const node = store.model.value?.get(e.path);
+  const link = node?.parent?.links.find((l) => l.source === node.label && l.outcomes.includes(e.outcome));
+  return link && link.target !== e.outcome ? ` \u2192 ${link.target}` : "";
+}

@@ -1,0 +1,144 @@
+// What the page knows and what its user chose. Panels read signals; the diagram reads `shown()`.
+import { signal, computed } from "@preact/signals";
+import { Model } from "viewer/model";
+import { Run, emptyState, ms } from "viewer/fold";
+
+const saved = (name, fallback) => {
+  try { return JSON.parse(localStorage.getItem(`smachpy.${name}`)) ?? fallback; } catch { return fallback; }
+};
+export const save = (name, value) => {
+  try { localStorage.setItem(`smachpy.${name}`, JSON.stringify(value)); } catch { /* a file has no storage */ }
+};
+
+export const connection = signal("connecting"); // connecting, live, lost, file
+export const settings = signal({ follow: false, control: false });
+export const machines = signal([]);
+export const facts = signal(null);
+export const problems = signal([]);
+export const model = signal(null);
+export const failure = signal(null); // a text that the whole page should know
+export const tick = signal(0); // counts the changes that panels should show
+export const cursor = signal(null); // the instant shown [ms]; null: now
+export const gap = signal(null);
+export const selected = signal(null);
+export const query = signal("");
+export const follow = signal(false);
+export const implicit = signal(saved("implicit", false));
+export const heat = signal("none"); // none, counts, time, failures, compare
+export const theme = signal(saved("theme", "system"));
+export const opened = signal(new Set());
+export const statistics = signal(null);
+export const notice = signal(null);
+export const help = signal(false);
+export const logFilter = signal("all");
+
+export let run = new Run(emptyState(), []);
+let past = null; // the state at the cursor
+
+export function begin(base, events) {
+  run = new Run(base, events);
+  past = null;
+  cursor.value = null;
+}
+
+export const shown = () => (cursor.value === null ? run.now : past ?? run.now);
+export const nowMs = () => {
+  if (cursor.value !== null) return cursor.value;
+  const ended = run.now.ended != null || facts.value?.stale != null || connection.value === "file";
+  return ended ? run.last() ?? Date.now() : Math.max(Date.now(), run.last() ?? 0);
+};
+
+// Show the instant t [ms]; null: now.
+export function seek(t) {
+  if (t !== null) {
+    t = Math.max(run.first() ?? t, Math.min(t, run.last() ?? t));
+    past = run.after(run.indexAt(t));
+  }
+  cursor.value = t;
+  tick.value += 1;
+}
+
+export function seekEvent(step) {
+  const here = cursor.value === null ? run.events.length : run.indexAt(cursor.value);
+  const to = Math.max(1, Math.min(here + step, run.events.length));
+  if (to >= run.events.length && step > 0) { seek(null); return; }
+  const event = run.events[to - 1];
+  if (!event) return;
+  past = run.after(to);
+  cursor.value = ms(event.stamp_ns);
+  tick.value += 1;
+}
+
+export const isActive = (state) => state?.since != null;
+export const activePaths = computed(() => {
+  tick.value;
+  const states = shown().states;
+  return Object.keys(states).filter((path) => states[path].since != null);
+});
+export const activeLeaves = computed(() => {
+  const all = activePaths.value;
+  return all.filter((p) => !all.some((other) => other.startsWith(p + "/")));
+});
+export const runStatus = computed(() => {
+  tick.value;
+  const data = shown(), about = facts.value;
+  if (!about) return { word: "waiting", kind: "other" };
+  if (cursor.value !== null) return { word: "replay", kind: "preempted" };
+  if (about.stale != null && data.ended == null) return { word: "stale", kind: "waiting" };
+  if (connection.value === "lost") return { word: "reconnecting", kind: "waiting" };
+  if (data.ended != null) return { word: `ended: ${data.outcome}`, kind: "done" };
+  if (about.control?.paused) return { word: "paused", kind: "waiting" };
+  if (data.started == null) return { word: "not started", kind: "other" };
+  return { word: about.recorded ? "recording ends here" : "running", kind: "active" };
+});
+
+export function setModel(payload) {
+  const next = new Model(payload, implicit.value);
+  next.payload = payload;
+  model.value = next;
+  const open = saved(`open.${next.root.label}`, null);
+  const known = open?.filter((path) => next.get(path)?.children.length);
+  opened.value = known?.length ? new Set(known) : next.toDepth(next.readableDepth());
+}
+
+export function setImplicit(on) {
+  implicit.value = on;
+  save("implicit", on);
+  const payload = model.value?.payload;
+  if (!payload) return;
+  const next = new Model(payload, on);
+  next.payload = payload;
+  model.value = next;
+}
+
+export function setOpened(paths) {
+  opened.value = paths;
+  if (model.value) save(`open.${model.value.root.label}`, [...paths]);
+}
+
+export function toggle(path) {
+  const next = new Set(opened.value);
+  if (!next.delete(path)) next.add(path);
+  follow.value = false;
+  setOpened(next);
+}
+
+// Open what hides a state.
+export function reveal(path) {
+  const hidden = model.value?.ancestors(path).filter((n) => !opened.value.has(n.path)) ?? [];
+  if (hidden.length) setOpened(new Set([...opened.value, ...hidden.map((n) => n.path)]));
+  return hidden.length > 0;
+}
+
+export function applyTheme() {
+  if (theme.value === "system") delete document.documentElement.dataset.theme;
+  else document.documentElement.dataset.theme = theme.value;
+  save("theme", theme.value);
+}
+
+let noticeTimer = 0;
+export function say(text, kind = "info") {
+  notice.value = { text, kind };
+  clearTimeout(noticeTimer);
+  noticeTimer = setTimeout(() => { notice.value = null; }, kind === "error" ? 8000 : 3000);
+}
