@@ -71,6 +71,8 @@ REQUEST_ID = "$id"
 STATUS_INTERVAL_S = 0.05
 """A container's status is sent at most so often; events are never held back."""
 
+READ_TRIES = 5
+
 LONGEST_VALUE = 10_000
 """Userdata values with more elements are shown by their size."""
 
@@ -248,12 +250,7 @@ class ContainerProxy:
         self._send_status(self._info, only_changes=True)
 
     def _send_status(self, info: str, *, only_changes: bool = False) -> None:
-        try:
-            status = self._describe_status()
-        except RuntimeError:  # userdata changed while it was read: another event is on its way
-            if self._pace is not None:
-                self._pace.mark()
-            return
+        status = self._describe_status()
         if self._topics is None or (only_changes and status == self._sent.get("status")):
             return
         self._sent["status"] = status
@@ -271,14 +268,23 @@ class ContainerProxy:
         }
 
     def _describe_status(self) -> dict[str, Any]:
-        userdata = self._container.userdata
-        values = {key: userdata[key] for key in userdata.keys() if key in userdata}  # noqa: SIM118
         return {
             "path": self._path,
             "initial_states": list(self._container.get_initial_states()),
             "active_states": list(self._container.get_active_states()),
-            "local_data": dumps(values, longest=LONGEST_VALUE),
+            "local_data": _describe_userdata(self._container.userdata),
         }
+
+
+def _describe_userdata(userdata: UserData) -> str:
+    """Return userdata as JSON, while states may be changing it in other threads."""
+    values = dict(userdata._data)  # noqa: SLF001  at once, so that no key vanishes meanwhile
+    for _ in range(READ_TRIES):
+        try:
+            return dumps(values, longest=LONGEST_VALUE)
+        except RuntimeError:  # a dict or set has changed its size while it was read
+            continue
+    return dumps({key: f"<{type(value).__name__} that changes>" for key, value in values.items()})
 
 
 class IntrospectionServer:

@@ -389,3 +389,20 @@ def test_in_every_order_the_last_status_is_the_right_one(seed):
             world.clock.sleep(0.2)
             last = [m for m in found if m.path == "/SM_ROOT"][-1]
             assert last.active_states == ["None"]
+
+
+def test_userdata_that_changes_while_it_is_read_is_shown_as_that(world):
+    class Restless(dict):
+        def items(self):
+            raise RuntimeError("dictionary changed size during iteration")
+
+    machine = make_machine()
+    machine.userdata.restless = Restless(a=1)
+    machine.userdata.number = 1
+    world.serve(machine)
+    found = world.listen(STATUS_TOPIC, SmachContainerStatus)
+    world.clock.sleep(0.1)
+    data = json.loads(next(m.local_data for m in found if m.path == "/SM_ROOT"))
+    assert data == {"restless": "<Restless that changes>", "number": "<int that changes>"}
+    client = IntrospectionClient(node=world.desk)
+    assert client.set_initial_state("robot", "/SM_ROOT", ["LAST"], timeout=1.0) is True
