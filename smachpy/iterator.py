@@ -8,6 +8,7 @@ from smachpy._construction import construction_method
 from smachpy._core.names import unique_names
 from smachpy._core.spec import ChildSpec, LoopSpec
 from smachpy._core.validate import loop_problems
+from smachpy._runtime.failures import unknown_outcome, user_error
 from smachpy._runtime.interrupt import Interruption
 from smachpy._runtime.step import run_watched
 from smachpy._runtime.watch import disarm, has_answered
@@ -16,7 +17,6 @@ from smachpy.events import Iterated, OutcomeForced, Preempted
 from smachpy.exceptions import (
     InconsistentMachineError,
     InvalidStateError,
-    InvalidTransitionError,
     InvalidUserCodeError,
     SmachError,
     did_you_mean,
@@ -252,10 +252,7 @@ class Iterator(Container):
         outcome = self._loop(frame, plan)
         outcome = self._final_outcome_map.get(outcome, outcome)
         if outcome not in self._outcomes and outcome != "preempted":
-            raise InvalidTransitionError(
-                f"{frame.path}: outcome: got {outcome!r}; expected one of "
-                f"{sorted(self._outcomes)}.{did_you_mean(outcome, self._outcomes)}"
-            )
+            raise unknown_outcome(frame.path, self._outcomes, outcome)
         if self._termination_cbs:
             self.call_termination_cbs([plan.step.label], outcome)
         return outcome
@@ -279,10 +276,7 @@ class Iterator(Container):
                 if ends:
                     return outcome
             if outcome not in plan.outcomes:
-                raise InvalidTransitionError(
-                    f"{frame.path}/{step.label}: unknown outcome: got {outcome!r}; expected one of "
-                    f"{sorted(plan.outcomes)}.{did_you_mean(outcome, plan.outcomes)}"
-                )
+                raise unknown_outcome(step.path_in(frame), plan.outcomes, outcome)
             if outcome in plan.breaks:
                 return outcome
             if self._transition_cbs:
@@ -305,11 +299,7 @@ class Iterator(Container):
                 raise
             return "preempted"
         except Exception as error:
-            path = f"{frame.path}/{step.label}"
-            raise InvalidUserCodeError(
-                f"{path}: {type(step.state).__name__} raised {type(error).__name__}: {error}",
-                path=path,
-            ) from error
+            raise user_error(step.path_in(frame), step.state, error) from error
         return outcome
 
     def _after_preempt(self, frame: Frame, plan: _Plan, outcome: str) -> tuple[str, bool]:

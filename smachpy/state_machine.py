@@ -9,6 +9,7 @@ from smachpy._construction import construction_method
 from smachpy._core.names import unique_names
 from smachpy._core.spec import ChildSpec, MachineSpec
 from smachpy._core.validate import machine_problems
+from smachpy._runtime.failures import unknown_outcome, user_error
 from smachpy._runtime.interrupt import Interruption
 from smachpy._runtime.step import End, Step, run_watched
 from smachpy._runtime.watch import disarm, has_answered
@@ -19,7 +20,6 @@ from smachpy.exceptions import (
     InvalidConstructionError,
     InvalidStateError,
     InvalidTransitionError,
-    InvalidUserCodeError,
     SmachError,
     did_you_mean,
 )
@@ -438,15 +438,8 @@ class StateMachine(Container):
         trace = error.__traceback__
         if isinstance(error, (KeyError, TypeError)) and trace is not None and not trace.tb_next:
             self._raise_bad_outcome(frame, step, error.args[0] if error.args else None)
-        path = f"{frame.path}/{step.label}"
-        raise InvalidUserCodeError(
-            f"{path}: {type(step.state).__name__} raised {type(error).__name__}: {error}",
-            path=path,
-        ) from error
+        raise user_error(step.path_in(frame), step.state, error) from error
 
     def _raise_bad_outcome(self, frame: Frame, step: Step, outcome: object) -> NoReturn:
         outcomes = step.state.get_registered_outcomes()
-        raise InvalidTransitionError(
-            f"{frame.path}/{step.label}: unknown outcome: got {outcome!r}; expected one of "
-            f"{sorted(outcomes)}.{did_you_mean(outcome, outcomes)}"
-        ) from None
+        raise unknown_outcome(step.path_in(frame), outcomes, outcome) from None

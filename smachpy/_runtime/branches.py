@@ -6,12 +6,13 @@ import threading
 from collections import deque
 from typing import TYPE_CHECKING, Any
 
+from smachpy._runtime.failures import unknown_outcome
 from smachpy._runtime.frame import FRAME, Frame
 from smachpy._runtime.interrupt import Interruption
 from smachpy._runtime.step import run_watched
 from smachpy._runtime.watch import disarm, has_answered
 from smachpy.events import OutcomeForced
-from smachpy.exceptions import InvalidTransitionError, InvalidUserCodeError, did_you_mean
+from smachpy.exceptions import InvalidUserCodeError
 
 if TYPE_CHECKING:
     from actionlib_core.clock import Event as ClockEvent
@@ -80,11 +81,7 @@ class Branch(Frame):
         step = self.step
         if outcome in step.next or (outcome == "preempted" and self._is_told()):
             return str(outcome)
-        outcomes = step.state.get_registered_outcomes()
-        raise InvalidTransitionError(
-            f"{self.here()}: unknown outcome: got {outcome!r}; expected one of "
-            f"{sorted(outcomes)}.{did_you_mean(outcome, outcomes)}"
-        )
+        raise unknown_outcome(self.here(), step.state.get_registered_outcomes(), outcome)
 
     def _attempt(self) -> Any:
         """Run the child once, unless it was asked to stop before it began."""
