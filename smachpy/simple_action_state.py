@@ -79,8 +79,8 @@ class SimpleActionState(State):
         input_keys: More keys to read, for the callbacks.
         output_keys: More keys to write, for the callbacks.
         outcomes: More outcomes, for `result_cb`.
-        exec_timeout: A goal that has not ended so long [s] after it was sent is cancelled, and the
-            outcome is 'aborted'; None: no limit.
+        exec_timeout: A goal that has not ended so long [s] after a server took it is cancelled, and
+            the outcome is 'aborted'; None: no limit.
         preempt_timeout: A cancelled goal that has not ended after so long [s] is abandoned and
             reported; it may still run on the server. None: no limit.
         server_wait_timeout: 'aborted' when no server has taken the goal after so long [s]; None: no
@@ -181,7 +181,7 @@ class SimpleActionState(State):
             MessageError: a field of the goal has a wrong type.
             TypeMismatchError: the action's server is of another type.
 
-        Blocks: until the goal has ended, `exec_timeout` + `preempt_timeout` at most; a preempt
+        Blocks: until the goal has ended: all three timeouts together at most; a preempt
             cancels the goal at once.
         """
         with Wakeup(self) as wake:
@@ -191,9 +191,7 @@ class SimpleActionState(State):
             client = self._get_client()
             if self._is_preempted():
                 return PREEMPTED
-            run = GoalRun(
-                wake.clock.now(), exec_timeout=self._exec_s, preempt_timeout=self._preempt_s
-            )
+            run = GoalRun(exec_timeout=self._exec_s, preempt_timeout=self._preempt_s)
             exchange = GoalExchange(client, wake, self._scope(), run)
             self._exchange = exchange
             wait_s = self._server_wait_s

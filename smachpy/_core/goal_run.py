@@ -32,8 +32,7 @@ class GoalRun:
     """What happened to the goal of one execution.
 
     Args:
-        now: When the goal was sent [s].
-        exec_timeout: The goal is cancelled after so long [s]; None: no limit.
+        exec_timeout: The goal is cancelled so long [s] after a server took it; None: no limit.
         preempt_timeout: A cancelled goal that has not ended after so long [s] is abandoned; None:
             no limit.
 
@@ -51,6 +50,7 @@ class GoalRun:
         "_deadline",
         "_failed",
         "_preempt_timeout",
+        "_taken",
         "abandoned",
         "cancelling",
         "exec_timeout",
@@ -60,12 +60,11 @@ class GoalRun:
         "timed_out",
     )
 
-    def __init__(
-        self, now: float, *, exec_timeout: float | None, preempt_timeout: float | None
-    ) -> None:
+    def __init__(self, *, exec_timeout: float | None, preempt_timeout: float | None) -> None:
         self.exec_timeout = exec_timeout
         self._preempt_timeout = preempt_timeout
-        self._deadline = None if exec_timeout is None else now + exec_timeout
+        self._deadline: float | None = None
+        self._taken = False
         self._failed = False
         self.preempted = False
         self.timed_out = False
@@ -78,6 +77,13 @@ class GoalRun:
     def deadline(self) -> float | None:
         """When `step` has something to do though nothing happens [s]; None: never."""
         return self._deadline
+
+    def on_taken(self, now: float) -> None:
+        """Note that a server has the goal; from then on `exec_timeout` counts."""
+        if not self._taken:
+            self._taken = True
+            if self.exec_timeout is not None and not self.cancelling:
+                self._deadline = now + self.exec_timeout
 
     def on_preempt(self) -> None:
         """Note that the state is to stop."""

@@ -124,6 +124,8 @@ class GoalExchange:
         """Do what is due; whether it is over."""
         machine = self._machine
         assert machine is not None
+        if machine.goal.acknowledged:
+            self.run.on_taken(self._wake.clock.now())
         while True:
             step = self.run.step(self._wake.clock.now())
             if step is Step.CANCEL:
@@ -141,7 +143,7 @@ class GoalExchange:
             self.accepted = True
         if state in _OVER:
             self._over = True
-            self._wake.set()
+        self._wake.set()
 
     def _note_feedback(self, _machine: CommStateMachine, feedback: Any) -> None:
         self._feedback.append(feedback)

@@ -198,6 +198,12 @@ def test_a_server_that_comes_late_gets_the_goal(world):
     assert world.clock.now() == pytest.approx(23.0, abs=0.2)
 
 
+def test_waiting_for_the_server_does_not_count_as_execution(world):
+    world.clock.call_later(20.0, lambda: world.clock.spawn(lambda: world.serve(count), name="late"))
+    assert world.machine(world.state(exec_timeout=4.0)).execute() == "succeeded"
+    assert world.machine(world.state(exec_timeout=2.0)).execute() == "aborted"
+
+
 def test_without_wait_a_server_that_is_there_has_time_to_answer(world):
     world.serve(count)
     assert world.machine(world.state(server_wait_timeout=0)).execute() == "succeeded"

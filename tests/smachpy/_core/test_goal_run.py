@@ -12,7 +12,9 @@ FINAL = ["PREEMPTED", "SUCCEEDED", "ABORTED", "REJECTED", "RECALLED", "LOST"]
 
 
 def run_of(exec_timeout=None, preempt_timeout=60.0):
-    return GoalRun(10.0, exec_timeout=exec_timeout, preempt_timeout=preempt_timeout)
+    run = GoalRun(exec_timeout=exec_timeout, preempt_timeout=preempt_timeout)
+    run.on_taken(10.0)
+    return run
 
 
 @pytest.mark.parametrize(
@@ -90,18 +92,25 @@ def test_without_preempt_timeout_it_waits_for_ever():
 
 
 @given(
-    st.lists(st.one_of(st.sampled_from(["preempt", *FINAL]), st.floats(0.0, 100.0)), max_size=20),
+    st.lists(
+        st.one_of(st.sampled_from(["preempt", "taken", "failure", *FINAL]), st.floats(0.0, 100.0)),
+        max_size=20,
+    ),
     st.none() | st.floats(0.0, 50.0),
     st.none() | st.floats(0.0, 50.0),
 )
 def test_every_story_cancels_at_most_once_and_ends_for_good(story, exec_timeout, preempt_timeout):
-    now, run = 0.0, GoalRun(0.0, exec_timeout=exec_timeout, preempt_timeout=preempt_timeout)
+    now, run = 0.0, GoalRun(exec_timeout=exec_timeout, preempt_timeout=preempt_timeout)
     steps = []
     for event in story:
         if isinstance(event, float):
             now += event
         elif event == "preempt":
             run.on_preempt()
+        elif event == "taken":
+            run.on_taken(now)
+        elif event == "failure":
+            run.on_failure()
         else:
             run.on_end(event, "")
         steps.append(run.step(now))
@@ -113,3 +122,24 @@ def test_every_story_cancels_at_most_once_and_ends_for_good(story, exec_timeout,
         assert set(steps[steps.index(Step.FINISH) :]) == {Step.FINISH}
         assert run.outcome in OUTCOMES
     assert run.deadline is None or run.deadline >= 0.0
+
+
+def test_exec_timeout_counts_from_when_a_server_took_the_goal():
+    run = GoalRun(exec_timeout=5.0, preempt_timeout=60.0)
+    assert run.deadline is None
+    assert run.step(1000.0) is Step.WAIT
+    run.on_taken(1000.0)
+    run.on_taken(1003.0)
+    assert run.deadline == 1005.0
+    run.on_preempt()
+    assert run.step(1001.0) is Step.CANCEL
+    assert run.deadline == 1061.0
+
+
+def test_a_server_that_takes_the_goal_after_the_cancel_does_not_extend_the_grace():
+    run = GoalRun(exec_timeout=500.0, preempt_timeout=2.0)
+    run.on_preempt()
+    assert run.step(0.0) is Step.CANCEL
+    run.on_taken(1.0)
+    assert run.deadline == 2.0
+    assert run.step(2.0) is Step.ABANDON
