@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import contextvars
 import heapq
@@ -16,7 +15,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from actionlib_core.clock._real import RealEvent
 from actionlib_core.clock._serial import report_thread_exception
 from actionlib_core.clock._threads import ThreadCache
-from actionlib_core.clock._virtual_loop import VirtualLoop
 from actionlib_core.clock._virtual_parts import (
     Deadlock,
     Participant,
@@ -128,6 +126,10 @@ class VirtualClock:
         return timer
 
     def run_async(self, main: Coroutine[object, object, T]) -> T:
+        import asyncio  # 60 ms that most programs never need
+
+        from actionlib_core.clock._virtual_loop import VirtualLoop
+
         with asyncio.Runner(loop_factory=lambda: VirtualLoop(self)) as runner:
             return runner.run(main)
 
