@@ -1,0 +1,102 @@
+"""Every mission under the test kit: what it does with good and bad servers, the same each time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
+from actionlib_core.interfaces.nav_msgs.msg import Odometry
+from actionlib_core.interfaces.sensor_msgs.msg import BatteryState
+from missions.countdown import countdown
+from missions.interfaces import ChargeAction
+from missions.patrol import patrol
+from missions.there_and_back import there_and_back
+from smachpy.checks import check
+from smachpy.checks.suppression import read_settings
+from smachpy.testing import mission_kit
+from smachpy.testing.coverage import Coverage
+
+MISSIONS = {"PATROL": patrol, "COUNTDOWN": countdown, "THERE_AND_BACK": there_and_back}
+PATROL = patrol()  # reading the waypoints takes longer than a run
+FULL, EMPTY = {"percentage": 1.0}, {"percentage": 0.05}
+
+
+def run_patrol(mission, battery=(FULL, EMPTY, FULL, FULL)):
+    mission.action_server("move_base", MoveBaseAction).default_result(duration=10)
+    mission.action_server("charge", ChargeAction).default_result(duration=100)
+    mission.topic("battery", BatteryState).publish_every(12.5, battery)
+    return mission(PATROL, userdata={"index": 0})
+
+
+def run_countdown(mission):
+    return mission(countdown())
+
+
+def run_there_and_back(mission):
+    server = mission.action_server("move_base", MoveBaseAction)
+    server.reply(duration=60)
+    server.reply(duration=4)
+    mission.topic("odom", Odometry).publish(latch=True)
+    return mission(there_and_back())
+
+
+RUNS = {"patrol": run_patrol, "countdown": run_countdown, "there_and_back": run_there_and_back}
+
+
+def test_patrol_charges_when_the_battery_is_low(mission):
+    run = run_patrol(mission)
+    run.assert_outcome("succeeded")
+    assert run.outcomes("ROUND") == ("battery_low", "all_visited")
+    run.assert_visited("DRIVE_TO_DOCK", "CHARGE")
+
+
+def test_patrol_gives_up_when_the_way_is_blocked(mission, action_server):
+    action_server("move_base", MoveBaseAction).reply(status="aborted")
+    mission(patrol()).assert_outcome("aborted")
+
+
+@pytest.mark.parametrize("state", ["DRIVE", "CHARGE", "DRIVE_TO_DOCK"])
+def test_patrol_is_preempted_anywhere(mission, state):
+    mission.preempt(on=state, after=1.0)
+    run_patrol(mission).assert_outcome("preempted")
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_every_mission_succeeds(mission, name):
+    run = RUNS[name](mission)
+    run.assert_outcome("succeeded")
+    assert run.goals_left == ()
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_a_hundred_seeds_give_the_same_verdict_twice(name):
+    def verdict(seed):
+        with mission_kit(seed=seed) as mission:
+            run = RUNS[name](mission)
+            return run.outcome, run.path, run.duration
+
+    first = [verdict(seed) for seed in range(100)]
+    assert first == [verdict(seed) for seed in range(100)]
+    assert {outcome for outcome, _, _ in first} == {"succeeded"}
+
+
+@pytest.mark.parametrize("name", MISSIONS)
+def test_no_mission_has_problems_that_a_check_finds(name):
+    settings = read_settings(Path(__file__).parents[2])
+    report = check(MISSIONS[name](), ignores=settings.ignores, name=name)
+    assert report.ok, report
+
+
+def test_the_runs_of_this_file_cover_the_patrol():
+    coverage = Coverage()
+    for preempted in (None, "DRIVE", "CHARGE", "DRIVE_TO_DOCK", "WATCH_BATTERY"):
+        with mission_kit() as mission:
+            mission.on_run = coverage.add
+            if preempted:
+                mission.preempt(on=preempted, after=1.0)
+            run_patrol(mission)
+    (machine,) = coverage.machines
+    assert machine.counts("states") == (10, 10)
+    assert machine.counts("preempts") == (4, 4)
