@@ -83,7 +83,7 @@ def _node(record: StateRecord, levels: int, wired: frozenset[str], *, show_impli
         if t.source in labels and (show_implicit or _is_drawn(t))
     ]
     edges = _edges(record, shown)
-    uses = _outcomes_used(record)
+    uses = _outcomes_used(record, shown)
     children = tuple(
         _node(child, levels - 1, uses.get(child.label, frozenset()), show_implicit=show_implicit)
         for child in record.children
@@ -184,9 +184,11 @@ def _backward(record: StateRecord, arrows: Sequence[tuple[str, str]]) -> frozens
     return frozenset(found)
 
 
-def _outcomes_used(record: StateRecord) -> dict[str, frozenset[str]]:
-    """By child, the outcomes that this container has written something about."""
-    pairs = [(t.source, t.outcome) for t in record.transitions if _is_drawn(t)]
+def _outcomes_used(
+    record: StateRecord, shown: Iterable[TransitionRecord]
+) -> dict[str, frozenset[str]]:
+    """By child, the outcomes from which an arrow starts."""
+    pairs = [(t.source, t.outcome) for t in shown]
     pairs += [pair for rule in record.rules for pair in rule.conditions]
     uses: dict[str, set[str]] = {}
     for label, outcome in pairs:

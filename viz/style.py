@@ -61,6 +61,7 @@ def graph(theme: Theme) -> Attributes:
         "fontname": FONT,
         "fontsize": "11",
         "labeljust": "l",
+        "margin": "0",
         "nodesep": "0.26",
         "notranslate": "true",
         "pad": "0.25",

@@ -109,3 +109,11 @@ def test_a_plain_state_can_be_drawn_alone(build):
     node = extract(record)
     assert not node.is_open
     assert node.hidden == 0
+
+
+def test_every_arrow_of_an_open_container_starts_at_an_outcome(patrol, large):
+    for record in (patrol, large(60)):
+        for node in extract(record, depth=9, show_implicit=True).walk():
+            pills = {c.label: {p.outcome for p in c.pills} for c in node.children if c.is_open}
+            for edge in node.edges:
+                assert set(edge.outcomes) <= pills.get(edge.source, set(edge.outcomes))
