@@ -14,7 +14,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import pygraphviz
+try:
+    import pygraphviz
+except ImportError as failure:  # its wheel needs glib and X11's libraries, which bare systems lack
+    sys.exit(
+        f"the package pygraphviz cannot be used: {failure}. Try: sudo apt-get install graphviz"
+    )
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
