@@ -192,7 +192,8 @@ class SimpleActionState(State):
             if self._is_preempted():
                 return PREEMPTED
             run = GoalRun(exec_timeout=self._exec_s, preempt_timeout=self._preempt_s)
-            exchange = GoalExchange(client, wake, self._scope(), run)
+            wanted = self._feedback_cb is not None or self._feedback_key is not None
+            exchange = GoalExchange(client, wake, self._scope(), run, wants_feedback=wanted)
             self._exchange = exchange
             wait_s = self._server_wait_s
             wait_s = None if wait_s is None else max(wait_s, SHORTEST_ACK_S)

@@ -29,6 +29,8 @@ class GoalExchange:
         wake: What the state's thread waits on.
         scope: Where the events go; None outside any machine.
         run: The decisions.
+        wants_feedback: Somebody besides the listeners wants the feedback: without either, feedback
+            does not wake the state's thread.
 
     Attributes:
         run: See above.
@@ -41,7 +43,13 @@ class GoalExchange:
     """
 
     def __init__(
-        self, client: ActionClient[Any], wake: Wakeup, scope: Scope | None, run: GoalRun
+        self,
+        client: ActionClient[Any],
+        wake: Wakeup,
+        scope: Scope | None,
+        run: GoalRun,
+        *,
+        wants_feedback: bool = True,
     ) -> None:
         self.run = run
         self.accepted = False
@@ -50,6 +58,7 @@ class GoalExchange:
         self._wake = wake
         self._scope = scope
         self._over = False
+        self._wants_feedback = wants_feedback
         self._feedback: deque[Any] = deque()
         self._machine: CommStateMachine | None = None
 
@@ -146,8 +155,11 @@ class GoalExchange:
         self._wake.set()
 
     def _note_feedback(self, _machine: CommStateMachine, feedback: Any) -> None:
-        self._feedback.append(feedback)
-        self._wake.set()
+        scope = self._scope
+        watched = scope is not None and scope._frame.run.watched  # noqa: SLF001  one machinery
+        if self._wants_feedback or watched:
+            self._feedback.append(feedback)
+            self._wake.set()
 
     def _deliver_feedback(self, on_feedback: Callable[[Any], object] | None) -> None:
         while self._feedback:
