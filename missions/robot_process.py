@@ -29,17 +29,18 @@ class RobotProcess:
 
     Args:
         arguments: Further arguments for it (`--map`, `--config`, `--pose`, ...).
-        on_exit: Called when the process has ended, whatever the reason.
+        on_change: Called when the robot is ready, and when the process has ended.
 
-    Threads: `on_exit` is called from a thread of the clock.
+    Threads: `on_change` is called from threads of the clock.
     """
 
     def __init__(
-        self, arguments: Sequence[str] = (), *, on_exit: Callable[[], object] = lambda: None
+        self, arguments: Sequence[str] = (), *, on_change: Callable[[], object] = lambda: None
     ) -> None:
         self._command = [sys.executable, "-m", "missions.move_base", "--child", *arguments]
-        self._on_exit = on_exit
+        self._on_change = on_change
         self._said: deque[str] = deque(maxlen=_KEPT_LINES)
+        self._ready = current_clock().event()
         self._ended = current_clock().event()
         self._process: subprocess.Popen[str] | None = None
 
@@ -47,14 +48,16 @@ class RobotProcess:
         self._process = subprocess.Popen(  # noqa: S603  our own interpreter and module
             self._command,
             stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
             errors="replace",
             start_new_session=True,
         )
-        stderr = self._process.stderr
+        stdout, stderr = self._process.stdout, self._process.stderr
+        assert stdout is not None
         assert stderr is not None
+        current_clock().spawn(lambda: self._listen(stdout), name="robot process output")
         current_clock().spawn(lambda: self._watch(stderr), name="robot process")
         return self
 
@@ -72,9 +75,9 @@ class RobotProcess:
         assert self._process is not None
         return self._process.pid
 
-    def ended(self) -> bool:
-        """Tell whether the process has ended."""
-        return self._ended.is_set()
+    def ready(self) -> bool:
+        """Tell whether the robot takes goals."""
+        return self._ready.is_set()
 
     def check(self) -> None:
         """Raise when it ended by itself.
@@ -107,6 +110,13 @@ class RobotProcess:
                 process.kill()
                 self._ended.wait(_LAST_GRACE)
 
+    def _listen(self, stdout: IO[str]) -> None:
+        """Wait for the line that says it is ready; read on, so that it never has to wait."""
+        with stdout:
+            for _line in stdout:
+                self._ready.set()
+                self._on_change()
+
     def _watch(self, stderr: IO[str]) -> None:
         """Read what it says until it ends."""
         assert self._process is not None
@@ -115,4 +125,4 @@ class RobotProcess:
                 self._said.append(line)
         self._process.wait()
         self._ended.set()
-        self._on_exit()
+        self._on_change()

@@ -96,7 +96,7 @@ def run_mission(target: Target, options: RunOptions) -> int:
         robot = None
         if options.start_robot:
             arguments = ("--map", str(options.map), "--config", str(options.config))
-            robot = RobotProcess((*arguments, *options.robot_arguments), on_exit=waiter.wake)
+            robot = RobotProcess((*arguments, *options.robot_arguments), on_change=waiter.wake)
             stack.enter_context(robot)
         if options.out is not None:
             _prepare(options.out)
@@ -273,7 +273,7 @@ class _ServerWait:
             watch.close()
 
     def wait(self, timeout: float, robot: RobotProcess | None) -> bool:
-        """Wait; False when the program is to end.
+        """Wait for the servers, and for `robot` to be ready; False when the program is to end.
 
         Raises:
             MissionError: a server is missing after `timeout` [s], or the robot could not start.
@@ -281,15 +281,18 @@ class _ServerWait:
         Blocks: `timeout` at most.
         """
         deadline = self._clock.now() + timeout
-        while self._missing and not shutdown.requested():
+        while not shutdown.requested():
             if robot is not None:
                 robot.check()
+            if not self._missing and (robot is None or robot.ready()):
+                return True
             left = deadline - self._clock.now()
             if left <= 0:
-                raise MissionError(_missing_text(list(self._missing.values()), timeout))
+                names = list(self._missing.values()) or ["move_base"]
+                raise MissionError(_missing_text(names, timeout))
             self._wake.wait(left)
             self._wake.clear()
-        return not shutdown.requested()
+        return False
 
     def _on_presence(self, presence: Presence) -> None:
         endpoint = parse_token(presence.key)

@@ -68,10 +68,10 @@ def serve(args: argparse.Namespace) -> int:
             server = RobotServer(robot, node=node)
             try:
                 server.start()
-                if not args.child:
-                    x, y, _ = robot.body.pose
-                    name = node.resolve("move_base")
-                    print(f"{name}: ready on {args.map.name} at ({x:.2f}, {y:.2f}); Ctrl-C ends it")
+                x, y, _ = robot.body.pose
+                name = node.resolve("move_base")
+                where = f"{args.map.name} at ({x:.2f}, {y:.2f})"
+                print(f"{name}: ready on {where}; Ctrl-C ends it", flush=True)
                 shutdown.event().wait()
             finally:
                 server.close()

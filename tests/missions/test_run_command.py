@@ -235,6 +235,9 @@ def test_two_robots_of_one_name(files):
         assert second.returncode == 2
         assert "action 'move_base': two servers" in second.stderr
         assert "Traceback" not in second.stderr
+        third = run("run", "patrol", "--start-robot")
+        assert third.returncode == 2
+        check_one_screen(third.stderr, "action 'move_base': two servers")
         first.send_signal(signal.SIGTERM)
         assert first.wait(5) == 0
 
