@@ -151,6 +151,10 @@ class ServerPort:
         for entry in declared:
             entry.close()
 
+    def has_clients(self) -> bool:
+        """Tell whether a client of the action is there."""
+        return bool(self._clients)
+
     def send_result(self, payload: bytes) -> None:
         """Send an XActionResult."""
         self._send(self.keys.result, self._types.action_result, RESULT, payload)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import threading
 from typing import TYPE_CHECKING, Any, Literal
@@ -18,21 +19,36 @@ from actionlib_core._core.server_goals import RESULT_TIMEOUT_S, Arrival, ServerG
 from actionlib_core._core.states import TERMINAL, Status
 from actionlib_core._server_port import ServerPort
 from actionlib_core._status_publisher import StatusPublisher
-from actionlib_core.exceptions import ActionException, ServerConflictError, TransportError
+from actionlib_core.exceptions import (
+    ActionException,
+    IllegalTransitionError,
+    ServerConflictError,
+    TransportError,
+)
 from actionlib_core.goal_id_generator import GoalIDGenerator
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from actionlib_core.node import get_node
 from actionlib_core.server_goal_handle import ServerGoalHandle
-from actionlib_core.status_tracker import StatusTracker
+from actionlib_core.status_tracker import (
+    StatusTracker,
+    entry_of,
+    entry_of_status,
+    text_of_past,
+)
 from actionlib_core.time import to_seconds
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from actionlib_core.clock import Event
     from actionlib_core.node import Node
     from actionlib_core.time import Duration
 
 log = logging.getLogger(__name__)
+
+DRAIN_S = 0.3  # how long `stop` waits for acknowledgements
+
+ACCEPTED = frozenset({Status.ACTIVE, Status.PREEMPTING})
 
 TEXT_STOPPED = "The action server was stopped"
 TEXT_CLIENT_LOST = "The client that sent this goal is gone"
@@ -104,12 +120,11 @@ class ActionServer:
         self._forget: Callable[[], None] | None = None
         self._started = False
         self._stopped = False
+        self._drained: Event | None = None
         self._left = self._clock.event(f"the end of action server {self.ns}")
         self._status = StatusPublisher(self._clock, self.lock, self._goals, self._send_status)
         if auto_start:
             self.start()
-
-    # -- life ----------------------------------------------------------------------------------
 
     def start(self) -> None:
         """Offer the action; a second call does nothing.
@@ -140,18 +155,26 @@ class ActionServer:
         """End all goals (ABORTED, or REJECTED when not yet accepted) and leave the name.
 
         Clients see the result of each goal, then the server's absence. A second call does nothing.
+
+        Blocks: until the clients have the results, `DRAIN_S` at most.
         """
         with self.lock:
             if self._stopped or not self._started:
                 return
             open_goals = [goal for goal in self._goals.listed() if goal.status not in TERMINAL]
         for goal in open_goals:
-            accepted = goal.status in {Status.ACTIVE, Status.PREEMPTING}
             if goal.arrived and isinstance(goal.tag, StatusTracker):
-                self.finish(
-                    goal.tag, "abort" if accepted else "reject", "stop()", None, TEXT_STOPPED
-                )
+                self.give_up(goal.tag, TEXT_STOPPED)
+        self._drain()
         self._leave()
+
+    def _drain(self) -> None:
+        """Stay until the clients have the results: the end of the token may overtake them."""
+        with self.lock:
+            drained = self._drained = self._clock.event("clients that take their results")
+            if not (self._port.has_clients() and self._goals.has_unacknowledged()):
+                return
+        drained.wait(DRAIN_S)
 
     def _leave(self) -> None:
         with self.lock:
@@ -182,8 +205,6 @@ class ActionServer:
     def stopped(self) -> bool:
         """Whether the server has left its name."""
         return self._stopped
-
-    # -- what actionlib's users look at --------------------------------------------------------
 
     @property
     def ActionSpec(self) -> Any:  # noqa: N802  actionlib's names
@@ -227,10 +248,8 @@ class ActionServer:
         """Replace the cancel callback; None takes it away."""
         self.cancel_callback = cancel_cb if cancel_cb is not None else nop_cb
 
-    # -- what handles do -----------------------------------------------------------------------
-
     def accept(self, tracker: StatusTracker, text: str = "") -> None:
-        """Accept a goal; see `ServerGoalHandle.set_accepted`."""
+        """Accept a goal; as `ServerGoalHandle.set_accepted`."""
         with self.lock:
             self._goals.step(tracker.record, "accept", "set_accepted()", text)
         self._status.on_change()
@@ -244,14 +263,9 @@ class ActionServer:
         return changed
 
     def finish(self, tracker: StatusTracker, event: str, call: str, result: Any, text: str) -> None:
-        """End a goal: move it, keep its result, send it.
+        """End a goal by an event of the server's table: move it, keep its result, send it.
 
-        Args:
-            tracker: The goal.
-            event: Event of the server's table: cancel, reject, abort or succeed.
-            call: What the user called, for the error.
-            result: The XResult message; None sends one with default values.
-            text: Why, for people.
+        `call` is what the user called; a `result` of None sends one with default values.
 
         Raises:
             IllegalTransitionError: the goal's state does not allow it.
@@ -261,7 +275,7 @@ class ActionServer:
         record = tracker.record
         with self.lock:
             self._goals.step(record, event, call, text)
-            payload = pack_report(self._clock.time_ns(), _entry(record), body)
+            payload = pack_report(self._clock.time_ns(), entry_of(record), body)
             record.result = payload
             self._goals.finish(record, self._clock.now())
             stopped = self._stopped
@@ -282,7 +296,7 @@ class ActionServer:
             MessageError: `result` does not fit the action.
         """
         body = self._body(result, self.types.result, "publish_result()")
-        self._port.send_result(pack_report(self._clock.time_ns(), _entry_of(status), body))
+        self._port.send_result(pack_report(self._clock.time_ns(), entry_of_status(status), body))
 
     def publish_feedback(self, status: GoalStatus, feedback: Any) -> None:
         """Send feedback for the goal that `status` names.
@@ -291,12 +305,12 @@ class ActionServer:
             MessageError: `feedback` does not fit the action.
         """
         body = self._body(feedback, self.types.feedback, "publish_feedback()")
-        self._port.send_feedback(pack_report(self._clock.time_ns(), _entry_of(status), body))
+        self._port.send_feedback(pack_report(self._clock.time_ns(), entry_of_status(status), body))
 
     def send_feedback(self, tracker: StatusTracker, feedback: Any) -> None:
         """Send feedback for a goal, without a status message in between."""
         body = self._body(feedback, self.types.feedback, "publish_feedback()")
-        entry = _entry(tracker.record)
+        entry = entry_of(tracker.record)
         self._port.send_feedback(pack_report(self._clock.time_ns(), entry, body))
 
     def _body(self, message: Any, expected: Any, call: str) -> bytes:
@@ -311,7 +325,7 @@ class ActionServer:
         return body
 
     def _send_status(self, goals: list[ServerGoal]) -> None:
-        entries = [_entry(goal) for goal in goals]
+        entries = [entry_of(goal) for goal in goals]
         try:
             self._port.send_status(pack_statuses(self._clock.time_ns(), entries))
         except TransportError:
@@ -332,7 +346,7 @@ class ActionServer:
             tracker = StatusTracker.arrived(record, content, self.types)
             if arrival is Arrival.RECALLED:
                 empty = self.types.result().to_bytes()
-                record.result = pack_report(self._clock.time_ns(), _entry(record), empty)
+                record.result = pack_report(self._clock.time_ns(), entry_of(record), empty)
         if arrival is Arrival.NEW:
             self._deliver_goal(ServerGoalHandle(tracker, self))
             return
@@ -343,7 +357,7 @@ class ActionServer:
         if goal is None:
             with self.lock:
                 status = self._goals.past_status(goal_id) or Status.LOST
-            entry = StatusEntry(goal_id, 0, status, _text_past(status))
+            entry = StatusEntry(goal_id, 0, status, text_of_past(status))
             self._port.send_status(pack_statuses(self._clock.time_ns(), [entry]))
         elif isinstance(goal.result, bytes):
             self._port.send_result(goal.result)
@@ -375,20 +389,22 @@ class ActionServer:
         """Take acknowledgements from the network; not for users."""
         with self.lock:
             self._goals.on_acknowledged(goal_ids, self._clock.now())
+            if self._drained is not None and not self._goals.has_unacknowledged():
+                self._drained.set()
 
     def on_question(self, goal_id: str) -> tuple[Any, bytes]:
         """Answer what became of a goal, or of all; not for users."""
         with self.lock:
             if not goal_id:
-                entries = [_entry(goal) for goal in self._goals.listed()]
+                entries = [entry_of(goal) for goal in self._goals.listed()]
                 return GoalStatusArray, pack_statuses(self._clock.time_ns(), entries)
             goal = self._goals.find(goal_id)
             if goal is not None and isinstance(goal.result, bytes):
                 return self.types.action_result, goal.result
             if goal is not None:
-                return GoalStatus, pack_status(_entry(goal))
+                return GoalStatus, pack_status(entry_of(goal))
             status = self._goals.past_status(goal_id) or Status.LOST
-            return GoalStatus, pack_status(StatusEntry(goal_id, 0, status, _text_past(status)))
+            return GoalStatus, pack_status(StatusEntry(goal_id, 0, status, text_of_past(status)))
 
     def on_conflict(self, error: ServerConflictError) -> None:
         """Leave the name to the older server; not for users."""
@@ -402,13 +418,27 @@ class ActionServer:
     # Subclasses that only note what came need no thread for it.
 
     def _deliver_goal(self, handle: ServerGoalHandle) -> None:
-        self.callback_queue.call(self.goal_callback, handle)
+        self.callback_queue.call(self._run_goal_callback, handle)
         self._status.on_change()
+
+    def _run_goal_callback(self, handle: ServerGoalHandle) -> None:
+        """Give a goal to the user's code; one that it raises on is ended, not forgotten."""
+        try:
+            self.goal_callback(handle)
+        except Exception as error:
+            self.give_up(handle.status_tracker, f"Exception in goal callback: {error}")
+            raise
+
+    def give_up(self, tracker: StatusTracker, text: str) -> None:
+        """End a goal that its code has left without an end; one that has ended stays."""
+        status = tracker.record.status
+        if status not in TERMINAL:
+            event = "abort" if status in ACCEPTED else "reject"
+            with contextlib.suppress(IllegalTransitionError):  # another thread has just ended it
+                self.finish(tracker, event, "the end of its callback", None, text)
 
     def _deliver_cancel(self, handle: ServerGoalHandle) -> None:
         self.callback_queue.call(self.cancel_callback, handle)
-
-    # -- status --------------------------------------------------------------------------------
 
     def publish_status(self) -> None:
         """Send the list of all goals now."""
@@ -417,18 +447,3 @@ class ActionServer:
     def publish_status_async(self, event: object = None) -> None:  # noqa: ARG002  actionlib's
         """Send the list of all goals; the form that ROS timers call."""
         self.publish_status()
-
-
-def _entry(goal: ServerGoal) -> StatusEntry:
-    return StatusEntry(goal.id, goal.stamp_ns, goal.status, goal.text)
-
-
-def _entry_of(status: GoalStatus) -> StatusEntry:
-    goal_id = status.goal_id
-    return StatusEntry(goal_id.id, goal_id.stamp.to_nsec(), status.status, status.text)
-
-
-def _text_past(status: Status) -> str:
-    if status is Status.LOST:
-        return "The action server does not know this goal"
-    return f"The goal ended {status.name}; its result is no longer kept"

@@ -95,18 +95,12 @@ class GoalManager:
         return next((end for end, error in self._servers.items() if error is None), None)
 
     def wait_for_server(self, timeout: float | None) -> bool:
-        """Wait for a server.
-
-        Args:
-            timeout: Longest wait [s]; None waits for ever.
-
-        Returns:
-            Whether there is one; False also when the client was stopped.
+        """Wait for a server; return whether there is one, False also when the client was stopped.
 
         Raises:
             TypeMismatchError: there is one of another type.
 
-        Blocks: until then.
+        Blocks: until then, `timeout` [s] at most; None: no limit.
         """
         deadline = None if timeout is None else self._clock.now() + timeout
         changed = self._clock.event()
@@ -159,7 +153,7 @@ class GoalManager:
     def on_server_gone(self, server: Endpoint) -> None:
         """Take the disappearance of a server."""
         with self._lock:
-            if self._servers.pop(server, self._server_lost_timeout) is not None:
+            if server not in self._servers or self._servers.pop(server) is not None:
                 return  # unknown, or of another type
             if self._server_lost_timeout <= 0:
                 self._lose_goals_of(server, "is gone")
@@ -194,8 +188,8 @@ class GoalManager:
             goal_id: Its id.
             stamp_ns: Its stamp [ns since the epoch].
             body: The bytes of the XGoal.
-            on_transition: See `CommStateMachine`.
-            on_feedback: See `CommStateMachine`.
+            on_transition: See `CommStateMachine`, also for `on_feedback`.
+            on_feedback: None when nobody wants any.
             ack_timeout: Without a server that takes it for so long [s] it is LOST.
             created: Called with the machine before anything can come back.
 

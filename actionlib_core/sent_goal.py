@@ -11,6 +11,7 @@ Leaving the block before the goal is over cancels it.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import threading
 from collections import deque
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
@@ -264,7 +265,7 @@ class SentGoal(Generic[R, F]):
         changed = asyncio.Event()
 
         def wake() -> None:
-            if not loop.is_closed():
+            with contextlib.suppress(RuntimeError):  # the loop has just been closed
                 loop.call_soon_threadsafe(changed.set)
 
         with self._lock:

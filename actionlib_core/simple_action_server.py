@@ -10,7 +10,7 @@ from actionlib_core._core.server_goals import RESULT_TIMEOUT_S
 from actionlib_core._core.single_goal import Policy, SingleGoal
 from actionlib_core._core.states import TERMINAL, Status
 from actionlib_core.action_server import TEXT_STOPPED, ActionServer, OnClientLost
-from actionlib_core.exceptions import ActionException, IllegalTransitionError
+from actionlib_core.exceptions import ActionException
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -64,7 +64,8 @@ class SimpleActionServer:
         ActionSpec: The action class (XAction).
         execute_cb: Called with the goal message (XGoal); it must call `set_succeeded`,
             `set_aborted`, `set_preempted` or `set_rejected` before it returns.
-        auto_start: Start at once. With False, call `start` when everything is ready.
+        auto_start: Start at once; a goal may then come before the constructor has returned. When
+            the callback uses the server, pass False and call `start` afterwards.
         node: Where; the current node when None.
         policy: What a new goal does while one runs: "preempt" asks the running one to stop, as in
             ROS; "queue" waits its turn; "reject" is turned away.
@@ -337,6 +338,8 @@ class SimpleActionServer:
         with self.lock:
             stamp_ns = goal.status_tracker.record.stamp_ns
             decision = self._policy.on_goal(goal, stamp_ns)
+            if decision.preempt:  # under the lock: the next goal clears it there
+                self._preempted.set()
             if decision.announce:
                 self._start_execution()
         self._carry_out(decision, TEXT_NEWER)
@@ -348,6 +351,8 @@ class SimpleActionServer:
             decision = self._policy.on_cancel(
                 goal, recall_waiting=self.execute_callback is not None
             )
+            if decision.preempt:
+                self._preempted.set()
         self._carry_out(decision, TEXT_CANCELLED_WAITING)
 
     def _carry_out(self, decision: Decision[ServerGoalHandle], text: str) -> None:
@@ -355,10 +360,8 @@ class SimpleActionServer:
             older.set_canceled(None, text)
         if decision.reject is not None:
             decision.reject.set_rejected(None, TEXT_BUSY)
-        if decision.preempt:
-            self._preempted.set()
-            if self.preempt_callback is not None:
-                self._queue.call(self.preempt_callback)
+        if decision.preempt and self.preempt_callback is not None:
+            self._queue.call(self.preempt_callback)
         if decision.announce and self.goal_callback is not None:
             self._queue.call(self.goal_callback)
 
@@ -392,11 +395,9 @@ class SimpleActionServer:
         text = TEXT_NO_STATUS
         try:
             execute()
-        except IllegalTransitionError as error:
-            if handle.status_tracker.record.text == TEXT_STOPPED:  # `stop` has ended the goal
-                return
-            text = self._report(error)
         except Exception as error:  # noqa: BLE001  a border: told to the client and logged
+            if handle.status_tracker.record.text == TEXT_STOPPED:
+                return  # `stop` has ended the goal, which the callback found out the hard way
             text = self._report(error)
         except BaseException as error:
             self._abort(handle, f"Exception in execute callback: {error!r}")
@@ -411,8 +412,6 @@ class SimpleActionServer:
 
     def _abort(self, handle: ServerGoalHandle, text: str) -> None:
         """End a goal that its callback has left without an end."""
+        self.action_server.give_up(handle.status_tracker, text)
         with self.lock:
-            status = handle.status_tracker.record.status
-            if status not in TERMINAL and handle is self._policy.current:
-                accepted = status in {Status.ACTIVE, Status.PREEMPTING}
-                self._end("the end of execute_cb", "abort" if accepted else "reject", None, text)
+            self._policy.on_ended(handle)

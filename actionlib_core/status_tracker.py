@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core._action_wire import StatusEntry
 from actionlib_core._core.server_goals import ServerGoal
 from actionlib_core._core.states import Status
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus
@@ -29,27 +30,26 @@ class StatusTracker:
     __slots__ = ("__weakref__", "_goal", "_types", "content", "record")
 
     def __init__(self, goal_id: Any = None, status: int | None = None, goal: Any = None) -> None:
-        self._goal = goal
-        self._types: ActionTypes | None = None
-        self.content: Any = None if goal is None else goal.goal
         found = goal.goal_id if goal is not None else goal_id
-        self.record = ServerGoal(
+        record = ServerGoal(
             "" if found is None else found.id,
             0 if found is None else found.stamp.to_nsec(),
             Status.PENDING if status is None else Status(status),
         )
-        self.record.tag = self
+        self._fill(record, None if goal is None else goal.goal, goal, None)
 
     @classmethod
     def arrived(cls, record: ServerGoal, content: Any, types: ActionTypes) -> StatusTracker:
         """Make the tracker of a goal read from the network."""
-        tracker = cls()
-        tracker.bring(record, content, types)
+        tracker = cls.__new__(cls)
+        tracker._fill(record, content, None, types)  # noqa: SLF001  its own
         return tracker
 
-    def bring(self, record: ServerGoal, content: Any, types: ActionTypes) -> None:
-        """Fill in what was read from the network."""
-        self.record, self.content, self._types = record, content, types
+    def _fill(self, record: ServerGoal, content: Any, goal: Any, types: ActionTypes | None) -> None:
+        self.record = record
+        self.content = content
+        self._goal = goal
+        self._types = types
         record.tag = self
 
     @property
@@ -69,3 +69,21 @@ class StatusTracker:
         """The status now, as a message of its own."""
         record = self.record
         return GoalStatus(goal_id=self.goal_id, status=int(record.status), text=record.text)
+
+
+def entry_of(goal: ServerGoal) -> StatusEntry:
+    """Return what the status list says of a goal."""
+    return StatusEntry(goal.id, goal.stamp_ns, goal.status, goal.text)
+
+
+def entry_of_status(status: GoalStatus) -> StatusEntry:
+    """Return what a status message says."""
+    goal_id = status.goal_id
+    return StatusEntry(goal_id.id, goal_id.stamp.to_nsec(), status.status, status.text)
+
+
+def text_of_past(status: Status) -> str:
+    """Return the text for a goal of which only its end is remembered."""
+    if status is Status.LOST:
+        return "The action server does not know this goal"
+    return f"The goal ended {status.name}; its result is no longer kept"

@@ -83,7 +83,7 @@ class ServerGoals:
         self.name = name
         self.result_timeout = result_timeout
         self._goals: dict[str, ServerGoal] = {}
-        self._past: dict[str, tuple[Status, float]] = {}
+        self._past: dict[str, tuple[int, float]] = {}  # plain numbers: nothing to collect
         self._last_cancel_ns = 0
         self._steps = server_life_cycle()
 
@@ -98,7 +98,7 @@ class ServerGoals:
     def past_status(self, goal_id: str) -> Status | None:
         """Return how a goal ended whose result is no longer kept; None: never heard of it."""
         past = self._past.get(goal_id)
-        return None if past is None else past[0]
+        return None if past is None else Status(past[0])
 
     def on_goal(self, arrived: ServerGoal, now: float) -> tuple[Arrival, ServerGoal | None]:
         """Take a goal that arrived, for the first time or again.
@@ -174,8 +174,11 @@ class ServerGoals:
         Raises:
             IllegalTransitionError: its status does not allow the event.
         """
-        where = f"goal {goal.id} on '{self.name}'"
-        goal.status = self._steps.step(goal.status, event, goal=where, call=call)[-1]
+        path = self._steps.steps.get((goal.status, event))
+        if path is None:
+            where = f"goal {goal.id} on '{self.name}'"
+            path = self._steps.step(goal.status, event, goal=where, call=call)
+        goal.status = path[-1]
         goal.text = text
 
     def finish(self, goal: ServerGoal, now: float) -> None:
@@ -190,6 +193,10 @@ class ServerGoals:
             goal = self._goals.get(goal_id)
             if goal is not None and goal.kept_until is not None:
                 self._forget(goal, now)
+
+    def has_unacknowledged(self) -> bool:
+        """Tell whether a result waits for its acknowledgement."""
+        return any(goal.kept_until is not None for goal in self._goals.values())
 
     def release(self, goal: ServerGoal, now: float) -> None:
         """Note that nobody will ever end this goal: it is LOST once its time in the list is up."""
@@ -231,7 +238,7 @@ class ServerGoals:
 
     def _forget(self, goal: ServerGoal, now: float) -> None:
         del self._goals[goal.id]
-        self._past[goal.id] = (goal.status, now)
+        self._past[goal.id] = (int(goal.status), now)
         if len(self._past) > MEMORY_GOALS:
             self._trim(now)
 

@@ -33,8 +33,9 @@ class Doubler:
         self.runs = []
         self.started = world.event()
         self.server = SimpleActionServer(
-            "demo", msg.TestAction, self.execute, node=world.node("server"), **kwargs
+            "demo", msg.TestAction, self.execute, False, node=world.node("server"), **kwargs
         )
+        self.server.start()  # not before `self.server` is there: a goal may be waiting
 
     def execute(self, goal):
         self.runs.append(goal.goal)
@@ -354,6 +355,32 @@ def test_many_goals_each_accepted_rejected_or_cancelled(world):
     with pytest.raises(IllegalTransitionError, match=r"cannot go REJECTED -> ACTIVE"):
         handles[0].set_accepted()
     server.stop()
+
+
+def test_goal_callback_that_raises_ends_the_goal(world, monkeypatch):
+    raised, both = [], world.event()
+
+    def report(args):
+        raised.append(args.exc_type)
+        if len(raised) == 2:
+            both.set()
+
+    monkeypatch.setattr(threading, "excepthook", report)
+
+    def on_goal(handle):
+        if handle.get_goal().goal:
+            handle.set_accepted()
+        raise RuntimeError("no map")
+
+    ActionServer("demo", msg.TestAction, on_goal, node=world.node("server"))
+    client = full_client(world)
+    for number, state in ((0, "REJECTED"), (1, "ABORTED")):
+        handle = client.send_goal(msg.TestGoal(number))
+        assert handle.wait(LONG_S)
+        assert handle.get_terminal_state().name == state
+        assert handle.get_goal_status_text() == "Exception in goal callback: no map"
+    assert both.wait(LONG_S)
+    assert raised == [RuntimeError] * 2
 
 
 def test_transition_callback_sees_each_state(world):
