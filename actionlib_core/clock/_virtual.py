@@ -352,7 +352,7 @@ class VirtualClock:
                 return self._ready.pop()
             return self._ready.pop(self._choose_by(self._ready_names()))
         if self._owner in self._waits:
-            waits = name_waits(self._waits)
+            waits = name_waits(self._waits, self._participants)
             over = self.limit is not None and self._next_due() is not None
             self._owner.error = TimeLimit(self._now, waits) if over else Deadlock(waits)
             self._wake(self._owner)

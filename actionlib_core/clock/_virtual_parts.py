@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import _thread
+import sys
 import threading
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ from actionlib_core.clock._threads import mark_idle
 if TYPE_CHECKING:
     import contextvars
     from collections.abc import Callable, Mapping
+    from types import FrameType
 
     from actionlib_core.clock._virtual import VirtualClock
 
@@ -163,13 +165,36 @@ class VirtualTimer:
         self.callback = None
 
 
-def name_waits(waits: Mapping[Participant, int]) -> dict[str, str]:
-    """Say who waits for what; a name that comes twice is numbered."""
+def name_waits(
+    waits: Mapping[Participant, int], idents: Mapping[int, Participant]
+) -> dict[str, str]:
+    """Say who waits for what, and where if that has no name; names that come twice get numbers."""
+    threads = {participant: ident for ident, participant in idents.items()}
+    frames = sys._current_frames()  # noqa: SLF001  the documented way
     named: dict[str, str] = {}
     for participant in waits:
         name, number = participant.name, 1
         while name in named:
             number += 1
             name = f"{participant.name} ({number})"
-        named[name] = participant.waiting
+        frame = frames.get(threads.get(participant, 0))
+        unnamed = participant.waiting.startswith(UNNAMED)
+        named[name] = participant.waiting + (_where(frame) if unnamed else "")
     return named
+
+
+def _where(frame: FrameType | None) -> str:
+    """Return the line that waits, and the line outside of the packages that led there."""
+    lines: list[str] = []
+    while frame is not None and len(lines) < 2:  # noqa: PLR2004  the two lines
+        module = str(frame.f_globals.get("__name__", ""))
+        ours = _OURS if lines else _CLOCK
+        if not module.startswith(ours):
+            lines.append(f"{frame.f_code.co_filename}:{frame.f_lineno}")
+        frame = frame.f_back
+    return f" at {', from '.join(lines)}" if lines else ""
+
+
+UNNAMED = "an event"
+_CLOCK = ("actionlib_core.clock.", "threading", "queue")
+_OURS = ("actionlib_core.", "smachpy.", "contextvars", "threading")

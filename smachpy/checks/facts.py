@@ -11,6 +11,7 @@ from smachpy.concurrence import Concurrence
 from smachpy.container import Container
 from smachpy.iterator import Iterator as IteratorState
 from smachpy.state import CBState, State
+from smachpy.util import CBInterface
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -99,7 +100,8 @@ def _is_ours(state: State) -> bool:
 def _code_of(state: State) -> leaves.Code | None:
     """Return what is known of the user's code in a leaf."""
     if isinstance(state, CBState) and type(state).execute is CBState.execute:
-        callback = inspect.unwrap(state._cb)  # noqa: SLF001  one house
+        given: Any = state._cb  # noqa: SLF001  one house
+        callback = given._cb if isinstance(given, CBInterface) else given  # noqa: SLF001
         if not inspect.isfunction(callback):
             return None
         return leaves.look_at(callback, userdata=0, owner=None)

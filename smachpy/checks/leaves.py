@@ -50,14 +50,15 @@ class Code:
 
 
 def look_at(function: Callable[..., Any], *, userdata: int, owner: type | None) -> Code | None:
-    """Return what `function` certainly does; None when it has no source.
+    """Return what `function` certainly does; None when it has no source, or is decorated.
 
     Args:
         function: The function, not bound.
         userdata: Position of its userdata parameter.
         owner: The state's class, when the function is a method of it.
     """
-    function = inspect.unwrap(function)
+    if hasattr(function, "__wrapped__"):
+        return None  # a decorator may change whatever it does
     parsed = _parse(function)
     if parsed is None:
         return None
@@ -311,7 +312,7 @@ def _method_looks(owner: type | None, name: str) -> bool:
     if name in _LOOKS:
         return True
     method = getattr(owner, name, None)
-    parsed = _parse(inspect.unwrap(method)) if inspect.isfunction(method) else None
+    parsed = _parse(method) if inspect.isfunction(method) else None
     if parsed is None:
         return True
     tree, _ = parsed

@@ -67,7 +67,11 @@ def as_text(reports: Iterable[Report]) -> str:
     for report in reports:
         for problem in report.problems:
             place = problem.place
-            where = f"{_relative(place.file)}:{place.line}: " if place is not None and place.file else ""
+            where = (
+                f"{_relative(place.file)}:{place.line}: "
+                if place is not None and place.file
+                else ""
+            )
             lines.append(f"{where}{problem.severity}: {problem.message} [{problem.rule}]")
             if problem.steps:
                 lines.append("    run: " + " ".join(problem.steps))

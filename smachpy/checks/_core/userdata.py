@@ -42,6 +42,9 @@ class _Flow:
             for record in subject.root.walk()
             for key in subject.facts_of(record).preset
         )
+        self._watched = {
+            record.path for record in subject.root.walk() if subject.facts_of(record).watched
+        }
         self._written = self._solve()
 
     # -- one moment ----------------------------------------------------------------------------
@@ -103,6 +106,8 @@ class _Flow:
                 variable = self._outer(node.record, key)
                 if variable is None or variable in written or (node.record.path, key) in told:
                     continue
+                if variable[0] in self._watched:
+                    continue  # a callback may have written it
                 told.add((node.record.path, key))
                 yield self._unset(node, key, variable)
 

@@ -210,3 +210,9 @@ def test_a_limit_hides_no_deadlock(clock):
     clock.limit = 10
     with pytest.raises(Deadlock):
         clock.event("the end").wait()
+
+
+def test_a_deadlock_on_an_event_without_a_name_names_the_line(clock):
+    with pytest.raises(Deadlock) as caught:
+        clock.event().wait()
+    assert f"an event at {__file__}:" in caught.value.waits["MainThread"]

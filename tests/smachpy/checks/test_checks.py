@@ -216,6 +216,30 @@ def test_a_declared_key_that_the_code_asks_for_first_or_never_reads_is_no_proble
     assert check(sm).ok
 
 
+def test_keys_that_a_callback_may_write_are_not_known():
+    sm = machine(("A", Leaf(input_keys=["pose"]), {}))
+    sm.register_start_cb(lambda ud, initial: ud.update({"pose": 1}))
+    assert check(sm).ok
+
+
+def test_a_decorated_execute_is_not_known():
+    import functools
+
+    def renamed(function):
+        @functools.wraps(function)
+        def wrapper(self, ud):
+            return "odd" if function(self, ud) else "done"
+
+        return wrapper
+
+    class Go(State):
+        @renamed
+        def execute(self, ud):
+            return "done"
+
+    assert check(machine(("A", Go(["done", "odd"]), {"odd": "done"}))).ok
+
+
 def test_a_key_written_in_one_branch_and_read_in_another_is_a_race():
     both = Concurrence(["done"], "done")
     with both:
