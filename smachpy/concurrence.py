@@ -79,6 +79,7 @@ class Concurrence(Container):
     """
 
     kind: ClassVar[Kind] = "concurrence"
+    _group: Group | None = None
 
     def __init__(
         self,
@@ -126,7 +127,6 @@ class Concurrence(Container):
         self._rules = as_rules(self._outcome_map)
         self._outcome_cb = outcome_cb
         self._child_termination_cb = child_termination_cb
-        self._group: Group | None = None
 
     @construction_method
     def add(

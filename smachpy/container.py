@@ -80,6 +80,19 @@ class Container(Openable, Callbacks, State):
         # because a signal handler may come in between.
         self._lock = threading.RLock()
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy of the container needs: the structure and the userdata, no run."""
+        state = dict(self.__dict__)
+        for name in ("_lock", "_frame", "_plan", "_control", "_group"):
+            state.pop(name, None)
+        return {**state, "_listeners": (), "_end_waiters": (), "_open_tokens": []}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take the structure and userdata over; not running."""
+        self.__dict__.update(state)
+        self._lock = threading.RLock()
+        self._frame = self._plan = self._control = None
+
     # -- structure -----------------------------------------------------------------------------
 
     def _repr_svg_(self) -> str | None:
@@ -153,7 +166,9 @@ class Container(Openable, Callbacks, State):
             if isinstance(child, Container):
                 child.reset_userdata()
 
-    def _store_child(self, label: str, state: State, remapping: Mapping[str, str] | None) -> None:
+    def _store_child(
+        self, label: object, state: object, remapping: Mapping[str, str] | None
+    ) -> None:
         if not isinstance(label, str) or not label:
             raise InvalidStateError(f"label: got {label!r}; expected a string, not empty.")
         if label in self._states:
@@ -161,15 +176,10 @@ class Container(Openable, Callbacks, State):
                 f"{label}: label is taken: got a second state with it; expected a label not in "
                 f"{sorted(self._states)}."
             )
-        if not callable(getattr(state, "execute", None)):
+        if not isinstance(state, State):
+            hint = f" Try {state.__name__}()." if isinstance(state, type) else ""
             raise InvalidStateError(
-                f"{label}: state: got {state!r}; expected an instance of State"
-                f"{'. Try adding (): it is a class' if isinstance(state, type) else ''}."
-            )
-        if isinstance(state, type):
-            raise InvalidStateError(
-                f"{label}: state: got the class {state.__name__}; expected an instance. "
-                f"Try {state.__name__}()."
+                f"{label}: state: got {state!r}; expected an instance of State.{hint}"
             )
         self._states[label] = state
         self._remappings[label] = dict(remapping or {})
@@ -201,7 +211,16 @@ class Container(Openable, Callbacks, State):
         parent = FRAME.get()
         if parent is None:
             return execute_root(self, parent_ud)
-        return self._run(Frame(self, parent), parent_ud)
+        frame = Frame(self, parent)
+        step = parent.step
+        if step is None or step.state is self:
+            return self._run(frame, parent_ud)
+        # A state runs this container by hand: a preempt of the state is one of the container.
+        forget = step.state._on_preempt(self.request_preempt)  # noqa: SLF001  a state too
+        try:
+            return self._run(frame, parent_ud)
+        finally:
+            forget()
 
     def _run(self, frame: Frame, parent_ud: UserData | Remapper | None) -> str:
         """Run in `frame`: copy the keys, call the callbacks, run the children."""
@@ -230,7 +249,7 @@ class Container(Openable, Callbacks, State):
             # it is the other way round, so one of the two always sees the other.
             if self._frame is frame:
                 self._frame = None
-            self._answered = frame.answered
+                self._answered = frame.answered
             if self._preempt_requested or frame.told is not None or self._end_waiters:
                 self._leave(frame)
 
@@ -310,9 +329,9 @@ class Container(Openable, Callbacks, State):
     def _stop_child(self, frame: Frame, step: Step, override: Any = None) -> bool:
         """Ask the child of `step` to stop, but not this container; tell whether it ran."""
         with self._lock:
-            frame.told = step  # first the mark, then the look: see the end of `_run`
-            if frame.step is not step or frame.dead or self._frame is None:
-                disarm(frame)
+            before, frame.told = frame.told, step  # first the mark, then the look: see `_run`
+            if frame.step is not step or frame.ended or frame.dead or self._frame is None:
+                frame.told = before
                 return False
             frame.override = override
             self._tell(frame, step)

@@ -17,7 +17,6 @@ Exceptions never write to a log; who handles one decides.
 
 from __future__ import annotations
 
-import difflib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -125,5 +124,7 @@ class ReadOnlyError(InvalidUserCodeError, TypeError):
 
 def did_you_mean(word: object, known: Iterable[object]) -> str:
     """Return " Did you mean …?" when `word` looks like one of `known`, else ""."""
+    import difflib  # errors are rare, imports are not
+
     near = difflib.get_close_matches(str(word), [str(k) for k in known], n=1, cutoff=0.5)
     return f" Did you mean {near[0]!r}?" if near else ""

@@ -7,7 +7,6 @@ of these records.
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
 
@@ -141,6 +140,8 @@ class StateRecord:
 
     def to_json(self, *, indent: int | None = None) -> str:
         """Return the record as JSON text."""
+        import json
+
         return json.dumps(asdict(self), ensure_ascii=False, indent=indent)
 
     @classmethod
@@ -150,6 +151,8 @@ class StateRecord:
         Raises:
             ValueError: The text is no JSON, or not of this shape; names the path of the bad field.
         """
+        import json
+
         return _state_from(json.loads(text), "$")
 
 

@@ -306,6 +306,8 @@ class Iterator(Container):
         """Return the outcome after a preempt, and whether it ends the iterator."""
         step = plan.step
         with self._lock:  # whoever passes a preempt on is done after this
+            if frame.dead:
+                raise Interruption
             answered = has_answered(frame, outcome)
             frame.answered = answered and self._preempt_requested
             disarm(frame)

@@ -400,6 +400,8 @@ class StateMachine(Container):
         """
         state = step.state
         with self._lock:  # whoever passes a preempt on is done after this
+            if frame.dead:
+                raise Interruption
             answered = frame.answered = has_answered(frame, outcome)
             disarm(frame)
             state.recall_preempt()

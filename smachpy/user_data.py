@@ -103,12 +103,13 @@ class UserData:
         return f"UserData({values})"
 
     def __copy__(self) -> UserData:
-        twin = UserData()
-        twin._data.update(self._data)
-        return twin
+        data = self._data
+        return _rebuild(data, data.fields.kind if isinstance(data, CheckedDict) else None)
 
     def __reduce__(self) -> tuple[object, ...]:
-        return (_rebuild, (dict(self._data),))
+        data = self._data
+        kind = data.fields.kind if isinstance(data, CheckedDict) else None
+        return (_rebuild, (dict(data), kind))
 
     def _missing(self, key: str) -> NoReturn:
         raise UserDataKeyError(
@@ -140,8 +141,8 @@ def reset(userdata: UserData) -> None:
         del data[key]
 
 
-def _rebuild(data: dict[str, Any]) -> UserData:
-    made = UserData()
+def _rebuild(data: dict[str, Any], kind: type | None = None) -> UserData:
+    made = UserData() if kind is None else typed_userdata(kind)
     made._data.update(data)  # noqa: SLF001  its own module
     return made
 

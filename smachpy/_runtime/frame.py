@@ -86,6 +86,7 @@ class Frame:
         thread: Identifier of the thread it runs in.
         injected: An interruption is on its way to that thread.
         dead: The thread was left behind.
+        ended: The child of a concurrence's branch has ended.
     """
 
     # Entering a container is a hot path: what is rarely set stands here, not in __init__.
@@ -101,6 +102,7 @@ class Frame:
     answered = False
     injected = False
     dead = False
+    ended = False
     _path: str | None = None
 
     def __init__(self, container: Container, parent: Frame) -> None:

@@ -15,7 +15,6 @@ of Python signal handlers".
 
 from __future__ import annotations
 
-import ctypes
 import signal
 import threading
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
@@ -83,6 +82,8 @@ def close(frame: Frame) -> None:
 
 
 def _set_exception(ident: int, kind: type[BaseException] | None) -> None:
+    import ctypes
+
     pointer = None if kind is None else ctypes.py_object(kind)
     ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(ident), pointer)
 

@@ -8,7 +8,6 @@ behind; in a thread that is not ours to leave (the caller of `execute`), it is i
 from __future__ import annotations
 
 import sys
-import traceback
 from typing import TYPE_CHECKING, Any
 
 from smachpy import log
@@ -77,6 +76,7 @@ class Watch:
                 self._again()
                 interrupt(frame)
                 return
+            frame.dead = True
         log.logerr(f"{frame.here()}: did not react; its thread is left behind.")
         bury(frame, boundary)
         boundary.abandon()
@@ -153,5 +153,7 @@ def bury(frame: Frame, boundary: Any) -> None:
 
 def stack_of(ident: int) -> str:
     """Return where the thread `ident` is, as a traceback prints it."""
+    import traceback
+
     top = sys._current_frames().get(ident)  # noqa: SLF001  the documented way
     return "" if top is None else "".join(traceback.format_stack(top))

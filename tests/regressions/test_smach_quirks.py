@@ -356,6 +356,27 @@ def test_the_same_machine_cannot_run_twice_at_once(clock):
     assert len(errors) == 1
 
 
+def test_machines_can_be_copied(clock):
+    import copy
+
+    inner = smach.Concurrence(["done"], "done")
+    inner.add("A", Say("done"))
+    loop_ = smach.Iterator(["done"], [], [], it=[1, 2], exhausted_outcome="done")
+    loop_.set_contained_state("EACH", Say("next"))
+    sm = machine()
+    sm.userdata.x = [1]
+    sm.add("INNER", inner, {"done": "LOOP"})
+    sm.add("LOOP", loop_)
+    sm.execute()
+    twin = copy.deepcopy(sm)
+    assert twin.execute() == "done"
+    assert twin.userdata.x == [1]
+    assert twin.userdata.x is not sm.userdata.x
+    assert (loop_["EACH"].runs, twin["LOOP"]["EACH"].runs) == (2, 4)
+    again = pickle.loads(pickle.dumps(sm))
+    assert again.execute() == "done"
+
+
 # -- concurrence -------------------------------------------------------------------------------
 
 

@@ -388,6 +388,23 @@ def test_preempting_a_leaf_directly_does_not_stick(clock):
     assert_clean(sm)
 
 
+def test_a_machine_that_a_state_runs_by_hand_is_told_too(clock):
+    class ByHand(smachpy.State):
+        def __init__(self):
+            super().__init__(["done", "preempted"])
+            self.inner = chain(Work(100.0))
+
+        def execute(self, userdata):
+            return self.inner.execute()
+
+    sm = chain(ByHand())
+    clock.call_later(1.0, sm.request_preempt)
+    assert sm.execute() == "preempted"
+    assert clock.now() == 1.0
+    assert_clean(sm)
+    assert_clean(sm["S0"].inner)
+
+
 def test_recalled_preempt_is_none(clock):
     sm = chain(Work(1.0))
     sm.request_preempt()
