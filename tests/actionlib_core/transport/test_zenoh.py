@@ -8,7 +8,8 @@ import socket
 import subprocess
 import sys
 import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import partial
 
 import pytest
 
@@ -225,6 +226,99 @@ def test_sessions_meet_through_a_router(router, mode):
     finally:
         a.close()
         b.close()
+
+
+class Cable:
+    """A TCP connection to `port` that can be cut: while it is, nothing passes, and nothing ends."""
+
+    def __init__(self, port):
+        self._target = ("127.0.0.1", port)
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.port = self._listener.getsockname()[1]
+        self._open = threading.Event()
+        self._open.set()
+        self._sockets = [self._listener]
+        self._tasks = [CLOCK.spawn(self._accept, name="cable")]
+
+    def _accept(self):
+        while True:
+            try:
+                near, _ = self._listener.accept()
+            except OSError:
+                return
+            far = socket.create_connection(self._target)
+            self._sockets += [near, far]
+            for source, sink in ((near, far), (far, near)):
+                task = CLOCK.spawn(partial(self._pump, source, sink), name="cable")
+                self._tasks.append(task)
+
+    def _pump(self, source, sink):
+        try:
+            while data := source.recv(65536):
+                self._open.wait()
+                sink.sendall(data)
+        except OSError:
+            pass
+        finally:
+            self._open.wait()
+            for end in (source, sink):
+                with suppress(OSError):
+                    end.shutdown(socket.SHUT_RDWR)
+
+    def cut(self):
+        self._open.clear()
+
+    def mend(self):
+        self._open.set()
+
+    def close(self):
+        self.mend()
+        for end in self._sockets:
+            with suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
+            end.close()
+        for task in self._tasks:
+            task.join(WAIT_S)
+
+
+@pytest.mark.parametrize("longer_than_lease", [False, True])
+def test_cut_cable(longer_than_lease):
+    lease = 1.0 if longer_than_lease else 10.0
+    port = free_port()
+    common = {"discovery": "off", "lease": lease}
+    router = ZenohTransport(Config(mode="router", listen=(f"tcp/127.0.0.1:{port}",), **common))
+    cable = Cable(port)
+    near = ZenohTransport(Config(mode="client", connect=(f"tcp/127.0.0.1:{cable.port}",), **common))
+    far = ZenohTransport(Config(mode="client", connect=(f"tcp/127.0.0.1:{port}",), **common))
+    try:
+        watch = Watch(far)
+        near.declare_alive("@test/near")
+        watch.wait(lambda alive: alive)
+        heard, changed = [], CLOCK.event()
+
+        def on_sample(sample):
+            heard.append(sample.payload)
+            changed.set()
+
+        far.subscribe("map", on_sample)
+        publisher = near.publisher("map", "", Quality(latch=True))
+        publisher.put(b"before")
+        assert changed.wait(WAIT_S)
+        changed.clear()
+        cable.cut()
+        publisher.put(b"during")
+        if longer_than_lease:
+            watch.wait(lambda alive: not alive)
+        else:
+            assert not changed.wait(0.5)
+        cable.mend()
+        watch.wait(lambda alive: alive)
+        assert changed.wait(WAIT_S)
+        assert heard == [b"before", b"during"]
+    finally:
+        for transport in (near, far, router):
+            transport.close()
+        cable.close()
 
 
 def test_unreachable_router_is_named():
