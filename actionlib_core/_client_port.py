@@ -200,7 +200,9 @@ class ClientPort:
             self._report("an answer", f"unknown encoding {reply.encoding!r}")
 
     def _report(self, what: str, error: object) -> None:
-        log.error("action '%s': %s cannot be read: %s", self.name, what, error)
+        """Report a message that is dropped; once of a kind, a server may go on like this."""
+        text = f"action '{self.name}': {what} cannot be read: {error}"
+        self._report_once(what, ActionlibError(text))
 
     def _is_readable(self, sample: Sample, message_class: Any) -> bool:
         """Check the type; a wrong one is reported once per sender and type."""

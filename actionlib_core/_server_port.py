@@ -191,7 +191,7 @@ class ServerPort:
             goal_id, stamp_ns, body = unpack_goal(sample.payload)
             content = self._types.goal.from_bytes(body)
         except (ValueError, ActionlibError) as error:
-            log.error("action '%s': a goal cannot be read: %s", self.name, error)  # noqa: TRY400
+            self._report_unreadable("a goal", sample, error)
             return
         self._listener.on_goal(goal_id, stamp_ns, content, sample.source)
 
@@ -201,7 +201,7 @@ class ServerPort:
         try:
             goal_id, stamp_ns = unpack_goal_id(sample.payload)
         except ValueError as error:
-            log.error("action '%s': a cancel cannot be read: %s", self.name, error)  # noqa: TRY400
+            self._report_unreadable("a cancel", sample, error)
             return
         self._listener.on_cancel(goal_id, stamp_ns)
 
@@ -209,7 +209,7 @@ class ServerPort:
         try:
             entries = unpack_statuses(sample.payload)
         except ValueError as error:
-            log.error("action '%s': an ack cannot be read: %s", self.name, error)  # noqa: TRY400
+            self._report_unreadable("an acknowledgement", sample, error)
             return
         self._listener.on_acknowledged([entry.id for entry in entries])
 
@@ -238,6 +238,11 @@ class ServerPort:
             self._report_once(f"{sample.source} {sample.encoding}", error)
             return False
         return True
+
+    def _report_unreadable(self, what: str, sample: Sample, error: Exception) -> None:
+        """Report a message that is dropped; a sender that goes on like this is told of once."""
+        text = f"action '{self.name}': {what} of session {sample.source} cannot be read: {error}"
+        self._report_once(f"{sample.source} {what}", ActionlibError(text))
 
     def _report_once(self, about: str, error: ActionlibError) -> None:
         with self._lock:

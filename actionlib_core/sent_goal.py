@@ -10,7 +10,6 @@ Leaving the block before the goal is over cancels it.
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import threading
 from collections import deque
@@ -261,6 +260,8 @@ class SentGoal(Generic[R, F]):
         return self._feedback.popleft() if self._feedback else None
 
     async def _wait_async(self, condition: Callable[[], object], limit: float | None) -> bool:
+        import asyncio  # programs without it start faster
+
         loop = asyncio.get_running_loop()
         changed = asyncio.Event()
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Generic, Literal, TypeVar
+from typing import Any, Generic, Literal, TypeVar
 
 G = TypeVar("G")
 
@@ -32,6 +32,9 @@ class Decision(Generic[G]):
     reject: G | None = None
     preempt: bool = False
     announce: bool = False
+
+
+_ANNOUNCE: Decision[Any] = Decision(announce=True)
 
 
 class SingleGoal(Generic[G]):
@@ -94,12 +97,12 @@ class SingleGoal(Generic[G]):
         """Take a goal that arrived."""
         if self.policy == "queue":
             self._waiting.append((goal, stamp_ns))
-            return Decision(announce=True)
+            return _ANNOUNCE
         if self.policy == "reject":
             if self._running or self._waiting:
                 return Decision(reject=goal)
             self._waiting.append((goal, stamp_ns))
-            return Decision(announce=True)
+            return _ANNOUNCE
         newest = self._waiting[-1][1] if self._waiting else self._current_stamp_ns
         if stamp_ns < max(newest, self._current_stamp_ns):
             return Decision(recall=(goal,))
@@ -107,6 +110,8 @@ class SingleGoal(Generic[G]):
         self._waiting.clear()
         self._waiting.append((goal, stamp_ns))
         self._cancelled_early = False
+        if not older and not self._running:
+            return _ANNOUNCE
         self.preempt_requested = self.preempt_requested or self._running
         return Decision(recall=older, preempt=self._running, announce=True)
 

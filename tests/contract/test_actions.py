@@ -488,3 +488,18 @@ def test_idle_ends_have_no_thread(world):
     assert len(started) <= 2  # the clock's timers, zenoh's own
     for end in (*servers, *clients):
         end.stop()
+
+
+def test_messages_that_cannot_be_read_are_dropped_and_reported_once(world, caplog):
+    doubler = Doubler(world)
+    client = simple_client(world)
+    transport = client.action_client.node.transport
+    garbage = [transport.publisher(f"demo/{word}") for word in ("goal", "cancel", "ack", "result")]
+    with caplog.at_level(logging.ERROR):
+        for publisher in garbage * 20:
+            publisher.put(b"\xff\x01")
+        assert client.send_goal_and_wait(msg.TestGoal(2), LONG_S) == S.SUCCEEDED
+    assert doubler.runs == [2]
+    reports = [record for record in caplog.records if "cannot be read" in record.message]
+    assert 1 <= len(reports) <= 4
+    caplog.clear()
