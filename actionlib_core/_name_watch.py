@@ -82,7 +82,7 @@ class NameWatch:
                 return
             self._mismatches[end] = error
         logger.error("%s %s", self._own.kind.value, error)
-        self._wake()
+        self.wake()
 
     def wait(self, condition: Callable[[], bool], timeout: float | None) -> bool:
         """Wait until `condition` holds, looking again whenever an end appears or vanishes.
@@ -115,7 +115,10 @@ class NameWatch:
 
     def wake(self) -> None:
         """Let those who wait look at their condition again."""
-        self._wake()
+        with self._lock:
+            waiters = list(self._waiters)
+        for waiter in waiters:
+            waiter.set()
 
     def close(self) -> None:
         """Stop following; those who wait are woken."""
@@ -123,13 +126,7 @@ class NameWatch:
         self._forget()
         if self._watch is not None:
             self._watch.close()
-        self._wake()
-
-    def _wake(self) -> None:
-        with self._lock:
-            waiters = list(self._waiters)
-        for waiter in waiters:
-            waiter.set()
+        self.wake()
 
     def _on_presence(self, presence: Presence) -> None:
         end = parse_token(presence.key)
@@ -145,7 +142,7 @@ class NameWatch:
         if error is not None:
             self.note(error, end)
         else:
-            self._wake()
+            self.wake()
 
     def _find_mismatch(self, end: Endpoint) -> TypeMismatchError | None:
         return None if self._any_type else find_mismatch([end], self._own)
