@@ -215,7 +215,11 @@ class Container(Openable, Callbacks, State):
         step = parent.step
         if step is None or step.state is self:
             return self._run(frame, parent_ud)
-        # A state runs this container by hand: a preempt of the state is one of the container.
+        # A state runs this container by hand, maybe in a thread that it has started: a preempt of
+        # the state is one of the container.
+        frame.thread = threading.get_ident()
+        if frame.thread != parent.thread:
+            frame.boundary = None
         forget = step.state._on_preempt(self.request_preempt)  # noqa: SLF001  a state too
         try:
             return self._run(frame, parent_ud)

@@ -124,22 +124,24 @@ class _Boundary:
 
 
 class _Stop:
-    """Preempts one run of a root; without effect on later ones."""
+    """Preempts one run of a root; without effect on later ones.
+
+    The lock is for this alone: the run's end waits for a request that is under way.
+    """
 
     def __init__(self, root: Container) -> None:
         self._root = root
         self._over = False
+        self._calling = threading.RLock()
 
     def __call__(self) -> None:
-        root = self._root
-        with root._lock:  # noqa: SLF001  one machinery
-            if self._over:
-                return
-            self._over = True
-            root.request_preempt()
+        with self._calling:
+            if not self._over:
+                self._over = True
+                self._root.request_preempt()
 
     def end(self) -> None:
-        with self._root._lock:  # noqa: SLF001  one machinery
+        with self._calling:
             self._over = True
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import os
 import signal
@@ -626,6 +627,26 @@ def test_async_leaf_is_cancelled(clock):
     clock.call_later(2.0, sm.request_preempt)
     assert sm.execute() == "preempted"
     assert cleaned == [2.0]
+    assert_clean(sm)
+
+
+@pytest.mark.parametrize("real", [False, True])
+def test_async_leaf_that_ignores_its_cancellation_is_interrupted(real, quiet):
+    class Deaf(smachpy.State):
+        async def execute(self, userdata):
+            while True:
+                try:  # noqa: SIM105  as users write it
+                    await asyncio.sleep(0.01)
+                except asyncio.CancelledError:
+                    pass
+
+    sm = chain(Deaf(["ok"]), preempt_timeout=0.05)
+    with contextlib.ExitStack() as stack:
+        if not real:
+            clock = stack.enter_context(VirtualClock())
+            stack.enter_context(use_clock(clock))
+        current_clock().call_later(0.02, sm.request_preempt)
+        assert sm.execute() == "preempted"
     assert_clean(sm)
 
 
