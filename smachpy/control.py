@@ -71,9 +71,9 @@ class Control:
             running: What happens to the states that run, and to their goals: "keep" lets them
                 end; "cancel" preempts them, and they run again from their start after `resume`.
         """
+        self._watch()
         with self._lock:
             self._paused = True
-        self._watch()
         if running == "cancel":
             for frame, step in self._active():
                 if not step.state.is_container:
@@ -90,11 +90,11 @@ class Control:
 
     def step(self) -> None:
         """Let one state run, then pause again."""
+        self._watch()
         with self._lock:
             self._paused = True
             self._steps += 1
             waiting = list(self._waiting.values())[:1]
-        self._watch()
         for event in waiting:
             event.set()
 
@@ -109,9 +109,9 @@ class Control:
 
     def add_breakpoint(self, path: str, outcome: str | None = None) -> None:
         """Pause before the state at `path`, or, with `outcome`, after it has ended with that."""
+        self._watch()
         with self._lock:
             self._breakpoints.add((path, outcome))
-        self._watch()
 
     def remove_breakpoint(self, path: str, outcome: str | None = None) -> None:
         """Forget a breakpoint."""
@@ -230,6 +230,8 @@ class Control:
     def _watch(self) -> None:
         run = self._run
         frame = self._machine._frame  # noqa: SLF001  one machinery
+        if frame is not None and frame.parent is not None:
+            raise ControlError(frame.path, "it is not the root; expected the root's control", ())
         if frame is not None:
             run = self._run = frame.run
             run.control = self

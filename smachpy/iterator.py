@@ -314,13 +314,22 @@ class Iterator(Container):
             step.state.recall_preempt()
             override, frame.override = frame.override, None
         if not self._preempt_requested:
-            if override is not None and override.outcome is not None:
-                frame.emit(OutcomeForced, override.outcome)
-                return override.outcome, False
-            return outcome, False
+            if override is None:
+                return outcome, False
+            if override.outcome is None:  # a pause that cancels: this item again
+                return self._once_more(frame, plan)
+            frame.emit(OutcomeForced, override.outcome)
+            return override.outcome, False
         if outcome in plan.breaks or answered:
             return outcome, True
         return self._preempted(frame, step), True
+
+    def _once_more(self, frame: Frame, plan: _Plan) -> tuple[str, bool]:
+        """Run the child again for the same item."""
+        outcome = self._run_child(frame, plan.step)
+        if self._preempt_requested or frame.told is not None:
+            return self._after_preempt(frame, plan, outcome)
+        return outcome, False
 
     def _preempted(self, frame: Frame, step: Step) -> str:
         frame.answered = True

@@ -75,6 +75,35 @@ def test_pause_that_cancels_runs_the_state_again(clock):
     assert clock.now() == 2.0 + 4.0
 
 
+@pytest.mark.parametrize("kind", ["iterator", "concurrence"])
+def test_pause_that_cancels_in_other_containers(clock, kind):
+    work = Work()
+    if kind == "iterator":
+        sm = smachpy.Iterator(["ok", "preempted"], [], [], it=[1, 2], exhausted_outcome="ok")
+        sm.set_contained_state("EACH", work, loop_outcomes=["ok", "failed"])
+    else:
+        sm = smachpy.Concurrence(["ok", "preempted"], "ok")
+        sm.add("W", work)
+    at(clock, (0.5, lambda: sm.control.pause(running="cancel")), (3.0, sm.control.resume))
+    assert sm.execute() == "ok"
+    assert clock.now() == (5.0 if kind == "iterator" else 4.0)
+    assert work.runs == (3 if kind == "iterator" else 2)
+
+
+def test_only_the_root_has_the_control(clock):
+    sm = mission()
+    errors = []
+
+    def wrong():
+        with pytest.raises(ControlError, match="not the root"):
+            sm["INNER"].control.pause()
+        errors.append("told")
+
+    at(clock, (1.5, wrong))
+    assert sm.execute() == "ok"
+    assert errors == ["told"]
+
+
 def test_step_lets_one_state_run(clock):
     sm = mission()
     sm.control.pause()
