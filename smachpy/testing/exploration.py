@@ -291,6 +291,7 @@ class _Runner:
         # A kit for each run: what still waits in one must not reach into the next.
         with MissionKit(choose=self.explorer.turn, on_run=runs.append) as kit:
             kit.draws = False
+            self.explorer.now = kit.clock.now
             if self.real_actions:
                 serve_actions(kit, machine, self.explorer)
             try:

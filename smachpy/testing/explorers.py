@@ -54,14 +54,25 @@ class Explorer:
     Args:
         root: The machine.
         options: What is explored.
+
+    Attributes:
+        now: Time on the run's clock [s]; set for each run.
+        choices: What was chosen in the run, in order.
+        too_long: It had too many leaves.
+        mismatch: Why it could not go on as told.
     """
 
     def __init__(self, root: Container, options: Options) -> None:
         self._root = root
         record = describe(root)
         self._parallel = {s.path for s in record.walk() if s.kind == "concurrence"}
+        # How long these have been active makes no difference.
+        self._timeless = {
+            s.path for s in record.walk() if s.is_container and "timeout" not in dict(s.details)
+        }
         self._root_path = record.path
         self._options = options
+        self.now: Callable[[], float] = float
         self._told: Sequence[int | str] = ()
         self.begin(())
 
@@ -77,6 +88,8 @@ class Explorer:
         self._active: dict[str, float] = {}
         self._ended: dict[str, str] = {}
         self._items: dict[str, int] = {}
+        self._attempts: dict[str, int] = {}
+        self._hanging: set[str] = set()
 
     def choose(self, where: str, options: Sequence[str], situation: Hashable = None) -> int:
         """Choose, as told or the first, and note it."""
@@ -109,12 +122,14 @@ class Explorer:
         """Keep up with where the run is."""
         if isinstance(event, Entered):
             self._active[event.path] = event.t
+            self._attempts.pop(event.path, None)
             inside = event.path + "/"
             for path in [path for path in self._ended if path.startswith(inside)]:
                 del self._ended[path]
         elif isinstance(event, Left):
             self._active.pop(event.path, None)
             self._ended[event.path] = event.outcome
+            self._hanging.discard(event.path)
         elif isinstance(event, Iterated):
             self._items[event.path] = event[3]  # tuples have an `index` of their own
 
@@ -122,12 +137,18 @@ class Explorer:
         """Return what the rest of the run depends on."""
         if not self._options.merges:
             return None
-        now = max(self._active.values(), default=0.0)
+        now = self.now()
         running = {self._root_path, *self._active}
+        ageless = self._timeless | self._hanging
+        active = (
+            (path, -1.0 if path in ageless else round(now - t, 6), self._attempts.get(path, 0))
+            for path, t in self._active.items()
+        )
         return (
             about,
             self._preempts,
-            tuple(sorted((path, round(now - t, 6)) for path, t in self._active.items())),
+            tuple(sorted(active)),
+            tuple(sorted(self._hanging)),
             tuple(
                 sorted(
                     (path, outcome)
@@ -161,6 +182,7 @@ class Explorer:
 
     def _execute(self, double: Double, path: str, ud: Any) -> str:
         outcomes = double.get_registered_outcomes()
+        self._attempts[path] = self._attempts.get(path, 0) + 1
         self._steps += 1
         if self._steps > self._options.most_steps:
             self.too_long = True
@@ -172,7 +194,7 @@ class Explorer:
         picked = self._pick(double, path, outcomes)
         for key, value in self._options.writes.get(path, {}).items():
             ud[key] = value
-        return self._act(double, picked, outcomes)
+        return self._act(double, path, picked, outcomes)
 
     def _pick(self, double: Double, path: str, outcomes: tuple[str, ...]) -> str:
         plain = [outcome for outcome in outcomes if outcome != PREEMPTED] or list(outcomes)
@@ -198,11 +220,14 @@ class Explorer:
         parent = path.rpartition("/")[0]
         return any(p.rpartition("/")[0] == parent and p != path for p in self._active)
 
-    def _act(self, double: Double, picked: str, outcomes: tuple[str, ...]) -> str:
+    def _act(self, double: Double, path: str, picked: str, outcomes: tuple[str, ...]) -> str:
         if picked == RAISES:
             raise RuntimeError("raised by the test")
         if picked == HANGS:
+            if double.timeout is None:
+                self._hanging.add(path)
             double.wait_preempt()
+            self._hanging.discard(path)
             double.service_preempt()
             return PREEMPTED if PREEMPTED in outcomes else outcomes[0]
         if picked == DEAF:

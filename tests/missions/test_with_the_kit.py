@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from actionlib_core.interfaces.geometry_msgs.msg import Pose
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.interfaces.sensor_msgs.msg import BatteryState
@@ -87,6 +88,32 @@ def test_no_mission_has_problems_that_a_check_finds(name):
     settings = read_settings(Path(__file__).parents[2])
     report = check(MISSIONS[name](), ignores=settings.ignores, name=name)
     assert report.ok, report
+
+
+def test_whatever_states_return_the_patrol_ends(mission):
+    found = mission.explore(PATROL, preempts=0, max_time=40)
+    assert found.ok, found
+    assert found.exhaustive
+
+
+def test_whatever_servers_do_the_patrol_ends(mission):
+    found = mission.explore(
+        PATROL, preempts=0, real_actions=True, interleavings=False, max_runs=60, max_time=40
+    )
+    assert found.ok, found
+
+
+def test_whatever_happens_the_way_there_and_back_ends(mission):
+    assert mission.explore(there_and_back, max_time=40)
+    home = {"/THERE_AND_BACK/REMEMBER": {"home": Pose()}}
+    found = mission.explore(there_and_back, real_actions=True, writes=home, max_runs=60)
+    assert found.ok, found
+
+
+def test_the_countdown_ends_whatever_happens(mission):
+    found = mission.explore(countdown, max_time=40)
+    assert found.ok, found
+    assert found.exhaustive
 
 
 def test_the_runs_of_this_file_cover_the_patrol():

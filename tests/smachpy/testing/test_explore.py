@@ -284,3 +284,40 @@ def test_exploring_costs_little():
         found = mission.explore(sound(), max_runs=1000, max_time=60, invariants=[lambda run: True])
     assert found.ok
     assert found.runs / found.seconds > 40  # three hundred on an idle computer
+
+
+def test_equal_situations_are_entered_once_and_nothing_is_missed():
+    def machine():
+        both = Concurrence(
+            ["low", "done", "lost", "preempted"],
+            "lost",
+            outcome_map={"low": {"WATCH": "low"}, "done": {"GO": "done"}},
+            child_termination_cb=lambda _: True,
+        )
+        go = StateMachine(["done", "lost", "preempted"])
+        with go:
+            go.add("NEXT", Leaf("drive", "end"), {"drive": "DRIVE", "end": "done"})
+            go.add("DRIVE", Leaf("there", "lost", "preempted"), {"there": "NEXT"})
+        with both:
+            both.add("GO", go)
+            both.add("WATCH", Leaf("low", "preempted"))
+        sm = StateMachine(["done", "lost", "preempted"], name="M")
+        with sm:
+            sm.add("BOTH", both, {"low": "CHARGE"})
+            sm.add("CHARGE", Leaf("full", "lost"), {"full": "BOTH"})
+        return sm
+
+    def seen(**options):
+        found = set()
+
+        def collect(run):
+            found.add(run.outcome)
+            found.update((e.path, e.outcome) for e in run.events if type(e).__name__ == "Left")
+
+        return explore(machine(), on_run=collect, grace=1e9, max_depth=40, **options), found
+
+    merged, states = seen()
+    assert merged.exhaustive
+    everything, all_states = seen(invariants=[lambda run: True], max_runs=400)
+    assert everything.runs > 2 * merged.runs
+    assert states == all_states
