@@ -44,6 +44,7 @@ class StatusPublisher:
         self._published = clock.now() - PERIOD_S
         self._timer: Timer | None = None
         self._due = 0.0
+        self._change_waits = False
         self._closed = False
 
     def close(self) -> None:
@@ -58,6 +59,7 @@ class StatusPublisher:
         with self._lock:
             if self._closed:
                 return
+            self._change_waits = False
             now = self._clock.now()
             self._published = now
             listed = self._goals.listed()
@@ -66,12 +68,16 @@ class StatusPublisher:
 
     def on_change(self) -> None:
         """Note that a goal has changed: send the list now or soon."""
+        if self._change_waits:  # the list is made after this is reset, so this change is in it
+            return
         with self._lock:
             now = self._clock.now()
             due = self._published + GAP_S + GAP_PER_GOAL_S * len(self._goals)
             if due > now:
-                if not self._closed and (self._timer is None or due < self._due):
-                    self._arm(due)
+                if not self._closed:
+                    self._change_waits = True
+                    if self._timer is None or due < self._due:
+                        self._arm(due)
                 return
         self.publish()
 

@@ -271,10 +271,11 @@ class GoalManager:
 
     def forget(self, machine: CommStateMachine) -> None:
         """Follow a goal no more; it runs on. Its result is acknowledged when it comes."""
+        if machine.goal.over:
+            return
         with self._lock:
-            if self._machines.get(machine.goal.id) is machine:
-                machine.on_transition = machine.on_feedback = None
-                machine.settled.set()
+            machine.on_transition = machine.on_feedback = None
+            machine.settled.set()
 
     # -- what arrives --------------------------------------------------------------------------
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+LINGER_S = 0.1  # the thread that runs goals waits so long for another one
 STOP_GRACE_S = 0.4  # how long `stop` waits for the execute callback to notice
 
 TEXT_ACCEPTED = "This goal has been accepted by the simple action server"
@@ -104,6 +105,8 @@ class SimpleActionServer:
         self.preempt_callback: Callable[[], object] | None = None
         self._policy: SingleGoal[ServerGoalHandle] = SingleGoal(policy)
         self._task: Task | None = None
+        self._idle: Event | None = None
+        self._stopping = False
         self.action_server = _QuickServer(
             name,
             ActionSpec,
@@ -169,7 +172,10 @@ class SimpleActionServer:
 
     def _ask_to_stop(self) -> None:
         with self.lock:
+            self._stopping = True
             waiting = self._policy.on_stop()
+            if self._idle is not None:
+                self._idle.set()
         for handle in waiting:
             handle.set_rejected(None, TEXT_STOPPED)
         self._preempted.set()
@@ -335,6 +341,9 @@ class SimpleActionServer:
 
     def internal_goal_callback(self, goal: ServerGoalHandle) -> None:
         """Take a new goal; the `ActionServer` beneath calls it."""
+        if self._stopping:
+            goal.set_rejected(None, TEXT_STOPPED)
+            return
         with self.lock:
             stamp_ns = goal.status_tracker.record.stamp_ns
             decision = self._policy.on_goal(goal, stamp_ns)
@@ -368,18 +377,28 @@ class SimpleActionServer:
     # -- execution -----------------------------------------------------------------------------
 
     def _start_execution(self) -> None:
-        """Start the thread that runs goals, unless it runs. Needs the lock."""
-        if self.execute_callback is not None and self._task is None:
+        """Wake or start the thread that runs goals, unless it is busy. Needs the lock."""
+        if self._idle is not None:
+            self._idle.set()
+        elif self.execute_callback is not None and self._task is None:
             self._task = self._queue.spawn(self.executeLoop, f"{self._name} execute")
 
     def executeLoop(self) -> None:  # noqa: N802  actionlib's name
-        """Run the goals that wait, until none does."""
+        """Run the goals that wait, until none has come for `LINGER_S`."""
+        come = self.action_server.node.clock.event(f"a goal for {self._name}")
         while True:
             with self.lock:
-                if not self._policy.waiting:
-                    self._task = None
-                    return
-            self._run_next()
+                waiting = self._policy.waiting
+                self._idle = None if waiting else come
+                come.clear()
+            if waiting:
+                self._run_next()
+            elif self._stopping or not come.wait(LINGER_S):
+                with self.lock:
+                    self._idle = None
+                    if self._stopping or not self._policy.waiting:
+                        self._task = None
+                        return
 
     def _run_next(self) -> None:
         """Accept the goal that waits and run it."""
@@ -402,7 +421,7 @@ class SimpleActionServer:
         except BaseException as error:
             self._abort(handle, f"Exception in execute callback: {error!r}")
             with self.lock:
-                self._task = None
+                self._task = self._idle = None
             raise
         self._abort(handle, text)
 
