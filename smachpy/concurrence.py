@@ -319,6 +319,7 @@ class Concurrence(Container):
     def _preempt_branches(self, group: Group, branches: list[Branch]) -> None:
         with self._lock:
             group.tell(branches)
+        group.frame.run.flush()
 
     def _tell_children(self, frame: Frame) -> None:
         group = self._group

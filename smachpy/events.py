@@ -292,14 +292,17 @@ def _container(value: Any, depth: int) -> Any:
         if all(isinstance(key, str) for key, _ in pairs):
             return {key: _plain(item, depth + 1) for key, item in pairs}
         return None
+    return _fields_of(value, depth)
+
+
+def _fields_of(value: Any, depth: int) -> Any:
+    """A message, or a ROS time or duration, by its fields; None when it is none."""
     if hasattr(value, "_md5sum") and hasattr(value, "__slots__"):
-        return _fields_of(value, depth)
+        fields = {name: getattr(value, name, None) for name in value.__slots__}
+        return {"$msg": value._type, "fields": _plain(fields, depth + 1)}
+    if hasattr(value, "to_nsec") and hasattr(value, "nsecs"):
+        return {"secs": value.secs, "nsecs": value.nsecs}
     return None
-
-
-def _fields_of(message: Any, depth: int) -> Any:
-    fields = {name: getattr(message, name, None) for name in message.__slots__}
-    return {"$msg": message._type, "fields": _plain(fields, depth + 1)}
 
 
 def _text_of(value: Any) -> str:

@@ -218,6 +218,8 @@ class Scope:
         """
         frame = self._frame
         if frame.run.watched:
+            if frame.run.pending:
+                frame.run.flush()
             clock = self.clock
             frame.publish(kind(self.path, clock.now(), clock.time_ns(), *fields))
 

@@ -128,18 +128,25 @@ export function brief(value) {
 }
 
 function Userdata({ page, data, now }) {
-  const all = Object.entries(data.userdata).sort(([a], [b]) => (a < b ? -1 : 1));
+  // What runs comes first, then what was written last.
+  const rank = new Map();
+  for (const entry of Object.values(data.userdata)) {
+    const runs = data.states[entry.container]?.since != null ? 1e20 : 0;
+    rank.set(entry.container, Math.max(rank.get(entry.container) ?? 0, runs ? runs - entry.container.length : entry.at / 1e6));
+  }
+  const all = Object.entries(data.userdata).sort(([a, x], [b, y]) =>
+    rank.get(y.container) - rank.get(x.container) || (a < b ? -1 : 1));
   const [open, setOpen] = useState(null);
   const several = new Set(all.map(([, entry]) => entry.container)).size > 1;
   let container = null;
   return html`<${Section} title="Userdata" count=${all.length || null}>
     ${!all.length && html`<p class="hint">nothing written yet</p>`}
-    <table class="userdata"><tbody>${all.slice(0, 200).map(([id, entry]) => {
+    <table class="userdata"><tbody>${all.slice(0, 60).map(([id, entry]) => {
       const text = brief(entry.value);
       const fresh = now - ms(entry.at) < FLASH_MS;
       const first = several && entry.container !== container;
       container = entry.container;
-      return html`${first && html`<tr class="group"><th colspan="2" title=${container}>${container.split("/").slice(-2).join(" \u203a ")}</th></tr>`}<tr key=${id} class=${fresh ? "fresh" : ""} onClick=${() => setOpen(open === id ? null : id)}>
+      return html`${first && html`<tr class="group"><th colspan="2" title=${container}>${container.split("/").filter(Boolean).slice(-2).join(" \u203a ")}</th></tr>`}<tr key=${id} class=${fresh ? "fresh" : ""} onClick=${() => setOpen(open === id ? null : id)}>
         <th scope="row" title=${entry.container}>${entry.key}</th>
         <td><code>${open === id ? html`<pre>${pretty(entry.value)}</pre>` : text.slice(0, SHORT)}${open !== id && text.length > SHORT ? "\u2026" : ""}</code>
           <small>by <${State} path=${entry.writer} page=${page} /> ${clock(entry.at, data)}</small></td></tr>`;
@@ -186,8 +193,9 @@ function Numbers({ data }) {
 function Problems({ page }) {
   const found = store.problems.value;
   if (!found.length) return null;
-  return html`<${Section} title="Problems of the machine" count=${found.length}>
-    <ul class="problems">${found.slice(0, 30).map((p) => html`<li class=${p.severity}><${State} path=${p.path} page=${page} /> ${p.text}</li>`)}</ul><//>`;
+  const words = (p) => (p.text.startsWith(`${p.path}: `) ? p.text.slice(p.path.length + 2) : p.text);
+  return html`<section><details class="fold-up"><summary><h2>Problems of the machine <span class="number">${found.length}</span></h2></summary>
+    <ul class="problems">${found.slice(0, 30).map((p) => html`<li class=${p.severity}><${State} path=${p.path} page=${page} /> ${words(p)}</li>`)}</ul></details></section>`;
 }
 
 const LINES = {

@@ -77,7 +77,7 @@ export class Model {
     return new Set(this.order.filter((n) => n.children.length && n.depth < depth).map((n) => n.path));
   }
   // The greatest depth at which a page is readable at a glance.
-  readableDepth(most = 60) {
+  readableDepth(most = 40) {
     let visible = 0, depth = 0, level = [this.root];
     while (level.length) {
       visible += level.length;

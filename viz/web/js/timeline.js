@@ -105,7 +105,7 @@ export class Timeline {
     this.#cursor(g, x, width, height);
   }
 
-  #laneHeight(lane) { return lane.kind === "concurrence" ? Math.max(LANE, 9 * lane.children.length + 3) : LANE; }
+  #laneHeight(lane) { return lane.kind === "concurrence" ? Math.max(LANE, 13 * Math.min(lane.children.length, 6) + 3) : LANE; }
 
   #grid(g, x, from, to, width, height) {
     const begun = ms(store.shown().started) ?? store.run.first() ?? from;
@@ -168,12 +168,14 @@ export class Timeline {
     }
     g.stroke();
     this.hits.push({ a, b: a + wide, top, bottom: top + tall, span });
-    if (wide > 26 && tall > 9) {
+    if (wide > 26 && tall > 8) {
       g.fillStyle = this.#colour(`${kind}-text`);
+      g.font = `${tall > 13 ? 11 : 9.5}px Inter, Arial, sans-serif`;
       g.textAlign = "left";
       g.save(); g.beginPath(); g.rect(a, top, wide - 3, tall); g.clip();
       g.fillText(node.name, a + 4, top + tall / 2 + 0.5);
       g.restore();
+      g.font = "11px Inter, Arial, sans-serif";
     }
   }
 
