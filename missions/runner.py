@@ -99,7 +99,7 @@ def run_mission(target: Target, options: RunOptions) -> int:
             robot = RobotProcess((*arguments, *options.robot_arguments), on_change=waiter.wake)
             stack.enter_context(robot)
         if options.out is not None:
-            _prepare(options.out)
+            _prepare(options.out / f"{target.name}.svg", machine)
         if not waiter.wait(options.server_timeout, robot):
             return _signal_exit(ending)
         stack.callback(machine.subscribe(recorder.on_event))
@@ -212,17 +212,20 @@ def _cannot_write(out: Path, error: OSError) -> MissionError:
     return MissionError(f"--out {out}: got {why!r}; expected a folder to write pictures to.")
 
 
-def _prepare(out: Path) -> None:
-    """Make the folder for pictures and import what draws, while the robot's process starts.
+def _prepare(picture: Path, machine: Container) -> None:
+    """Draw the machine that has not run yet, while the robot's process starts.
+
+    What cannot be drawn or written is known before anything moves.
 
     Raises:
-        MissionError: there can be no such folder.
+        MissionError: the file cannot be written.
+        SmachError: there is no `dot` program.
     """
     try:
-        out.mkdir(parents=True, exist_ok=True)
+        picture.parent.mkdir(parents=True, exist_ok=True)
+        viz.render(machine, picture)
     except OSError as error:
-        raise _cannot_write(out, error) from error
-    importlib.import_module("viz.drawing")
+        raise _cannot_write(picture.parent, error) from error
     importlib.import_module("missions.move_base.track")
 
 
