@@ -73,29 +73,46 @@ class Publisher(Declared):
             congestion_control=blocking if quality.block else dropping,
         )
         self._source = zenoh.SourceInfo(self._port.id, 0)
+        self._users: list[None] = []  # one per call in progress; list operations are atomic
         self._keep(self._port)
 
+    def close(self) -> None:
+        # Zenoh refuses to undeclare what another thread is using: the last user does it then.
+        self._inlet.closed = True
+        if not self._users:
+            super().close()
+
+    def _leave(self) -> None:
+        self._users.pop()
+        if self._inlet.closed and not self._users:
+            super().close()
+
     def put(self, payload: bytes, attachment: bytes | None = None) -> None:
-        if self._inlet.closed:
-            raise TransportError(
-                f"{self._key}: the publisher is closed. Try sending before the node is closed."
-            )
+        self._users.append(None)
         inside.depth += 1  # as `with inside`, in half the time
         try:
+            if self._inlet.closed:
+                raise TransportError(
+                    f"{self._key}: the publisher is closed. Try sending before the node is closed."
+                )
             self._port.put(payload, source_info=self._source, attachment=attachment)
         except zenoh.ZError as error:
             raise TransportError(f"{self._key}: cannot send: {error}") from error
         finally:
             inside.depth -= 1
+            self._leave()
 
     def matching(self) -> bool:
-        if self._inlet.closed:
-            return False
+        self._users.append(None)
         try:
+            if self._inlet.closed:
+                return False
             status: Any = self._port.matching_status  # zenoh's stub says bool
+            return bool(status.matching)
         except zenoh.ZError:  # the session is closed
             return False
-        return bool(status.matching)
+        finally:
+            self._leave()
 
 
 class LatchedPublisher(Publisher):
