@@ -135,9 +135,10 @@ export class Timeline {
     let lastPx = -10;
     for (let i = firstAfter(spans, from); i < spans.length; i++) {
       const span = spans[i];
-      if (span.from > to || span.from > now) break;
-      const ended = span.to !== null && span.to <= now;
-      const until = ended ? span.to : now;
+      if (span.from > to) break;
+      const later = span.from > now; // the future of an earlier instant
+      const ended = span.to !== null && (later || span.to <= now);
+      const until = span.to !== null ? span.to : Math.max(now, store.run.last() ?? now);
       if (until < from) continue;
       const a = Math.max(NAMES, x(span.from)), b = Math.min(width - RIGHT + 2, x(until));
       if (regions === 1 && b - lastPx < LEAST_SPAN && ended) continue; // too thin to see
@@ -146,7 +147,9 @@ export class Timeline {
       const row = regions > 1 ? lane.children.indexOf(node) : 0;
       const top = y + 1.5 + (row * (h - 3)) / regions;
       const tall = (h - 3) / regions - (regions > 1 ? 1.5 : 0);
-      this.#bar(g, span, node, ended, a, Math.max(2, b - a), top, tall, x, now);
+      g.globalAlpha = later ? 0.35 : 1;
+      this.#bar(g, span, node, ended, a, Math.max(2, b - a), top, tall, x, later ? Infinity : now);
+      g.globalAlpha = 1;
     }
   }
 
@@ -162,7 +165,7 @@ export class Timeline {
       const from = Math.max(a, x(span.preempt));
       g.save(); g.clip();
       g.fillStyle = this.#colour("preempted");
-      g.globalAlpha = 0.55;
+      g.globalAlpha *= 0.55;
       for (let p = from; p < a + wide; p += 5) g.fillRect(p, top, 2.5, tall);
       g.restore();
     }

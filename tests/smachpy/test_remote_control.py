@@ -1,0 +1,141 @@
+"""Commands over the network, and the history that late viewers ask for."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from actionlib_core.interfaces.std_srvs.srv import Trigger
+from actionlib_core.node import Node
+from actionlib_core.service import ServiceProxy
+from actionlib_core.transport.memory import MemoryNetwork
+from smachpy import IntrospectionServer, State, StateMachine
+from smachpy.events import PreemptRequested, to_record
+from smachpy.remote_control import CommandError, ControlClient, parse_command
+from smachpy.run_state import RunState
+
+
+class Wait(State):
+    def __init__(self):
+        super().__init__(outcomes=["done", "preempted"])
+
+    def execute(self, userdata):
+        self.sleep(2.0)
+        return "preempted" if self.preempt_requested() else "done"
+
+
+@pytest.fixture
+def world(clock):
+    network = MemoryNetwork(clock)
+    robot = Node("robot", transport=network.session(), clock=clock)
+    desk = Node("desk", transport=network.session(), clock=clock)
+    machine = StateMachine(outcomes=["done", "preempted"], name="JOB")
+    with machine:
+        StateMachine.add("A", Wait(), {"done": "B"})
+        StateMachine.add("B", Wait(), {"done": "A"})
+    server = IntrospectionServer("robot", machine, "/JOB", node=robot, control=True)
+    server.start()
+    client = ControlClient("/robot", desk)
+    task = clock.spawn(machine.execute, name="mission")
+    clock.sleep(0.5)
+    yield machine, client, clock, desk
+    machine.control.resume()
+    machine.request_preempt()
+    assert task.join(60.0)
+    client.close()
+    server.stop()
+    desk.close()
+    robot.close()
+
+
+def test_pause_step_resume_and_breakpoints(world):
+    machine, client, clock, _ = world
+    answer = client.send({"command": "pause"})
+    assert answer["ok"]
+    assert answer["paused"]
+    clock.sleep(5.0)
+    assert machine.control.waiting() == ("/JOB/B",)
+    client.send({"command": "step"})
+    clock.sleep(5.0)
+    assert machine.control.waiting() == ("/JOB/A",)
+    assert client.send({"command": "break", "path": "/JOB/B"})["breakpoints"] == [["/JOB/B", None]]
+    client.send({"command": "resume"})
+    clock.sleep(5.0)
+    assert machine.control.waiting() == ("/JOB/B",)
+    assert client.send({"command": "unbreak", "path": "/JOB/B"})["breakpoints"] == []
+
+
+def test_force_jump_preempt_and_the_next_start(world):
+    machine, client, clock, _ = world
+    assert client.send({"command": "force", "path": "/JOB/A", "outcome": "done"})["ok"]
+    clock.sleep(0.5)
+    assert machine.get_active_states() == ["B"]
+    assert client.send({"command": "jump", "path": "/JOB/A"})["ok"]
+    clock.sleep(0.5)
+    assert machine.get_active_states() == ["A"]
+    assert client.send({"command": "initial", "path": "/JOB", "states": ["B"]})["ok"]
+    assert client.send({"command": "preempt", "path": "/JOB"})["ok"]
+
+
+def test_what_cannot_be_done_is_told_to_who_asked(world):
+    _, client, _, _ = world
+    answer = client.send({"command": "jump", "path": "/JOB/NOWHERE"})
+    assert not answer["ok"]
+    assert "NOWHERE" in answer["text"]
+    answer = client.send({"command": "initial", "path": "/JOB/A/X", "states": ["B"]})
+    assert not answer["ok"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("no json", "no JSON"),
+        ("[]", "an object"),
+        ('{"command": "explode"}', "explode"),
+        ('{"command": "jump"}', "path"),
+        ('{"command": "jump", "path": 3}', "path"),
+        ('{"command": "initial", "path": "/A", "states": "B"}', "states"),
+        ('{"command": "break", "path": "/A", "outcome": 5}', "outcome"),
+    ],
+)
+def test_wrong_commands_are_refused(text, words):
+    with pytest.raises(CommandError, match=words):
+        parse_command(text)
+
+
+def test_nobody_answers(clock):
+    with Node("desk", transport=MemoryNetwork(clock).session(), clock=clock) as desk:
+        client = ControlClient("/nobody", desk)
+        with pytest.raises(CommandError, match="no answer"):
+            client.send({"command": "pause"})
+        client.close()
+
+
+def test_history_rebuilds_what_happened(world):
+    machine, _, clock, desk = world
+    clock.sleep(6.0)
+    with ServiceProxy("/robot/smach/history", Trigger, node=desk) as ask:
+        history = json.loads(ask().message)
+    assert [event["seq"] for event in history["events"]] == list(
+        range(1, len(history["events"]) + 1)
+    )
+    state = RunState(history["base"])
+    for event in history["events"]:
+        state.fold(event)
+    assert state.active() == ["/JOB", f"/JOB/{machine.get_active_states()[0]}"]
+    assert state.data["states"]["/JOB/A"]["visits"] == 2
+    assert history["control"] == {"paused": False, "breakpoints": []}
+    assert history["description"]["label"] == "JOB"
+
+
+def test_state_of_a_run_notes_preempts_while_they_last():
+    state = RunState()
+    for number, (kind, path, more) in enumerate(
+        [("Started", "/J", {}), ("Entered", "/J/A", {}), ("PreemptRequested", "/J/A", {})], 1
+    ):
+        state.fold({"kind": kind, "path": path, "stamp_ns": number, **more})
+    assert state.data["states"]["/J/A"]["preempt"] == 3
+    state.fold({"kind": "Left", "path": "/J/A", "stamp_ns": 4, "outcome": "preempted"})
+    assert state.data["states"]["/J/A"]["preempt"] is None
+    assert to_record(PreemptRequested("/J", 0.0, 1))["kind"] == "PreemptRequested"

@@ -1,0 +1,203 @@
+"""Missions and viewers in processes of their own, and a browser to look at them."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-dev-shm-usage",
+    "--disable-background-networking",
+]
+
+
+class Child:
+    """A process that ends when its standard input ends."""
+
+    def __init__(self, *command):
+        self.process = subprocess.Popen(
+            [sys.executable, *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        self.said = self.process.stdout.readline().strip()
+
+    @property
+    def pid(self):
+        return self.process.pid
+
+    def end(self):
+        if self.process.stdin.closed:
+            return
+        self.process.stdin.close()
+        try:
+            self.process.wait(5.0)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        self.process.stdout.close()
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait()
+        self.end()
+
+
+def start_robot(*arguments):
+    child = Child(str(HERE / "robot.py"), *map(str, arguments))
+    assert child.said == "ready"
+    return child
+
+
+class View(Child):
+    """`smachpy view`."""
+
+    def __init__(self, *arguments, port=0):
+        super().__init__(
+            "-m", "smachpy.cli", "view", "--child", "--port", str(port), *map(str, arguments)
+        )
+        self.address = self.said
+        self.base, _, self.token = self.address.partition("#token=")
+        found = re.search(r":(\d+)/", self.base)
+        assert found, self.said
+        self.port = int(found[1])
+
+    def get(self, path, **headers):
+        request = urllib.request.Request(self.base + path.lstrip("/"), headers=headers)
+        with urllib.request.urlopen(request, timeout=10) as answer:
+            return answer.status, dict(answer.headers), answer.read()
+
+
+@pytest.fixture(scope="session")
+def domain():
+    """A network of this test session's own, which the child processes inherit."""
+    old = os.environ.get("SMACHPY_DOMAIN")
+    os.environ["SMACHPY_DOMAIN"] = str(1 + (os.getpid() * 7 + 13) % 9999)
+    yield
+    if old is None:
+        del os.environ["SMACHPY_DOMAIN"]
+    else:
+        os.environ["SMACHPY_DOMAIN"] = old
+
+
+@pytest.fixture
+def start(domain):
+    """`start.robot(...)` and `start.view(...)`; what is left is ended after the test."""
+
+    class Start:
+        def __init__(self):
+            self.children = []
+
+        def robot(self, *arguments):
+            self.children.append(start_robot(*arguments))
+            return self.children[-1]
+
+        def view(self, *arguments, port=0):
+            self.children.append(View(*arguments, port=port))
+            return self.children[-1]
+
+    start = Start()
+    yield start
+    for child in reversed(start.children):
+        child.end()
+
+
+@pytest.fixture(scope="module")
+def delivery(domain):
+    """A delivery that loops for ever and obeys, and a viewer that may command it."""
+    robot = start_robot("--name", "delivery", "--rate", 4, "--control")
+    view = View("--control")
+    yield view
+    view.end()
+    robot.end()
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    if CHROMIUM is None:
+        pytest.skip("needs a browser; try: apt-get install chromium")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def look(chromium):
+    """`look(address)` opens a page and waits until it has drawn; errors in it fail the test."""
+    contexts, errors = [], []
+
+    def look(address, *, drawn=True, **options):
+        context = chromium.new_context(viewport={"width": 1400, "height": 900}, **options)
+        contexts.append(context)
+        page = context.new_page()
+        page.foreign = []
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.on(
+            "request",
+            lambda r: (
+                page.foreign.append(r.url)
+                if not r.url.startswith(
+                    ("http://127.0.0.1", "http://localhost", "data:", "blob:", "file:")
+                )
+                else None
+            ),
+        )
+        page.on(
+            "console", lambda m: errors.append(m.text) if "Content Security" in m.text else None
+        )
+        page.goto(address)
+        if drawn:
+            page.wait_for_selector("html[data-drawn]", timeout=20_000)
+        return page
+
+    yield look
+    for context in contexts:
+        context.close()
+    assert not errors
+
+
+@pytest.fixture(scope="module")
+def first_page(chromium, delivery):
+    context = chromium.new_context(viewport={"width": 1400, "height": 900})
+    page = context.new_page()
+    page.foreign = []
+    page.errors = []
+    page.on("pageerror", lambda error: page.errors.append(str(error)))
+    page.on(
+        "request",
+        lambda r: (
+            None if r.url.startswith(("http://127.0.0.1", "data:")) else page.foreign.append(r.url)
+        ),
+    )
+    page.goto(delivery.base + "?machine=delivery")
+    page.wait_for_selector("html[data-drawn]", timeout=20_000)
+    yield page
+    context.close()
+
+
+@pytest.fixture
+def shared(first_page):
+    """`shared()` is one page of the delivery for all tests, as it was when it was opened."""
+
+    def reset():
+        first_page.keyboard.press("Escape")
+        first_page.evaluate(
+            """async () => { const { page, store } = smachpy; page.setFollow(false); page.timeline.live();
+            page.select(null); store.query.value = ""; page.setDepth(9); await page.drawing; }"""
+        )
+        return first_page
+
+    yield reset
+    assert not first_page.errors

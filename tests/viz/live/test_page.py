@@ -1,0 +1,323 @@
+"""The page in a real browser, against real missions in other processes."""
+
+from __future__ import annotations
+
+import json
+import socket
+import time
+import urllib.error
+import urllib.request
+
+import pytest
+
+pytestmark = [pytest.mark.browser, pytest.mark.zenoh]
+
+
+@pytest.fixture
+def no_leaks():
+    """Processes of this module's fixtures outlive single tests."""
+
+
+def active(page):
+    return page.evaluate("() => smachpy.store.activeLeaves.value")
+
+
+def wait_for(page, condition, timeout=10.0):
+    """Wait for a JavaScript condition; the page's policy forbids playwright's own way."""
+    deadline = time.monotonic() + timeout
+    while not page.evaluate(f"() => Boolean({condition})"):
+        assert time.monotonic() < deadline, f"never true: {condition}"
+        page.wait_for_timeout(50)
+
+
+def group(path):
+    return f'g[data-path="{path}"]'
+
+
+def test_states_light_up_where_the_mission_is(delivery, shared):
+    page = shared()
+    seen = set()
+    for _ in range(40):
+        page.wait_for_timeout(100)
+        shown = page.evaluate(
+            "() => [...document.querySelectorAll('.diagram g.leaf.active')].map((g) => g.dataset.path)"
+        )
+        seen.update(shown)
+        if len(seen) >= 5:
+            break
+    assert len(seen) >= 5
+    assert page.text_content("[data-testid=status]") == "running"
+    assert page.foreign == []
+
+
+def test_a_concurrence_shows_all_its_active_regions(delivery, shared):
+    page = shared()
+    wait_for(
+        page,
+        "['NAVIGATE', 'WATCH'].every((l) => document.querySelector("
+        '`g.active[data-path="/DELIVER/TRANSPORT/${l}"]`))',
+    )
+
+
+def test_collapse_expand_and_depth_without_moving_the_rest(delivery, shared):
+    page = shared()
+    before = page.evaluate("() => ({...smachpy.page.view, svg: 0, world: 0}).k")
+    page.dblclick(group("/DELIVER/PICK") + " > text.title", force=True)
+    page.evaluate("() => smachpy.page.drawing")
+    wait_for(page, "!document.querySelector('g[data-path=\"/DELIVER/PICK/GRASP\"]')")
+    assert page.evaluate("() => smachpy.page.view.k") == before
+    page.evaluate("() => smachpy.page.setDepth(9)")
+    wait_for(page, "document.querySelector('g[data-path=\"/DELIVER/PICK/GRASP\"]')")
+    page.keyboard.press("1")
+    wait_for(page, "!document.querySelector('g[data-path=\"/DELIVER/PICK/GRASP\"]')")
+
+
+def test_search_reveals_a_hidden_state(delivery, shared):
+    page = shared()
+    page.keyboard.press("1")
+    wait_for(page, "!document.querySelector('g[data-path=\"/DELIVER/PICK/GRASP\"]')")
+    page.keyboard.press("/")
+    page.keyboard.type("gras")
+    page.keyboard.press("Enter")
+    wait_for(page, "document.querySelector('g.selected[data-path=\"/DELIVER/PICK/GRASP\"]')")
+    assert "GRASP" in page.text_content(".inspector h2")
+    page.keyboard.press("Escape")
+    wait_for(page, "!document.querySelector('.selected[data-path]')")
+
+
+def test_follow_opens_what_runs_and_keeps_it_legible(delivery, shared):
+    page = shared()
+    page.keyboard.press("1")
+    page.keyboard.press("o")
+    wait_for(
+        page, "[...document.querySelectorAll('g.leaf[data-path^=\"/DELIVER/PICK/\"]')].length > 0"
+    )
+    page.wait_for_timeout(500)
+    assert page.evaluate("() => smachpy.page.view.k * 11") >= 9.0
+
+
+def test_events_never_move_the_view(delivery, shared):
+    page = shared()
+    page.mouse.move(600, 400)
+    page.mouse.wheel(0, -400)
+    view = page.evaluate("() => [smachpy.page.view.x, smachpy.page.view.y, smachpy.page.view.k]")
+    page.wait_for_timeout(1200)
+    assert (
+        page.evaluate("() => [smachpy.page.view.x, smachpy.page.view.y, smachpy.page.view.k]")
+        == view
+    )
+
+
+def test_time_travel_shows_graph_goals_and_userdata_of_one_instant(delivery, shared):
+    page = shared()
+    wait_for(page, "smachpy.store.run.events.length > 60")
+    found = page.evaluate("""() => {
+      const { store } = smachpy, run = store.run;
+      const i = run.events.findIndex((e, n) => n > 20 && e.kind === "Left");
+      store.seek(run.events[i].stamp_ns / 1e6);
+      const path = run.events[i].path;
+      return { path, out: store.shown().states[path].outcome, wrote: Object.values(store.shown().userdata).map((u) => u.writer) };
+    }""")
+    assert found["out"] == "succeeded"
+    assert found["wrote"]
+    assert page.text_content("[data-testid=status]") == "replay"
+    frozen = active(page)
+    page.wait_for_timeout(700)
+    assert active(page) == frozen
+    page.keyboard.press("l")
+    wait_for(page, "smachpy.store.cursor.value === null")
+
+
+def test_the_page_folds_events_as_the_server_does(delivery, shared):
+    from smachpy.run_state import RunState
+
+    page = shared()
+    wait_for(page, "smachpy.store.run.events.length > 40")
+    mine, theirs, base = page.evaluate(
+        "() => [smachpy.store.run.after(40), smachpy.store.run.events.slice(0, 40), JSON.parse(smachpy.store.run.base)]"
+    )
+    state = RunState(base)
+    for event in theirs:
+        state.fold(event)
+    for path, facts in state.data["states"].items():
+        for key in ("visits", "outcome", "outcomes", "since", "preempt"):
+            assert mine["states"][path].get(key) == facts.get(key), (path, key)
+    assert mine["run"] == state.data["run"]
+    assert {k: v["writer"] for k, v in mine["userdata"].items()} == {
+        k: v["writer"] for k, v in state.data["userdata"].items()
+    }
+
+
+def test_control_with_the_token(delivery, look):
+    page = look(delivery.address.replace("/#", "/?machine=delivery#"))
+    assert "token" not in page.url
+    page.click("#pause")
+    wait_for(page, "smachpy.store.facts.value.control.paused")
+    wait_for(page, "document.querySelector('g.waiting')")
+    held = page.evaluate("() => document.querySelector('g.waiting').dataset.path")
+    page.click("#step")
+    wait_for(page, f"document.querySelector('g.waiting')?.dataset.path !== {json.dumps(held)}")
+    page.click("#pause")
+    wait_for(page, "!smachpy.store.facts.value.control.paused")
+    page.evaluate("() => smachpy.page.goTo('/DELIVER/PLACE')")
+    page.click("text=Breakpoint")
+    wait_for(page, "document.querySelector('g.stopped[data-path=\"/DELIVER/PLACE\"]')")
+    wait_for(page, "document.querySelector('g.waiting[data-path=\"/DELIVER/PLACE\"]')")
+    page.click("text=Remove breakpoint")
+    page.click("#pause")
+    wait_for(page, "!document.querySelector('g.waiting')")
+
+
+def test_without_the_token_there_is_nothing_to_press(delivery, shared):
+    page = shared()
+    assert page.query_selector("#pause") is None
+    ask = """(headers) => fetch('/api/control?machine=delivery', {method: 'POST', headers,
+        body: JSON.stringify({command: 'pause'})}).then(async (a) => [a.status, await a.text()])"""
+    assert page.evaluate(ask, {})[0] == 403
+    status, text = page.evaluate(ask, {"x-smachpy-token": "guess"})
+    assert status == 403
+    assert "token" in text
+
+
+def test_a_robot_that_dies_is_stale_and_one_that_comes_back_is_not(start, look):
+    robot = start.robot("--name", "mortal", "--rate", 4)
+    view = start.view()
+    page = look(view.base + "?machine=mortal")
+    robot.kill()
+    wait_for(page, "smachpy.store.runStatus.value.word === 'stale'")
+    assert "Stale" in page.text_content(".banner")
+    start.robot("--name", "mortal", "--rate", 4)
+    wait_for(page, "smachpy.store.runStatus.value.word === 'running'")
+    assert active(page)
+
+
+def test_a_viewer_that_is_restarted_is_found_again_with_the_whole_history(start, look):
+    start.robot("--name", "steady", "--rate", 8)
+    view = start.view()
+    page = look(view.base + "?machine=steady")
+    wait_for(page, "smachpy.store.run.events.length > 30")
+    first = page.evaluate("() => smachpy.store.run.events[0].stamp_ns")
+    view.kill()
+    wait_for(page, "smachpy.store.connection.value === 'lost'")
+    start.view(port=view.port)
+    wait_for(page, "smachpy.store.connection.value === 'live'", timeout=15.0)
+    wait_for(page, "smachpy.store.runStatus.value.word === 'running'")
+    assert page.evaluate("() => smachpy.store.run.events[0].stamp_ns") == first
+
+
+def test_hostile_names_and_values_are_harmless(start, look):
+    start.robot("--name", "hostile", "--rate", 5, "--hostile")
+    view = start.view()
+    page = look(view.base + "?machine=hostile")
+    wait_for(page, "Object.keys(smachpy.store.run.now.userdata).length >= 4")
+    page.wait_for_timeout(500)
+    assert page.title().startswith("HOSTILE")
+    assert page.evaluate("() => document.querySelectorAll('img, .diagram script').length") == 0
+    text = page.text_content(".userdata")
+    assert "<list of 100000 elements>" in text
+    assert "its repr raised RuntimeError" in text
+    assert "lock" in text
+
+
+def test_ten_clients_at_once_hear_the_same(delivery, shared):
+    page = shared()
+    streams = [
+        urllib.request.urlopen(f"{delivery.base}api/events?machine=delivery", timeout=20)
+        for _ in range(9)
+    ]
+    last = page.evaluate("() => smachpy.store.run.events.at(-1).seq")
+    wait_for(page, f"smachpy.store.run.events.at(-1).seq > {last + 4}")
+    for stream in streams:
+        numbers = []
+        while not numbers or numbers[-1] <= last + 4:
+            line = stream.readline().decode()
+            if line.startswith("id: "):
+                numbers.append(int(line.rpartition(":")[2]))
+        assert numbers == sorted(numbers)
+        stream.close()
+
+
+def test_a_preempt_is_a_process_one_can_watch(start, look):
+    start.robot("--name", "slow", "--rate", 20, "--control", "--stubborn", 3)
+    view = start.view("--control")
+    page = look(view.address.replace("/#", "/?machine=slow#"))
+    wait_for(page, "document.querySelector('g.active[data-path=\"/DELIVER/PLACE\"]')")
+    page.click("text=Preempt")
+    page.click("text=Yes")
+    wait_for(page, "document.querySelector('g.preempting[data-path=\"/DELIVER/PLACE\"]')")
+    wait_for(page, "document.querySelector('.waterfall')")
+    assert "Held up by PLACE" in page.text_content(".inspector")
+    wait_for(page, "smachpy.store.runStatus.value.word === 'ended: preempted'")
+
+
+def test_a_run_opens_as_one_file_without_a_server(start, look, tmp_path):
+    start.robot("--name", "mailed", "--rate", 10)
+    view = start.view()
+    page = look(view.base + "?machine=mailed")
+    wait_for(page, "smachpy.store.run.events.length > 60")
+    _, _, text = view.get("/api/export?machine=mailed&format=html")
+    file = tmp_path / "run.html"
+    file.write_bytes(text)
+    page = look(file.as_uri())
+    assert page.evaluate("() => smachpy.store.run.events.length") > 60
+    assert page.query_selector(group("/DELIVER/PICK/GRASP")) is not None
+    page.keyboard.press(",")
+    assert page.evaluate("() => smachpy.store.cursor.value") is not None
+    assert page.foreign == []
+
+
+def test_dark_small_and_by_keyboard_alone(delivery, look):
+    page = look(delivery.base + "?machine=delivery", color_scheme="dark")
+    assert (
+        page.evaluate("() => getComputedStyle(document.body).backgroundColor") == "rgb(15, 23, 32)"
+    )
+    page.keyboard.press("d")
+    wait_for(page, "getComputedStyle(document.body).backgroundColor === 'rgb(255, 255, 255)'")
+    page.evaluate("() => smachpy.page.select('/DELIVER/INIT')")
+    page.keyboard.press("ArrowDown")
+    assert page.evaluate("() => smachpy.store.selected.value") != "/DELIVER/INIT"
+    k = page.evaluate("() => smachpy.page.view.k")
+    page.keyboard.press("+")
+    assert page.evaluate("() => smachpy.page.view.k") > k
+    page.keyboard.press("?")
+    assert page.query_selector("[role=dialog]") is not None
+    page.keyboard.press("Escape")
+    label = page.get_attribute(group("/DELIVER/INIT"), "aria-label")
+    assert label.startswith("/DELIVER/INIT, ")
+    page.set_viewport_size({"width": 600, "height": 800})
+    page.wait_for_timeout(100)
+    assert page.is_visible(".diagram")
+
+
+def test_who_stops_reading_holds_up_nobody(delivery, shared):
+    deaf = socket.create_connection(("127.0.0.1", delivery.port))
+    deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1024)
+    deaf.sendall(b"GET /api/events?machine=delivery HTTP/1.1\r\nHost: localhost\r\n\r\n")
+    page = shared()
+    seq = page.evaluate("() => smachpy.store.run.events.at(-1).seq")
+    wait_for(page, f"smachpy.store.run.events.at(-1).seq > {seq + 20}")
+    deaf.close()
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({"Host": "evil.example"}, 421),
+        ({"Host": "evil.example:80"}, 421),
+        ({"Host": "localhost"}, 200),
+    ],
+)
+def test_foreign_host_names_are_refused(delivery, headers, status):
+    try:
+        got = delivery.get("/api/machines", **headers)[0]
+    except urllib.error.HTTPError as error:
+        got = error.code
+    assert got == status
+
+
+def test_a_policy_that_lets_nothing_in_from_elsewhere(delivery):
+    _, headers, _ = delivery.get("/")
+    policy = headers["content-security-policy"]
+    assert "default-src 'none'" in policy
+    assert "unsafe" not in policy
+    assert headers["x-content-type-options"] == "nosniff"
