@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from actionlib_core.clock import VirtualClock, use_clock
 
@@ -19,6 +20,12 @@ if TYPE_CHECKING:
 # Test runs on one machine, and the workers of one run, do not find each other's processes.
 if "SMACHPY_DOMAIN" not in os.environ or "PYTEST_XDIST_WORKER" in os.environ:
     os.environ["SMACHPY_DOMAIN"] = str(1 + os.getpid() % 9999)
+
+# A busy computer is no failure: pytest's timeout is the only one.
+settings.register_profile(
+    "suite", deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True
+)
+settings.load_profile("suite")
 
 # Threads that a clock keeps for a few seconds, without work.
 CACHED = {"idle", "clock-timers"}
