@@ -133,6 +133,19 @@ def test_send_goal_timeouts(shell, counting):
     assert "action '/nobody': got no server within 3 s" in out
 
 
+def test_ctrl_c_cancels_the_goal_first(shell, counting, monkeypatch):
+    from actionlib_core.cli import send_goal
+
+    def follow(handle, _args):
+        handle.next_feedback()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(send_goal, "_follow", follow)
+    out = shell("send_goal", "robot/count", "{goal: 1000}", code=130)
+    assert "Canceling goal...\nGoal canceled.\n" in out
+    assert out.endswith("Goal finished with status: PREEMPTED (stopped)\n")
+
+
 @pytest.mark.parametrize(
     ("argv", "text"),
     [
