@@ -153,6 +153,8 @@ class RunState:
         goal = self.data["goals"].get(record["goal_id"])
         if goal is not None:
             goal["feedback"] = record["feedback"]
+            if "progress" in record:  # a viewer's reading of it
+                goal["progress"] = record["progress"]
             if goal["first_feedback"] is None:
                 goal["first_feedback"] = record["feedback"]
 

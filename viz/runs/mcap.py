@@ -47,7 +47,7 @@ def write_mcap(recording: Recording, path: Path) -> None:
         writer = Writer(file)
         writer.start(profile="ros1", library="smachpy")
         _Export(recording, writer).run()
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
 
 
 class _Export:
@@ -71,9 +71,9 @@ class _Export:
             self._write(f"{self._server}/smach/events", String(data=text), stamp)
             if event["kind"] in GOAL_PARTS:
                 self._write_goal(event, GOAL_PARTS[event["kind"]])
-            container = self._containers.get(event["path"].rpartition("/")[0])
-            if container is not None and event["kind"] not in {"GoalFeedback"}:
-                message = self._status(container, event)
+            parent = self._containers.get(event["path"].rpartition("/")[0])
+            if parent is not None and event["kind"] not in {"GoalFeedback"}:
+                message = self._status(parent, event)
                 self._write(f"{self._server}/smach/container_status", message, stamp)
 
     def _write(self, topic: str, message: Any, stamp_ns: int) -> None:

@@ -1,0 +1,272 @@
+"""The live view in a terminal: tree, goals, userdata and log; works over ssh."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from rich.text import Text
+from textual import work
+from textual.app import App, ComposeResult
+from textual.containers import Horizontal, Vertical
+from textual.widgets import DataTable, Footer, Input, RichLog, Static, Tree
+
+from smachpy.exceptions import SmachError
+from smachpy.run_state import RunState
+from viz.model import outcome_class
+from viz.narration import STYLES
+from viz.words import GLYPHS, shorten
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from textual.widgets.tree import TreeNode
+
+    from smachpy.introspection import StateRecord
+    from viz.live.machines import Machine, Machines
+
+FRAME_S = 0.2
+BAR = 20
+LOGGED = {"Started", "Finished", "Left", "Failed", "PreemptRequested", "GoalDone", "Retried"}
+
+
+class MissionApp(App[None]):
+    """Shows one machine at a time.
+
+    Args:
+        machines: What there is to see.
+        send: Sends a command to a machine; None only looks.
+    """
+
+    TITLE = "smachpy"
+    CSS = """
+    #status { height: 1; background: $panel; padding: 0 1; }
+    #left { width: 45%; } Tree { height: 1fr; } #search { display: none; dock: bottom; }
+    #goals { height: auto; max-height: 9; padding: 0 1; } DataTable { height: 1fr; }
+    RichLog { height: 1fr; border-top: solid $panel; }
+    """
+    BINDINGS: ClassVar = [
+        ("q", "quit", "Quit"),
+        ("n", "next", "Next machine"),
+        ("o", "follow", "Follow"),
+        ("slash", "search", "Search"),
+        ("space", "pause", "Pause"),
+        ("s", "step", "Step"),
+        ("escape", "leave", "Back"),
+    ]
+
+    def __init__(
+        self,
+        machines: Machines,
+        send: Callable[[str, dict[str, Any]], dict[str, Any]] | None,
+    ) -> None:
+        super().__init__()
+        self._machines = machines
+        self._send = send
+        self._machine: Machine | None = None
+        self._shown: tuple[str, int] = ("", 0)
+        self._seq = 0
+        self._state = RunState()
+        self._places: dict[str, TreeNode[StateRecord]] = {}
+        self._follow = True
+
+    def compose(self) -> ComposeResult:
+        """Lay the widgets out."""
+        yield Static(id="status")
+        with Horizontal():
+            with Vertical(id="left"):
+                yield Tree[Any]("no machine yet", id="tree")
+                yield Input(placeholder="search", id="search")
+            with Vertical():
+                yield Static(id="goals")
+                yield DataTable(id="userdata", cursor_type="row")
+                yield RichLog(id="log", max_lines=500, wrap=True)
+        yield Footer()
+
+    def on_mount(self) -> None:
+        """Begin to draw."""
+        self.query_one(DataTable).add_columns("key", "value", "written by")
+        self.set_interval(FRAME_S, self.refresh_view)
+
+    def refresh_view(self) -> None:
+        """Draw what has changed."""
+        machine = self._machine or self._first()
+        self._machine = machine
+        if machine is None or machine.record is None:
+            self.query_one("#status", Static).update("waiting for a machine on the network")
+            return
+        if self._shown != (machine.epoch, machine.revision):
+            self._begin(machine, machine.record)
+        self._catch_up(machine)
+        self._draw_status(machine)
+        self._draw_tree()
+        self._draw_goals()
+
+    def _first(self) -> Machine | None:
+        there = self._machines.summaries()
+        live = [one for one in there if one["stale"] is None] or there
+        return self._machines.get(live[0]["name"]) if live else None
+
+    def _begin(self, machine: Machine, record: StateRecord) -> None:
+        self._shown = (machine.epoch, machine.revision)
+        self._state, self._seq = RunState(machine.base()), 0
+        tree = self.query_one(Tree)
+        tree.reset(Text(record.label), record)
+        self._places = {record.path: tree.root}
+        self._grow(tree.root, record)
+        tree.root.expand()
+        self.query_one(RichLog).clear()
+
+    def _grow(self, node: TreeNode[Any], record: StateRecord) -> None:
+        for child in record.children:
+            add = node.add if child.children else node.add_leaf
+            self._places[child.path] = added = add(Text(child.label), child)
+            self._grow(added, child)
+
+    def _catch_up(self, machine: Machine) -> None:
+        events = [event for event in machine.events() if event["seq"] > self._seq]
+        wrote = False
+        for event in events:
+            self._state.fold(event)
+            self._seq = event["seq"]
+            wrote = wrote or event["kind"] == "UserdataWritten"
+            if event["kind"] in LOGGED:
+                self.query_one(RichLog).write(_line(event))
+        if wrote:
+            table = self.query_one(DataTable)
+            table.clear()
+            for entry in list(self._state.data["userdata"].values())[:100]:
+                value = shorten(str(entry["value"]), 60)
+                table.add_row(entry["key"], value, entry["writer"].rpartition("/")[2])
+
+    def _draw_status(self, machine: Machine) -> None:
+        data = self._state.data
+        if machine.stale is not None and data["ended"] is None:
+            word, style = "stale", "magenta"
+        elif data["ended"] is not None:
+            word, style = f"ended: {data['outcome']}", STYLES[outcome_class(data["outcome"])]
+        elif machine.control and machine.control["paused"]:
+            word, style = "paused", "magenta"
+        else:
+            word, style = "running", "blue"
+        active = self._state.active()
+        leaf = next((p for p in reversed(active) if not _inside(p, active)), "")
+        trail = " \u203a ".join(shorten(name, 24) for name in leaf.strip("/").split("/"))
+        text = Text.assemble(
+            (f" {machine.name} ", "bold"), (f" {word} ", f"{style} reverse"), f"  {trail}"
+        )
+        self.query_one("#status", Static).update(text)
+
+    def _draw_tree(self) -> None:
+        now = time.time_ns()
+        for path, node in self._places.items():
+            if node.data is None:
+                continue
+            state = self._state.data["states"].get(path)
+            node.set_label(_label(node.data, state, now))
+            if self._follow and state and state["since"] and node.data.children:
+                node.expand()
+
+    def _draw_goals(self) -> None:
+        lines = Text()
+        for goal in list(self._state.data["goals"].values())[-4:]:
+            progress = goal.get("progress") or {}
+            part = 1.0 if goal["status"] == "SUCCEEDED" else progress.get("fraction") or 0.0
+            filled = round(part * BAR)
+            style = "blue" if goal["ended"] is None else STYLES[outcome_class(goal["status"])]
+            lines.append(f"{shorten(goal['action'], 20):20} ", "bold")
+            lines.append("\u2501" * filled, style)
+            lines.append("\u2501" * (BAR - filled), "dim")
+            words = goal["text"] or progress.get("text") or ""
+            lines.append(f" {part:4.0%} {goal['status'].lower()} {shorten(words, 40)}\n")
+        self.query_one("#goals", Static).update(lines)
+
+    # -- keys ----------------------------------------------------------------------------------
+
+    def action_next(self) -> None:
+        """Show the next machine."""
+        names = [one["name"] for one in self._machines.summaries()]
+        if names and self._machine is not None:
+            after = (names.index(self._machine.name) + 1) % len(names)
+            self._machine = self._machines.get(names[after])
+
+    def action_follow(self) -> None:
+        """Open what runs, or not."""
+        self._follow = not self._follow
+
+    def action_search(self) -> None:
+        """Ask what to look for."""
+        search = self.query_one("#search", Input)
+        search.display = True
+        search.focus()
+
+    def action_leave(self) -> None:
+        """Leave the search."""
+        self.query_one("#search", Input).display = False
+        self.query_one(Tree).focus()
+
+    def on_input_submitted(self, event: Input.Submitted) -> None:
+        """Go to the first state that is called so."""
+        wanted = event.value.lower()
+        for path, node in self._places.items():
+            if wanted and wanted in path.rpartition("/")[2].lower():
+                above = node.parent
+                while above is not None:
+                    above.expand()
+                    above = above.parent
+                self.call_after_refresh(self.query_one(Tree).move_cursor, node)
+                break
+        self.action_leave()
+
+    def action_pause(self) -> None:
+        """Pause or go on."""
+        machine = self._machine
+        if machine is not None:
+            paused = bool(machine.control and machine.control["paused"])
+            self._command(machine.name, "resume" if paused else "pause")
+
+    def action_step(self) -> None:
+        """Let one state run."""
+        if self._machine is not None:
+            self._command(self._machine.name, "step")
+
+    @work(thread=True)
+    def _command(self, name: str, command: str) -> None:
+        if self._send is None:
+            self.call_from_thread(self.notify, "this viewer only looks; try --control")
+            return
+        try:
+            answer = self._send(name, {"command": command})
+            text = answer["text"] or f"{command}: done"
+        except SmachError as error:
+            text = str(error)
+        self.call_from_thread(self.notify, text)
+
+
+def _inside(path: str, active: list[str]) -> bool:
+    return any(other.startswith(path + "/") for other in active)
+
+
+def _label(record: StateRecord, state: dict[str, Any] | None, now: int) -> Text:
+    glyph = GLYPHS.get(record.kind, "\u00b7" if not record.children else "")
+    name = f"{glyph} {shorten(record.label)}".strip()
+    if state is None:
+        return Text(name, "dim")
+    if state["since"] is not None:
+        style = "bold yellow" if state.get("preempt") else "bold blue"
+        text = Text.assemble((name, style), (f"  {(now - state['since']) / 1e9:.1f} s", "dim"))
+        return text.append("  asked to stop", "yellow") if state.get("preempt") else text
+    text = Text(name)
+    if state["outcome"]:
+        text.append(f"  {shorten(state['outcome'], 20)}", STYLES[outcome_class(state["outcome"])])
+    return text.append(f" x{state['visits']}", "dim") if state["visits"] > 1 else text
+
+
+def _line(event: dict[str, Any]) -> Text:
+    words = event.get("outcome") or event.get("error") or event.get("status") or event["kind"]
+    style = STYLES[outcome_class(str(words))]
+    clock = time.strftime("%H:%M:%S", time.localtime(event["stamp_ns"] / 1e9))
+    name = shorten(event["path"].rpartition("/")[2])
+    return Text.assemble(
+        (f"{clock}  ", "dim"), (name, "bold"), "  ", (shorten(str(words), 80), style)
+    )
