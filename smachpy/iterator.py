@@ -249,7 +249,12 @@ class Iterator(Container):
     def _run_children(self, frame: Frame, plan: _Plan) -> str:
         if self._start_cbs:
             self.call_start_cbs()
-        outcome = self._loop(frame, plan)
+        try:
+            outcome = self._loop(frame, plan)
+        except Interruption:  # it came just when the child had ended by itself
+            if frame.dead:
+                raise
+            outcome, _ = self._after_preempt(frame, plan, "preempted")
         outcome = self._final_outcome_map.get(outcome, outcome)
         if outcome not in self._outcomes and outcome != "preempted":
             raise unknown_outcome(frame.path, self._outcomes, outcome)

@@ -41,7 +41,7 @@ class Branch(Frame):
         self.run = frame.run
         self.step = step
         self.boundary = self
-        self.thread = frame.thread
+        self.thread = 0  # until it runs there is nothing to interrupt
         self.path = frame.path
         self.group = group
         self.outcome: str | None = None
@@ -60,7 +60,12 @@ class Branch(Frame):
             outcome = "preempted"
         except BaseException as error:  # noqa: BLE001  handed to the container's thread
             failure = error
-        self.group.end(self, outcome, failure)
+        while True:
+            try:
+                self.group.end(self, outcome, failure)
+            except Interruption:  # on its way when the child ended; `end` has done nothing yet
+                continue
+            return
 
     def abandon(self) -> None:
         """Go on without the child; its thread is left behind."""
@@ -147,10 +152,11 @@ class Group:
         with self.container._lock:  # noqa: SLF001  whoever passes a preempt on is done after this
             if branch.ended:
                 return
+            answered = has_answered(branch, outcome)
+            disarm(branch)  # from here on no interruption arrives
             branch.ended = True
             branch.outcome, branch.error = outcome, error
-            branch.answered = has_answered(branch, outcome)
-            disarm(branch)
+            branch.answered = answered
             if not branch.dead:
                 branch.step.state.recall_preempt()
             self._left -= 1

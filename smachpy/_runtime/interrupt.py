@@ -62,6 +62,8 @@ def interrupt(frame: Frame) -> None:
 
     The runner closes the window with `close`, so it is never raised after the child has ended.
     """
+    if not frame.thread:
+        return
     clock = frame.run.clock
     if isinstance(clock, InterruptingClock) and clock.interrupt(frame.thread, Interruption()):
         return

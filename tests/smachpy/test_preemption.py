@@ -489,6 +489,45 @@ def test_ignoring_branch_does_not_hold_the_others(seed, quiet):
         assert_clean(both)
 
 
+@pytest.mark.parametrize("seed", [None, *range(8)])
+def test_no_grace_at_all(seed, quiet):
+    with VirtualClock(seed) as clock, use_clock(clock):
+        sm = mission()
+        sm.preempt_timeout = 0.0
+        for at in (0.0, 0.5, 1.0, 1.25, 2.5, 3.0):
+            clock.spawn(lambda at=at: (clock.sleep(at), sm.request_preempt()), name="operator")
+            begun = clock.now()
+            outcome = sm.execute()
+            assert outcome in {"preempted", "done"}
+            assert clock.now() - begun <= at
+            clock.sleep(5.0)
+            if sm.preempt_requested():
+                assert sm.execute() == "preempted"
+            assert_clean(sm)
+
+
+@pytest.mark.parametrize("container", ["machine", "iterator", "concurrence"])
+def test_leaf_that_ends_just_when_its_grace_does(container, quiet):
+    def just_in_time():
+        threading.Event().wait(0.02)
+
+    for _ in range(15):
+        leaf = Ignores(just_in_time)
+        outcomes = ["ok", "done", "preempted"]
+        if container == "machine":
+            sm = smachpy.StateMachine(outcomes, preempt_timeout=0.019)
+            sm.add("A", leaf)
+        elif container == "iterator":
+            sm = smachpy.Iterator(outcomes, [], [], it=[1, 2], preempt_timeout=0.019)
+            sm.set_contained_state("A", leaf, loop_outcomes=["ok"])
+        else:
+            sm = smachpy.Concurrence(outcomes, "done", preempt_timeout=0.019)
+            sm.add("A", leaf)
+        sm.register_start_cb(lambda *a, sm=sm: current_clock().call_later(0.0, sm.request_preempt))
+        assert sm.execute() in {"ok", "done", "preempted"}
+        assert_clean(sm)
+
+
 def test_grace_is_the_states_own_then_the_containers_then_ten_seconds(clock, quiet):
     def measure(leaf=None, inner=None, outer=None):
         state = Ignores(ignore_until(3600.0), **(leaf or {}))
