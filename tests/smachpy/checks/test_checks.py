@@ -558,7 +558,9 @@ def test_a_check_takes_milliseconds():
     children = [(f"S{i}", Leaf("done", "failed"), {"done": f"S{i + 1}"}) for i in range(99)]
     sm = machine(*children, ("S99", Leaf("done", "failed"), {}), outcomes=["done", "failed"])
     check(sm)
-    assert check(sm).seconds < 0.2
+    begun = time.process_time()
+    check(sm)
+    assert time.process_time() - begun < 0.2
 
 
 def test_the_function_of_the_package():

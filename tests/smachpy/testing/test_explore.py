@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
@@ -280,10 +282,11 @@ def test_explored_runs_are_the_same_twice():
 
 
 def test_exploring_costs_little():
+    begun = time.process_time()
     with mission_kit() as mission:
-        found = mission.explore(sound(), max_runs=1000, max_time=60, invariants=[lambda run: True])
+        found = mission.explore(sound(), max_runs=300, max_time=60, invariants=[lambda run: True])
     assert found.ok
-    assert found.runs / found.seconds > 40  # three hundred on an idle computer
+    assert (time.process_time() - begun) / found.runs < 0.01
 
 
 def test_equal_situations_are_entered_once_and_nothing_is_missed():

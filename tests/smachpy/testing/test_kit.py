@@ -320,9 +320,9 @@ def test_ten_thousand_transitions_cost_little_more_than_in_real_time():
         best = 1e9
         for _ in range(3):
             left[0] = 10_000
-            begun = time.perf_counter()
+            begun = time.process_time()
             run()
-            best = min(best, time.perf_counter() - begun)
+            best = min(best, time.process_time() - begun)
         return best
 
     # With the same listener: a mission under test is always watched.
