@@ -117,7 +117,7 @@ class Peer:
 
     def __init__(self, *arguments: str) -> None:
         self.process = subprocess.Popen(
-            [sys.executable, __file__, *(arguments or ("--serve",))],
+            [sys.executable, str(Path(__file__).resolve()), *(arguments or ("--serve",))],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
         )
