@@ -72,7 +72,9 @@ def serve(args: argparse.Namespace) -> int:
                 name = node.resolve("move_base")
                 where = f"{args.map.name} at ({x:.2f}, {y:.2f})"
                 print(f"{name}: ready on {where}; Ctrl-C ends it", flush=True)
-                shutdown.event().wait()
+                forget = ending.on_shutdown(server.close)
+                server.wait()
+                forget()
             finally:
                 server.close()
     return 0

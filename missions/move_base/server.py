@@ -93,6 +93,16 @@ class RobotServer:
         self._publish_odometry()
         self._housekeeper = self._clock.spawn(self._keep_house, name="robot battery")
 
+    def wait(self) -> None:
+        """Wait until `close` was called.
+
+        Raises:
+            ServerConflictError: an older robot of this name was found after all.
+
+        Blocks: until then.
+        """
+        self._move.wait()
+
     def close(self) -> None:
         """Stop taking goals; a running one is aborted. A second call does nothing.
 
