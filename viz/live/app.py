@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from viz.live.machines import Machine, Machines
 
-COALESCE_S = 0.016
+COALESCE_S = 0.012
 """Events wait so long for others: at most 60 messages a second."""
 
 LIST_S = 0.5

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import threading
+from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.clock import SerialExecutor
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
 logger = logging.getLogger("viz.live")
 
 HISTORY_S = 5.0
+GATHER_S = 0.008
+"""Events are worked off together that come so close to each other."""
+
 SETTLE_S = 0.3
 """An event may slip through until a server has seen its new listener: the history is read again."""
 
@@ -100,6 +104,7 @@ class Link:
         self._executor = SerialExecutor(node.clock, f"link to {name}")
         self._alive: set[str] = set()
         self._closed = False
+        self._heard: deque[str] = deque()
         server = f"/{name}"
         self._client = ControlClient(server, node) if control else None
         self._history = ServiceProxy(
@@ -144,11 +149,19 @@ class Link:
             self._machine.set_stale(self._node.clock.time_ns())
 
     def _take(self, message: Any) -> None:
-        self._executor.submit(lambda: self._add(message.data))
+        self._heard.append(message.data)
+        if len(self._heard) == 1:  # the others go with the first
+            self._executor.submit(self._add)
 
-    def _add(self, text: str) -> None:
-        if not self._machine.add([json.loads(text)]):
+    def _add(self) -> None:
+        self._node.clock.sleep(GATHER_S)
+        texts = list(self._heard)
+        for _ in texts:
+            self._heard.popleft()
+        if not self._machine.add([json.loads(text) for text in texts]):
             self._read_history()
+        if self._heard:
+            self._executor.submit(self._add)
 
     def _take_description(self, message: Any) -> None:
         self._executor.submit(lambda: self._machine.describe(StateRecord.from_json(message.data)))

@@ -17,7 +17,7 @@ import { weights } from "viewer/statistics";
 import { ms } from "viewer/fold";
 
 const html = htm.bind(h);
-const PANELS_MS = 120; // the panels are drawn again at most so often
+const PANELS_MS = 160; // the panels are drawn again at most so often
 const ANNOUNCE_MS = 1000;
 
 class Page {

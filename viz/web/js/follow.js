@@ -36,8 +36,13 @@ export function framing(diagram, view) {
   const deepest = leaves.reduce((a, b) => (b.split("/").length > a.split("/").length ? b : a));
   const shared = model.ancestors(deepest).filter((n) => leaves.every((l) => l.startsWith(n.path + "/")));
   const boxes = shared.map((n) => diagram.boxOf(n.path)).filter(Boolean);
-  const legible = boxes.find((box) => view.scaleFor(box) >= READABLE);
-  if (legible) return legible;
   const own = model.ancestors(deepest).map((n) => diagram.boxOf(n.path)).filter(Boolean);
-  return own.find((box) => view.scaleFor(box) >= READABLE) ?? own.at(-1) ?? diagram.size;
+  const legible = (some) => some.find((box) => view.scaleFor(box) >= READABLE);
+  return atLeast(legible(boxes) ?? legible(own) ?? own.at(-1) ?? diagram.size, view);
+}
+
+// Something small is shown with what is around it, not blown up.
+function atLeast(box, view) {
+  const w = Math.max(box.w, view.width * 0.9), h = Math.max(box.h, view.height * 0.9);
+  return { x: box.x - (w - box.w) / 2, y: box.y - (h - box.h) / 2, w, h };
 }

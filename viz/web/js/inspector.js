@@ -11,7 +11,7 @@ import { coverage, failureShare } from "viewer/statistics";
 
 const html = htm.bind(h);
 const FLASH_MS = 900;
-const LOG_LINES = 120;
+const LOG_LINES = 70;
 const SHORT = 160;
 
 const Section = ({ title, count, children }) =>

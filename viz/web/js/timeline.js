@@ -90,19 +90,32 @@ export class Timeline {
     const x = (t) => NAMES + ((t - from) / (to - from)) * (width - NAMES - RIGHT);
     this.#grid(g, x, from, to, width, height);
     const room = height - FOOT;
-    const all = this.lanes.reduce((sum, lane) => sum + this.#laneHeight(lane), 0);
+    const lanes = this.#lanesToShow(from, to, room);
+    const all = lanes.reduce((sum, lane) => sum + this.#laneHeight(lane), 0);
     this.top = Math.max(0, Math.min(this.top, all - room));
     let y = 3 - this.top;
     g.save();
     g.beginPath(); g.rect(0, 0, width, room); g.clip();
     this.hits = [];
-    for (const lane of this.lanes) {
+    for (const lane of lanes) {
       const h = this.#laneHeight(lane);
       if (y + h > 0 && y < room) this.#lane(g, lane, y, h, x, from, to, width);
       y += h;
     }
     g.restore();
     this.#cursor(g, x, width, height);
+  }
+
+  // All lanes where there is room, else those with something in them.
+  #lanesToShow(from, to, room) {
+    const tall = this.lanes.reduce((sum, lane) => sum + this.#laneHeight(lane), 0);
+    if (tall <= room) return this.lanes;
+    return this.lanes.filter((lane) => {
+      const spans = this.byPath.get(lane.path) ?? [];
+      for (let i = firstAfter(spans, from); i < spans.length && spans[i].from <= to; i++)
+        if ((spans[i].to ?? Infinity) >= from) return true;
+      return false;
+    });
   }
 
   #laneHeight(lane) { return lane.kind === "concurrence" ? Math.max(LANE, 13 * Math.min(lane.children.length, 6) + 3) : LANE; }

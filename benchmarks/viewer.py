@@ -1,0 +1,106 @@
+"""What the live page costs: frames, time from an event to its paint, the server's processor time.
+
+    python benchmarks/viewer.py [--states N] [--depth N] [--rate HZ] [--seconds S]
+
+A mission in another process, `smachpy view` in a third, a headless Chromium that draws in software.
+Hold at 50 transitions/s: 50 frames/s, p95 from event to paint 80 ms, 5 % of a core per client.
+Figures mean something only on a machine that does nothing else.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from playwright.sync_api import sync_playwright
+
+ROBOT = Path(__file__).parent.parent / "tests" / "viz" / "live" / "robot.py"
+TICKS = os.sysconf("SC_CLK_TCK")
+
+
+def start(*command):
+    child = subprocess.Popen(
+        [sys.executable, *map(str, command)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    return child, child.stdout.readline().strip()
+
+
+def processor_time(pid):
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / TICKS
+
+
+def quantile(values, share):
+    ordered = sorted(values)
+    return ordered[min(int(share * len(ordered)), len(ordered) - 1)]
+
+
+def measure(page, pid, seconds):
+    page.evaluate("""() => {
+        smachpy.page.latencies.length = 0; window.frames_ = 0; window.go_ = true;
+        const frame = () => { window.frames_ += 1; if (window.go_) requestAnimationFrame(frame); };
+        requestAnimationFrame(frame);
+        window.from_ = smachpy.store.run.events.length;
+    }""")
+    cpu, begun = processor_time(pid), time.perf_counter()
+    page.wait_for_timeout(seconds * 1000)
+    took = time.perf_counter() - begun
+    frames, latencies, events, left = page.evaluate("""() => { window.go_ = false;
+        const fresh = smachpy.store.run.events.slice(window.from_);
+        return [window.frames_, smachpy.page.latencies, fresh.length,
+            fresh.filter((e) => e.kind === "Left").length]; }""")
+    cpu = (processor_time(pid) - cpu) / took
+    print(
+        f"{left / took:6.1f} transitions/s, {events / took:6.1f} events/s: "
+        f"{frames / took:5.1f} frames/s, event to paint p50 {quantile(latencies, 0.5):5.1f} ms "
+        f"p95 {quantile(latencies, 0.95):5.1f} ms, server {cpu:5.1%} of a core"
+    )
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--states", type=int, default=60)
+    parser.add_argument("--depth", type=int, default=99)
+    parser.add_argument("--rate", type=float, default=30.0)
+    parser.add_argument("--seconds", type=float, default=6.0)
+    args = parser.parse_args()
+    os.environ.setdefault("SMACHPY_DOMAIN", str(1 + os.getpid() % 9999))
+    robot, _ = start(ROBOT, "--states", args.states, "--rate", args.rate)
+    view, address = start("-m", "smachpy.cli", "view", "--child", "--port", 0)
+    try:
+        found = re.match(r"http://[^#]*", address)
+        assert found, address
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(
+                executable_path=shutil.which("chromium"),
+                args=["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"],
+            )
+            page = browser.new_page(viewport={"width": 1600, "height": 950})
+            begun = time.perf_counter()
+            page.goto(found[0] + "?machine=robot")
+            page.wait_for_selector("html[data-drawn]", timeout=60_000)
+            first = time.perf_counter() - begun
+            page.evaluate(f"async () => {{ smachpy.page.setDepth({args.depth}); await smachpy.page.drawing; }}")
+            page.wait_for_timeout(1000)
+            shown = page.evaluate("() => document.querySelectorAll('.diagram *').length")
+            print(f"{args.states} states, {shown} elements; first picture after {first:.1f} s")
+            measure(page, view.pid, args.seconds)
+            page.evaluate("() => smachpy.page.setFollow(true)")
+            page.wait_for_timeout(1000)
+            print("following:")
+            measure(page, view.pid, args.seconds)
+            browser.close()
+    finally:
+        for child in (robot, view):
+            child.stdin.close()
+            child.wait(10)
+
+
+if __name__ == "__main__":
+    main()
