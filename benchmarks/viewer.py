@@ -26,7 +26,10 @@ TICKS = os.sysconf("SC_CLK_TCK")
 
 def start(*command):
     child = subprocess.Popen(
-        [sys.executable, *map(str, command)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        [sys.executable, *map(str, command)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
     )
     return child, child.stdout.readline().strip()
 
@@ -59,7 +62,8 @@ def measure(page, pid, seconds):
     print(
         f"{left / took:6.1f} transitions/s, {events / took:6.1f} events/s: "
         f"{frames / took:5.1f} frames/s, event to paint p50 {quantile(latencies, 0.5):5.1f} ms "
-        f"p95 {quantile(latencies, 0.95):5.1f} ms, server {cpu:5.1%} of a core"
+        f"p95 {quantile(latencies, 0.95):5.1f} ms, "
+        f"server {cpu:5.1%} of a core"
     )
 
 
@@ -86,7 +90,9 @@ def main():
             page.goto(found[0] + "?machine=robot")
             page.wait_for_selector("html[data-drawn]", timeout=60_000)
             first = time.perf_counter() - begun
-            page.evaluate(f"async () => {{ smachpy.page.setDepth({args.depth}); await smachpy.page.drawing; }}")
+            page.evaluate(
+                f"async () => {{ smachpy.page.setDepth({args.depth}); await smachpy.page.drawing; }}"
+            )
             page.wait_for_timeout(1000)
             shown = page.evaluate("() => document.querySelectorAll('.diagram *').length")
             print(f"{args.states} states, {shown} elements; first picture after {first:.1f} s")

@@ -1,9 +1,9 @@
 """A recorded run as MCAP with ROS 1 messages, which Foxglove and other tools open.
 
-    <machine>/smach/container_structure   smach_msgs/SmachContainerStructure, of every container
-    <machine>/smach/container_status      smach_msgs/SmachContainerStatus, whenever it changes
-    <machine>/smach/events                std_msgs/String, every event as JSON
-    <action>/goal, /feedback, /result     the messages of the actions, where their types are known
+Topics of the machine MACHINE: /MACHINE/smach/container_structure (of every container),
+/MACHINE/smach/container_status (whenever it changes) and /MACHINE/smach/events (std_msgs/String,
+every event as JSON); of its actions: /ACTION/goal, /feedback and /result, where their types are
+known.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class _Export:
             if event["kind"] in GOAL_PARTS:
                 self._write_goal(event, GOAL_PARTS[event["kind"]])
             parent = self._containers.get(event["path"].rpartition("/")[0])
-            if parent is not None and event["kind"] not in {"GoalFeedback"}:
+            if parent is not None and event["kind"] != "GoalFeedback":
                 message = self._status(parent, event)
                 self._write(f"{self._server}/smach/container_status", message, stamp)
 
@@ -103,7 +103,7 @@ class _Export:
         self._write(f"/{event['action'].strip('/')}/{part}", message, event["stamp_ns"])
 
     def _status(self, container: StateRecord, event: dict[str, Any]) -> Any:
-        active = {path for path in self._state.active()}
+        active = set(self._state.active())
         userdata = {
             entry["key"]: entry["value"]
             for entry in self._state.data["userdata"].values()

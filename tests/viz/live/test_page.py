@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import socket
 import time
 import urllib.error
@@ -321,3 +323,27 @@ def test_a_policy_that_lets_nothing_in_from_elsewhere(delivery):
     assert "default-src 'none'" in policy
     assert "unsafe" not in policy
     assert headers["x-content-type-options"] == "nosniff"
+
+
+def test_a_viewer_that_hangs_or_dies_slows_no_mission(start):
+    start.robot("--name", "busy", "--rate", 50)
+    views = [start.view(), start.view(), start.view()]
+
+    def count(view):
+        lines = view.get("/api/export?machine=busy&format=jsonl")[2].splitlines()
+        return sum(b'"Left"' in line for line in lines)
+
+    deadline = time.monotonic() + 10.0
+    while views[0].get("/api/machines")[2] == b"[]":
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    before, begun = count(views[0]), time.monotonic()
+    time.sleep(1.0)
+    free = (count(views[0]) - before) / (time.monotonic() - begun)
+    os.kill(views[1].pid, signal.SIGSTOP)
+    views[2].kill()
+    before, begun = count(views[0]), time.monotonic()
+    time.sleep(1.5)
+    held = (count(views[0]) - before) / (time.monotonic() - begun)
+    os.kill(views[1].pid, signal.SIGCONT)
+    assert held > 0.5 * free > 0

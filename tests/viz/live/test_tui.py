@@ -23,7 +23,9 @@ def recorded(tmp_path):
     with inner:
         StateMachine.add("DEEP", CBState(write, outcomes=["succeeded"], output_keys=["x"]))
     with sm:
-        StateMachine.add("FIRST", CBState(lambda _: "succeeded", outcomes=["succeeded"]), {"succeeded": "IN"})
+        StateMachine.add(
+            "FIRST", CBState(lambda _: "succeeded", outcomes=["succeeded"]), {"succeeded": "IN"}
+        )
         StateMachine.add("IN", inner)
     with Recorder(tmp_path / "run.jsonl", sm):
         sm.execute()
@@ -52,6 +54,8 @@ def test_tree_log_status_search_and_refused_commands(tmp_path, clock):
 
     asyncio.run(look())
     assert "ended: succeeded" in found["status"]
-    assert [label.split()[0] for label in found["tree"]] == ["FIRST", "IN"] or "FIRST" in found["tree"][0]
+    assert [label.split()[0] for label in found["tree"]] == ["FIRST", "IN"] or "FIRST" in found[
+        "tree"
+    ][0]
     assert found["log"] > 3
     assert "DEEP" in found["cursor"]

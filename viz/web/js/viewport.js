@@ -1,5 +1,6 @@
 // Pan and zoom: at the cursor, by keys, by flights; events never move it.
 const LEAST = 0.04, MOST = 4;
+const FOOT = 22; // what the legend covers
 
 export class Viewport {
   constructor(svg, world, onChange) {
@@ -17,9 +18,10 @@ export class Viewport {
     this.onChange();
   }
   frame(box, { margin = 28, most = 1.6, fly = true } = {}) {
-    const k = Math.min(most, (this.width - 2 * margin) / box.w, (this.height - 2 * margin) / box.h);
+    const room = this.height - FOOT;
+    const k = Math.min(most, (this.width - 2 * margin) / box.w, (room - 2 * margin) / box.h);
     const x = (this.width - box.w * k) / 2 - box.x * k;
-    const y = (this.height - box.h * k) / 2 - box.y * k;
+    const y = (room - box.h * k) / 2 - box.y * k;
     if (fly) this.fly(x, y, k); else this.set(x, y, k);
   }
   scaleFor(box, margin = 28) {
