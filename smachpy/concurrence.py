@@ -331,27 +331,40 @@ class Concurrence(Container):
         return [] if group is None or group.frame is not frame else [*group.running()]
 
     def _outcome(self, frame: Frame, group: Group) -> str:
-        """Return the outcome that the callback, the rules or the default give."""
+        """Return the outcome that the callback, the rules or the default give.
+
+        It answers a preempt only if every child behind it answered: when one just finished its
+        work, the machine above must not take the outcome for the end of the preempt.
+        """
         outcomes = group.outcomes()
-        answered = any(branch.answered for branch in group.branches)
-        frame.answered = self._preempt_requested and answered
+        answered = [b.step.label for b in group.branches if b.answered]
+        asked = self._preempt_requested
         if self._outcome_cb is not None:
-            try:
-                answer = self._outcome_cb(dict(outcomes))
-            except Exception as error:
-                raise InvalidUserCodeError(
-                    f"{frame.path}: outcome_cb raised {type(error).__name__}: {error}",
-                    path=frame.path,
-                ) from error
-            if answer:
-                return self._registered(frame, answer)
+            answer = self._ask_callback(frame, outcomes)
+            if answer is not None:
+                frame.answered = asked and len(answered) == len(outcomes)
+                return answer
         ruled = decide(self._rules, outcomes)
         if ruled is not None:
-            return ruled
+            outcome, rule = ruled
+            frame.answered = asked and set(rule.met_by(outcomes)) <= set(answered)
+            return outcome
+        frame.answered = asked and bool(answered)
         if frame.answered and self._may_end_preempted():
             frame.emit_own(Preempted, "")
             return "preempted"
         return self._default_outcome
+
+    def _ask_callback(self, frame: Frame, outcomes: dict[str, str | None]) -> str | None:
+        assert self._outcome_cb is not None
+        try:
+            answer = self._outcome_cb(dict(outcomes))
+        except Exception as error:
+            raise InvalidUserCodeError(
+                f"{frame.path}: outcome_cb raised {type(error).__name__}: {error}",
+                path=frame.path,
+            ) from error
+        return self._registered(frame, answer) if answer else None
 
     def _may_end_preempted(self) -> bool:
         return "preempted" in self._outcomes or not self._default_outcome

@@ -26,8 +26,11 @@ class Rule:
 
     def holds(self, outcomes: Mapping[str, str | None]) -> bool:
         """Tell whether the children's outcomes fulfil the rule."""
-        met = sum(outcomes.get(label) in wanted for label, wanted in self.conditions)
-        return met >= self.need
+        return len(self.met_by(outcomes)) >= self.need
+
+    def met_by(self, outcomes: Mapping[str, str | None]) -> tuple[str, ...]:
+        """Return the labels of the children that meet their condition."""
+        return tuple(label for label, wanted in self.conditions if outcomes.get(label) in wanted)
 
     def __str__(self) -> str:
         parts = ", ".join(f"{label}:{'|'.join(wanted)}" for label, wanted in self.conditions)
@@ -67,16 +70,17 @@ def as_rules(outcome_map: Mapping[str, Any]) -> tuple[tuple[str, Rule], ...]:
     )
 
 
-def decide(rules: Iterable[tuple[str, Rule]], outcomes: Mapping[str, str | None]) -> str | None:
-    """Return the outcome of the rule that holds and asks for most; None when none holds.
+def decide(
+    rules: Iterable[tuple[str, Rule]], outcomes: Mapping[str, str | None]
+) -> tuple[str, Rule] | None:
+    """Return the rule that holds and asks for most, with its outcome; None when none holds.
 
     Among rules that ask for equally much the last one wins, as in SMACH.
     """
-    best: str | None = None
-    most = -1
+    best: tuple[str, Rule] | None = None
     for outcome, rule in rules:
-        if rule.need >= most and rule.holds(outcomes):
-            best, most = outcome, rule.need
+        if (best is None or rule.need >= best[1].need) and rule.holds(outcomes):
+            best = outcome, rule
     return best
 
 
