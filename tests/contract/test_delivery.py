@@ -39,6 +39,7 @@ class Bad:
             nodes[name] = Node(name, transport=link, clock=clock)
         self.nodes = nodes
         self.runs = Counter()
+        self.closing = False
         self.fates = {}
         self.server = ActionServer(
             "demo",
@@ -53,6 +54,8 @@ class Bad:
     def on_goal(self, handle):
         goal_id = handle.get_goal_id().id
         self.runs[goal_id] += 1
+        if self.closing:  # `stop` ends the goals that the client has given up
+            return
         number = handle.get_goal().goal
         if number < 0:
             self.end(handle, handle.set_rejected)
@@ -68,7 +71,7 @@ class Bad:
 
     def end(self, handle, how):
         goal_id = handle.get_goal_id().id
-        if goal_id in self.fates:  # the end and a cancel met
+        if goal_id in self.fates or self.closing:  # the end and a cancel met
             return
         result = msg.TestResult(len(self.fates) + 1)
         how(result, f"end {result.result}")
@@ -91,6 +94,7 @@ class Bad:
             yield state
 
     def close(self):
+        self.closing = True
         for node in self.nodes.values():
             node.close()
             node.transport.close()
