@@ -91,7 +91,8 @@ def main():
             page.wait_for_selector("html[data-drawn]", timeout=60_000)
             first = time.perf_counter() - begun
             page.evaluate(
-                f"async () => {{ smachpy.page.setDepth({args.depth}); await smachpy.page.drawing; }}"
+                f"async () => {{ smachpy.page.setDepth({args.depth});"
+                " await smachpy.page.drawing; }"
             )
             page.wait_for_timeout(1000)
             shown = page.evaluate("() => document.querySelectorAll('.diagram *').length")

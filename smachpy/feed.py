@@ -79,9 +79,9 @@ class Feed:
         self._descriptions = Publisher(
             server_name + DESCRIPTION_TOPIC, String, latch=True, node=node
         )
-        self._history = Service(server_name + HISTORY_SERVICE, Trigger, self._tell, node=node)
-        self._events = Publisher(server_name + EVENTS_TOPIC, String, node=node)
         self._describe()
+        self._history = Service(server_name + HISTORY_SERVICE, Trigger, self._tell, node=node)
+        self._events = Publisher(server_name + EVENTS_TOPIC, String, node=node)  # what viewers seek
         self._unsubscribe = machine.subscribe(self._on_event)
 
     def close(self) -> None:
@@ -139,9 +139,12 @@ class Feed:
     def _describe(self) -> None:
         text = describe(self._machine, name=self._path.strip("/")).to_json()
         if text != self._description:
-            self._problems = _problems(self._machine, self._path)
             self._description = text
             self._descriptions.publish(text)
+            self._executor.submit(self._look_for_problems)
+
+    def _look_for_problems(self) -> None:
+        self._problems = _problems(self._machine, self._path)
 
 
 def _problems(machine: Container, path: str) -> list[dict[str, str]]:

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger("viz.live")
 
-HISTORY_S = 5.0
+HISTORY_S = 3.0
+RETRY_S = 0.5
 GATHER_S = 0.008
 """Events are worked off together that come so close to each other."""
 
@@ -172,11 +173,13 @@ class Link:
         try:
             answer = self._history.call()
         except ActionlibError as error:
-            logger.warning("%s: no history: %s", self._name, error)
+            logger.info("%s: no history yet: %s", self._name, error)
+            self._node.clock.call_later(RETRY_S, lambda: self._executor.submit(self._read_history))
             return
         history = json.loads(answer.message)
         machine = self._machine
-        if machine.record is not None and machine.epoch == history["epoch"]:
+        known = machine.record is not None and machine.problems == history["problems"]
+        if known and machine.epoch == history["epoch"]:
             machine.set_stale(None)
             if machine.add(history["events"]):
                 return

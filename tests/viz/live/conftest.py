@@ -121,7 +121,7 @@ def delivery(domain):
     robot.end()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # its event loop would be in the way of other modules' tests
 def chromium():
     if CHROMIUM is None:
         pytest.skip("needs a browser; try: apt-get install chromium")
