@@ -258,7 +258,7 @@ class _Page:
         epoch, _, seq = last_id.partition(":")
         self._epoch = epoch
         self._seq = int(seq) if seq.isdigit() else 0
-        self._facts = ""
+        self._facts: dict[str, Any] = {}
         self._list = ""
         self._listed = 0.0
 
@@ -305,10 +305,10 @@ class _Page:
             self._seq, snap = machine.snapshot(short=short)
             texts.append(f"event: snap\nid: {self._epoch}:{self._seq}\ndata: {snap}\n\n")
             behind = []
-        facts = json.dumps(machine.facts())
+        facts = machine.facts()
         if facts != self._facts:
             self._facts = facts
-            texts.append(f"event: facts\ndata: {facts}\n\n")
+            texts.append(f"event: facts\ndata: {json.dumps(facts)}\n\n")
         if behind:
             self._seq += len(behind)
             data = f"[{','.join(behind)}]"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import threading
 import uuid
@@ -110,7 +111,9 @@ class Machine:
             missing = self._seq - seq
             if missing < 0 or missing > len(self._events):
                 return None
-            return [text for _, _, text in list(self._events)[len(self._events) - missing :]]
+            newest = [text for _, _, text in itertools.islice(reversed(self._events), missing)]
+        newest.reverse()
+        return newest
 
     def snapshot(self, *, short: bool = False) -> tuple[int, str]:
         """Return the newest number and all that a page needs to begin, as JSON.

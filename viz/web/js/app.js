@@ -18,6 +18,8 @@ import { ms } from "viewer/fold";
 
 const html = htm.bind(h);
 const PANELS_MS = 160; // the panels are drawn again at most so often
+const WORDS_MS = 400; // and the inspector
+const BUSY = 15; // transitions in a second from which they do not fade one by one
 const ANNOUNCE_MS = 1000;
 
 class Page {
@@ -107,6 +109,13 @@ class Page {
   #panels(moment) {
     this.panelsAt = moment;
     store.tick.value += 1;
+    if (moment - (this.wordsAt ?? 0) > WORDS_MS) {
+      this.wordsAt = moment;
+      store.slowTick.value += 1;
+      const left = store.run.events.length - (this.counted ?? 0);
+      this.counted = store.run.events.length;
+      this.diagram.svg.classList.toggle("busy", left > 3 * BUSY * (WORDS_MS / 1000));
+    }
     this.timeline.draw();
     this.#announce(moment);
     this.#follow();

@@ -22,7 +22,7 @@ const State = ({ path, page }) => {
 };
 
 export function Inspector({ page }) {
-  store.tick.value;
+  store.slowTick.value;
   const model = store.model.value;
   if (!model) return html`<aside class="inspector"></aside>`;
   const data = store.shown(), now = store.nowMs();

@@ -92,6 +92,7 @@ async function takeSnap(snap, payload) {
     store.problems.value = snap.problems;
     store.begin(snap.base, snap.events);
     store.tick.value += 1;
+    store.slowTick.value += 1;
   });
   const same = known && store.model.value && known.name === snap.name && known.revision === snap.revision
     && known.epoch === snap.epoch;

@@ -18,6 +18,7 @@ export const problems = signal([]);
 export const model = signal(null);
 export const failure = signal(null); // a text that the whole page should know
 export const tick = signal(0); // counts the changes that panels should show
+export const slowTick = signal(0); // the same, for panels of many words
 export const cursor = signal(null); // the instant shown [ms]; null: now
 export const gap = signal(null);
 export const selected = signal(null);
@@ -56,6 +57,7 @@ export function seek(t) {
   }
   cursor.value = t;
   tick.value += 1;
+  slowTick.value += 1;
 }
 
 export function seekEvent(step) {
@@ -67,6 +69,7 @@ export function seekEvent(step) {
   past = run.after(to);
   cursor.value = ms(event.stamp_ns);
   tick.value += 1;
+  slowTick.value += 1;
 }
 
 export const isActive = (state) => state?.since != null;
