@@ -99,7 +99,9 @@ class MissionApp(App[None]):
             self._begin(machine, machine.record)
         self._catch_up(machine)
         self._draw_status(machine)
-        self._draw_tree()
+        events = machine.events()
+        ended = (machine.stale is not None or machine.recorded) and events
+        self._draw_tree(events[-1]["stamp_ns"] if ended else time.time_ns())
         self._draw_goals()
 
     def _first(self) -> Machine | None:
@@ -136,7 +138,7 @@ class MissionApp(App[None]):
             table = self.query_one(DataTable)
             table.clear()
             for entry in list(self._state.data["userdata"].values())[:100]:
-                value = shorten(str(entry["value"]), 60)
+                value = shorten(str(entry["value"]), 34)
                 table.add_row(entry["key"], value, entry["writer"].rpartition("/")[2])
 
     def _draw_status(self, machine: Machine) -> None:
@@ -157,8 +159,7 @@ class MissionApp(App[None]):
         )
         self.query_one("#status", Static).update(text)
 
-    def _draw_tree(self) -> None:
-        now = time.time_ns()
+    def _draw_tree(self, now: int) -> None:
         for path, node in self._places.items():
             if node.data is None:
                 continue
@@ -265,6 +266,7 @@ def _label(record: StateRecord, state: dict[str, Any] | None, now: int) -> Text:
 def _line(event: dict[str, Any]) -> Text:
     words = event.get("outcome") or event.get("error") or event.get("status") or event["kind"]
     style = STYLES[outcome_class(str(words))]
+    words = {"PreemptRequested": "asked to stop", "Started": "started"}.get(str(words), words)
     clock = time.strftime("%H:%M:%S", time.localtime(event["stamp_ns"] / 1e9))
     name = shorten(event["path"].rpartition("/")[2])
     return Text.assemble(
