@@ -1,5 +1,7 @@
 # smachpy: `make run` drives the patrol mission, `make test` checks everything.
 BIN := .venv/bin
+# Continuous integration (CI=true) runs the slow tests too.
+TESTS := $(if $(CI),,-m "not slow")
 
 .PHONY: help run test lint types format bench clean
 
@@ -11,7 +13,7 @@ run:  ## Drive the simulated robot through the patrol mission
 	@$(BIN)/smachpy run patrol --start-robot --out out
 
 test: lint types  ## Check everything: ruff, mypy, import-linter, pytest
-	$(BIN)/python -m pytest -q -n 2
+	$(BIN)/python -m pytest -q -n 2 $(TESTS)
 
 lint:
 	@.ci/venv dot,sim,test

@@ -19,8 +19,15 @@ from pathlib import Path
 
 import pytest
 
+from actionlib_core import node
+
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+# Pages that drive the robot for long.
+SLOW = {"there_and_back.md", "countdown.md", "patrol.md"}
+MARKED = [
+    pytest.param(page, marks=pytest.mark.slow) if page.name in SLOW else page for page in PAGES
+]
 FENCE = re.compile(
     r"(?:<!-- (?P<directive>file|exit|shown): (?P<value>.*?) -->\n+)?"
     r"^```(?P<language>\w+)[^\n]*\n(?P<text>.*?)^```$",
@@ -96,9 +103,20 @@ def check_output(where: str, shown: str, output: str) -> None:
         )
 
 
+@pytest.fixture
+def fresh_program(monkeypatch):
+    """No default node from before, none left after."""
+    default = node._Default()
+    monkeypatch.setattr(node, "_default", default)
+    yield
+    if default._node is not None:
+        default._node.close()
+
+
 @pytest.mark.zenoh
 @pytest.mark.timeout(120)
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+@pytest.mark.parametrize("page", MARKED, ids=lambda page: str(page.relative_to(ROOT)))
+@pytest.mark.usefixtures("fresh_program")
 def test_page(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))

@@ -120,6 +120,7 @@ def far(files):
     return ["run", "patrol", "--start-robot", "--plain", "--out", str(files / "out"), "-i", way]
 
 
+@pytest.mark.slow
 def test_a_patrol_of_two_processes_succeeds_and_leaves_its_pictures(files):
     out = files / "out"
     done = run(
@@ -149,6 +150,7 @@ def test_a_signal_stops_the_robot_and_everything_ends_soon(far, number, code):
         assert not is_alive(robot)
 
 
+@pytest.mark.slow
 def test_a_mission_that_is_killed_takes_its_robot_along(far):
     with started(*far) as process:
         wait_for_line(process, "move_base")
@@ -189,6 +191,7 @@ def test_bad_input_is_one_screen_without_traceback(arguments, text, capsys):
     check_one_screen(capsys.readouterr().err, text)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [

@@ -71,6 +71,7 @@ def test_every_mission_succeeds(mission, name):
     assert run.goals_left == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RUNS)
 def test_a_hundred_seeds_give_the_same_verdict_twice(name):
     def verdict(seed):
