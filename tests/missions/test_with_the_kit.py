@@ -92,14 +92,14 @@ def test_no_mission_has_problems_that_a_check_finds(name):
 
 
 def test_whatever_states_return_the_patrol_ends(mission):
-    found = mission.explore(PATROL, preempts=0, max_time=40)
+    found = mission.explore(PATROL, grace=30, max_time=40)
     assert found.ok, found
     assert found.exhaustive
 
 
 def test_whatever_servers_do_the_patrol_ends(mission):
     found = mission.explore(
-        PATROL, preempts=0, real_actions=True, interleavings=False, max_runs=60, max_time=40
+        PATROL, grace=30, real_actions=True, interleavings=False, max_runs=60, max_time=40
     )
     assert found.ok, found
 
