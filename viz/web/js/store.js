@@ -91,6 +91,7 @@ export const runStatus = computed(() => {
   if (connection.value === "lost") return { word: "reconnecting", kind: "waiting" };
   if (data.ended != null) return { word: `ended: ${data.outcome}`, kind: "done" };
   if (about.control?.paused) return { word: "paused", kind: "waiting" };
+  if (data.states[model.value?.root.path]?.preempt) return { word: "preempting", kind: "preempted" };
   if (data.started == null) return { word: "not started", kind: "other" };
   return { word: about.recorded ? "recording ends here" : "running", kind: "active" };
 });
