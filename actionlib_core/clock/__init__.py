@@ -5,6 +5,8 @@ mission with its action servers runs unchanged on `RealClock` (wall time) or `Vi
 (deterministic, as fast as the computer allows).
 """
 
+from typing import TYPE_CHECKING, Any
+
 from actionlib_core.clock._current import current_clock as current_clock
 from actionlib_core.clock._current import use_clock as use_clock
 from actionlib_core.clock._protocol import Clock as Clock
@@ -13,9 +15,14 @@ from actionlib_core.clock._protocol import Task as Task
 from actionlib_core.clock._protocol import Timer as Timer
 from actionlib_core.clock._real import RealClock as RealClock
 from actionlib_core.clock._serial import SerialExecutor as SerialExecutor
-from actionlib_core.clock._virtual import VirtualClock as VirtualClock
-from actionlib_core.clock._virtual_parts import Deadlock as Deadlock
-from actionlib_core.clock._virtual_parts import TimeLimit as TimeLimit
+
+if TYPE_CHECKING:
+    from actionlib_core.clock._virtual import VirtualClock as VirtualClock
+    from actionlib_core.clock._virtual_parts import Deadlock as Deadlock
+    from actionlib_core.clock._virtual_parts import TimeLimit as TimeLimit
+
+# Only tests need virtual time; programs on robots start without it.
+_VIRTUAL = {"VirtualClock": "_virtual", "Deadlock": "_virtual_parts", "TimeLimit": "_virtual_parts"}
 
 __all__ = [
     "Clock",
@@ -30,3 +37,11 @@ __all__ = [
     "current_clock",
     "use_clock",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _VIRTUAL:
+        from importlib import import_module
+
+        return getattr(import_module(f"{__name__}.{_VIRTUAL[name]}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
