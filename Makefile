@@ -3,6 +3,9 @@ BIN := .venv/bin
 # Continuous integration (CI=true) runs the slow tests too.
 TESTS := $(if $(CI),,-m "not slow")
 
+# The commands and the tests start many processes; each is quicker with cached bytecode.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: help run test lint types format bench clean
 
 help:  ## Show the targets
