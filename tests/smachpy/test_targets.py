@@ -62,7 +62,9 @@ def test_a_mission_s_name_gives_its_factory():
 
 
 def test_an_unknown_mission_names_the_nearest():
-    with pytest.raises(TargetError, match="target 'helo': no such mission; .*Did you mean 'hello'"):
+    with pytest.raises(
+        TargetError, match=r"target 'helo': no such mission; .*Did you mean 'hello'"
+    ):
         load_target("helo")
 
 

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 
     from viz.live.machines import Machine, Machines
 
-COALESCE_S = 0.012
-"""Events wait so long for others: at most 60 messages a second."""
+COALESCE_S = 0.004
+"""Events wait so long for others, besides what their link has gathered already."""
 
 LIST_S = 0.5
 BEAT_S = 5.0

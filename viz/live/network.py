@@ -28,7 +28,7 @@ logger = logging.getLogger("viz.live")
 
 HISTORY_S = 3.0
 RETRY_S = 0.5
-GATHER_S = 0.008
+GATHER_S = 0.014
 """Events are worked off together that come so close to each other."""
 
 SETTLE_S = 0.3
