@@ -1,7 +1,7 @@
 # smachpy: `make run` drives the patrol mission, `make test` checks everything.
 BIN := .venv/bin
-# Continuous integration (CI=true) runs the slow tests too.
-TESTS := $(if $(CI),,-m "not slow")
+# Continuous integration (CI=true) runs the slow tests and those in a browser too.
+TESTS := $(if $(CI),,-m "not slow and not browser")
 
 # The commands and the tests start many processes; each is quicker with cached bytecode.
 unexport PYTHONDONTWRITEBYTECODE
