@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 _GRACE: Final = 1.5  # [s] from the end of its standard input until it is terminated
 _LAST_GRACE: Final = 1.0  # [s] from then until it is killed
+_BAD_INPUT: Final = 2  # its exit code when something it was given does not fit
 _KEPT_LINES: Final = 40  # of what it said
 
 
@@ -39,6 +40,7 @@ class RobotProcess:
     ) -> None:
         self._command = [sys.executable, "-m", "missions.move_base", "--child", *arguments]
         self._on_change = on_change
+        self._on_refusal: Callable[[], object] = lambda: None
         self._said: deque[str] = deque(maxlen=_KEPT_LINES)
         self._ready = current_clock().event()
         self._ended = current_clock().event()
@@ -90,6 +92,18 @@ class RobotProcess:
             code = self._process.returncode
             raise MissionError(said or f"the robot process ended with exit code {code}")
 
+    def on_refusal(self, callback: Callable[[], object]) -> None:
+        """Call `callback`, in a thread of the clock, when it ends because it may not be there."""
+        self._on_refusal = callback
+
+    def refused(self) -> bool:
+        """Tell whether it ended by itself because it may not be there: `check` says why."""
+        return (
+            self._ended.is_set()
+            and self._process is not None
+            and self._process.returncode == _BAD_INPUT
+        )
+
     def let_go(self) -> None:
         """Tell the process to end, without waiting for it."""
         if self._process is not None and self._process.stdin is not None:
@@ -125,4 +139,6 @@ class RobotProcess:
                 self._said.append(line)
         self._process.wait()
         self._ended.set()
+        if self.refused():
+            self._on_refusal()
         self._on_change()

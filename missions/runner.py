@@ -97,6 +97,7 @@ def run_mission(target: Target, options: RunOptions) -> int:
         if options.start_robot:
             arguments = ("--map", str(options.map), "--config", str(options.config))
             robot = RobotProcess((*arguments, *options.robot_arguments), on_change=waiter.wake)
+            robot.on_refusal(machine.request_preempt)
             stack.enter_context(robot)
         if options.out is not None:
             _prepare(options.out / f"{target.name}.svg", machine)
@@ -108,6 +109,8 @@ def run_mission(target: Target, options: RunOptions) -> int:
         stack.callback(machine.subscribe(view.on_event))
         outcome = _execute(machine, view, debug=options.debug)
         if robot is not None:
+            if robot.refused():  # an older robot of its name turned up late, and got the goals
+                robot.check()
             robot.let_go()
         if options.out is not None:
             files = write_pictures(target.name, machine, view.history, recorder, outcome, options)

@@ -59,6 +59,7 @@ __all__ = ["ZenohTransport"]
 D = TypeVar("D", bound=Declared)
 
 CLOSE_S = 0.5  # zenoh may take so long to leave the network; it is left behind after that
+SETTLE_S = 0.05  # the interpreter's end waits so long for callbacks that had begun
 IDLE_S = 0.3  # `close` waits so long for callbacks that are running
 ACCESS_S = 1.0  # longest wait for the other side's access rules
 ASK_S = 5.0  # longest wait for a latched publisher's answer
@@ -303,8 +304,15 @@ _open_transports: dict[ZenohTransport, None] = {}
 
 
 def _close_all() -> None:
+    """Leave the network, and let zenoh's threads that are about to enter Python do so.
+
+    CPython ends a foreign thread that asks for the interpreter after its end, which aborts the
+    process ("exception not rethrown") when zenoh's Rust is on the thread's stack. A callback that
+    had begun before the session closed can be at that point, and nothing tells.
+    """
     for transport in list(_open_transports):
         transport.close()
+    RealClock().sleep(SETTLE_S)
 
 
 atexit.register(_close_all)
