@@ -6,6 +6,7 @@ import subprocess
 import sys
 from typing import TYPE_CHECKING
 
+from actionlib_core.clock import current_clock
 from smachpy.exceptions import SmachError
 
 if TYPE_CHECKING:
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from types import TracebackType
     from typing import Self
 
+_START_S = 20.0  # a viewer that says nothing for so long is ended
 _GRACE_S = 1.5
 _LAST_GRACE_S = 0.5
 
@@ -53,7 +55,9 @@ class ViewerProcess:
             start_new_session=True,
         )
         assert self._process.stdout is not None
+        stuck = current_clock().call_later(_START_S, self._process.kill)  # then there is no line
         self.address = self._process.stdout.readline().strip()
+        stuck.cancel()
         if not self.address:
             assert self._process.stderr is not None
             said = self._process.stderr.read().strip()
