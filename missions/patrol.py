@@ -18,12 +18,12 @@ from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.sensor_msgs.msg import BatteryState
 from missions.interfaces import ChargeAction, ChargeGoal
 from missions.maps import OFFICE_WAYPOINTS
-from missions.waypoints import load_route
+from missions.waypoint_file import load_route
 from smachpy import CBState, Concurrence, MonitorState, SimpleActionState, StateMachine, UserData
 
 if TYPE_CHECKING:
     from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseGoal
-    from missions.waypoints import Route
+    from missions.waypoint_file import Route
 
 
 def patrol(waypoints: str | Path = OFFICE_WAYPOINTS, rounds: int = 1) -> StateMachine:

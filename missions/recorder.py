@@ -6,7 +6,7 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from missions.move_base.geometry import Pose2D, yaw_of
-from missions.waypoints import Waypoint
+from missions.waypoint_file import Waypoint
 from smachpy import events as ev
 
 if TYPE_CHECKING:

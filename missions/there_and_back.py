@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from missions.move_base.geometry import Pose2D
-from missions.waypoints import goal_at
+from missions.waypoint_file import goal_at
 from smachpy import MonitorState, SimpleActionState, StateMachine, UserData
 
 if TYPE_CHECKING:

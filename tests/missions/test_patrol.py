@@ -8,7 +8,7 @@ from actionlib_core.clock import VirtualClock, use_clock
 from missions.exceptions import InputFileError
 from missions.maps import OFFICE_WAYPOINTS
 from missions.patrol import patrol
-from missions.waypoints import load_route
+from missions.waypoint_file import load_route
 from smachpy import events as ev
 
 

@@ -9,7 +9,7 @@ from missions.exceptions import MissionError
 from missions.move_base.geometry import Pose2D
 from missions.recorder import TrackRecorder
 from missions.runner import RunOptions, build, good_outcomes, needed_servers
-from missions.waypoints import Waypoint, goal_at
+from missions.waypoint_file import Waypoint, goal_at
 from smachpy import events as ev
 from smachpy.targets import Target
 

@@ -16,7 +16,7 @@ from actionlib_core.topic import Subscriber, wait_for_message
 from missions.interfaces import ChargeAction, ChargeGoal
 from missions.move_base.geometry import Pose2D, wrap_angle
 from missions.move_base.server import RobotServer
-from missions.waypoints import goal_at
+from missions.waypoint_file import goal_at
 
 OFFICE_1 = Pose2D(2.0, 3.0, 0.0)
 OPEN_PLAN = Pose2D(16.5, 10.4, 1.57)

@@ -5,7 +5,7 @@ import pytest
 from missions.exceptions import InputFileError
 from missions.maps import OFFICE_MAP, OFFICE_ROBOT, OFFICE_WAYPOINTS
 from missions.move_base.config import load_config
-from missions.waypoints import load_route
+from missions.waypoint_file import load_route
 
 
 def test_the_office_route_lies_on_the_office_floor():
