@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from missions.arguments import Text, usage, wants_help
+from missions.exceptions import MissionError
 from missions.maps import OFFICE_MAP, OFFICE_ROBOT
 from missions.move_base.geometry import finite
 
@@ -26,9 +28,13 @@ def register_run(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "run",
         help="run a mission",
+        usage="smachpy run MISSION [OPTIONS] [-- ARGUMENTS]",
         description="Run a mission to its end and show it in the terminal. Exit codes: 0 it "
         "succeeded, 1 it ended otherwise, 2 bad input; the mission was preempted: 130 by Ctrl-C, "
         "143 by SIGTERM.",
+        epilog="What stands after -- are the arguments of the mission's function: smachpy run "
+        "there_and_back -- 4.6 10.6. 'smachpy run MISSION -- --help' shows them. Names are "
+        "changed by a:=b, __ns:=robot_1 or --ros-args.",
     )
     parser.add_argument(
         "target", metavar="MISSION", help="a name of `smachpy list`, module:factory, or a .py file"
@@ -40,7 +46,7 @@ def register_run(subparsers: Any) -> None:
         default=[],
         metavar="KEY=VALUE",
         type=_input,
-        help="an argument of the mission's function, or a userdata key; the value is YAML",
+        help="an argument of the mission's function by name, or a userdata key",
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="write pictures of the run there")
     parser.add_argument("--plain", action="store_true", help="lines only, for logs")
@@ -79,7 +85,7 @@ def register_run(subparsers: Any) -> None:
         metavar=("X", "Y", "YAW"),
         help="where it starts [m, m, rad]",
     )
-    parser.set_defaults(run=_run)
+    parser.set_defaults(run=_run, words=())
 
 
 def _add_watching(parser: argparse.ArgumentParser) -> None:
@@ -114,9 +120,14 @@ def _run(args: argparse.Namespace) -> int:
     from missions.watching import Watching
     from smachpy.targets import load_target
 
+    target = load_target(args.target)
+    if wants_help(args.words):
+        print(usage(target))
+        return 0
     pose: Sequence[float] = args.pose or ()
     options = RunOptions(
-        inputs=dict(args.input),
+        inputs=_inputs(args.input),
+        words=args.words,
         start_robot=args.start_robot,
         robot_arguments=("--pose", *(str(value) for value in pose)) if pose else (),
         map=args.map,
@@ -128,18 +139,20 @@ def _run(args: argparse.Namespace) -> int:
         debug=args.debug,
         watching=Watching(record=args.record, view=args.view, port=args.port, control=args.control),
     )
-    return run_mission(load_target(args.target), options)
+    return run_mission(target, options)
 
 
-def _input(text: str) -> tuple[str, object]:
-    """Read KEY=VALUE, where VALUE is YAML: 3, 0.5, true, [1, 2], some words."""
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
+def _inputs(pairs: Sequence[tuple[str, Text]]) -> dict[str, Text]:
+    inputs = dict(pairs)
+    if len(inputs) < len(pairs):
+        twice = next(key for key, _ in pairs if sum(key == other for other, _ in pairs) > 1)
+        raise MissionError(f"--input {twice}: given twice; expected once.")
+    return inputs
 
+
+def _input(text: str) -> tuple[str, Text]:
+    """Read KEY=VALUE."""
     key, equals, value = text.partition("=")
     if not (key and equals):
         raise argparse.ArgumentTypeError(f"got {text!r}; expected KEY=VALUE")
-    try:
-        return key, YAML(typ="safe", pure=True).load(value)
-    except YAMLError:
-        return key, value
+    return key, Text(value)

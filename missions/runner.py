@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-import inspect
 import signal
 import sys
 import traceback
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final, get_args, get_type_hints
+from typing import TYPE_CHECKING, Any, Final
 
 import viz
 from actionlib_core import shutdown
 from actionlib_core.clock import current_clock
 from actionlib_core.node import get_node
 from actionlib_core.presence import Kind, parse_token, token_pattern
+from missions.arguments import MisfitError, fit, parameters_of, read_words
 from missions.exceptions import MissionError
 from missions.maps import OFFICE_MAP, OFFICE_ROBOT
 from missions.recorder import TrackRecorder
@@ -24,7 +24,7 @@ from missions.watching import Watching, watched
 from smachpy import InvalidUserCodeError, describe
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from actionlib_core.node import Node
@@ -47,6 +47,7 @@ class RunOptions:
 
     Attributes:
         inputs: Arguments of the mission's function, or values of its userdata keys.
+        words: Arguments of its function, in order.
         start_robot: Start the simulated robot as a process of its own.
         robot_arguments: Further arguments for it.
         map: The robot's map, also for the picture of the track.
@@ -61,6 +62,7 @@ class RunOptions:
     """
 
     inputs: Mapping[str, object] = field(default_factory=dict)
+    words: tuple[str, ...] = ()
     start_robot: bool = False
     robot_arguments: tuple[str, ...] = ()
     map: Path = OFFICE_MAP
@@ -84,7 +86,7 @@ def run_mission(target: Target, options: RunOptions) -> int:
 
     Blocks: until the mission has ended.
     """
-    machine = build(target, options.inputs)
+    machine = build(target, options.inputs, options.words)
     record = describe(machine)
     needed = needed_servers(record) - set(getattr(target.thing, "serves", ()))
     recorder = TrackRecorder()
@@ -120,18 +122,21 @@ def run_mission(target: Target, options: RunOptions) -> int:
     return EXIT_SUCCESS if outcome in good_outcomes(record, options) else EXIT_OTHER_OUTCOME
 
 
-def build(target: Target, inputs: Mapping[str, object]) -> Container:
-    """Make the machine: inputs become arguments of its function where it has such, else userdata.
+def build(target: Target, inputs: Mapping[str, object], words: Sequence[str] = ()) -> Container:
+    """Make the machine.
+
+    Args:
+        target: The mission.
+        inputs: Arguments of its function, or values of its userdata keys, by name.
+        words: Arguments of its function as they stand after `--`.
 
     Raises:
-        MissionError: an input is neither, or of a wrong type.
+        MissionError: one of them does not fit, is missing, or is not known.
     """
-    thing = target.thing
-    parameters = inspect.signature(thing).parameters if inspect.isfunction(thing) else {}
-    hints = get_type_hints(thing) if parameters else {}
-    arguments = {k: _fit(k, v, hints.get(k)) for k, v in inputs.items() if k in parameters}
-    machine = target.build(**arguments)
-    known = {*parameters, *machine.get_registered_input_keys(), *machine.userdata.keys()}
+    machine = target.build(**read_words(target, words, inputs))
+    parameters = parameters_of(target.thing)
+    keys = machine.get_registered_input_keys()
+    known = {*parameters, *keys, *machine.userdata.keys()}
     for key, value in inputs.items():
         if key not in known:
             raise MissionError(
@@ -139,21 +144,32 @@ def build(target: Target, inputs: Mapping[str, object]) -> Container:
                 f"{sorted(known)}."
             )
         if key not in parameters:
-            machine.userdata[key] = value
+            machine.userdata[key] = _fit_userdata(machine, key, value)
+    missing = sorted(key for key in keys if key not in machine.userdata)
+    if missing:
+        raise MissionError(
+            f"mission {target.name!r}: input keys {missing} have no value; expected one for each. "
+            f"Try --input {missing[0]}=VALUE."
+        )
     return machine
 
 
-def _fit(name: str, value: object, hint: Any) -> object:
-    """Return an input as a parameter of type `hint` takes it."""
-    kinds = tuple(kind for kind in get_args(hint) or (hint,) if isinstance(kind, type))
-    if not kinds or isinstance(value, kinds):
-        return value
-    if float in kinds and isinstance(value, int):
-        return float(value)
-    if str in kinds:
-        return str(value)
-    expected = " or ".join(kind.__name__ for kind in kinds)
-    raise MissionError(f"--input {name}: got {value!r}; expected {expected}.")
+def _fit_userdata(machine: Container, key: str, value: object) -> object:
+    """Return an input as the machine's own value of that key has it, if there is one."""
+    own = machine.userdata[key] if key in machine.userdata else None  # noqa: SIM401  no dict
+    hint: Any = Any
+    if isinstance(own, bool | str):
+        hint = type(own)
+    elif isinstance(own, int | float):
+        hint = int | float
+    elif isinstance(own, list | dict):
+        hint = type(own)
+    try:
+        return fit(value, hint)
+    except MisfitError as error:
+        raise MissionError(
+            f"--input {key}: got {value!s:.60}; expected {error}, as the mission's own {own!r}."
+        ) from error
 
 
 def needed_servers(record: StateRecord) -> set[str]:

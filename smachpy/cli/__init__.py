@@ -1,7 +1,9 @@
 """The `smachpy` command: every subcommand is found through an entry point.
 
 A package adds a subcommand with an entry point in the group `smachpy.commands` whose object is a
-function `register(subparsers)`. It adds one parser and sets `run=function(args) -> int`.
+function `register(subparsers)`. It adds one parser and sets `run=function(args) -> int`. With
+`words=()` set as well it gets what stands after the first `--` there, and renaming in the style of
+ROS (`a:=b`, `--ros-args`) in `names`.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from importlib.metadata import EntryPoint, entry_points, version
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from actionlib_core.exceptions import ActionlibError
+from actionlib_core.names import parse_arguments
 from smachpy.exceptions import SmachError
 
 if TYPE_CHECKING:
@@ -33,6 +36,16 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         self.exit(EXIT_ERROR, f"{self.prog}: {message}\nTry '{self.prog} --help'.\n")
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Put aside what is not for this command but for what it runs, if it has `words`."""
+        if args is None or self.get_default("words") is None:
+            return super().parse_known_args(args, namespace)
+        end = args.index("--") if "--" in args else len(args)
+        names = parse_arguments(args[:end])
+        found, unknown = super().parse_known_args(list(names.rest), namespace)
+        found.words, found.names = tuple(args[end + 1 :]), names
+        return found, unknown
 
 
 def main(argv: Sequence[str] | None = None) -> int:

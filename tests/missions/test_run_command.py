@@ -177,7 +177,7 @@ def test_a_robot_that_is_killed_ends_the_mission(far):
         (["run", "patroll"], "Did you mean 'patrol'"),
         (["run", "patrol", "-i", "waypoints=nowhere.yaml"], "nowhere.yaml: got"),
         (["run", "patrol", "-i", "speed=3"], "no such input; expected one of"),
-        (["run", "patrol", "-i", "rounds=many"], "expected int"),
+        (["run", "patrol", "-i", "rounds=many"], "expected a whole number"),
         (["run", "patrol", "-i", "speed"], "expected KEY=VALUE"),
         (["run", "patrol", "--start-robot", "--pose", "nan", "0", "0"], "invalid finite value"),
     ],

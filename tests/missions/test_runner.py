@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 import smachpy
+from missions.arguments import Text
 from missions.exceptions import MissionError
 from missions.move_base.geometry import Pose2D
 from missions.recorder import TrackRecorder
@@ -47,6 +48,31 @@ def test_inputs_become_arguments_or_userdata():
     assert built.userdata.places == ["a"]
 
 
+def test_inputs_must_fit_the_machines_own_values():
+    built = build(target(machine), {})
+    assert not list(built.userdata.keys())
+    own = target(lambda: machine(places=[], speed=1, name="a", thing=None))
+    built = build(own, {"speed": Text("2.5"), "places": Text("[a]"), "name": Text("7")})
+    assert [built.userdata[key] for key in ("speed", "places", "name")] == [2.5, ["a"], "7"]
+    assert build(own, {"thing": Text("{a: 1}")}).userdata.thing == {"a": 1}
+    with pytest.raises(MissionError, match=r"--input speed: got fast; expected a number, as .* 1"):
+        build(own, {"speed": Text("fast")})
+
+
+def test_input_keys_without_a_value_are_named():
+    def factory():
+        sm = smachpy.StateMachine(outcomes=["done"], input_keys=["place", "item"])
+        with sm:
+            smachpy.StateMachine.add("ONE", Done())
+        return sm
+
+    with pytest.raises(
+        MissionError, match=r"input keys \['item'\] have no value; .* --input item="
+    ):
+        build(target(factory), {"place": "here"})
+    build(target(factory), {"place": "here", "item": None})
+
+
 def test_an_unknown_input_names_the_known_ones():
     with pytest.raises(
         MissionError, match=r"--input sped: .* expected one of \['places', 'speed'\]"
@@ -65,7 +91,7 @@ def test_inputs_must_fit_the_parameters(value, fitted):
         return machine()
 
     if fitted is None:
-        with pytest.raises(MissionError, match=r"--input speed: got .*; expected float"):
+        with pytest.raises(MissionError, match=r"--input speed: got .*; expected a number"):
             build(target(factory), {"speed": value})
     else:
         build(target(factory), {"speed": value})
