@@ -79,6 +79,9 @@ class ControlConfig:
 
     rate: float = _quantity(20.0, "Hz", "Control steps a second.", low=5, high=1000)
     feedback_rate: float = _quantity(10.0, "Hz", "Feedback messages a second.", above=0, high=100)
+    override_time: float = _quantity(
+        0.5, "s", "A message on cmd_vel counts so long.", above=0, high=60
+    )
     xy_tolerance: float = _quantity(0.05, "m", "Distance that counts as there.", low=0.01, high=2)
     yaw_tolerance: float = _quantity(0.05, "rad", "Heading error allowed.", low=0.01, high=3.2)
     lookahead_time: float = _quantity(0.7, "s", "It steers to where it is then.", above=0, high=5)

@@ -1,8 +1,10 @@
-"""The robot on the network: actions `move_base` and `charge`, topics `odom` and `battery`."""
+"""The robot on the network: actions `move_base` and `charge`, topics, a service."""
 
 from __future__ import annotations
 
+import logging
 import math
+from functools import partial
 from typing import TYPE_CHECKING, Final
 
 from actionlib_core.interfaces.geometry_msgs.msg import (
@@ -19,26 +21,33 @@ from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBas
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.interfaces.sensor_msgs.msg import BatteryState
 from actionlib_core.interfaces.std_msgs.msg import Header
+from actionlib_core.interfaces.std_srvs.srv import Empty, EmptyResponse
 from actionlib_core.node import get_node
+from actionlib_core.service import Service
 from actionlib_core.simple_action_server import SimpleActionServer
 from actionlib_core.time import Time
-from actionlib_core.topic import Publisher
+from actionlib_core.topic import Publisher, Subscriber
 from missions.exceptions import NavigationError
 from missions.interfaces import ChargeAction, ChargeFeedback, ChargeResult
 from missions.move_base.geometry import Pose2D, quaternion_of, yaw_of
-from missions.move_base.navigation import STOP, drive_to
+from missions.move_base.navigation import STOP
+from missions.move_base.pilot import Pilot
+from missions.move_base.stepper import Stepper
 
 if TYPE_CHECKING:
-    from actionlib_core.clock import Task
+    from collections.abc import Callable
+
     from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseGoal
     from actionlib_core.node import Node
     from missions.interfaces import ChargeGoal
-    from missions.move_base.navigation import Command
     from missions.move_base.world import Robot
 
+logger = logging.getLogger(__name__)
+
 MAP_FRAME: Final = "map"
+ODOM_FRAME: Final = "odom"  # the same place as the map frame: the odometry does not drift
 BASE_FRAME: Final = "base_link"
-_LATE: Final = 0.5  # [s] a loop this late gives the lost time up instead of hurrying after it
+_UNHEARD: Final = 10  # battery periods between two messages that nobody hears
 _AT_DOCK: Final = 0.2  # [m] the charger reaches this far
 _CHARGE_PERIOD: Final = 0.5  # [s] between two feedback messages of `charge`
 _JUST_PAST: Final = 1e-3  # [s] waited longer, as a rounding error would never pass
@@ -48,29 +57,36 @@ _SHORTEST_ROTATION: Final = 1e-3  # a quaternion shorter than this is no rotatio
 class RobotServer:
     """Serves one robot.
 
-    The robot moves only while a goal of `move_base` is executed, in that server's own thread;
-    an idle robot costs one battery message now and then.
+    A stepper's thread moves the robot; the goal's own thread only waits for the end. A robot that
+    stands costs a battery message now and then, and none while nobody listens.
 
     Args:
         robot: The robot; nothing else may steer it.
         node: Where it is on the network; None takes the node in force.
+        stepper: Lets time pass for it and for others; None makes one for this robot alone.
 
     Threads: `start` and `close` may be called from any thread.
     """
 
-    def __init__(self, robot: Robot, *, node: Node | None = None) -> None:
+    def __init__(
+        self, robot: Robot, *, node: Node | None = None, stepper: Stepper | None = None
+    ) -> None:
         self._node = node if node is not None else get_node()
         self._clock = self._node.clock
         self._robot = robot
+        self._pilot = Pilot(robot)
         control = robot.config.control
-        self._dt = 1.0 / control.rate
-        self._feedback_every = max(1, round(control.rate / control.feedback_rate))
-        self._steps = 0
-        self._next = 0.0
-        self._closing = self._clock.event()
-        self._wake = self._clock.event()
-        self._charge_wake = self._clock.event()
-        self._housekeeper: Task | None = None
+        self._owns_stepper = stepper is None
+        self._stepper = stepper or Stepper(
+            self._clock, rate=control.rate, reports=control.feedback_rate
+        )
+        self._report_period = 1.0 / control.feedback_rate
+        self._reported = self._battery_told = -math.inf
+        self._moved = False
+        self._closing = self._clock.event("the robot closes")
+        self._wake = self._clock.event("the end of the drive")
+        self._charge_wake = self._clock.event("the charge")
+        self._parts: list[Publisher | Subscriber[Twist] | Service] = []
         self._odom = Publisher("odom", Odometry, latch=True, node=self._node)
         self._battery = Publisher("battery", BatteryState, latch=True, node=self._node)
         self._move = SimpleActionServer(
@@ -90,8 +106,15 @@ class RobotServer:
         """
         self._move.start()
         self._charge.start()
+        self._parts = [
+            self._odom,
+            self._battery,
+            Subscriber("cmd_vel", Twist, self._on_cmd_vel, queue_size=1, node=self._node),
+            Service("move_base/clear_costmaps", Empty, self._on_clear, node=self._node),
+        ]
         self._publish_odometry()
-        self._housekeeper = self._clock.spawn(self._keep_house, name="robot battery")
+        self._publish_battery()
+        self._stepper.add(self)
 
     def wait(self) -> None:
         """Wait until `close` was called.
@@ -113,91 +136,125 @@ class RobotServer:
         self._charge_wake.set()
         self._move.stop()
         self._charge.stop()
-        if self._housekeeper is not None:
-            self._housekeeper.join(1.0)
-        self._odom.unregister()
-        self._battery.unregister()
+        self._stepper.remove(self)
+        if self._owns_stepper:
+            self._stepper.close()
+        for part in self._parts:
+            part.unregister() if isinstance(part, (Publisher, Subscriber)) else part.close()
+
+    # -- steps: the stepper's thread -----------------------------------------------------------
+
+    def is_busy(self, now: float) -> bool:
+        """Tell whether the robot moves or is to move."""
+        return self._pilot.is_busy(now)
+
+    def step(self, now: float, dt: float) -> None:
+        """Drive for `dt` seconds."""
+        self._moved = True
+        self._pilot.step(now, dt)
+
+    def report(self, now: float) -> None:
+        """Send feedback, odometry and battery where they are due; tell what has ended."""
+        moved, self._moved = self._moved, False
+        if moved and now - self._reported > self._report_period - _JUST_PAST:
+            self._reported = now
+            self._publish_feedback()
+            if self._odom.get_num_connections() or self._robot.body.standing:
+                self._publish_odometry()
+        self._report_battery(now)
+        with self._stepper.lock:
+            ended = self._pilot.take_ends()
+        for tell in ended:
+            tell()
+
+    # -- by hand -------------------------------------------------------------------------------
+
+    def _on_cmd_vel(self, twist: Twist) -> None:
+        command = twist.linear.x, twist.angular.z
+        if not all(math.isfinite(value) for value in command):
+            logger.error(
+                "%s: got a speed that is no finite number; it stops", self._node.resolve("cmd_vel")
+            )
+            command = STOP
+        with self._stepper.lock:
+            self._pilot.override(self._clock.now(), command)
+        self._stepper.wake()
+
+    def _on_clear(self, _request: object) -> EmptyResponse:
+        with self._stepper.lock:
+            self._robot.forget()
+            self._pilot.plan_anew()
+        return EmptyResponse()
 
     # -- move_base -----------------------------------------------------------------------------
 
     def _drive(self, goal: MoveBaseGoal) -> None:
-        self._next = self._clock.now()
         try:
-            self._go(self._target(goal.target_pose))
+            target = self._target(goal.target_pose)
+            self._robot.check_place(target.x, target.y)
         except NavigationError as error:
-            self._halt()
+            self._order(self._pilot.stop)
             self._move.set_aborted(text=str(error))
+            return
+        trouble = self._order(partial(self._pilot.drive, target))
+        if trouble is None:
+            self._order(self._pilot.stop)
+            self._give_way()
+        elif trouble:
+            self._move.set_aborted(text=trouble)
+        else:
+            self._move.set_succeeded(text="arrived")
 
-    def _go(self, target: Pose2D) -> None:
-        """Drive to `target`; ends the goal unless it fails.
-
-        Raises:
-            NavigationError: it failed.
-        """
-        for command in drive_to(self._robot, target):
-            if self._move.is_preempt_requested():
-                self._halt()
-                self._move.set_preempted(text="stopped on request")
-                return
-            self._step(command)
-            self._check_health()
-        self._catch_up()
-        self._publish_odometry()
-        self._move.set_succeeded(text="arrived")
-
-    def _halt(self) -> None:
-        """Brake to a stop; a new goal that waits takes over at once, moving as it is."""
-        robot = self._robot
-        while not (robot.body.standing or self._move.is_new_goal_available()):
-            if self._closing.is_set():
-                return
-            self._step(STOP)
-        self._catch_up()
-        self._publish_odometry()
-
-    def _step(self, command: Command) -> None:
-        """Drive for one control period; now and then let time catch up and report.
-
-        Blocks: until the time that was driven has passed, less when the goal is to stop.
-        """
-        self._robot.step(self._next, self._dt, command)
-        self._next += self._dt
-        self._steps += 1
-        if self._steps % self._feedback_every == 0:
-            self._catch_up()
-            self._report()
-
-    def _catch_up(self) -> None:
-        wait = self._next - self._clock.now()
-        if wait > 0.0:
-            self._wake.wait(wait)
-            if not self._closing.is_set():
-                self._wake.clear()
-        elif wait < -_LATE:
-            self._next -= wait
-
-    def _check_health(self) -> None:
+    def _give_way(self) -> None:
+        """End the goal that was asked to stop."""
         if self._closing.is_set():
-            raise NavigationError("the robot is shutting down")
-        if self._steps % self._feedback_every == 0 and not self._robot.battery.charge(self._next):
-            raise NavigationError("the battery is empty")
+            self._move.set_aborted(text="the robot is shutting down")
+        else:
+            self._move.set_preempted(text="stopped on request")
 
-    def _report(self) -> None:
-        """Send feedback and odometry."""
-        header = self._header(MAP_FRAME)
-        pose = _pose_message(self._robot.body.pose)
+    def _order(self, order: Callable[[Callable[[str], object]], object]) -> str | None:
+        """Give the pilot an order and wait for its end.
+
+        Returns:
+            What went wrong, "" for nothing; None when a newer goal waits, the goal is to stop while
+            it drives, or the robot closes.
+
+        Blocks: until then.
+        """
+        ended: list[str] = []
+        driving = order != self._pilot.stop
+
+        def done(trouble: str) -> None:
+            ended.append(trouble)
+            self._wake.set()
+
+        with self._stepper.lock:
+            order(done)
+        self._stepper.wake()
+        while not ended:
+            asked = self._move.is_preempt_requested() and driving
+            if self._closing.is_set() or asked or self._move.is_new_goal_available():
+                with self._stepper.lock:
+                    self._pilot.let_go()
+                return None
+            self._wake.wait()
+            self._wake.clear()
+        return ended[0]
+
+    def _publish_feedback(self) -> None:
         if self._move.is_active():
-            self._move.publish_feedback(MoveBaseFeedback(PoseStamped(header, pose)))
-        self._publish_odometry(header, pose)
+            pose = _pose_message(self._robot.body.pose)
+            stamped = PoseStamped(self._header(MAP_FRAME), pose)
+            self._move.publish_feedback(MoveBaseFeedback(stamped))
 
-    def _publish_odometry(self, header: Header | None = None, pose: Pose | None = None) -> None:
+    def _publish_odometry(self) -> None:
         body = self._robot.body
         twist = Twist(linear=Vector3(x=body.speed), angular=Vector3(z=body.turn_rate))
         self._odom.publish(
             Odometry(
-                header=header or self._header(MAP_FRAME),
+                header=self._header(ODOM_FRAME),
                 child_frame_id=BASE_FRAME,
-                pose=PoseWithCovariance(pose=pose or _pose_message(body.pose)),
+                pose=PoseWithCovariance(pose=_pose_message(body.pose)),
                 twist=TwistWithCovariance(twist=twist),
             )
         )
@@ -278,10 +335,15 @@ class RobotServer:
 
     # -- battery -------------------------------------------------------------------------------
 
-    def _keep_house(self) -> None:
-        while not self._closing.is_set():
+    def _report_battery(self, now: float) -> None:
+        """Publish the battery when it is due, seldom while nobody listens."""
+        period = self._robot.config.battery.period
+        since = now - self._battery_told
+        if since < period - _JUST_PAST:
+            return
+        if self._battery.get_num_connections() or since > _UNHEARD * period:
+            self._battery_told = now
             self._publish_battery()
-            self._closing.wait(self._robot.config.battery.period)
 
     def _publish_battery(self) -> None:
         battery = self._robot.battery

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from missions.move_base.geometry import Pose2D
     from missions.move_base.occupancy import OccupancyMap
 
+_ROOM_BESIDE: Final = 0.2  # [m] looked for ahead besides the braking distance
 _KEPT_PLANNERS: Final = 8  # of the last sets of obstacles
 
 
@@ -105,7 +106,7 @@ class Robot:
         body.steer(command[0], command[1], dt)
         body.advance(dt)
         self.bumped = False
-        if self._touches(body.x, body.y) and not self._touches(x, y):
+        if self._hits(x, y, body.x, body.y):
             body.x, body.y, body.yaw, body.speed = x, y, yaw, 0.0
             self.bumped = True
         self.odometer += abs(body.speed) * dt
@@ -113,6 +114,28 @@ class Robot:
         if share != self._share:
             self._share = share
             self.battery.drive(now, share)
+
+    def room(self, command: tuple[float, float]) -> float:
+        """Return the free distance [m] ahead on the arc of a command (speed, turn rate).
+
+        Looked for no farther than it takes to brake.
+        """
+        speed, turn_rate = command
+        body = self.body
+        fastest = max(abs(speed), abs(body.speed))
+        braking = fastest * fastest / self.config.robot.braking + _ROOM_BESIDE
+        step = math.copysign(self._world.map.resolution / 2.0, speed)
+        turn = turn_rate * step / speed if speed else 0.0
+        x, y, yaw = body.pose
+        done = 0.0
+        while done < braking:
+            yaw += turn
+            ahead_x, ahead_y = x + step * math.cos(yaw), y + step * math.sin(yaw)
+            if self._hits(x, y, ahead_x, ahead_y):
+                break
+            x, y = ahead_x, ahead_y
+            done += abs(step)
+        return done
 
     def look(self) -> bool:
         """Compare the floor in sight with what is known.
@@ -156,6 +179,10 @@ class Robot:
     def _sees(self, obstacle: Obstacle) -> bool:
         distance = math.hypot(obstacle.x - self.body.x, obstacle.y - self.body.y)
         return distance <= self.config.robot.sight + obstacle.radius
+
+    def _hits(self, x: float, y: float, new_x: float, new_y: float) -> bool:
+        """Tell whether the body would run into something; out of something it may always go."""
+        return self._touches(new_x, new_y) and not self._touches(x, y)
 
     def _touches(self, x: float, y: float) -> bool:
         """Tell whether a body at (x, y) would overlap something solid."""

@@ -7,12 +7,14 @@ import pytest
 
 from actionlib_core.exceptions import ServerConflictError
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
-from actionlib_core.interfaces.geometry_msgs.msg import PoseStamped
+from actionlib_core.interfaces.geometry_msgs.msg import PoseStamped, Twist, Vector3
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.interfaces.sensor_msgs.msg import BatteryState
+from actionlib_core.interfaces.std_srvs.srv import Empty
+from actionlib_core.service import ServiceProxy
 from actionlib_core.simple_action_client import SimpleActionClient
-from actionlib_core.topic import Subscriber, wait_for_message
+from actionlib_core.topic import Publisher, Subscriber, wait_for_message
 from missions.interfaces import ChargeAction, ChargeGoal
 from missions.move_base.geometry import Pose2D, wrap_angle
 from missions.move_base.server import RobotServer
@@ -156,7 +158,7 @@ def test_an_empty_battery_stops_it(office_robot, simulate):
 def test_odometry_and_battery_can_be_watched_at_rest_and_on_the_way(clock, simulation, client):
     odometry = wait_for_message("odom", Odometry, 1.0)
     assert odometry.pose.pose.position.x == pytest.approx(9.8)
-    assert (odometry.header.frame_id, odometry.child_frame_id) == ("map", "base_link")
+    assert (odometry.header.frame_id, odometry.child_frame_id) == ("odom", "base_link")
     battery = wait_for_message("battery", BatteryState, 1.0)
     assert battery.percentage == pytest.approx(1.0, abs=1e-3)
     assert battery.power_supply_status == BatteryState.POWER_SUPPLY_STATUS_DISCHARGING
@@ -243,6 +245,131 @@ def test_without_a_dock_there_is_no_charging(office_robot, simulate):
         client.wait_for_server()
         client.send_goal_and_wait(ChargeGoal(until=0.9))
         assert client.get_goal_status_text() == "this robot has no dock"
+
+
+# -- by hand ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def teleop(clock, simulation):
+    """Sends a speed ten times a second for some seconds."""
+    with Publisher("cmd_vel", Twist) as publisher:
+
+        def send(speed, turn_rate, seconds):
+            for _ in range(round(seconds * 10)):
+                publisher.publish(Twist(linear=Vector3(x=speed), angular=Vector3(z=turn_rate)))
+                clock.sleep(0.1)
+
+        yield send
+
+
+def test_it_is_driven_by_hand_within_its_acceleration(clock, simulation, teleop):
+    body, limits = simulation.robot.body, simulation.robot.config.robot
+    before = body.pose
+    teleop(0.5, 0.0, 0.2)
+    assert 0.0 < body.speed <= 0.3 * limits.acceleration
+    teleop(0.5, 0.0, 1.0)
+    assert body.speed == pytest.approx(0.5)
+    clock.sleep(2.0)
+    assert body.standing
+    ahead = before.then(Pose2D(before.distance(body.pose), 0, 0))
+    assert body.pose.distance(ahead) < 1e-6
+    assert 0.5 * 1.2 < before.distance(body.pose) < 0.5 * (1.2 + 0.5 + 0.4)
+
+
+def test_it_stops_half_a_second_after_the_last_message(clock, simulation, teleop):
+    teleop(0.4, 0.0, 0.5)
+    clock.sleep(0.35)
+    assert simulation.robot.body.speed == pytest.approx(0.4)
+    clock.sleep(0.5)
+    assert simulation.robot.body.standing
+
+
+def test_it_turns_by_hand(clock, simulation, teleop):
+    before = simulation.robot.body.yaw
+    teleop(0.0, 0.5, 2.0)
+    clock.sleep(1.0)
+    turned = wrap_angle(simulation.robot.body.yaw - before)
+    assert turned == pytest.approx(0.5 * 2.4, abs=0.12)
+    assert simulation.robot.odometer == 0.0
+
+
+@pytest.mark.parametrize("speed", [5.0, 0.3])
+def test_driven_by_hand_it_stops_before_a_wall_without_a_bump(simulation, teleop, speed):
+    bumps = []
+    step = simulation.robot.step
+
+    def watch(*arguments):
+        step(*arguments)
+        bumps.append(simulation.robot.bumped)
+
+    simulation.robot.step = watch
+    teleop(speed, 0.0, 8.0)
+    body = simulation.robot.body
+    assert body.standing
+    assert len(bumps) > 50
+    assert not any(bumps)
+    nose = body.pose.then(Pose2D(0.25 + 0.12, 0, 0))
+    row, column = simulation.world.map.cell(nose.x, nose.y)
+    assert (simulation.world.map.cells[row - 2 : row + 3, column - 2 : column + 3] == 100).any()
+
+
+def test_a_goal_waits_while_somebody_drives_by_hand_and_goes_on_afterwards(
+    clock, simulation, client, teleop
+):
+    client.send_goal(goal_at(OFFICE_1))
+    clock.sleep(2.0)
+    teleop(-0.2, 0.0, 3.0)
+    assert simulation.robot.body.speed == pytest.approx(-0.2)
+    assert client.get_state() == GoalStatus.ACTIVE
+    client.wait_for_result()
+    assert client.get_state() == GoalStatus.SUCCEEDED
+    assert simulation.robot.body.pose.distance(OFFICE_1) < 0.05
+
+
+def test_a_cancel_does_not_wait_for_the_hand(clock, simulation, client, teleop):
+    client.send_goal(goal_at(OFFICE_1))
+    clock.sleep(2.0)
+    teleop(0.1, 0.0, 1.0)
+    client.cancel_goal()
+    clock.sleep(0.2)
+    assert client.get_state() == GoalStatus.PREEMPTED
+    assert simulation.robot.body.speed == pytest.approx(0.1)
+
+
+def test_a_speed_that_is_no_number_stops_it(clock, simulation, teleop, caplog):
+    teleop(0.4, 0.0, 1.0)
+    teleop(math.nan, 0.0, 0.1)
+    clock.sleep(0.5)
+    assert simulation.robot.body.standing
+    assert "cmd_vel: got a speed that is no finite number" in caplog.text
+
+
+# -- the costmap -----------------------------------------------------------------------------------
+
+
+def test_clear_costmaps_forgets_obstacles_that_went_unseen(clock, simulation, client):
+    world, robot = simulation.world, simulation.robot
+    obstacles = [world.add_obstacle(6.0, y, 0.4) for y in (6.9, 7.6, 8.3)]
+    assert drive(client, OFFICE_1)[0] == GoalStatus.ABORTED
+    assert drive(client, Pose2D(11.5, 8.0, 0))[0] == GoalStatus.SUCCEEDED
+    for obstacle in obstacles:
+        world.remove_obstacle(obstacle)
+    assert set(robot.known_obstacles) == set(obstacles)
+    ServiceProxy("move_base/clear_costmaps", Empty)()
+    assert robot.known_obstacles == ()
+    start = robot.body.pose
+    client.send_goal(goal_at(OFFICE_1))
+    clock.sleep(4.0)
+    assert robot.body.pose.distance(start) > 1.0
+    client.wait_for_result()
+    assert client.get_state() == GoalStatus.SUCCEEDED
+
+
+def test_clear_costmaps_sees_at_once_what_is_still_there(simulation):
+    obstacle = simulation.world.add_obstacle(11.5, 7.8, 0.3)
+    ServiceProxy("move_base/clear_costmaps", Empty)()
+    assert simulation.robot.known_obstacles == (obstacle,)
 
 
 # -- names -----------------------------------------------------------------------------------------
