@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from actionlib_core._action_wire import ActionTypes
 from actionlib_core.simple_action_server import SimpleActionServer
 from smachpy import log
+from smachpy._runtime.asker import asking
 from smachpy.events import UserdataWritten
 from smachpy.exceptions import InvalidStateError, did_you_mean
 from smachpy.user_data import Remapper, UserData
@@ -173,7 +174,8 @@ class ActionServerWrapper:
         with self._lock:
             executing = self._executing
         if executing:
-            self.wrapped_container.request_preempt()
+            with asking("action", self._server_name, "the server stops"):
+                self.wrapped_container.request_preempt()
         self._action_server.stop()
         if self._unsubscribe is not None:
             self._unsubscribe()
@@ -260,7 +262,15 @@ class ActionServerWrapper:
         """Preempt the container; the action server calls it."""
         with self._lock:  # so that it never hits the run of the next goal; nothing here waits
             if self._executing and self._action_server.is_preempt_requested():
-                self.wrapped_container.request_preempt()
+                with asking("action", self._server_name, self._why()):
+                    self.wrapped_container.request_preempt()
+
+    def _why(self) -> str:
+        """Say whether a cancel or a newer goal asks; goal ids begin with the client's name."""
+        newer, current = self._action_server.next_goal, self._action_server.current_goal
+        if newer is not None:
+            return f"newer goal {newer.get_goal_id().id}"
+        return "cancel" if current is None else f"cancel of goal {current.get_goal_id().id}"
 
     # -- feedback ------------------------------------------------------------------------------
 

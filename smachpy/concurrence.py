@@ -9,6 +9,7 @@ from smachpy._construction import construction_method
 from smachpy._core.rules import Rule, all_of, any_of, as_rules, decide, n_of
 from smachpy._core.spec import ChildSpec, ConcurrenceSpec
 from smachpy._core.validate import concurrence_problems
+from smachpy._runtime.asker import asking
 from smachpy._runtime.branches import Group
 from smachpy.container import Container
 from smachpy.events import Preempted
@@ -263,8 +264,9 @@ class Concurrence(Container):
                 self.call_transition_cbs()
         try:
             self._see_them_end(group)
-        except BaseException:
-            self._preempt_branches(group, group.running())
+        except BaseException as error:
+            with asking("concurrence", group.frame.path, f"raised {type(error).__name__}"):
+                self._preempt_branches(group, group.running())
             raise
 
     def _see_them_end(self, group: Group) -> None:
@@ -278,14 +280,16 @@ class Concurrence(Container):
                     self._branch_ended(group, branch)
                 except InvalidUserCodeError as error:
                     failure = failure or error
-                    self._preempt_branches(group, group.running())
+                    with asking("concurrence", group.frame.path, "child_termination_cb raised"):
+                        self._preempt_branches(group, group.running())
         if failure is not None:
             raise failure
         group.raise_errors()
 
     def _branch_ended(self, group: Group, branch: Branch) -> None:
         if branch.error is not None:
-            self._preempt_branches(group, group.running())
+            with asking("concurrence", branch.here(), f"raised {type(branch.error).__name__}"):
+                self._preempt_branches(group, group.running())
             return
         if self._transition_cbs:
             self.call_transition_cbs()
@@ -298,7 +302,8 @@ class Concurrence(Container):
                 f"{group.frame.path}: child_termination_cb raised {type(error).__name__}: {error}",
                 path=group.frame.path,
             ) from error
-        self._preempt_branches(group, self._chosen(group, answer))
+        with asking("concurrence", branch.here(), f"ended with {branch.outcome!r}"):
+            self._preempt_branches(group, self._chosen(group, answer))
 
     def _chosen(self, group: Group, answer: Any) -> list[Branch]:
         """Return the branches that the answer of child_termination_cb names."""

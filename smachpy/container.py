@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
 from smachpy import log
 from smachpy._construction import Openable
 from smachpy._core.typed import CheckedDict
+from smachpy._runtime.asker import asking, current_asker
 from smachpy._runtime.callbacks import Callbacks
 from smachpy._runtime.frame import FRAME, Frame
 from smachpy._runtime.root import execute_root
 from smachpy._runtime.step import Step
-from smachpy._runtime.watch import arm, disarm
+from smachpy._runtime.watch import arm, disarm, grace_of
 from smachpy.events import PreemptRequested
 from smachpy.exceptions import (
     InconsistentMachineError,
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from typing import Unpack
 
     from actionlib_core.clock import Event as ClockEvent
+    from smachpy._runtime.asker import Asker
     from smachpy.control import Control
     from smachpy.state import StateOptions
     from smachpy.user_data import Remapper
@@ -53,6 +55,7 @@ class Container(Openable, Callbacks, State):
     is_container: ClassVar[bool] = True
     name: str | None = None
     _end_waiters: tuple[ClockEvent, ...] = ()
+    _asker: Asker | None = None  # of a preempt that came before the run
 
     def __init__(
         self,
@@ -299,20 +302,34 @@ class Container(Openable, Callbacks, State):
             if self._frame is None:
                 self._preempt_requested = False
 
-    def request_preempt(self) -> None:
+    def request_preempt(self, *, by: str = "") -> None:
         """Ask the container and all active states below it to stop.
 
         Before a run it ends the next one at once. When it returns, every active descendant has
         been told.
 
+        Args:
+            by: Who asks, for those who watch; "" finds out what it can (see
+                `smachpy.events.PreemptRequested`).
+
         Threads: any thread, callback or signal handler; never waits for a state.
         """
+        if by:
+            with asking("program", by):
+                self._preempt()
+        else:
+            self._preempt()
+
+    def _preempt(self) -> None:
         with self._lock:
-            super().request_preempt()
+            State.request_preempt(self)
             frame = self._frame
-            if frame is not None:
-                if frame.parent is None:
-                    frame.note(frame.path, PreemptRequested)
+            if frame is None:
+                self._asker = current_asker()
+            else:
+                if frame.parent is None and frame.run.watched:
+                    frame.asked = True
+                    frame.note(frame.path, PreemptRequested, *current_asker())
                 self._tell_children(frame)
         if frame is not None and frame.parent is None:
             frame.run.flush()
@@ -326,7 +343,10 @@ class Container(Openable, Callbacks, State):
     def _tell(self, frame: Frame, step: Step) -> None:
         """Ask one child to stop and see that it does; called with the lock held."""
         frame.told = step
-        frame.note(f"{frame.path}/{step.label}", PreemptRequested)
+        if frame.run.watched:
+            grace = None if step.state.is_container else grace_of(frame, step)
+            fields = (*current_asker(), grace)
+            frame.note(f"{frame.path}/{step.label}", PreemptRequested, *fields)
         step.state.request_preempt()
         arm(frame, step)
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
+from smachpy._runtime.asker import asking
 from smachpy._runtime.frame import Override
 from smachpy.events import Paused, Resumed
 from smachpy.exceptions import SmachError, did_you_mean
@@ -75,9 +76,10 @@ class Control:
         with self._lock:
             self._paused = True
         if running == "cancel":
-            for frame, step in self._active():
-                if not step.state.is_container:
-                    _stop(frame, step, Override(label=step.label))
+            with asking("operator", "", "pause"):
+                for frame, step in self._active():
+                    if not step.state.is_container:
+                        _stop(frame, step, Override(label=step.label))
 
     def resume(self) -> None:
         """Let the machine go on."""
@@ -136,7 +138,8 @@ class Control:
         ):
             known = sorted(frame.container.get_children())
             raise ControlError(path, f"no jump there; children: {known}", self.active())
-        self._stop_at(frame, frame.step, path, Override(label=label))
+        with asking("operator", "", f"jump to {path}"):
+            self._stop_at(frame, frame.step, path, Override(label=label))
 
     def force_outcome(self, path: str, outcome: str) -> None:
         """Preempt the active state at `path`; whatever it returns, it ends with `outcome`.
@@ -152,7 +155,8 @@ class Control:
                 f"no such outcome: got {outcome!r}; expected one of {sorted(outcomes)}",
                 self.active(),
             )
-        self._stop_at(frame, step, path, Override(outcome=outcome))
+        with asking("operator", "", f"force {outcome!r} of {path}"):
+            self._stop_at(frame, step, path, Override(outcome=outcome))
 
     def preempt(self, path: str) -> None:
         """Preempt the state or sub-machine at `path`; its container follows its outcome.
@@ -160,11 +164,12 @@ class Control:
         Raises:
             ControlError: it does not run.
         """
-        if path == self._path():
-            self._machine.request_preempt()
-            return
-        frame, step = self._step_at(path)
-        self._stop_at(frame, step, path, None)
+        with asking("operator", "", f"preempt of {path}"):
+            if path == self._path():
+                self._machine.request_preempt()
+                return
+            frame, step = self._step_at(path)
+            self._stop_at(frame, step, path, None)
 
     def active(self) -> tuple[str, ...]:
         """Return the paths of all states that run, containers first."""

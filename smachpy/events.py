@@ -61,7 +61,42 @@ class Failed(NamedTuple):
 
 
 class PreemptRequested(NamedTuple):
-    """Somebody asked the state to stop."""
+    """Somebody asked the state to stop.
+
+    Below a container that was asked, every active state has such an event of its own, with the
+    same `source`, `by` and `why`: they tell where the wish came from first.
+
+    Attributes:
+        source: What sort of asker: one of `SOURCES`.
+        by: Who: the signal's name, the operator's or client's name, the path of the state (of a
+            concurrence's child that ended, of the state whose timeout passed, of the state that
+            asked), the action's name, the thread's name; "" when there is no more to say.
+        why: What happened, in words ("ended with 'low'", "cancel of goal desk-1-3.5"), or "".
+        grace: So long the state has to stop [s] before it is abandoned; None for a container, and
+            for a state that may take as long as it likes.
+    """
+
+    path: str
+    t: float
+    stamp_ns: int
+    source: str = "program"
+    by: str = ""
+    why: str = ""
+    grace: float | None = None
+
+    @property
+    def asker(self) -> str:
+        """Who asked and why, in one phrase for people."""
+        return asker_text(self.source, self.by, self.why)
+
+
+class PreemptServiced(NamedTuple):
+    """The state took its preempt up: `service_preempt()`, or it ended with 'preempted'.
+
+    A state that was asked and has no such event either still runs (it holds the preempt up), just
+    finished its work, or was abandoned. It comes before the state's `Left`; between the two the
+    state cleans up.
+    """
 
     path: str
     t: float
@@ -212,6 +247,7 @@ Event: TypeAlias = (
     | Left
     | Failed
     | PreemptRequested
+    | PreemptServiced
     | Preempted
     | Abandoned
     | TimedOut
@@ -230,12 +266,38 @@ Event: TypeAlias = (
 
 EVENT_TYPES: tuple[type[Event], ...] = Event.__args__
 
+SOURCES: dict[str, str] = {
+    "signal": "signal",
+    "shutdown": "the program's end",
+    "operator": "operator",
+    "timeout": "timeout of",
+    "concurrence": "concurrence, after",
+    "action": "action",
+    "state": "state",
+    "test": "test",
+    "program": "program",
+}
+"""What sorts of askers there are (`PreemptRequested.source`), and what to call them.
+
+signal: a signal, Ctrl-C too. shutdown: `actionlib_core.shutdown` or the shutdown check. operator:
+`machine.control`, here or over the network. timeout: the state's, or that of a state around it.
+concurrence: the end of a child. action: a client's cancel, a newer goal or the server's stop, by
+`ActionServerWrapper`. state: code that a state or callback ran. test: the test kit. program: all
+else; `by` is the thread, or what `request_preempt(by=...)` said.
+"""
+
 LONGEST_TEXT = 4_000
 LONGEST_LIST = 1_000
 DEEPEST = 20
 """What of a value is put into a record; it is to be looked at, not to be computed with."""
 
 _BY_NAME = {kind.__name__: kind for kind in EVENT_TYPES}
+
+
+def asker_text(source: str, by: str, why: str) -> str:
+    """Return who asked for a preempt, in one phrase for people ("timeout of /P/DRIVE: 5 s")."""
+    who = f"{SOURCES.get(source, source)} {by}".strip()
+    return f"{who}: {why}" if why else who
 
 
 def to_record(event: Event) -> dict[str, Any]:

@@ -3,7 +3,8 @@
     <server>/smach/control          commands, JSON in std_msgs/String
     <server>/smach/control_result   the answers, JSON in std_msgs/String
 
-A command is an object: `id` (comes back with the answer), `command`, and what that needs:
+A command is an object: `id` (comes back with the answer), `by` (who sends it, for those who watch;
+may be left out), `command`, and what that needs:
 
     pause  resume  step
     preempt path          jump path          force path outcome
@@ -23,6 +24,7 @@ from actionlib_core.clock import SerialExecutor
 from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.topic import Publisher, Subscriber
 from smachpy import log
+from smachpy._runtime.asker import asking
 from smachpy.exceptions import SmachError
 from smachpy.user_data import UserData
 
@@ -96,7 +98,9 @@ class ControlServer:
         try:
             command = parse_command(text)
             request = str(command.get("id", ""))
-            self._carry_out(command)
+            words = [command["command"], *(str(command[f]) for f in COMMANDS[command["command"]])]
+            with asking("operator", command.get("by") or "", " ".join(words)):
+                self._carry_out(command)
             log.loginfo(f"{self._path}: command from remote: {command}")
         except SmachError as error:
             problem = str(error)
@@ -158,6 +162,7 @@ class ControlClient:
     def __init__(self, server_name: str, node: Node) -> None:
         self._name = server_name
         self._clock = node.clock
+        self._by = node.full_name
         self._waiting: dict[str, tuple[Any, list[dict[str, Any]]]] = {}
         self._results = Subscriber(server_name + RESULT_TOPIC, String, self._take, node=node)
         self._commands = Publisher(server_name + CONTROL_TOPIC, String, node=node)
@@ -168,7 +173,7 @@ class ControlClient:
         self._commands.unregister()
 
     def send(self, command: dict[str, Any], timeout: float = ANSWER_S) -> dict[str, Any]:
-        """Send a command and return the answer.
+        """Send a command and return the answer; `by` is the node's name if it is left out.
 
         Raises:
             CommandError: the command is wrong, or nobody answers.
@@ -176,7 +181,7 @@ class ControlClient:
         Blocks: until the answer, `timeout` [s] at most.
         """
         request = uuid.uuid4().hex
-        text = json.dumps({**command, "id": request})
+        text = json.dumps({"by": self._by, **command, "id": request})
         parse_command(text)
         event, answers = self._clock.event(), list[dict[str, Any]]()
         self._waiting[request] = event, answers
@@ -220,7 +225,8 @@ def parse_command(text: str) -> dict[str, Any]:
         if not isinstance(command.get(field), kind):
             got = command.get(field)
             raise CommandError(f"command {name!r}: {field}: got {got!r}; expected {kind.__name__}.")
-    outcome = command.get("outcome")
-    if outcome is not None and not isinstance(outcome, str):
-        raise CommandError(f"command {name!r}: outcome: got {outcome!r}; expected str.")
+    for field in ("outcome", "by"):
+        value = command.get(field)
+        if value is not None and not isinstance(value, str):
+            raise CommandError(f"command {name!r}: {field}: got {value!r}; expected str.")
     return command

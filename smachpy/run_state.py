@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 RAISED = "exception"
 """Stands for the outcome of a state that raised."""
 
+_NOT_ASKED = {"preempt": None, "asked": None, "serviced": None, "abandoned": None}
+
 ENDED_GOALS = 20
 """So many goals that have ended are kept."""
 
@@ -27,7 +29,9 @@ class RunState:
             run: number of runs begun; started, ended, outcome: of the newest run;
             states: by path: visits, since (None while it does not run), outcome, outcomes (times
             each), seconds (in finished visits), error, preempt (when it was asked to stop),
-            attempt, item (of an iterator), waits (why it is held back);
+            asked (by whom: `source`, `by`, `why` and `grace` of the PreemptRequested), serviced
+            (when it took the preempt up), abandoned (when its grace was over); these four are None
+            while it is not asked; attempt, item (of an iterator), waits (why it is held back);
             goals: by goal id: path, action, since, goal, feedback, first_feedback, status, text,
             result, ended; userdata: by "container key": key, value, writer, at, container.
 
@@ -51,6 +55,8 @@ class RunState:
             "Left": lambda record: self._leave(record, record["outcome"]),
             "Failed": self._on_failed,
             "PreemptRequested": self._on_preempt,
+            "PreemptServiced": lambda r: self._on_answer(r, "serviced"),
+            "Abandoned": lambda r: self._on_answer(r, "abandoned"),
             "Retried": lambda r: self._set(r, attempt=r["attempt"] + 1),
             "Iterated": lambda r: self._set(r, item=r["number"]),
             "Paused": lambda r: self._set(r, waits=r["reason"]),
@@ -91,7 +97,7 @@ class RunState:
         self.data["run"] += 1
         self.data.update(started=record["stamp_ns"], ended=None, outcome=None)
         for state in self.data["states"].values():
-            state.update(since=None, preempt=None, waits=None)
+            state.update(since=None, waits=None, **_NOT_ASKED)
         self._on_entered(record)
 
     def _on_finished(self, record: dict[str, Any]) -> None:
@@ -102,7 +108,7 @@ class RunState:
     def _on_entered(self, record: dict[str, Any]) -> None:
         state = self._state(record["path"])
         state["visits"] += 1
-        state.update(since=record["stamp_ns"], preempt=None, waits=None, error=None, attempt=1)
+        state.update(since=record["stamp_ns"], waits=None, error=None, attempt=1, **_NOT_ASKED)
 
     def _on_failed(self, record: dict[str, Any]) -> None:
         self._leave(record, RAISED)
@@ -112,13 +118,28 @@ class RunState:
         state = self._state(record["path"])
         if state["since"] is not None:
             state["seconds"] += (record["stamp_ns"] - state["since"]) / 1e9
-        state.update(since=None, outcome=outcome, preempt=None, waits=None)
+        state.update(since=None, outcome=outcome, waits=None, **_NOT_ASKED)
         state["outcomes"][outcome] = state["outcomes"].get(outcome, 0) + 1
 
     def _on_preempt(self, record: dict[str, Any]) -> None:
         state = self._state(record["path"])
         if state["since"] is not None and not state.get("preempt"):
-            state["preempt"] = record["stamp_ns"]
+            asked = {name: record.get(name) for name in ("source", "by", "why", "grace")}
+            state.update(preempt=record["stamp_ns"], asked=asked)
+
+    def _on_answer(self, record: dict[str, Any], fact: str) -> None:
+        state = self._state(record["path"])
+        if state.get("preempt"):
+            state[fact] = record["stamp_ns"]
+
+    def holding_up(self) -> list[str]:
+        """Return the paths of the leaves that were asked to stop and still run."""
+        asked = [
+            path
+            for path, state in self.data["states"].items()
+            if state["since"] is not None and state.get("preempt")
+        ]
+        return [path for path in asked if not any(one.startswith(f"{path}/") for one in asked)]
 
     def _on_userdata(self, record: dict[str, Any]) -> None:
         container = record["path"].rpartition("/")[0] or record["path"]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias, TypedDict
 from actionlib_core.clock import current_clock
 from smachpy._core.names import unique_names
 from smachpy._core.retry import Retry, as_retry
-from smachpy._runtime.frame import current_scope
+from smachpy._runtime.frame import current_scope, note_serviced
 from smachpy.exceptions import InvalidStateError
 from smachpy.introspection import Structure
 from smachpy.util import has_smach_interface
@@ -172,7 +172,9 @@ class State:
 
     def service_preempt(self) -> None:
         """Say that the request was answered; the machine follows the outcome then."""
-        self._preempt_requested = False
+        if self._preempt_requested:
+            self._preempt_requested = False
+            note_serviced(self)
 
     def recall_preempt(self) -> None:
         """Take a request back."""

@@ -9,6 +9,7 @@ from smachpy._construction import construction_method
 from smachpy._core.names import unique_names
 from smachpy._core.spec import ChildSpec, MachineSpec
 from smachpy._core.validate import machine_problems
+from smachpy._runtime.asker import asking
 from smachpy._runtime.failures import unknown_outcome, user_error
 from smachpy._runtime.interrupt import Interruption
 from smachpy._runtime.step import End, Step, run_watched
@@ -359,7 +360,8 @@ class StateMachine(Container):
         if run.control is not None:
             run.control.pass_gate(frame, step)
         if run.has_shutdown_check and is_shutdown():
-            self.request_preempt()
+            with asking("shutdown", "", "the shutdown check says so"):
+                self.request_preempt()
         if self._preempt_requested:
             return self._preempted(frame, step)
         outcome = run_watched(frame, step) if run.watched else step.execute(step.userdata)

@@ -55,13 +55,15 @@ def set_preempt_handler(sc: State, *, timeout: float | None = 60.0) -> None:
         timeout: Longest wait for its end [s]; None waits for ever.
     """
     from actionlib_core import shutdown
+    from smachpy._runtime.asker import shutdown_asking
 
     running: Callable[[], bool] = getattr(sc, "is_running", lambda: True)
     wait: Callable[[float | None], object] = getattr(sc, "wait_ended", lambda _timeout: True)
 
     def stop() -> None:
         if running():
-            sc.request_preempt()
+            with shutdown_asking(current):
+                sc.request_preempt()
             if not wait(timeout):
                 log.logerr(f"{sc!r} still runs {timeout} s after its preempt; it is left behind.")
 

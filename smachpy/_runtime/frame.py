@@ -12,7 +12,7 @@ from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from smachpy import log
-from smachpy.events import CallbackFailed
+from smachpy.events import CallbackFailed, PreemptServiced
 from smachpy.util import has_shutdown_check
 
 if TYPE_CHECKING:
@@ -79,6 +79,7 @@ class Frame:
     Attributes:
         step: What runs now: anything with `label` and `state`; None between runs.
         told: The step whose state was asked to stop.
+        asked: The root itself was asked to stop.
         answered: The container ends because a preempt was taken up.
         watch: What sees to it that the told step stops.
         override: What an operator wants instead of the told step's outcome.
@@ -87,6 +88,7 @@ class Frame:
         injected: An interruption is on its way to that thread.
         dead: The thread was left behind.
         ended: The child of a concurrence's branch has ended.
+        serviced: The told step has said that it takes the preempt up.
     """
 
     # Entering a container is a hot path: what is rarely set stands here, not in __init__.
@@ -99,10 +101,12 @@ class Frame:
     told: Any = None
     watch: Any = None
     override: Override | None = None
+    asked = False
     answered = False
     injected = False
     dead = False
     ended = False
+    serviced = False
     _path: str | None = None
 
     def __init__(self, container: Container, parent: Frame) -> None:
@@ -231,6 +235,17 @@ def current_scope() -> Scope | None:
     """Return the scope of the state that runs in this context; None outside any machine."""
     frame = FRAME.get()
     return None if frame is None else Scope(frame)
+
+
+def note_serviced(state: State) -> None:
+    """Publish that `state`, which runs in this context, takes its preempt up."""
+    frame = FRAME.get()
+    if frame is None or not frame.run.watched or frame.serviced:
+        return
+    told = frame.told
+    if told is not None and told is frame.step and told.state is state:
+        frame.serviced = True
+        frame.emit(PreemptServiced)
 
 
 def current_path() -> str:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import inspect
 from typing import TYPE_CHECKING, Any
 
+from smachpy._runtime.asker import asking
 from smachpy._runtime.frame import FRAME
 from smachpy._runtime.interrupt import Interruption
+from smachpy._runtime.watch import note_answer
 from smachpy.events import Retried, TimedOut
 from smachpy.exceptions import InvalidUserCodeError
 
@@ -148,6 +150,8 @@ class _Guarded:
         finally:
             timeout_guard.cancel()
         if timeout_guard.passed and outcome == "preempted":
+            if frame is not None and frame.run.watched:
+                note_answer(frame, outcome)
             return self._state.timeout_outcome
         return outcome
 
@@ -173,7 +177,8 @@ class _Timeout:
             self._state.request_preempt()
             return
         frame.emit(TimedOut, self._timeout)
-        frame.container._stop_child(frame, self._step)  # noqa: SLF001  one machinery
+        with asking("timeout", frame.here(), f"{self._timeout:g} s"):
+            frame.container._stop_child(frame, self._step)  # noqa: SLF001  one machinery
 
 
 def _reason(result: Any) -> str:

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 
 from actionlib_core import shutdown
 from actionlib_core.clock import RealClock, current_clock
+from smachpy._runtime.asker import shutdown_asking
 from smachpy._runtime.frame import RootFrame, Run
 from smachpy._runtime.guarded import guarded
 from smachpy._runtime.interrupt import Interruption, use_signals
-from smachpy.events import Finished, Started
+from smachpy.events import Finished, PreemptRequested, PreemptServiced, Started
 
 if TYPE_CHECKING:
     from types import FrameType
@@ -32,7 +33,7 @@ def execute_root(root: Container, parent_ud: UserData | Remapper | None) -> str:
 
     Blocks: until it has ended.
     """
-    stop = _Stop(root)
+    stop = _Stop(root, shutdown.current_shutdown())
     forget = shutdown.on_shutdown(stop)
     ctrl_c: _CtrlC | None = None
     try:
@@ -65,9 +66,15 @@ def _run_root(
     if not run.watched:
         return _run_in(root, frame, parent_ud)
     frame.emit_own(Started, tuple(root.get_initial_states()))
+    asker, root._asker = root._asker, None  # noqa: SLF001  one machinery
+    if asker is not None and root.preempt_requested():
+        frame.asked = True
+        frame.emit_own(PreemptRequested, *asker)
     outcome: str | None = None
     try:
         outcome = _run_in(root, frame, parent_ud)
+        if frame.asked and frame.answered:
+            frame.emit_own(PreemptServiced)
     finally:
         frame.emit_own(Finished, outcome)
     return outcome
@@ -129,8 +136,9 @@ class _Stop:
     The lock is for this alone: the run's end waits for a request that is under way.
     """
 
-    def __init__(self, root: Container) -> None:
+    def __init__(self, root: Container, ending: shutdown.Shutdown) -> None:
         self._root = root
+        self._shutdown = ending
         self._over = False
         self._calling = threading.RLock()
 
@@ -138,7 +146,8 @@ class _Stop:
         with self._calling:
             if not self._over:
                 self._over = True
-                self._root.request_preempt()
+                with shutdown_asking(self._shutdown):
+                    self._root.request_preempt()
 
     def end(self) -> None:
         with self._calling:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
 
 from smachpy._runtime.guarded import runner_of
 from smachpy._runtime.interrupt import Interruption
+from smachpy._runtime.watch import note_answer
 from smachpy.events import Entered, Failed, Left, UserdataWritten
 from smachpy.user_data import Remapper
 
@@ -157,6 +158,8 @@ def run_watched(frame: Frame, step: Step) -> Any:
     except Interruption:
         frame.emit(Left, "preempted")
         raise
+    if frame.told is not None:
+        note_answer(frame, outcome)
     if run.pending:
         run.flush()
     frame.publish(_new(Left, (path, clock.now(), clock.time_ns(), outcome)))

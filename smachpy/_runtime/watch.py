@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from smachpy import log
 from smachpy._runtime.interrupt import close, interrupt
-from smachpy.events import Abandoned
+from smachpy.events import Abandoned, PreemptServiced
 
 if TYPE_CHECKING:
     from actionlib_core.clock import Timer
@@ -113,6 +113,16 @@ def has_answered(frame: Frame, outcome: object) -> bool:
         return True
     state = told.state
     return bool(state._answered if state.is_container else not state.preempt_requested())  # noqa: SLF001
+
+
+def note_answer(frame: Frame, outcome: object) -> None:
+    """Publish that the child, which has just ended with `outcome`, took its preempt up, if so."""
+    with frame.container._lock:  # noqa: SLF001  one machinery
+        answered = frame.told is frame.step and not frame.serviced and has_answered(frame, outcome)
+        if answered:
+            frame.serviced = True
+    if answered:
+        frame.emit(PreemptServiced)
 
 
 def grace_of(frame: Frame, step: Step) -> float | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from smachpy._runtime.asker import asking
 from smachpy.container import Container
 from smachpy.events import Entered, Iterated, Left
 from smachpy.introspection import describe
@@ -245,7 +246,8 @@ class Explorer:
 
     def _ask(self) -> None:
         self._preempts -= 1
-        self._root.request_preempt()
+        with asking("test"):
+            self._root.request_preempt()
 
 
 def _userdata(container: Container) -> Hashable:

@@ -14,6 +14,7 @@ from actionlib_core.clock import Deadlock, TimeLimit, VirtualClock, use_clock
 from actionlib_core.node import Node, use_node
 from actionlib_core.shutdown import Shutdown, use_shutdown
 from actionlib_core.transport.memory import MemoryNetwork
+from smachpy._runtime.asker import asking
 from smachpy.events import Entered, Event
 from smachpy.exceptions import SmachError
 from smachpy.introspection import describe
@@ -266,7 +267,12 @@ class MissionKit:
         Raises:
             ValueError: neither or both of `at` and `on`.
         """
-        self._add(lambda machine: machine.request_preempt(), at, on, after, visit)
+
+        def preempt(machine: Container) -> None:
+            with asking("test"):
+                machine.request_preempt()
+
+        self._add(preempt, at, on, after, visit)
 
     def interrupt(
         self,
@@ -283,7 +289,8 @@ class MissionKit:
 
         def interrupt(machine: Container) -> None:
             self.shutdown.request("interrupted by the test")
-            machine.request_preempt()
+            with asking("test", "", "interrupt"):
+                machine.request_preempt()
 
         self._add(interrupt, 0.0 if at is None and on is None else at, on, after, visit)
 
