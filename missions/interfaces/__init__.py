@@ -1,6 +1,7 @@
-"""The actions of these missions, from the `.action` files beside this module.
+"""The messages and actions of these missions, from the files in ROS layout beside this module.
 
-Own definitions are added in the same way: a folder in ROS layout and `add_path`.
+Own definitions are added in the same way: a folder in ROS layout and `add_path`. The services are
+in `missions.interfaces.srv`.
 """
 
 from __future__ import annotations
@@ -20,6 +21,23 @@ from actionlib_core.interfaces.mission_msgs.msg import (  # noqa: E402  found si
     CountdownFeedback,
     CountdownGoal,
     CountdownResult,
+    DeliverAction,
+    DeliverFeedback,
+    DeliverGoal,
+    DeliverResult,
+    Demo_actionAction,
+    Demo_actionFeedback,
+    Demo_actionGoal,
+    Demo_actionResult,
+    DemoMsg,
+    RechargeAction,
+    RechargeFeedback,
+    RechargeGoal,
+    RechargeResult,
+    TurnAction,
+    TurnFeedback,
+    TurnGoal,
+    TurnResult,
 )
 
 __all__ = [
@@ -31,4 +49,21 @@ __all__ = [
     "CountdownFeedback",
     "CountdownGoal",
     "CountdownResult",
+    "DeliverAction",
+    "DeliverFeedback",
+    "DeliverGoal",
+    "DeliverResult",
+    "DemoMsg",
+    "Demo_actionAction",
+    "Demo_actionFeedback",
+    "Demo_actionGoal",
+    "Demo_actionResult",
+    "RechargeAction",
+    "RechargeFeedback",
+    "RechargeGoal",
+    "RechargeResult",
+    "TurnAction",
+    "TurnFeedback",
+    "TurnGoal",
+    "TurnResult",
 ]

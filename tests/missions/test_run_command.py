@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -251,11 +252,10 @@ def test_two_robots_of_one_name():
 def test_list_names_the_missions():
     done = run("list")
     assert done.returncode == 0
-    assert [line.split()[0] for line in done.stdout.splitlines()] == [
-        "countdown",
-        "patrol",
-        "there_and_back",
-    ]
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+    assert [line.split()[0] for line in done.stdout.splitlines()] == sorted(
+        project["entry-points"]["smachpy.missions"]
+    )
 
 
 def test_the_parameters_of_the_robot_are_listed_and_can_be_read_again(tmp_path):
