@@ -134,7 +134,7 @@ class LatchedPublisher(Publisher):
         self._last: tuple[bytes, bytes] = b"", pack_numbers(self._number, 0)
         self._own_key = f"{key}/@latch/{transport.session_id}/{self._number}"
         session = transport.session
-        self._keep(session.declare_queryable(self._own_key, _direct(self._on_query)))
+        self._keep(session.declare_queryable(self._own_key, direct(self._on_query)))
         self._keep(session.liveliness().declare_token(self._own_key))
 
     def put(self, payload: bytes, attachment: bytes | None = None) -> None:
@@ -172,10 +172,10 @@ class Subscriber(Declared):
         self._encoding_text = ""
         self._latched: set[str] = set()
         session = transport.session
-        self._keep(session.declare_subscriber(key, _direct(self._on_sample)))
+        self._keep(session.declare_subscriber(key, direct(self._on_sample)))
         if history:
             tokens = session.liveliness().declare_subscriber(
-                f"{key}/@latch/*/*", _direct(self._on_token), history=True
+                f"{key}/@latch/*/*", direct(self._on_token), history=True
             )
             self._keep(tokens)
 
@@ -275,7 +275,7 @@ class Queryable(Declared):
     ) -> None:
         super().__init__(transport)
         self._callback = callback
-        self._keep(transport.session.declare_queryable(key, _direct(self._on_query)))
+        self._keep(transport.session.declare_queryable(key, direct(self._on_query)))
 
     def _on_query(self, raw: zenoh.Query) -> None:
         self._inlet.take(self._answer, raw, zenoh.Query.drop)
@@ -339,7 +339,7 @@ class Watcher(Declared):
         self._callback = callback
         self._alive: set[str] = set()
         tokens = transport.session.liveliness().declare_subscriber(
-            pattern, _direct(self._on_token), history=True
+            pattern, direct(self._on_token), history=True
         )
         self._keep(tokens)
 
@@ -362,7 +362,7 @@ class Token(Declared):
         self._keep(transport.session.liveliness().declare_token(key))
 
 
-def _direct(callback: Callable[[T], None]) -> handlers.Callback[T]:
+def direct(callback: Callable[[T], None]) -> handlers.Callback[T]:
     """Run a callback on zenoh's thread; zenoh's default starts a Python thread for each."""
     return handlers.Callback(callback, indirect=False)
 

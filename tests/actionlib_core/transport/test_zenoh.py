@@ -213,16 +213,19 @@ def test_sessions_meet_through_a_router(router, mode):
 
         def on_sample(sample):
             heard.append(sample)
-            changed.set()
+            if sample.payload == b"new":
+                changed.set()
 
         b.subscribe("map", on_sample)
         assert changed.wait(WAIT_S)
         done = CLOCK.event()
         b.query("add", b"1", timeout=WAIT_S, on_reply=answers.append, on_done=done.set)
         assert done.wait(WAIT_S)
-        assert [s[1:] for s in heard] == [(b"new", "enc", a.session_id)]
+        # Tokens overtake samples: the live "old" may still have been on its way.
+        assert [s[1:] for s in heard if s.payload != b"old"] == [(b"new", "enc", a.session_id)]
         assert [r.payload for r in answers] == [b"sum of 1"]
-        assert b.list_alive("@test/*", WAIT_S) == ["@test/a"]
+        for _ in range(40):  # each one: a router leaves some liveliness queries unanswered
+            assert b.list_alive("@test/*", WAIT_S) == ["@test/a"]
         a.close()
         watch.wait(lambda alive: not alive)
     finally:
