@@ -98,6 +98,11 @@ class Section:
     def __contains__(self, key: str) -> bool:
         return key in self._data
 
+    @property
+    def problem_count(self) -> int:
+        """How many problems were found in the file so far."""
+        return len(self._document.problems)
+
     def path(self, key: str) -> str:
         """Return the dotted path of `key` in the file."""
         return f"{self._field}.{key}" if self._field else key
@@ -220,7 +225,7 @@ class Section:
 
 
 class Document:
-    """A YAML file whose top is a mapping.
+    """A YAML file whose top is a mapping, or a CSV file, whose rows are a list in one.
 
     Attributes:
         name: The file as the user named it.
@@ -228,15 +233,20 @@ class Document:
         top: The mapping.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, csv_rows: str = "", csv_texts: Sequence[str] = ()) -> None:
         """Read `path`.
+
+        Args:
+            path: The file.
+            csv_rows: The key under which the rows of a CSV file are found; "": no CSV file will do.
+            csv_texts: Columns of a CSV file that hold texts, whatever they look like.
 
         Raises:
             InputFileError: it cannot be read or is not YAML with a mapping at the top.
         """
         self.name = str(path)
         self.problems: list[Problem] = []
-        self.top = Section(self, "", self._load(path), 1)
+        self.top = Section(self, "", self._read(path, csv_rows, csv_texts), 1)
 
     def check(self) -> None:
         """Raise what was found.
@@ -246,6 +256,13 @@ class Document:
         """
         if self.problems:
             raise InputFileError(self.problems)
+
+    def _read(self, path: Path, csv_rows: str, csv_texts: Sequence[str]) -> CommentedMap:
+        if csv_rows and path.suffix.lower() == ".csv":
+            from missions.checked_csv import read_csv
+
+            return read_csv(path, csv_rows, csv_texts)
+        return self._load(path)
 
     def _load(self, path: Path) -> CommentedMap:
         try:

@@ -1,13 +1,15 @@
-"""Waypoint lists: where a mission drives, read from YAML and checked against the map."""
+"""Waypoint lists: where a mission drives, read from YAML or CSV and checked against the map."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from actionlib_core.exceptions import InvalidNameError
 from actionlib_core.interfaces.geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseGoal
 from actionlib_core.interfaces.std_msgs.msg import Header
+from actionlib_core.names import check_name
 from missions.checked_yaml import REQUIRED, Document, Limits
 from missions.exceptions import NavigationError
 from missions.move_base.config import SimConfig, load_config
@@ -18,8 +20,27 @@ if TYPE_CHECKING:
 
     from missions.checked_yaml import Section
     from missions.move_base.floor import Floor
+    from missions.move_base.occupancy import OccupancyMap
 
+TASKS: Final = ("photo", "turn", "wait_for_service")
 _SHARE: Final = Limits(low=0.0, high=1.0)
+_SECONDS: Final = Limits(low=0.0)
+_TURN: Final = Limits(low=-180.0, high=180.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What to do at a waypoint.
+
+    Attributes:
+        kind: One of `TASKS`.
+        angle: By how much to turn [deg], anticlockwise.
+        service: The service to wait for.
+    """
+
+    kind: str
+    angle: float = 0.0
+    service: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,10 +50,16 @@ class Waypoint:
     Attributes:
         name: What to call it in logs and pictures.
         pose: In the map frame.
+        dwell: How long to stay there [s].
+        task: What to do there after that.
+        door: The door that leads there; "" when there is none.
     """
 
     name: str
     pose: Pose2D
+    dwell: float = 0.0
+    task: Task | None = None
+    door: str = ""
 
     def goal(self) -> MoveBaseGoal:
         """Return the `move_base` goal that drives here."""
@@ -56,6 +83,32 @@ class Route:
     charge_until: float
 
 
+@dataclass(frozen=True, slots=True)
+class Tour:
+    """Waypoints with what to do at each.
+
+    Attributes:
+        waypoints: Where to go, in this order.
+        map: The floor, if the file names one.
+    """
+
+    waypoints: tuple[Waypoint, ...]
+    map: OccupancyMap | None
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Where deliveries go.
+
+    Attributes:
+        home: Where the robot waits for orders and comes back to.
+        places: The others, by name.
+    """
+
+    home: Waypoint
+    places: dict[str, Waypoint]
+
+
 def goal_at(pose: Pose2D, frame: str = "map") -> MoveBaseGoal:
     """Return the `move_base` goal that drives to a pose in the frame "map" or "base_link"."""
     turn = Quaternion(*quaternion_of(pose.yaw))
@@ -64,7 +117,7 @@ def goal_at(pose: Pose2D, frame: str = "map") -> MoveBaseGoal:
 
 
 def load_route(path: Path) -> Route:
-    """Read a waypoint file.
+    """Read a patrol's waypoint file.
 
     With the field `map` (and `robot`, for its radius) every place is checked against that floor;
     without it only the robot's server can refuse places where the robot cannot stand.
@@ -79,39 +132,128 @@ def load_route(path: Path) -> Route:
     until = top.number("charge_until", 0.9, _SHARE)
     if "charge_until" in top and until <= low:
         top.problem("charge_until", f"more than low_battery ({low:g})")
-    dock = _waypoint(top.section("dock"), "dock", floor)
+    dock = _place(top.section("dock"), "dock", floor)
     waypoints = tuple(
-        _waypoint(row, f"waypoint {i}", floor) for i, row in enumerate(top.rows("waypoints"), 1)
+        _place(row, f"waypoint {i}", floor) for i, row in enumerate(top.rows("waypoints"), 1)
     )
     top.close()
     document.check()
     return Route(waypoints, dock, low, until)
 
 
-def _floor(top: Section, path: Path) -> Floor | None:
+def load_tour(path: Path, map_file: Path | None = None) -> Tour:
+    """Read waypoints with their tasks, from YAML (the list `waypoints`) or CSV (a header line).
+
+    Args:
+        path: The file.
+        map_file: The floor to check the waypoints against when the file has no field `map`.
+
+    Raises:
+        InputFileError: with the line and field of every problem.
+    """
+    document = Document(path, csv_rows="waypoints", csv_texts=("name", "task", "service"))
+    top = document.top
+    floor = _floor(top, path, map_file)
+    waypoints = tuple(
+        _stop(row, f"waypoint {i}", floor) for i, row in enumerate(top.rows("waypoints"), 1)
+    )
+    top.close()
+    document.check()
+    return Tour(waypoints, None if floor is None else floor.map)
+
+
+def load_places(path: Path) -> Places:
+    """Read the places that deliveries go to: `home`, and the list `places`.
+
+    Raises:
+        InputFileError: with the line and field of every problem.
+    """
+    document = Document(path)
+    top = document.top
+    floor = _floor(top, path)
+    home = _place(top.section("home"), "home", floor)
+    places: dict[str, Waypoint] = {}
+    for row in top.rows("places"):
+        place = _behind_door(row, floor)
+        if place.name in places:
+            row.problem("name", "a name that no other place has")
+        places[place.name] = place
+    top.close()
+    document.check()
+    return Places(home, places)
+
+
+def _floor(top: Section, path: Path, map_file: Path | None = None) -> Floor | None:
     """Return the floor that the file names, inflated by its robot."""
     robot = SimConfig()
     if "robot" in top:
         robot = load_config(path.parent / top.text("robot", REQUIRED))
-    if "map" not in top:
+    if "map" in top:
+        map_file = path.parent / top.text("map", REQUIRED)
+    if map_file is None:
         return None
     from missions.move_base.floor import Floor
     from missions.move_base.occupancy import load_map
 
-    grid = load_map(path.parent / top.text("map", REQUIRED))
-    return Floor(grid, robot.robot.radius, robot.planner)
+    return Floor(load_map(map_file), robot.robot.radius, robot.planner)
 
 
-def _waypoint(section: Section, default_name: str, floor: Floor | None) -> Waypoint:
+def _place(section: Section, default_name: str, floor: Floor | None) -> Waypoint:
+    """Read the name and the pose, and close the section."""
     name = section.text("name", default_name)
+    found = section.problem_count
     x = section.number("x", REQUIRED, unit="m")
     y = section.number("y", REQUIRED, unit="m")
+    known = section.problem_count == found
     yaw = section.number("yaw", 0.0, unit="rad")
     section.close()
-    if floor is not None and "x" in section and "y" in section:
+    if floor is not None and known:
         try:
             floor.check_place(x, y)
         except NavigationError as error:
             reason = str(error).removeprefix("goal ")
             section.problem("x", "a place where the robot can stand", f"{name}: {reason}.")
     return Waypoint(name, Pose2D(x, y, wrap_angle(yaw)))
+
+
+def _stop(row: Section, default_name: str, floor: Floor | None) -> Waypoint:
+    """Read a waypoint with dwell time and task."""
+    dwell = row.number("dwell", 0.0, _SECONDS, "s")
+    task = _task(row)
+    place = _place(row, default_name, floor)
+    return Waypoint(place.name, place.pose, dwell, task)
+
+
+def _task(row: Section) -> Task | None:
+    angle = row.number("angle", 90.0, _TURN, "deg")
+    service = _name(row, "service")
+    found = row.problem_count
+    kind = row.text("task", TASKS[0], TASKS)
+    if row.problem_count > found:
+        return None
+    if "angle" in row and kind != "turn":
+        row.problem("angle", "nothing, as the task is not 'turn'")
+    if ("service" in row) != (kind == "wait_for_service"):
+        row.problem("service", "the service of the task 'wait_for_service', and only of that")
+    return Task(kind, angle, service) if "task" in row else None
+
+
+def _behind_door(row: Section, floor: Floor | None) -> Waypoint:
+    """Read a place with the door that leads there."""
+    row.text("name", REQUIRED)
+    door = _name(row, "door")
+    place = _place(row, "-", floor)
+    return Waypoint(place.name, place.pose, door=door)
+
+
+def _name(row: Section, key: str) -> str:
+    """Read a name of the network; "" when it is not there."""
+    if key not in row:
+        row.text(key, "-")
+        return ""
+    name = row.text(key, REQUIRED)
+    try:
+        return check_name(name, key)
+    except InvalidNameError as error:
+        row.problem(key, "a name of the network", f"{error.reason}.")
+        return "-"

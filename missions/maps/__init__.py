@@ -9,3 +9,4 @@ FOLDER: Final = Path(__file__).parent
 OFFICE_MAP: Final = FOLDER / "office.yaml"
 OFFICE_ROBOT: Final = FOLDER / "office_robot.yaml"
 OFFICE_WAYPOINTS: Final = FOLDER / "office_waypoints.yaml"
+OFFICE_TOUR: Final = FOLDER / "office_tour.yaml"
