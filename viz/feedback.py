@@ -51,11 +51,17 @@ def _distance(goal: Any, feedback: Any) -> float | None:
     said = _first(feedback, DISTANCES)
     if said is not None:
         return said
-    here = _position(_read(feedback, "base_position"))
-    there = _position(_read(goal, "target_pose"))
-    if here is None or there is None:
+    base, target = _read(feedback, "base_position"), _read(goal, "target_pose")
+    here, there = _position(base), _position(target)
+    if here is None or there is None or _frame(base) != _frame(target):
         return None
     return math.hypot(there[0] - here[0], there[1] - here[1])
+
+
+def _frame(stamped: Any) -> Any:
+    """The frame that a pose is given in; distances between two frames mean nothing."""
+    frame = _read(_read(stamped, "header"), "frame_id")
+    return frame.removeprefix("/") if isinstance(frame, str) else frame
 
 
 def _position(stamped: Any) -> tuple[float, float] | None:

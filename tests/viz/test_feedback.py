@@ -27,6 +27,16 @@ def test_the_way_left_of_move_base_is_measured_to_the_target():
     assert found.fraction == pytest.approx(0.8)
 
 
+def test_distances_between_two_frames_mean_nothing():
+    goal = Message(target_pose=pose(3.0, 4.0))
+    goal.target_pose.header = Message(frame_id="base_link")
+    here = Message(base_position=pose(20.0, 0.0))
+    here.base_position.header = Message(frame_id="map")
+    assert progress(goal, here, here).distance is None
+    goal.target_pose.header.frame_id = "/map"
+    assert progress(goal, here, here).distance == pytest.approx(17.46, abs=0.01)
+
+
 @pytest.mark.parametrize(
     ("first", "now", "fraction"),
     [
