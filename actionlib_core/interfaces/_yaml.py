@@ -61,9 +61,12 @@ def _scalar(value: Any) -> str:
         if math.isinf(value):
             return ".inf" if value > 0 else "-.inf"
         return repr(value)
-    if isinstance(value, str):
-        return '"' + "".join(map(_character, value)) + '"'
-    return str(value)
+    return quote(value) if isinstance(value, str) else str(value)
+
+
+def quote(text: str) -> str:
+    """Return a double-quoted YAML string."""
+    return f'"{"".join(map(_character, text))}"'
 
 
 def _character(character: str) -> str:
