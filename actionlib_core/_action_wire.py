@@ -181,10 +181,10 @@ def unpack_report(payload: bytes) -> tuple[StatusEntry, int]:
     return _read_status(payload, _skip_header(payload))
 
 
-def pack_statuses(sent_ns: int, entries: Iterable[StatusEntry]) -> bytes:
-    """Write an actionlib_msgs/GoalStatusArray."""
+def pack_statuses(sent_ns: int, entries: Iterable[StatusEntry], frame: str = "") -> bytes:
+    """Write an actionlib_msgs/GoalStatusArray; a `frame` makes it a farewell or its answer."""
     parts = [pack_status(entry) for entry in entries]
-    return b"".join((_pack_header(sent_ns), _U32.pack(len(parts)), *parts))
+    return b"".join((_pack_header(sent_ns, frame), _U32.pack(len(parts)), *parts))
 
 
 @_reads("GoalStatusArray")
@@ -204,8 +204,19 @@ def unpack_statuses(payload: bytes) -> list[StatusEntry]:
     return entries
 
 
-def _pack_header(sent_ns: int) -> bytes:
-    return _HEADER.pack(0, *divmod(sent_ns, _NS), 0)
+@_reads("Header")
+def unpack_frame(payload: bytes) -> str:
+    """Read the frame id of the header that a message begins with.
+
+    Raises:
+        ValueError: the bytes are cut short or are not text where text belongs.
+    """
+    return _read_text(payload, 12)[0]
+
+
+def _pack_header(sent_ns: int, frame: str = "") -> bytes:
+    raw = frame.encode()
+    return _HEADER.pack(0, *divmod(sent_ns, _NS), len(raw)) + raw
 
 
 def _skip_header(payload: bytes) -> int:

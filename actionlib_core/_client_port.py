@@ -12,6 +12,7 @@ from actionlib_core._action_wire import (
     action_keys,
     pack_goal_id,
     pack_statuses,
+    unpack_frame,
     unpack_report,
     unpack_status,
     unpack_statuses,
@@ -42,6 +43,9 @@ class ClientListener(Protocol):
 
     def on_statuses(self, entries: list[StatusEntry], server: str) -> None:
         """Take a list of all goals."""
+
+    def on_farewell(self, entries: list[StatusEntry], server: Endpoint) -> None:
+        """Take the last list of a server that leaves: the goals it ever took; answer it."""
 
     def on_feedback(self, entry: StatusEntry, payload: bytes, start: int, server: str) -> None:
         """Take feedback; its bytes begin at `start`."""
@@ -133,15 +137,16 @@ class ClientPort:
         """Send a GoalID as a cancel."""
         self._cancels.put(pack_goal_id(goal_id, stamp_ns))
 
-    def send_acks(self, goal_ids: list[str], now_ns: int) -> None:
-        """Say that the results of these goals have arrived."""
+    def send_acks(self, goal_ids: list[str], now_ns: int, *, farewell: bool = False) -> None:
+        """Say that the results of these goals have arrived, and maybe a server's farewell."""
         with self._lock:
             if self._acks is None:
                 self._acks = self._transport.publisher(
                     self.keys.ack, encoding_of(GoalStatusArray), ACK
                 )
         entries = [StatusEntry(goal_id, 0, 0, "") for goal_id in goal_ids]
-        self._acks.put(pack_statuses(now_ns, entries))
+        frame = token_key(self.endpoint) if farewell else ""
+        self._acks.put(pack_statuses(now_ns, entries, frame))
 
     def ask(self, goal_id: str, on_done: Callable[[], None]) -> None:
         """Ask the server what became of a goal; the answer goes to the listener."""
@@ -160,10 +165,15 @@ class ClientPort:
         if self._is_readable(sample, GoalStatusArray):
             try:
                 entries = unpack_statuses(sample.payload)
+                frame = unpack_frame(sample.payload)
             except ValueError as error:
                 self._report("a status", error)
                 return
-            self._listener.on_statuses(entries, sample.source)
+            server = parse_token(frame) if frame else None
+            if server is not None:
+                self._listener.on_farewell(entries, server)
+            else:
+                self._listener.on_statuses(entries, sample.source)
 
     def _on_feedback(self, sample: Sample) -> None:
         if self._is_readable(sample, self._types.action_feedback):

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 from actionlib_core._action_wire import (
     ActionKeys,
     action_keys,
+    pack_statuses,
+    unpack_frame,
     unpack_goal,
     unpack_goal_id,
     unpack_statuses,
@@ -32,7 +34,7 @@ from actionlib_core.transport import Quality
 from actionlib_core.wire import check_encoding, encoding_of
 
 if TYPE_CHECKING:
-    from actionlib_core._action_wire import ActionTypes
+    from actionlib_core._action_wire import ActionTypes, StatusEntry
     from actionlib_core.node import Node
     from actionlib_core.presence import Endpoint
     from actionlib_core.transport import Closable, Presence, PublisherPort, Query, Sample
@@ -40,7 +42,9 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 LIST_TIMEOUT_S = 1.0
+FAREWELL_LIST_S = 0.2
 RESULT = Quality(express=True, block=True)
+FAREWELL = RESULT
 FEEDBACK = Quality(express=False, block=True)
 STATUS = Quality(express=False, block=False)  # said again every second: never worth waiting
 
@@ -55,7 +59,7 @@ class ServerListener(Protocol):
         """Take a cancel."""
 
     def on_acknowledged(self, goal_ids: list[str]) -> None:
-        """Take the news that results have arrived."""
+        """Take the news that results have arrived, or that `farewell_heard` may have changed."""
 
     def on_question(self, goal_id: str) -> tuple[Any, bytes]:
         """Return the class and the bytes that answer "what of this goal?"."""
@@ -88,9 +92,10 @@ class ServerPort:
         self.keys: ActionKeys = action_keys(name)
         self._lock = threading.Lock()
         self._declared: list[Closable] = []
-        self._publishers: dict[str, PublisherPort] = {}
+        self._publishers: dict[tuple[str, bool], PublisherPort] = {}
         self._token: Closable | None = None
         self._clients: dict[str, Endpoint] = {}
+        self._unaware: set[str] = set()  # tokens of clients that the farewell has not reached
         self._wrong: set[str] = set()
         self._closed = False
         endpoint = node.endpoint(
@@ -155,32 +160,61 @@ class ServerPort:
         """Tell whether a client of the action is there."""
         return bool(self._clients)
 
+    def begin_farewell(self) -> bool:
+        """Tell whether anybody listens, and note which clients are to answer.
+
+        Raises:
+            TransportError: the session is closed.
+
+        Blocks: when only others than known clients listen, until the network has said who there
+            is, `FAREWELL_LIST_S` at most.
+        """
+        if not self._publisher(self.keys.status, GoalStatusArray, FAREWELL).matching():
+            return False
+        unaware = set(self._clients)
+        if not unaware:  # a server that has just started may not have heard of them yet
+            pattern = token_pattern(Kind.ACTION_CLIENT, self.name)
+            unaware = set(self._node.transport.list_alive(pattern, FAREWELL_LIST_S))
+        self._unaware = unaware
+        return True
+
+    def send_farewell(self, now_ns: int, taken: list[StatusEntry]) -> None:
+        """Say that the server leaves and which goals it has taken, and so which it has not."""
+        payload = pack_statuses(now_ns, taken, token_key(self.endpoint))
+        self._publisher(self.keys.status, GoalStatusArray, FAREWELL).put(payload)
+
+    @property
+    def farewell_heard(self) -> bool:
+        """Whether all clients have answered the farewell."""
+        return not self._unaware
+
     def send_result(self, payload: bytes) -> None:
         """Send an XActionResult."""
-        self._send(self.keys.result, self._types.action_result, RESULT, payload)
+        self._publisher(self.keys.result, self._types.action_result, RESULT).put(payload)
 
     def send_feedback(self, payload: bytes) -> None:
         """Send an XActionFeedback."""
-        self._send(self.keys.feedback, self._types.action_feedback, FEEDBACK, payload)
+        self._publisher(self.keys.feedback, self._types.action_feedback, FEEDBACK).put(payload)
 
     def send_status(self, payload: bytes) -> None:
         """Send a GoalStatusArray."""
-        self._send(self.keys.status, GoalStatusArray, STATUS, payload)
+        self._publisher(self.keys.status, GoalStatusArray, STATUS).put(payload)
 
-    def _send(self, key: str, message_class: Any, quality: Quality, payload: bytes) -> None:
-        publisher = self._publishers.get(key)
+    def _publisher(self, key: str, message_class: Any, quality: Quality) -> PublisherPort:
+        which = key, quality.express
+        publisher = self._publishers.get(which)
         if publisher is None:
             with self._lock:
                 if self._closed:
                     raise TransportError(
                         f"action {self.name!r}: the server is stopped. Try ending goals before."
                     )
-                publisher = self._publishers.get(key)
+                publisher = self._publishers.get(which)
                 if publisher is None:
-                    publisher = self._publishers[key] = self._node.transport.publisher(
+                    publisher = self._publishers[which] = self._node.transport.publisher(
                         key, encoding_of(message_class), quality
                     )
-        publisher.put(payload)
+        return publisher
 
     # -- what arrives --------------------------------------------------------------------------
 
@@ -208,6 +242,7 @@ class ServerPort:
     def _on_ack(self, sample: Sample) -> None:
         try:
             entries = unpack_statuses(sample.payload)
+            self._unaware.discard(unpack_frame(sample.payload))
         except ValueError as error:
             self._report_unreadable("an acknowledgement", sample, error)
             return
@@ -279,7 +314,9 @@ class ServerPort:
             error = find_mismatch([client], self.endpoint)
             if error is not None:
                 self._report_once(f"{client.session} {client.type} {client.md5}", error)
-        elif self._clients.pop(presence.key, None) is not None and not any(
-            end.session == client.session for end in self._clients.values()
-        ):
-            self._listener.on_client_lost(client.session)
+        elif self._clients.pop(presence.key, None) is not None:
+            if presence.key in self._unaware:
+                self._unaware.discard(presence.key)
+                self._listener.on_acknowledged([])
+            if not any(end.session == client.session for end in self._clients.values()):
+                self._listener.on_client_lost(client.session)

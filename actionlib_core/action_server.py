@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 DRAIN_S = 0.3  # how long `stop` waits for acknowledgements
+FAREWELL_S = 0.1  # it says farewell again after so long
 
 ACCEPTED = frozenset({Status.ACTIVE, Status.PREEMPTING})
 
@@ -154,10 +155,12 @@ class ActionServer:
     def stop(self) -> None:
         """End all goals (ABORTED, or REJECTED when not yet accepted) and leave the name.
 
-        Clients see the result of each goal, then the server's absence. A second call does nothing.
+        Clients see the result of each goal, then the server's absence; what they sent too late goes
+        to the next server. A second call does nothing.
 
-        Blocks: until the clients have the results, `DRAIN_S` at most.
+        Blocks: until the clients have heard all that, `DRAIN_S` at most.
         """
+        self.close_to_goals()
         with self.lock:
             if self._stopped or not self._started:
                 return
@@ -165,16 +168,42 @@ class ActionServer:
         for goal in open_goals:
             if goal.arrived and isinstance(goal.tag, StatusTracker):
                 self.give_up(goal.tag, TEXT_STOPPED)
-        self._drain()
+        self._say_farewell()
         self._leave()
 
-    def _drain(self) -> None:
-        """Stay until the clients have the results: the end of the token may overtake them."""
+    def close_to_goals(self) -> None:
+        """Take no more goals, what comes from now on is for the next server; not for users."""
+        with self.lock:
+            self._goals.close()
+
+    def _say_farewell(self) -> None:
+        """Name the goals that were ever taken, so that clients know which were not.
+
+        Stays until they have that and the results: the end of the token may overtake them.
+        """
+        now = self._clock.now()
         with self.lock:
             drained = self._drained = self._clock.event("clients that take their results")
-            if not (self._port.has_clients() and self._goals.has_unacknowledged()):
-                return
-        drained.wait(DRAIN_S)
+            taken = [
+                StatusEntry(goal_id, 0, status, text_of_past(status))
+                if goal is None
+                else entry_of(goal)
+                for goal_id, status, goal in self._goals.taken()
+            ]
+        until = now + DRAIN_S
+        with contextlib.suppress(TransportError):  # the session is closed: nobody can be told
+            listened = self._port.begin_farewell()
+            while listened:
+                self._port.send_farewell(self._clock.time_ns(), taken)
+                left = until - self._clock.now()
+                if self._is_drained() or left <= 0 or drained.wait(min(left, FAREWELL_S)):
+                    return
+
+    def _is_drained(self) -> bool:
+        if not self._port.has_clients():
+            return True
+        with self.lock:
+            return self._port.farewell_heard and not self._goals.has_unacknowledged()
 
     def _leave(self) -> None:
         with self.lock:
@@ -343,6 +372,8 @@ class ActionServer:
             if self._stopped:
                 return
             arrival, known = self._goals.on_goal(record, self._clock.now())
+            if arrival is Arrival.LATE:
+                return
             tracker = StatusTracker.arrived(record, content, self.types)
             if arrival is Arrival.RECALLED:
                 empty = self.types.result().to_bytes()
@@ -389,7 +420,7 @@ class ActionServer:
         """Take acknowledgements from the network; not for users."""
         with self.lock:
             self._goals.on_acknowledged(goal_ids, self._clock.now())
-            if self._drained is not None and not self._goals.has_unacknowledged():
+            if self._drained is not None and self._is_drained():
                 self._drained.set()
 
     def on_question(self, goal_id: str) -> tuple[Any, bytes]:

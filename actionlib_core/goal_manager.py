@@ -29,6 +29,7 @@ log = logging.getLogger(__name__)
 TICK_S = 0.05  # repetitions and acknowledgements due within this go out together
 ACK_AT = 64  # so many acknowledgements go out at once
 STATUSES = {int(status): status for status in Status}
+UNSURE = " and had not acknowledged the goal, which may or may not have begun"
 REMEMBERED = 1024  # ids of ended goals whose result may come again
 
 
@@ -60,6 +61,7 @@ class GoalManager:
         self._acks: list[str] = []
         self._servers: dict[Endpoint, TypeMismatchError | None] = {}
         self._away: dict[Endpoint, float] = {}
+        self._leaving: set[Endpoint] = set()
         self._waiters: list[Event] = []
         self._timer: Timer | None = None
         self._due = 0.0
@@ -92,7 +94,8 @@ class GoalManager:
             return self._server()
 
     def _server(self) -> Endpoint | None:
-        return next((end for end, error in self._servers.items() if error is None), None)
+        ends = (end for end, error in self._servers.items() if error is None)
+        return next((end for end in ends if end not in self._leaving), None)
 
     def wait_for_server(self, timeout: float | None) -> bool:
         """Wait for a server; return whether there is one, False also when the client was stopped.
@@ -155,19 +158,45 @@ class GoalManager:
         with self._lock:
             if server not in self._servers or self._servers.pop(server) is not None:
                 return  # unknown, or of another type
-            if self._server_lost_timeout <= 0:
+            if server in self._leaving or self._server_lost_timeout <= 0:
                 self._lose_goals_of(server, "is gone")
             else:
                 now = self._clock.now()
                 self._away[server] = now + self._server_lost_timeout
                 self._arm(self._away[server])
 
+    def on_farewell(self, entries: list[StatusEntry], server: Endpoint) -> None:
+        """Take the last list of a server that leaves, and answer it.
+
+        Any goal that it does not name it has not taken and never will: the next server gets it.
+        """
+        now = self._clock.now()
+        taken = {entry.id: entry for entry in entries}
+        with self._lock:
+            if self._closed:
+                return
+            if server in self._servers:
+                self._leaving.add(server)
+            for machine in list(self._machines.values()):
+                goal = machine.goal
+                entry = taken.get(goal.id)
+                if entry is not None:
+                    self._hear(machine, entry, server.session, now)
+                elif goal.server in {"", server.session}:
+                    self._take(machine, goal.on_untaken(now))
+            acks, self._acks = self._acks, []
+        self._port.send_acks(acks, self._clock.time_ns(), farewell=True)
+
     def _lose_goals_of(self, server: Endpoint, what: str) -> None:
+        """Give up the goals that a server has, or may have. Needs the lock."""
         reason = f"the action server of node '{server.node}' (session {server.session}) {what}"
+        # A server that has said farewell has named its goals: others are not with it.
+        mine = {server.session} if server in self._leaving else {"", server.session}
+        self._leaving.discard(server)
         for machine in list(self._machines.values()):
             goal = machine.goal
-            if goal.offered and goal.server in {"", server.session}:
-                self._take(machine, goal.lose(reason))
+            if goal.offered and goal.server in mine:
+                self._take(machine, goal.lose(reason if goal.acknowledged else reason + UNSURE))
 
     # -- what the user does --------------------------------------------------------------------
 
@@ -437,14 +466,15 @@ class GoalManager:
         goal = machine.goal
         if Duty.CANCEL in duty:
             self._port.send_cancel(goal.id, 0)
-        if Duty.GOAL in duty:
-            # Sent only when somebody listens: a goal that was not sent cannot run twice.
-            heard = self._port.is_heard()
-            if heard:
+        # Sent only when somebody listens: a goal that was not sent cannot run twice.
+        if Duty.GOAL in duty and self._port.is_heard():
+            with self._lock:
+                server = self._server()
+                goal.on_offered(server.session if server is not None else "")
+            self._port.send_goal(machine.payload)
+            if not goal.offered:  # a farewell came in between: another server may have heard it
                 with self._lock:
-                    server = self._server()
-                    goal.on_offered(server.session if server is not None else "")
-                self._port.send_goal(machine.payload)
+                    goal.on_offered("")
         if Duty.ASK in duty and not machine.asking:
             machine.asking = True
             self._port.ask(goal.id, machine.on_answered)

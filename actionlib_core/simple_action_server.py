@@ -152,6 +152,7 @@ class SimpleActionServer:
             return
         forget()
         task = self._task
+        self.action_server.close_to_goals()
         self._ask_to_stop()
         if task is not None:
             task.join(STOP_GRACE_S)

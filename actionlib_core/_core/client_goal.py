@@ -20,6 +20,7 @@ LONGEST_S = 2.0  # repetitions are never further apart
 UNLISTED_S = 5.0  # the server lists other goals but not this one for so long: it is lost
 
 TEXT_NEVER_SENT = "This goal was canceled before any action server was there"
+TEXT_NEVER_TAKEN = "This goal was canceled before any action server had taken it"
 
 _STEPS = client_life_cycle().steps
 _NAMES: Final = [status.name for status in Status]
@@ -179,6 +180,20 @@ class ClientGoal:
             self._due = min(self._due, now + ASK_FIRST_S)
         elif not answers and now - self._unlisted_since > UNLISTED_S:
             return self.lose("the action server no longer lists this goal")
+        return ()
+
+    def on_untaken(self, now: float) -> Path:
+        """Take the proof that the server it was offered to never took it and never will.
+
+        The next server gets it; a goal whose cancel was on the way is recalled on the spot.
+        """
+        if self.acknowledged or self.attached or self.over:
+            return ()
+        self.offered = False
+        self.server = ""
+        if self._cancelled:
+            return self.on_result(Status.RECALLED, TEXT_NEVER_TAKEN, None, now)
+        self._pause = RESEND_FIRST_S
         return ()
 
     def on_unknown(self, text: str) -> Path:

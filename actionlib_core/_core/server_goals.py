@@ -13,7 +13,7 @@ from actionlib_core._core.life_cycle import server_life_cycle
 from actionlib_core._core.states import TERMINAL, Status
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
 LISTED_S = (
     5.0  # a finished goal and an early cancel stay in the status list (ROS: status_list_timeout)
@@ -38,6 +38,8 @@ class Arrival(enum.Enum):
     """A cancel came first: answer RECALLED, never run it."""
     REPEAT = enum.auto()
     """Known: say again what is known of it."""
+    LATE = enum.auto()
+    """The server takes no more goals: say nothing, the next server may have it."""
 
 
 @dataclass(slots=True, eq=False)
@@ -83,7 +85,9 @@ class ServerGoals:
         self.name = name
         self.result_timeout = result_timeout
         self._goals: dict[str, ServerGoal] = {}
-        self._past: dict[str, tuple[int, float]] = {}  # plain numbers: nothing to collect
+        # Status, when it was forgotten, whether acknowledged; plain numbers: nothing to collect.
+        self._past: dict[str, tuple[int, float, bool]] = {}
+        self._closed = False
         self._last_cancel_ns = 0
         self._steps = server_life_cycle()
 
@@ -104,13 +108,16 @@ class ServerGoals:
         """Take a goal that arrived, for the first time or again.
 
         Returns:
-            What it is, and the goal as it is tracked; None for a repeat of one that ended long ago.
+            What it is, and the goal as it is tracked; None for a repeat of one that ended long ago,
+            and for one that comes too late.
         """
         known = self._goals.get(arrived.id)
         if known is not None and known.arrived:
             return Arrival.REPEAT, known
         if known is None and arrived.id in self._past:
             return Arrival.REPEAT, None
+        if self._closed:
+            return Arrival.LATE, None
         self._goals[arrived.id] = arrived
         if known is not None:
             text = TEXT_CANCEL_CAME_FIRST
@@ -192,7 +199,7 @@ class ServerGoals:
         for goal_id in goal_ids:
             goal = self._goals.get(goal_id)
             if goal is not None and goal.kept_until is not None:
-                self._forget(goal, now)
+                self._forget(goal, now, acknowledged=True)
 
     def has_unacknowledged(self) -> bool:
         """Tell whether a result waits for its acknowledgement."""
@@ -202,6 +209,22 @@ class ServerGoals:
         """Note that nobody will ever end this goal: it is LOST once its time in the list is up."""
         if goal.status not in TERMINAL:
             goal.listed_until = now + LISTED_S
+
+    def close(self) -> None:
+        """Take no more goals."""
+        self._closed = True
+
+    def taken(self) -> Iterator[tuple[str, Status, ServerGoal | None]]:
+        """Return the goals ever taken, without those whose clients have acknowledged their end.
+
+        Each with its id and status; None for one whose result is no longer kept.
+        """
+        for goal in self._goals.values():
+            if goal.arrived:
+                yield goal.id, goal.status, goal
+        for goal_id, (status, _, acknowledged) in self._past.items():
+            if not acknowledged:
+                yield goal_id, Status(status), None
 
     def listed(self) -> list[ServerGoal]:
         """Return the goals of the status list."""
@@ -236,9 +259,9 @@ class ServerGoals:
             return None
         return goal.listed_until if goal.listed_until is not None else goal.kept_until
 
-    def _forget(self, goal: ServerGoal, now: float) -> None:
+    def _forget(self, goal: ServerGoal, now: float, *, acknowledged: bool = False) -> None:
         del self._goals[goal.id]
-        self._past[goal.id] = (int(goal.status), now)
+        self._past[goal.id] = (int(goal.status), now, acknowledged)
         if len(self._past) > MEMORY_GOALS:
             self._trim(now)
 

@@ -56,6 +56,15 @@ def test_report(sent, entry, number):
     assert (found, payload[start:]) == (entry, body)
 
 
+@given(stamps, texts)
+def test_farewell_is_a_status_list_with_a_frame(sent, frame):
+    payload = wire.pack_statuses(sent, [], frame)
+    filled = Header(stamp=Time(0, sent), frame_id=frame)
+    assert payload == GoalStatusArray(header=filled).to_bytes()
+    assert wire.unpack_frame(payload) == frame
+    assert wire.unpack_statuses(payload) == []
+
+
 @given(stamps, st.lists(entries, max_size=5))
 def test_statuses(sent, found):
     payload = wire.pack_statuses(sent, found)

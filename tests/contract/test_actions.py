@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
+from collections import Counter
 
 import pytest
 
@@ -236,6 +237,51 @@ def test_client_and_server_in_one_node_and_a_client_in_the_execute_callback(worl
 
 
 # -- servers that come, go and double ------------------------------------------------------------
+
+
+def test_server_is_swapped_under_a_live_client(world):
+    client = ActionClient("demo", msg.TestAction, node=world.node("client"))
+    for policy in ("queue", "reject", "preempt"):
+        doubler = Doubler(world, policy=policy)
+        assert client.wait_for_server(LONG_S)
+        handle = client.send_goal(msg.TestGoal(4))
+        assert handle.wait(LONG_S)
+        assert handle.get_terminal_state() is TerminalState.SUCCEEDED, handle.get_goal_status_text()
+        assert doubler.runs == [4]
+        doubler.server.stop()
+        assert not client.wait_for_server(0.01)  # it has heard the farewell
+
+
+def test_goals_sent_as_servers_come_and_go_run_once_and_none_is_lost(world):
+    client = ActionClient("demo", msg.TestAction, node=world.node("client"))
+    handles, doublers = [], []
+
+    def send(count):
+        for _ in range(count):
+            handles.append(client.send_goal(msg.TestGoal(len(handles))))
+
+    for _ in range(4):
+        doublers.append(Doubler(world, policy="queue"))
+        send(3)
+        assert handles[-3].wait(LONG_S)  # both ends know each other now
+        stopping = world.clock.spawn(doublers[-1].server.stop, name="stop")
+        for _ in range(5):
+            send(1)
+            world.clock.sleep(0.001)
+        assert stopping.join(LONG_S)
+        send(2)
+    doublers.append(Doubler(world, policy="queue"))
+    assert all(handle.wait(LONG_S) for handle in handles)
+    ran = Counter(number for doubler in doublers for number in doubler.runs)
+    for number, handle in enumerate(handles):
+        state = handle.get_terminal_state()
+        if state is TerminalState.REJECTED:  # it waited in the queue as its server was stopped
+            assert handle.get_goal_status_text() == "The action server was stopped"
+            assert ran[number] == 0
+        else:
+            assert state is TerminalState.SUCCEEDED, handle.get_goal_status_text()
+            assert ran[number] == 1
+    assert doublers[-1].runs
 
 
 def test_goal_sent_before_the_server_exists_runs_when_it_appears(world):

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import contextlib
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import hypothesis.strategies as st
 import pytest
 from hypothesis import given, settings
 
+from actionlib_core._core.client_goal import TEXT_NEVER_TAKEN
 from actionlib_core.action_client import ActionClient, CommState
 from actionlib_core.action_server import ActionServer
 from actionlib_core.clock import VirtualClock, use_clock
@@ -307,3 +308,232 @@ def test_goal_is_lost_when_the_server_restarts_and_is_not_run_again():
         assert "restarted" in handle.get_goal_status_text()
         clock.sleep(10.0)
         assert runs == ["first"]
+
+
+# -- one server after another --------------------------------------------------------------------
+
+
+class Row:
+    """One client, and servers that follow each other on one name; each has a bad link."""
+
+    def __init__(self, clock, *, client_plan=None, server_plan=None, **kwargs):
+        self.clock = clock
+        self.network = MemoryNetwork(clock)
+        self.server_plan = server_plan
+        self.runs = []
+        self.nodes = []
+        self.client = ActionClient(
+            "demo", msg.TestAction, node=self.node("client", client_plan), **kwargs
+        )
+
+    def node(self, name, plan):
+        plans = () if plan is None else (plan,)
+        link = FaultyTransport(self.network.session(), *plans, clock=self.clock)
+        self.nodes.append(Node(name, transport=link, clock=self.clock))
+        return self.nodes[-1]
+
+    def serve(self, name):
+        """Start a server; every goal runs for as many tenths of a second as it says."""
+
+        def execute(goal):
+            self.runs.append((name, goal.goal))
+            if server.wait_preempt(goal.goal / 10):
+                server.set_preempted()
+            else:
+                server.set_succeeded()
+
+        server = SimpleActionServer(
+            "demo",
+            msg.TestAction,
+            execute,
+            auto_start=False,
+            node=self.node(name, self.server_plan),
+            policy="queue",
+        )
+        server.start()
+        return server
+
+    def kill(self, server):
+        server.action_server.node.transport.inner.kill()
+
+    def close(self):
+        for node in self.nodes:
+            node.close()
+            node.transport.close()
+
+
+@contextlib.contextmanager
+def row(seed=None, **kwargs):
+    with VirtualClock(seed) as clock, use_clock(clock):
+        servers = Row(clock, **kwargs)
+        yield servers
+        servers.close()
+
+
+def end_of(handle):
+    assert handle.wait(3000.0), handle
+    return handle.get_terminal_state().name, handle.get_goal_status_text()
+
+
+def test_goal_that_never_reached_a_server_that_leaves_is_run_by_the_next():
+    with row(client_plan=ScriptedFaults({"demo/goal": [()]})) as servers:
+        first = servers.serve("first")
+        assert servers.client.wait_for_server(1.0)
+        handle = servers.client.send_goal(msg.TestGoal(1))
+        servers.clock.sleep(0.1)
+        first.stop()
+        servers.clock.sleep(7.0)
+        assert not handle.wait(0)
+        servers.serve("second")
+        assert end_of(handle)[0] == "SUCCEEDED"
+        assert servers.runs == [("second", 1)]
+
+
+def test_goal_that_never_reached_a_server_that_is_killed_is_lost_and_not_run_by_the_next():
+    """The client cannot tell this from a server that had just begun the goal."""
+    with row(client_plan=ScriptedFaults({"demo/goal": [()]})) as servers:
+        first = servers.serve("first")
+        assert servers.client.wait_for_server(1.0)
+        handle = servers.client.send_goal(msg.TestGoal(1))
+        servers.clock.sleep(0.1)
+        servers.kill(first)
+        state, text = end_of(handle)
+        assert state == "LOST"
+        assert "node 'first'" in text
+        assert "may or may not have begun" in text
+        servers.serve("second")
+        servers.clock.sleep(10.0)
+        assert servers.runs == []
+
+
+def test_goal_that_a_server_took_before_it_left_is_not_run_by_the_next():
+    """What the first server says of the goal is lost, but its farewell names it: it is asked."""
+    plan = ScriptedFaults({"demo/status": [()], "demo/result": [()] * 9})
+    with row(server_plan=plan, server_lost_timeout=60.0) as servers:
+        first = servers.serve("first")
+        assert servers.client.wait_for_server(1.0)
+        handle = servers.client.send_goal(msg.TestGoal(1000))
+        servers.clock.sleep(0.1)
+        first.stop()
+        assert end_of(handle)[0] == "PREEMPTED"
+        servers.serve("second")
+        servers.clock.sleep(10.0)
+        assert servers.runs == [("first", 1000)]
+
+
+@pytest.mark.parametrize(("lost", "state"), [(1, "SUCCEEDED"), (9, "LOST")])
+def test_farewell_is_repeated_and_without_it_the_goal_is_lost(lost, state):
+    plans = {
+        "client_plan": ScriptedFaults({"demo/goal": [()]}),
+        "server_plan": ScriptedFaults({"demo/status": [()] * lost}),
+    }
+    with row(**plans) as servers:
+        first = servers.serve("first")
+        assert servers.client.wait_for_server(1.0)
+        handle = servers.client.send_goal(msg.TestGoal(1))
+        servers.clock.sleep(0.1)
+        first.stop()
+        servers.serve("second")
+        assert end_of(handle)[0] == state
+        assert servers.runs == ([("second", 1)] if state == "SUCCEEDED" else [])
+
+
+def test_cancelled_goal_that_a_leaving_server_never_took_is_recalled():
+    with row(client_plan=ScriptedFaults({"demo/goal": [()]})) as servers:
+        first = servers.serve("first")
+        assert servers.client.wait_for_server(1.0)
+        handle = servers.client.send_goal(msg.TestGoal(1))
+        servers.clock.sleep(0.1)
+        handle.cancel()
+        first.stop()
+        state, text = end_of(handle)
+        assert (state, text) == ("RECALLED", TEXT_NEVER_TAKEN)
+        servers.serve("second")
+        servers.clock.sleep(10.0)
+        assert servers.runs == []
+
+
+def test_goal_still_waits_no_longer_than_its_ack_timeout_for_the_next_server():
+    with row(client_plan=ScriptedFaults({"demo/goal": [()]})) as servers:
+        first = servers.serve("first")
+        assert servers.client.wait_for_server(1.0)
+        handle = servers.client.send_goal(msg.TestGoal(1), ack_timeout=3.0)
+        servers.clock.sleep(0.1)
+        first.stop()
+        state, text = end_of(handle)
+        assert (state, servers.clock.now()) == ("LOST", pytest.approx(3.0, abs=0.1))
+        assert "no action server took this goal within 3 s" in text
+
+
+def test_server_without_clients_leaves_at_once():
+    with row() as servers:
+        servers.client.stop()
+        first = servers.serve("first")
+        before = servers.clock.now()
+        first.stop()
+        assert servers.clock.now() == before
+
+
+@dataclass(frozen=True)
+class Reign:
+    """The time of one server: how long, how it ends, how long the name is free then."""
+
+    length: float
+    killed: bool
+    gap: float
+
+
+@settings(deadline=None, max_examples=100)
+@given(
+    seed=st.integers(0, 1000),
+    client_plan=faults,
+    server_plan=faults,
+    reigns=st.lists(
+        st.builds(Reign, st.floats(0.05, 4.0), st.booleans(), st.floats(0.0, 2.0)),
+        min_size=1,
+        max_size=4,
+    ),
+    script=st.lists(sends, min_size=1, max_size=8),
+    grace=st.sampled_from([0.0, 30.0]),
+)
+def test_servers_that_come_and_go(seed, client_plan, server_plan, reigns, script, grace):
+    """Every goal has an end, none runs twice; none is lost without a kill or a lost message.
+
+    Goals are not late here: one that arrives when its client has its end, at a server that came
+    after the one that ended it, runs again.
+    """
+    client_plan = replace(client_plan, delay=0.0, repeat=0.0)
+    options = {"server_plan": server_plan, "server_lost_timeout": grace}
+    with row(seed, client_plan=client_plan, **options) as servers:
+
+        def rule():
+            for number, reign in enumerate(reigns):
+                server = servers.serve(f"s{number}")
+                servers.clock.sleep(reign.length)
+                (servers.kill if reign.killed else _stop)(server)
+                servers.clock.sleep(reign.gap)
+            servers.serve("last")
+
+        ruling = servers.clock.spawn(rule, name="reigns")
+        handles = []
+        for number, step in enumerate(script):
+            handles.append(servers.client.send_goal(msg.TestGoal(number)))
+            if step.cancel_after is not None:
+                servers.clock.call_later(step.cancel_after, handles[-1].cancel)
+            servers.clock.sleep(step.pause)
+        states = [end_of(handle)[0] for handle in handles]
+        assert ruling.join(3000.0)
+        ran = Counter(number for _, number in servers.runs)
+        assert all(count == 1 for count in ran.values()), servers.runs
+        for number, state in enumerate(states):
+            if state in {"RECALLED", "REJECTED"}:
+                assert ran[number] == 0
+            elif state == "SUCCEEDED":
+                assert ran[number] == 1
+        good = not (client_plan.drop or server_plan.drop or server_plan.delay)
+        if good and not any(reign.killed for reign in reigns):
+            assert "LOST" not in states
+
+
+def _stop(server):
+    server.stop()

@@ -184,3 +184,27 @@ def test_whatever_arrives_the_goal_stays_sound(events):
             assert goal.status in TERMINAL
         if not goal.over:
             assert goal.due > now - 1e-9 or goal.tick(now)[1]  # never forgotten
+
+
+def test_goal_that_no_server_took_is_offered_again():
+    goal = started()
+    assert goal.on_untaken(0.1) == ()
+    assert (goal.offered, goal.server, goal.comm) == (False, "", C.WAITING_FOR_GOAL_ACK)
+    goal.hurry(3.0)
+    assert goal.tick(3.0)[1] is Duty.GOAL
+
+
+def test_cancelled_goal_that_no_server_took_is_recalled():
+    goal = started()
+    goal.cancel(0.05)
+    assert goal.on_untaken(0.1)[-1] is C.DONE
+    assert goal.status is Status.RECALLED
+
+
+@pytest.mark.parametrize("attached", [False, True])
+def test_goal_that_a_server_has_or_had_is_not_offered_again(attached):
+    goal = started(attached=attached)
+    if not attached:
+        goal.on_status(Status.ACTIVE, "", 0.1)
+    assert goal.on_untaken(0.2) == ()
+    assert goal.offered

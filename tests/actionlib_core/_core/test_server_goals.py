@@ -131,3 +131,27 @@ def test_released_goal_becomes_lost():
     goals.release(goals.find("a"), 0.0)
     assert goals.expire(5.0) is None
     assert goals.past_status("a") is Status.LOST
+
+
+def test_server_that_takes_no_more_goals_still_knows_those_it_has():
+    goals = book(("a", 1))
+    goals.on_cancel("cancelled", 0, 0.0)
+    goals.close()
+    assert goals.on_goal(ServerGoal("a", 1), 1.0)[0] is Arrival.REPEAT
+    for late in ("b", "cancelled"):
+        assert goals.on_goal(ServerGoal(late, 2), 1.0) == (Arrival.LATE, None)
+    assert [goal_id for goal_id, _, _ in goals.taken()] == ["a"]
+
+
+def test_goals_taken_are_those_whose_end_is_not_acknowledged():
+    goals = book(("known", 1), ("forgotten", 2), ("kept", 3), ("running", 4), result_timeout=60.0)
+    for goal_id, now in (("known", 0.0), ("forgotten", 0.0), ("kept", 100.0)):
+        end(goals, goal_id, now)
+    goals.on_acknowledged(["known"], 1.0)
+    goals.expire(99.0)
+    taken = [(goal_id, status, goal is None) for goal_id, status, goal in goals.taken()]
+    assert taken == [
+        ("kept", Status.SUCCEEDED, False),
+        ("running", Status.PENDING, False),
+        ("forgotten", Status.SUCCEEDED, True),
+    ]
