@@ -8,10 +8,12 @@ parsers and sets `run=function(args) -> int`. Names are ROS names, renamed by `a
 from __future__ import annotations
 
 import argparse
+import contextlib
 import importlib
 import pkgutil
 import signal
 import sys
+import threading
 import traceback
 from importlib.metadata import version
 from typing import TYPE_CHECKING, NoReturn
@@ -20,13 +22,20 @@ from actionlib_core.exceptions import ActionlibError
 from actionlib_core.names import parse_arguments
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from actionlib_core.node import Node
 
 EXIT_FAILED = 1
 EXIT_ERROR = 2
 EXIT_INTERRUPTED = 128 + signal.SIGINT
+
+
+EXIT_TERMINATED = 128 + signal.SIGTERM
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM came: what a command does on Ctrl-C it does then too."""
 
 
 class UsageError(ActionlibError):
@@ -43,7 +52,7 @@ class _Parser(argparse.ArgumentParser):
 def main(argv: Sequence[str] | None = None, *, node: Node | None = None) -> int:
     """Run the command line; returns the exit code.
 
-    Exit codes: 0 success, 1 the goal or call did not succeed, 2 bad input, 130 Ctrl-C.
+    Exit codes: 0 success, 1 the goal or call did not succeed, 2 bad input, 130 Ctrl-C, 143 SIGTERM.
 
     Args:
         argv: The arguments; those of the process when None.
@@ -55,7 +64,10 @@ def main(argv: Sequence[str] | None = None, *, node: Node | None = None) -> int:
         names = parse_arguments([word for word in given if word != "--debug"])
         args = _parser().parse_args(names.rest)
         args.node, args.names = node, names
-        return int(args.run(args))
+        with _terminable():
+            return int(args.run(args))
+    except Terminated:
+        return EXIT_TERMINATED
     except KeyboardInterrupt:
         return EXIT_INTERRUPTED
     except BrokenPipeError:  # `actionlib list | head`: the reader has seen enough
@@ -67,6 +79,23 @@ def main(argv: Sequence[str] | None = None, *, node: Node | None = None) -> int:
         else:
             print(f"actionlib: {error}", file=sys.stderr)
         return EXIT_ERROR
+
+
+@contextlib.contextmanager
+def _terminable() -> Iterator[None]:
+    """Raise `Terminated` in the main thread when SIGTERM comes."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def on_signal(_number: int, _frame: object) -> None:
+        raise Terminated
+
+    before = signal.signal(signal.SIGTERM, on_signal)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _parser() -> argparse.ArgumentParser:

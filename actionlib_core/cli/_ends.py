@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from actionlib_core.cli import UsageError
+from actionlib_core.cli._network import find_by_name, which_there_are
 from actionlib_core.presence import list_endpoints
 
 if TYPE_CHECKING:
@@ -40,13 +41,11 @@ def find_ends(node: Node, name: str, kinds: Iterable[Kind], what: str) -> list[E
         UsageError: there are none; the text says which there are.
     """
     full = node.resolve(name, f"{what} name")
-    found = ends_by_name(node, kinds)
-    if full not in found:
-        there = [f"/{other}" for other in found]
-        raise UsageError(
-            f"{what} '/{full}': not there; expected one of {there}. Try 'actionlib {what} list'."
-        )
-    return found[full]
+    found = find_by_name(node, full, tuple(kinds))
+    if not found:
+        there = which_there_are(full, ends_by_name(node, kinds))
+        raise UsageError(f"{what} '/{full}': not there; {there} Try 'actionlib {what} list'.")
+    return found
 
 
 def types_of(ends: Iterable[Endpoint], kind: str) -> list[str]:

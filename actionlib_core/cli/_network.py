@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import difflib
 import os
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from actionlib_core.cli import UsageError
@@ -12,12 +12,14 @@ from actionlib_core.presence import Endpoint, Kind, list_endpoints, parse_token,
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterable, Iterator
 
     from actionlib_core.node import Node
     from actionlib_core.transport import Presence, Reply
 
-SETTLE_S = 0.4  # peers on one machine find each other within this
+SETTLE_S = 0.4  # the network is known when nobody new has shown up for so long
+SETTLE_MOST_S = 3.0
+FIND_S = 2.0  # a name that is not there then may still come within this: a busy machine is slow
 ASK_S = 2.0
 
 ACTION_KINDS = (Kind.ACTION_SERVER, Kind.ACTION_CLIENT)
@@ -29,7 +31,7 @@ def open_node(args: argparse.Namespace, *, settle: float = SETTLE_S) -> Iterator
 
     Args:
         args: What `main` has parsed.
-        settle: How long to wait until the others have been found [s]; 0 does not wait.
+        settle: Wait until nobody new has been found for so long [s]; 0 does not wait.
     """
     if args.node is not None:
         yield args.node
@@ -38,11 +40,69 @@ def open_node(args: argparse.Namespace, *, settle: float = SETTLE_S) -> Iterator
     from actionlib_core.node import Node
 
     config = load_config(args.config)
-    config = replace(config, settle=max(config.settle, settle))
     with Node(
         f"actionlib_{os.getpid()}", config=config, namespace=config.namespace, arguments=args.names
     ) as node:
+        if settle:
+            _settle(node, settle)
         yield node
+
+
+def _settle(node: Node, quiet: float) -> None:
+    """Wait until nobody new has been found for `quiet` [s].
+
+    Blocks: `SETTLE_MOST_S` at most.
+    """
+    news = node.clock.event()
+    watch = node.transport.watch_alive(token_pattern(None, "**"), lambda _presence: news.set())
+    deadline = node.clock.now() + SETTLE_MOST_S
+    try:
+        while news.wait(min(quiet, max(deadline - node.clock.now(), 0.0))):
+            news.clear()
+    finally:
+        watch.close()
+
+
+def find_by_name(node: Node, full: str, kinds: Collection[Kind]) -> list[Endpoint]:
+    """Return the ends of a full name, of some kinds; waits a little for the first.
+
+    Blocks: `FIND_S` at most.
+    """
+
+    def there() -> list[Endpoint]:
+        return [end for end in list_endpoints(node.transport, name=full) if end.kind in kinds]
+
+    found = there()
+    if found:
+        return found
+    came = node.clock.event()
+
+    def on_presence(presence: Presence) -> None:
+        end = parse_token(presence.key)
+        if end is not None and presence.alive and end.kind in kinds:
+            came.set()
+
+    watch = node.transport.watch_alive(token_pattern(None, full), on_presence)
+    try:
+        came.wait(FIND_S)
+    finally:
+        watch.close()
+    return there()
+
+
+def which_there_are(wanted: str, names: Iterable[str]) -> str:
+    """Return what to say when `wanted` is not there: the others, and the nearest.
+
+    Args:
+        wanted: A full name.
+        names: The full names that are there.
+    """
+    there = [f"/{name}" for name in names]
+    if not there:
+        return "expected one, but there is none at all."
+    near = difflib.get_close_matches(f"/{wanted}", there, n=1, cutoff=0.6)
+    hint = f" Did you mean {near[0]!r}?" if near else ""
+    return f"expected one of {there}.{hint}"
 
 
 def list_ends(node: Node, name: str = "**") -> dict[str, list[Endpoint]]:
@@ -67,10 +127,11 @@ def find_ends(node: Node, name: str) -> list[Endpoint]:
         UsageError: there are none.
     """
     full = node.resolve(name, "action name")
-    ends = list_ends(node, full).get(full)
+    ends = find_by_name(node, full, ACTION_KINDS)
     if not ends:
         raise UsageError(
-            f"action '/{full}': got no server and no client; expected one. Try 'actionlib list'."
+            f"action '/{full}': got no server and no client; "
+            f"{which_there_are(full, list_ends(node))} Try 'actionlib list'."
         )
     return ends
 
@@ -82,12 +143,18 @@ def find_server(node: Node, name: str) -> Endpoint:
         UsageError: there is none.
     """
     full = node.resolve(name, "action name")
-    for end in list_ends(node, full).get(full, []):
-        if end.kind is Kind.ACTION_SERVER:
-            return end
+    for end in find_by_name(node, full, (Kind.ACTION_SERVER,)):
+        return end
     raise UsageError(
-        f"action '/{full}': got no server; expected one. Try 'actionlib list', or start its server."
+        f"action '/{full}': got no server; {which_there_are(full, list_servers(node))} "
+        "Try 'actionlib list', or start its server."
     )
+
+
+def list_servers(node: Node) -> list[str]:
+    """Return the full names of the actions that have a server."""
+    ends = list_endpoints(node.transport, kind=Kind.ACTION_SERVER)
+    return sorted({end.name for end in ends})
 
 
 def wait_for_server(node: Node, name: str, timeout: float | None) -> Endpoint:
@@ -115,8 +182,9 @@ def wait_for_server(node: Node, name: str, timeout: float | None) -> Endpoint:
         watch.close()
     if not found:
         raise UsageError(
-            f"action '/{full}': got no server within {timeout:g} s; expected one. Try 'actionlib "
-            "list', or start its server."
+            f"action '/{full}': got no server within {timeout:g} s; "
+            f"{which_there_are(full, list_servers(node))} Try 'actionlib list', or start its "
+            "server."
         )
     return found[0]
 

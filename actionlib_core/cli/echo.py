@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
+import sys
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.cli import EXIT_FAILED
+from actionlib_core.cli._feed import Feed
 from actionlib_core.cli._network import action_class, open_node, wait_for_server
+from actionlib_core.cli._numbers import count, seconds
 from actionlib_core.cli._output import add_json, print_json, print_message
 
 if TYPE_CHECKING:
@@ -20,13 +25,14 @@ def register(subparsers: Any) -> None:
     parser.add_argument("name", metavar="NAME", help="the action")
     parser.add_argument("-s", "--status", action="store_true", help="also the status lists")
     parser.add_argument("--once", action="store_true", help="end after the first message")
-    parser.add_argument("--timeout", type=float, metavar="S", help="end after this time [s]")
+    parser.add_argument("-n", "--count", type=count, metavar="N", help="end after N messages")
+    parser.add_argument("--timeout", type=seconds, metavar="S", help="end after this time [s]")
     add_json(parser)
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print messages until Ctrl-C, `--timeout` or, with `--once`, the first."""
+    """Print messages until Ctrl-C, `--timeout` or, with `--once` or `-n`, enough of them."""
     from actionlib_core._action_wire import action_keys
     from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatusArray
 
@@ -42,32 +48,37 @@ def run(args: argparse.Namespace) -> int:
         }
         if args.status:
             classes[keys.status] = GoalStatusArray
-        seen = node.clock.event()
+        feed = Feed(node.clock)
         subscriptions = [
-            node.transport.subscribe(
-                key, partial(_show, key.rpartition("/")[2], message_class, args, seen)
-            )
+            node.transport.subscribe(key, partial(_put, feed, message_class))
             for key, message_class in classes.items()
         ]
+        deadline = None if args.timeout is None else node.clock.now() + args.timeout
+        limit = 1 if args.once else args.count
         try:
-            if args.once:
-                seen.wait(args.timeout)
-            else:
-                node.clock.event().wait(args.timeout)
+            for _ in itertools.count() if limit is None else range(limit):
+                _show(feed.next(deadline), as_json=args.json)
+        except TimeoutError:
+            return 0 if limit is None else _too_few(args)
         finally:
             for subscription in subscriptions:
                 subscription.close()
     return 0
 
 
-def _show(
-    word: str, message_class: Any, args: argparse.Namespace, seen: Any, sample: Sample
-) -> None:
-    if args.once and seen.is_set():
-        return
-    message = message_class.from_bytes(sample.payload)
-    if args.json:
+def _too_few(args: argparse.Namespace) -> int:
+    print(f"actionlib: /{args.name.lstrip('/')}: not enough in {args.timeout:g} s", file=sys.stderr)
+    return EXIT_FAILED
+
+
+def _put(feed: Feed, message_class: Any, sample: Sample) -> None:
+    feed.put((sample.key.rpartition("/")[2], message_class, sample.payload))
+
+
+def _show(item: tuple[str, Any, bytes], *, as_json: bool) -> None:
+    word, message_class, payload = item
+    message = message_class.from_bytes(payload)
+    if as_json:
         print_json(topic=word, message=message.to_dict())
     else:
         print_message(f"{word}:", message)
-    seen.set()

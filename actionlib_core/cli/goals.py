@@ -115,13 +115,15 @@ def _cancel(args: argparse.Namespace) -> int:
     stamp_ns = _stamp(args.before)
     from actionlib_core._action_wire import pack_goal_id
     from actionlib_core._client_port import GOAL
-    from actionlib_core._core.states import TERMINAL
+    from actionlib_core._core.states import TERMINAL, Status
     from actionlib_core.interfaces.actionlib_msgs.msg import GoalID
     from actionlib_core.wire import encoding_of
 
     with open_node(args) as node:
         name = find_server(node, args.name).name
-        goals = [entry for entry in _goals(node, f"/{name}") if entry.status not in TERMINAL]
+        # A cancel that waits for its goal is listed as RECALLING; it was cancelled already.
+        done = {*TERMINAL, Status.RECALLING}
+        goals = [entry for entry in _goals(node, f"/{name}") if entry.status not in done]
         asked = [
             entry.id
             for entry in goals

@@ -6,8 +6,9 @@ import re
 import sys
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core.cli import EXIT_FAILED, EXIT_INTERRUPTED, UsageError
+from actionlib_core.cli import EXIT_FAILED, UsageError
 from actionlib_core.cli._network import action_class, open_node, wait_for_server
+from actionlib_core.cli._numbers import seconds
 from actionlib_core.cli._output import add_json, print_json, print_message
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ def register(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "send_goal",
         help="send a goal, wait for its result",
-        description="Exit code 0 when the goal SUCCEEDED. Ctrl-C cancels it first.",
+        description="Exit code 0 when the goal SUCCEEDED. Ctrl-C and SIGTERM cancel it first.",
     )
     parser.add_argument("name", metavar="NAME", help="the action")
     parser.add_argument(
@@ -37,7 +38,7 @@ def register(subparsers: Any) -> None:
     parser.add_argument("-f", "--feedback", action="store_true", help="print feedback")
     parser.add_argument("--stdin", action="store_true", help="read the YAML from standard input")
     parser.add_argument(
-        "--timeout", type=float, metavar="S", help="longest time for server and goal [s]"
+        "--timeout", type=seconds, metavar="S", help="longest time for server and goal [s]"
     )
     add_json(parser)
     parser.set_defaults(run=run)
@@ -86,11 +87,12 @@ def _drive(
     if not args.json:
         print_message("Sending goal:", goal)
     handle: SentGoal[Any, Any] = client.send(goal, timeout=timeout)
-    interrupted = timed_out = False
+    interrupted: KeyboardInterrupt | None = None
+    timed_out = False
     try:
         _follow(handle, args)
-    except KeyboardInterrupt:
-        interrupted = True
+    except KeyboardInterrupt as error:  # Ctrl-C, or a signal that asks the same
+        interrupted = error
         _cancel(handle, args)
     except TimeoutError:
         timed_out = True
@@ -98,8 +100,8 @@ def _drive(
     _print_end(handle, args)
     if timed_out:
         print(f"actionlib: send_goal: not over within {args.timeout:g} s", file=sys.stderr)
-    if interrupted:
-        return EXIT_INTERRUPTED
+    if interrupted is not None:
+        raise interrupted
     return 0 if handle.status.name == "SUCCEEDED" and not timed_out else EXIT_FAILED
 
 

@@ -146,4 +146,4 @@ class Desk:
                 f"got {verb!r}; expected one of "
                 f"{['accept', 'reject', 'feedback', *ends, 'list', 'quit']}."
             )
-        ends[verb](self.types.result.from_yaml(rest) if rest else None, verb)
+        ends[verb](self.types.result.from_yaml(rest) if rest else None)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from actionlib_core.cli import EXIT_FAILED, UsageError
 from actionlib_core.cli._ends import ends_by_name, find_ends, only_type, types_of
 from actionlib_core.cli._network import SETTLE_S, open_node
+from actionlib_core.cli._numbers import rate, seconds
 from actionlib_core.exceptions import ServiceException
 from actionlib_core.presence import Kind
 
@@ -40,9 +41,9 @@ def register(subparsers: Any) -> None:
         help="the type (default: what the server says) and the request, '{data: true}'",
     )  # fmt: skip
     call.add_argument("--stdin", action="store_true", help="read the request from standard input")
-    call.add_argument("-r", "--rate", type=float, metavar="HZ", help="call again and again")
+    call.add_argument("-r", "--rate", type=rate, metavar="HZ", help="call again and again")
     call.add_argument(
-        "--timeout", type=float, default=10.0, metavar="S", help="longest wait [s] (default: 10)"
+        "--timeout", type=seconds, default=10.0, metavar="S", help="longest wait [s] (default: 10)"
     )
     call.add_argument("--json", action="store_true", help="the response as JSON")
 

@@ -1,18 +1,22 @@
-"""`actionlib topic list|info|type|echo|pub|hz`, with the flags of `ros2 topic`."""
+"""`actionlib topic list|info|type|echo|pub|hz|bw`, with the flags of `ros2 topic`."""
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import json
 import math
 import sys
 from collections import deque
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from actionlib_core.cli import UsageError
+from actionlib_core.cli import EXIT_FAILED, UsageError
 from actionlib_core.cli._ends import ends_by_name, find_ends, only_type, types_of
+from actionlib_core.cli._feed import Feed
+from actionlib_core.cli._filter import Filter
 from actionlib_core.cli._network import open_node
-from actionlib_core.presence import Kind
+from actionlib_core.cli._numbers import count, rate, seconds, size
+from actionlib_core.presence import Kind, parse_token, token_pattern
 
 if TYPE_CHECKING:
     import argparse
@@ -22,8 +26,11 @@ if TYPE_CHECKING:
     from actionlib_core.interfaces import Message
     from actionlib_core.node import Node
     from actionlib_core.presence import Endpoint
+    from actionlib_core.transport import Closable, Presence, Sample
 
 ENDS = (Kind.PUBLISHER, Kind.SUBSCRIBER)
+REPORT_S = 1.0
+SHOW_S = 0.5
 
 
 def register(subparsers: Any) -> None:
@@ -36,6 +43,7 @@ def register(subparsers: Any) -> None:
     _register_echo(verbs)
     _register_pub(verbs)
     _register_hz(verbs)
+    _register_bw(verbs)
 
 
 def _add(verbs: Any, name: str, run: Callable[[argparse.Namespace], int], help_: str) -> Any:
@@ -70,8 +78,13 @@ def _register_echo(verbs: Any) -> None:
     parser.add_argument("name", metavar="NAME")
     parser.add_argument("type", metavar="TYPE", nargs="?", help="default: what its ends say")
     parser.add_argument("--once", action="store_true", help="end after the first message")
-    parser.add_argument("-n", "--count", type=int, metavar="N", help="end after N messages")
-    parser.add_argument("--timeout", type=float, metavar="S", help="longest wait for a message [s]")
+    parser.add_argument("-n", "--count", type=count, metavar="N", help="end after N messages")
+    parser.add_argument(
+        "--timeout", type=seconds, metavar="S", help="longest wait for a message [s]"
+    )
+    parser.add_argument(
+        "--filter", metavar="EXPR", help="only messages for which this holds: 'data > 3'"
+    )
     parser.add_argument("--field", metavar="PATH", help="only this field: pose.position, data[0]")
     parser.add_argument("--csv", action="store_true", help="one line per message")
     parser.add_argument("--json", action="store_true", help="one JSON object per line")
@@ -81,7 +94,7 @@ def _register_echo(verbs: Any) -> None:
     parser.add_argument("--flow-style", action="store_true", help="collections on one line")
     parser.add_argument("-f", "--full-length", action="store_true", help="nothing shortened")
     parser.add_argument(
-        "-l", "--truncate-length", type=int, default=128, metavar="N",
+        "-l", "--truncate-length", type=size, default=128, metavar="N",
         help="shorten arrays and texts to N (default: 128)",
     )  # fmt: skip
 
@@ -91,14 +104,14 @@ def _register_pub(verbs: Any) -> None:
     parser.add_argument("name", metavar="NAME")
     parser.add_argument("type", metavar="TYPE")
     parser.add_argument("values", metavar="YAML", nargs="?", default="", help="'{data: hello}'")
-    parser.add_argument("-r", "--rate", type=float, default=1.0, metavar="HZ", help="default: 1 Hz")
+    parser.add_argument("-r", "--rate", type=rate, default=1.0, metavar="HZ", help="default: 1 Hz")
     parser.add_argument("-1", "--once", action="store_true", help="one message, then end")
-    parser.add_argument("-t", "--times", type=int, metavar="N", help="N messages, then end")
+    parser.add_argument("-t", "--times", type=count, metavar="N", help="N messages, then end")
     parser.add_argument(
-        "-w", "--wait-matching-subscriptions", type=int, metavar="N",
+        "-w", "--wait-matching-subscriptions", type=size, metavar="N",
         help="wait for N subscribers (default: 1 with --once and --times, else 0)",
     )  # fmt: skip
-    parser.add_argument("--timeout", type=float, metavar="S", help="longest wait for them [s]")
+    parser.add_argument("--timeout", type=seconds, metavar="S", help="longest wait for them [s]")
     parser.add_argument("--latch", action="store_true", help="keep it for late subscribers")
     parser.add_argument(
         "--stdin", action="store_true", help="one message per YAML document from standard input"
@@ -110,9 +123,19 @@ def _register_hz(verbs: Any) -> None:
     parser = _add(verbs, "hz", _hz, "print how often messages come")
     parser.add_argument("name", metavar="NAME")
     parser.add_argument(
-        "-w", "--window", type=int, default=10_000, metavar="N", help="over the last N messages"
+        "-w", "--window", type=count, default=10_000, metavar="N", help="over the last N messages"
     )
-    parser.add_argument("-n", "--count", type=int, metavar="N", help="end after N reports")
+    parser.add_argument("-n", "--count", type=count, metavar="N", help="end after N reports")
+    parser.add_argument("--json", action="store_true", help="one JSON object per report")
+
+
+def _register_bw(verbs: Any) -> None:
+    parser = _add(verbs, "bw", _bw, "print how many bytes come in a second")
+    parser.add_argument("name", metavar="NAME")
+    parser.add_argument(
+        "-w", "--window", type=count, default=100, metavar="N", help="over the last N messages"
+    )
+    parser.add_argument("-n", "--count", type=count, metavar="N", help="end after N reports")
     parser.add_argument("--json", action="store_true", help="one JSON object per report")
 
 
@@ -191,28 +214,6 @@ def _type(args: argparse.Namespace) -> int:
 # -- messages --------------------------------------------------------------------------------------
 
 
-class _Feed:
-    """Hands what callbacks bring to the main thread, which prints it and gets the Ctrl-C."""
-
-    def __init__(self, clock: Clock) -> None:
-        self._clock = clock
-        self._items: deque[Any] = deque()
-        self._changed = clock.event()
-
-    def put(self, item: Any) -> None:
-        self._items.append(item)
-        self._changed.set()
-
-    def take(self, timeout: float | None) -> Iterator[Any]:
-        """Yield what comes, until nothing has come for `timeout` [s]."""
-        while True:
-            self._changed.clear()
-            while self._items:
-                yield self._items.popleft()
-            if not self._changed.wait(timeout):
-                return
-
-
 def _message_class(node: Node, args: argparse.Namespace) -> type[Message]:
     from actionlib_core.interfaces import get_message
 
@@ -227,21 +228,45 @@ def _echo(args: argparse.Namespace) -> int:
     from actionlib_core.topic import Subscriber
 
     limit = 1 if args.once else args.count
-    with open_node(args) as node:
-        feed = _Feed(node.clock)
+    wanted = Filter(args.filter) if args.filter else None
+    if wanted is not None and args.raw:
+        raise UsageError("topic echo: got --filter beside --raw; expected one of the two.")
+    with open_node(args) as node, contextlib.ExitStack() as stack:
+        feed = Feed(node.clock)
         if args.raw:
-            name = node.resolve(args.name, "topic name")
-            node.transport.subscribe(name, lambda sample: feed.put(sample.payload))
+            stack.enter_context(
+                _listening(node, args.name, lambda sample: feed.put(sample.payload))
+            )
             show: Callable[[Any], str] = _raw
         else:
             show = MessageText(args).format
-            Subscriber(args.name, _message_class(node, args), feed.put, node=node)
-        for number, item in enumerate(feed.take(args.timeout), 1):
+            subscriber = Subscriber(args.name, _message_class(node, args), feed.put, node=node)
+            stack.callback(subscriber.unregister)
+        shown = 0
+        while limit is None or shown < limit:
+            deadline = None if args.timeout is None else node.clock.now() + args.timeout
+            try:
+                item = _next(feed, deadline, wanted)
+            except TimeoutError:
+                return _nothing(args)
             print(show(item), flush=True)
-            if number == limit:
-                return 0
-    print(f"actionlib: /{args.name.lstrip('/')}: no message in {args.timeout:g} s", file=sys.stderr)
-    return 1
+            shown += 1
+    return 0
+
+
+def _next(feed: Feed, deadline: float | None, wanted: Filter | None) -> Any:
+    """Return the next item that is wanted."""
+    while True:
+        item = feed.next(deadline)
+        if wanted is None or wanted(item.to_dict()):
+            return item
+
+
+def _nothing(args: argparse.Namespace) -> int:
+    which = "message that passes the filter" if args.filter else "message"
+    name = args.name.lstrip("/")
+    print(f"actionlib: /{name}: no {which} in {args.timeout:g} s", file=sys.stderr)
+    return EXIT_FAILED
 
 
 def _raw(payload: bytes) -> str:
@@ -332,24 +357,117 @@ def _publish_at_rate(
 # -- rates -----------------------------------------------------------------------------------------
 
 
-def _hz(args: argparse.Namespace) -> int:
-    reports = 0
-    with open_node(args, settle=0.0) as node:
+class _Arrival(NamedTuple):
+    """When a message came [s], and its size [bytes]."""
+
+    time: float
+    size: int
+
+
+@contextlib.contextmanager
+def _listening(node: Node, name: str, callback: Callable[[Sample], None]) -> Iterator[_Ear]:
+    """Receive the bytes of a topic, seen by its publishers as a subscriber of their type."""
+    ear = _Ear(node, node.resolve(name, "topic name"), callback)
+    try:
+        yield ear
+    finally:
+        ear.close()
+
+
+class _Ear:
+    """A subscription whose type is that of the first publisher.
+
+    Publishers that say nothing, or less, while nobody listens need to see it.
+    """
+
+    def __init__(self, node: Node, full: str, callback: Callable[[Sample], None]) -> None:
+        self._node = node
+        self._publishers = Feed(node.clock)
+        self._shown = False
+        self._parts: list[Closable] = [node.transport.subscribe(full, callback)]
+        pattern = token_pattern(Kind.PUBLISHER, full)
+        self._parts.append(node.transport.watch_alive(pattern, self._on_presence))
+
+    def show(self, timeout: float) -> None:
+        """Let the publishers know, if not done yet.
+
+        Blocks: until there is a publisher, `timeout` [s] at most.
+        """
+        if self._shown:
+            return
+        with contextlib.suppress(TimeoutError):
+            end: Endpoint = self._publishers.next(self._node.clock.now() + timeout)
+            self._parts.append(self._node.announce(Kind.SUBSCRIBER, end.name, end.type, end.md5))
+            self._shown = True
+
+    def close(self) -> None:
+        """Listen no more."""
+        for part in self._parts:
+            part.close()
+
+    def _on_presence(self, presence: Presence) -> None:
+        end = parse_token(presence.key)
+        if end is not None and presence.alive:
+            self._publishers.put(end)
+
+
+def _measure(args: argparse.Namespace, report: Callable[[list[_Arrival]], None]) -> int:
+    """Give `report` the last messages once a second."""
+    arrivals: deque[_Arrival] = deque(maxlen=args.window)
+    with open_node(args) as node:
         clock = node.clock
-        times: deque[float] = deque(maxlen=args.window)
-        name = node.resolve(args.name, "topic name")
-        node.transport.subscribe(name, lambda _: times.append(clock.now()), history=False)
-        fresh = 0.0
-        while args.count is None or reports < args.count:
-            clock.sleep(1.0)
-            stamps = list(times)
-            if len(stamps) > 1 and stamps[-1] != fresh:
-                fresh = stamps[-1]
-                _print_rate(stamps, as_json=args.json)
-            else:
-                print("no new messages", file=sys.stderr)
-            reports += 1
+
+        def take(sample: Sample) -> None:
+            arrivals.append(_Arrival(clock.now(), len(sample.payload)))
+
+        with _listening(node, args.name, take) as ear:
+            fresh = 0.0
+            for _ in itertools.count() if args.count is None else range(args.count):
+                due = clock.now() + REPORT_S
+                ear.show(REPORT_S)
+                clock.sleep(max(due - clock.now(), 0.0))
+                known = list(arrivals)
+                if len(known) > 1 and known[-1].time != fresh:
+                    fresh = known[-1].time
+                    report(known)
+                else:
+                    print("no new messages", file=sys.stderr)
     return 0
+
+
+def _hz(args: argparse.Namespace) -> int:
+    return _measure(
+        args, lambda known: _print_rate([arrival.time for arrival in known], as_json=args.json)
+    )
+
+
+def _bw(args: argparse.Namespace) -> int:
+    return _measure(args, lambda known: _print_bandwidth(known, as_json=args.json))
+
+
+def _print_bandwidth(known: list[_Arrival], *, as_json: bool) -> None:
+    sizes = [arrival.size for arrival in known]
+    # The first message ends a gap that was not seen: its bytes belong to the time before.
+    speed = sum(sizes[1:]) / max(known[-1].time - known[0].time, 1e-9)
+    mean = sum(sizes) / len(sizes)
+    if as_json:
+        record = {"bytes_per_s": speed, "mean": mean, "min": min(sizes), "max": max(sizes),
+                  "window": len(sizes)}  # fmt: skip
+        print(json.dumps(record), flush=True)
+        return
+    print(f"{_bytes(speed)}/s from {len(sizes)} messages")
+    print(
+        f"\tMessage size mean: {_bytes(mean)} min: {_bytes(min(sizes))} max: {_bytes(max(sizes))}",
+        flush=True,
+    )
+
+
+def _bytes(number: float) -> str:
+    """Return bytes as `ros2 topic bw` does: `512 B`, `1.50 KB`, `2.00 MB`."""
+    for unit, factor in (("MB", 1e6), ("KB", 1e3)):
+        if number >= factor:
+            return f"{number / factor:.2f} {unit}"
+    return f"{number:.0f} B"
 
 
 def _print_rate(stamps: list[float], *, as_json: bool) -> None:

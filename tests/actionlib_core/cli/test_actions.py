@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import signal
 import threading
 
 import pytest
@@ -133,15 +134,18 @@ def test_send_goal_timeouts(shell, counting):
     assert "action '/nobody': got no server within 3 s" in out
 
 
-def test_ctrl_c_cancels_the_goal_first(shell, counting, monkeypatch):
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_cancels_the_goal_first(shell, counting, monkeypatch, number, code):
     from actionlib_core.cli import send_goal
 
     def follow(handle, _args):
         handle.next_feedback()
-        raise KeyboardInterrupt
+        signal.raise_signal(number)
 
     monkeypatch.setattr(send_goal, "_follow", follow)
-    out = shell("send_goal", "robot/count", "{goal: 1000}", code=130)
+    before = signal.getsignal(signal.SIGTERM)
+    out = shell("send_goal", "robot/count", "{goal: 1000}", code=code)
+    assert signal.getsignal(signal.SIGTERM) is before
     assert "Canceling goal...\nGoal canceled.\n" in out
     assert out.endswith("Goal finished with status: PREEMPTED (stopped)\n")
 
@@ -157,6 +161,9 @@ def test_ctrl_c_cancels_the_goal_first(shell, counting, monkeypatch):
         (["cancel", "robot/count", "x", "--all"], "--all beside ID"),
         (["cancel", "robot/count", "--before", "noon"], "expected seconds since the epoch"),
         (["info", "nobody"], "Try 'actionlib list'"),
+        (["info", "robot/cuont"], "Did you mean '/robot/count'?"),
+        (["type", "count"], "expected one of ['/robot/count']"),
+        (["cancel", "robot/coun", "--all"], "Did you mean '/robot/count'?"),
         (["goal", "list", "nobody"], "got no server"),
     ],
 )
@@ -203,6 +210,7 @@ def test_goals_are_listed_shown_and_cancelled(shell, network, clock):
     assert shell.json("cancel", "keep", "--all") == {"cancelled": [ids[1]]}
     assert second.wait(1.0)
     assert "remembers the cancel" in shell("cancel", "keep", "unknown-1")
+    assert shell.json("cancel", "keep", "--all") == {"cancelled": []}
     clock.sleep(1.0)
     shown = shell("goal", "info", "keep", ids[0], code=0)
     assert "Status: PREEMPTED" in shown
@@ -219,6 +227,20 @@ def test_echo_prints_what_passes(shell, counting, clock, capsys):
     out = shell("echo", "robot/count", "--timeout", "5", "--json")
     topics = [json.loads(line).get("topic") for line in out.splitlines()]
     assert [topic for topic in topics if topic] == ["goal", "feedback", "result"]
+
+
+def test_echo_ends_after_enough(shell, counting, clock):
+    def later():
+        clock.sleep(1.0)
+        main(["send_goal", "robot/count", "{goal: 9}", "--json"], node=shell.node)
+
+    task = clock.spawn(later, name="later")
+    out = shell("echo", "robot/count", "-n", "3", "--json")
+    lines = [json.loads(line) for line in out.splitlines()]
+    assert [line["topic"] for line in lines if "topic" in line] == ["goal", "feedback", "feedback"]
+    task.join()
+    out = shell("echo", "robot/count", "--once", "--timeout", "2", code=1)
+    assert "/robot/count: not enough in 2 s" in out
 
 
 def test_server_by_hand(capsys, monkeypatch):
@@ -270,6 +292,7 @@ def test_server_by_hand(capsys, monkeypatch):
     out, err = capsys.readouterr()
     assert client.get_state() == 3
     assert client.get_result().result == 8
+    assert client.get_goal_status_text() == ""
     assert seen[-1] == 3
     assert "Goal 1 (" in out
     assert "1 ACTIVE" in out

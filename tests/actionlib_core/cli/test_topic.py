@@ -142,6 +142,31 @@ def test_echo_shortens_long_arrays_unless_told_not_to(cli, robot, capsys):
     assert 'ranges: "<array length: 200>"' in capsys.readouterr().out
 
 
+def test_echo_of_what_passes_a_filter(cli, robot, capsys, clock):
+    publisher = Publisher("count", Int32, node=robot)
+
+    def publish():
+        for number in range(10):
+            clock.sleep(1)
+            publisher.publish(number)
+
+    clock.spawn(publish, name="robot")
+    assert cli("echo", "count", "--filter", "data % 3 == 0", "-n", "3", "--csv") == 0
+    assert capsys.readouterr().out == "0\n3\n6\n"
+    assert cli("echo", "count", "--filter", "data > 9", "--timeout", "5") == 1
+    assert "/count: no message that passes the filter in 5 s" in capsys.readouterr().err
+
+
+def test_echo_with_a_filter_that_does_not_fit(cli, robot, capsys):
+    Publisher("chatter", String, latch=True, node=robot).publish("hello")
+    assert cli("echo", "chatter", "--filter", "dat == 3") == 2
+    assert "'dat' is not there; there are ['data']" in capsys.readouterr().err
+    assert cli("echo", "chatter", "--filter", "print(data)") == 2
+    assert "this call is not allowed" in capsys.readouterr().err
+    assert cli("echo", "chatter", "--filter", "data == 3", "--raw") == 2
+    assert "got --filter beside --raw" in capsys.readouterr().err
+
+
 def test_pub_waits_for_a_subscriber_and_publishes(cli, robot, capsys, clock):
     heard = []
     clock.call_later(3.0, lambda: Subscriber("point", Point, heard.append, node=robot))
@@ -198,6 +223,79 @@ def test_hz(cli, robot, clock, capsys):
     assert lines[1].startswith("\tmin: 0.100s max: 0.100s std dev: 0.00000s window: ")
     assert cli("hz", "nothing", "-n", "1", "--json") == 0
     assert "no new messages" in capsys.readouterr().err
+
+
+def test_bw(cli, robot, clock, capsys):
+    publisher = Publisher("chatter", String, node=robot)
+
+    def publish():
+        for _ in range(100):
+            clock.sleep(0.05)
+            publisher.publish("x" * 996)  # and four bytes that say how many
+            clock.sleep(0.05)
+
+    clock.spawn(publish, name="robot")
+    assert cli("bw", "chatter", "-n", "1") == 0
+    assert capsys.readouterr().out.splitlines() == [
+        "10.00 KB/s from 10 messages",
+        "\tMessage size mean: 1.00 KB min: 1.00 KB max: 1.00 KB",
+    ]
+    assert cli("bw", "chatter", "-n", "1", "-w", "5", "--json") == 0
+    record = json.loads(capsys.readouterr().out)
+    assert record.pop("bytes_per_s") == pytest.approx(10_000)
+    assert record == {"mean": 1000, "min": 1000, "max": 1000, "window": 5}
+
+
+@pytest.mark.parametrize("verb", ["hz", "bw"])
+def test_rates_of_a_publisher_that_speaks_only_when_heard(cli, robot, clock, capsys, verb):
+    publisher = Publisher("chatter", String, node=robot)
+
+    def publish():
+        for _ in range(100):
+            if publisher.get_num_connections():
+                publisher.publish("x")
+            clock.sleep(0.1)
+
+    clock.spawn(publish, name="robot")
+    assert cli(verb, "chatter", "-n", "3", "--json") == 0
+    captured = capsys.readouterr()
+    assert len(captured.out.splitlines()) == 3, captured.err
+    clock.sleep(1.0)
+    assert publisher.get_num_connections() == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["pub", "a", "std_msgs/String", "{}", "-r", "0"], "'0'; expected a rate above 0"),
+        (["pub", "a", "std_msgs/String", "{}", "-r", "nan"], "expected a rate above 0"),
+        (["pub", "a", "std_msgs/String", "{}", "-t", "0"], "expected a whole number above 0"),
+        (["pub", "a", "std_msgs/String", "{}", "-w", "x"], "expected a whole number above 0"),
+        (["echo", "a", "--timeout", "-1"], "'-1'; expected seconds above 0"),
+        (["echo", "a", "-n", "0"], "expected a whole number above 0"),
+        (["hz", "a", "-n", "two"], "'two'; expected a whole number above 0"),
+        (["bw", "a", "-w", "0"], "expected a whole number above 0"),
+    ],
+)
+def test_numbers_that_are_no_use(cli, capsys, words, expected):
+    with pytest.raises(SystemExit) as caught:
+        cli(*words)
+    assert caught.value.code == 2
+    assert expected in capsys.readouterr().err
+
+
+def test_a_name_nearby_is_suggested(cli, robot, capsys):
+    assert cli("type", "chatter") == 2
+    assert "not there; expected one, but there is none at all." in capsys.readouterr().err
+    Publisher("chatter", String, node=robot)
+    assert cli("type", "chater") == 2
+    assert "Did you mean '/chatter'?" in capsys.readouterr().err
+
+
+def test_a_name_that_comes_late_is_found(cli, robot, clock, capsys):
+    clock.call_later(1.0, lambda: Publisher("chatter", String, node=robot))
+    assert cli("type", "chatter") == 0
+    assert capsys.readouterr().out == "std_msgs/msg/String\n"
 
 
 @pytest.mark.parametrize(
