@@ -1,0 +1,147 @@
+"""A state that asks a person, and waits for the answer from anywhere on the network.
+
+    actionlib topic echo operator/question
+    actionlib topic pub -1 operator/answer std_msgs/String '{data: retry}'
+    actionlib service call operator/confirm '{data: true}'          # yes or no
+
+On the live page (`smachpy run MISSION --view --control`) the operator ends the state with the
+outcome of their choice.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.interfaces.std_msgs.msg import String
+from actionlib_core.interfaces.std_srvs.srv import SetBool
+from actionlib_core.node import get_node
+from actionlib_core.service import Service
+from actionlib_core.topic import Publisher, Subscriber
+from smachpy import State, UserData
+from smachpy.log import logwarn
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from actionlib_core.interfaces.std_srvs.srv import SetBoolRequest
+    from actionlib_core.node import Node
+    from smachpy.introspection import Kind
+
+YES_NO = ("yes", "no")
+
+
+class AskOperator(State):
+    """Asks a question and waits. Outcomes: the answers, 'no_answer', 'preempted'.
+
+    While it waits, the question is on the latched topic `<channel>/question` (std_msgs/String), and
+    answers are taken from the topic `<channel>/answer` (std_msgs/String: one of the answers) and,
+    for yes and no, from the service `<channel>/confirm` (std_srvs/SetBool). The first one counts.
+    Words that are no answer are refused and logged; the question stays.
+
+    Args:
+        question: What to ask.
+        answers: What may be answered.
+        patience: 'no_answer' after so long [s].
+        channel: Where questions and answers go; one question at a time may use it.
+        **options: See `smachpy.state.StateOptions`.
+    """
+
+    def __init__(
+        self,
+        question: str,
+        answers: Sequence[str] = YES_NO,
+        *,
+        patience: float,
+        channel: str = "operator",
+        **options: Any,
+    ) -> None:
+        super().__init__((*answers, "no_answer", "preempted"), **options)
+        self.question = question
+        self.answers = tuple(answers)
+        self.patience = patience
+        self.channel = channel
+
+    def execute(self, userdata: UserData) -> str:
+        """Ask.
+
+        Raises:
+            ServerConflictError: another question is asked on this channel.
+
+        Blocks: until the answer, `patience` [s] or a preempt.
+        """
+        del userdata
+        node = get_node()
+        with contextlib.ExitStack() as open_ends:
+            inbox = _Inbox(self, node)
+            open_ends.callback(self._on_preempt(inbox.wake.set))
+            ask = open_ends.enter_context(
+                Publisher(f"{self.channel}/question", String, latch=True, node=node)
+            )
+            open_ends.enter_context(
+                Subscriber(f"{self.channel}/answer", String, inbox.on_answer, node=node)
+            )
+            if self.answers == YES_NO:
+                confirm = f"{self.channel}/confirm"
+                open_ends.enter_context(Service(confirm, SetBool, inbox.on_confirm, node=node))
+            ask.publish(String(f"{self.question} ({', '.join(self.answers)})"))
+            logwarn(self._invitation(node))
+            answer = inbox.wait(self.patience)
+            ask.publish(String(""))
+        if answer is None and self.preempt_requested():
+            self.service_preempt()
+            return "preempted"
+        return answer or "no_answer"
+
+    def _invitation(self, node: Node) -> str:
+        topic = node.resolve(f"{self.channel}/answer")
+        return (
+            f"{self.question} Answer {' or '.join(self.answers)} within {self.patience:g} s: "
+            f"actionlib topic pub -1 {topic} std_msgs/String '{{data: {self.answers[0]}}}'"
+        )
+
+    def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
+        """Add the question and the patience."""
+        kind, details = super().describe_details()
+        own = (("question", self.question), ("timeout", f"{self.patience:g} s -> no_answer"))
+        return kind, (*own, *details)
+
+
+class _Inbox:
+    """Takes answers in; the first that is one wins."""
+
+    def __init__(self, state: AskOperator, node: Node) -> None:
+        self.wake = node.clock.event(f"an answer to {state.question!r}")
+        self._state = state
+        self._clock = node.clock
+        self._answers: list[str] = []
+
+    def wait(self, seconds: float) -> str | None:
+        """Return the answer; None when none came in time, or a preempt did."""
+        until = self._clock.now() + seconds
+        while not self._answers and not self._state.preempt_requested():
+            left = until - self._clock.now()
+            if left <= 0.0:
+                break
+            self.wake.wait(left)
+            self.wake.clear()
+        return self._answers[0] if self._answers else None
+
+    def on_answer(self, message: String) -> None:
+        word, known = message.data.strip().lower(), self._state.answers
+        if word in known:
+            self._take(word)
+            return
+        near = difflib.get_close_matches(word, known, n=1)
+        hint = f" Did you mean {near[0]!r}?" if near else ""
+        logwarn(f"answer: got {message.data!r}; expected one of {list(known)}.{hint}")
+
+    def on_confirm(self, request: SetBoolRequest) -> tuple[bool, str]:
+        word = YES_NO[not request.data]
+        return self._take(word), f"{self._state.question} {self._answers[0]}"
+
+    def _take(self, word: str) -> bool:
+        self._answers.append(word)
+        self.wake.set()
+        return self._answers[0] == word
