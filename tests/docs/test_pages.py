@@ -24,7 +24,14 @@ from actionlib_core import node
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 # Pages that drive the robot for long.
-SLOW = {"demo_action.md", "demo_service.md", "there_and_back.md", "countdown.md", "patrol.md"}
+SLOW = {
+    "demo_action.md",
+    "demo_service.md",
+    "rp_action.md",
+    "there_and_back.md",
+    "countdown.md",
+    "patrol.md",
+}
 MARKED = [
     pytest.param(page, marks=pytest.mark.slow) if page.name in SLOW else page for page in PAGES
 ]

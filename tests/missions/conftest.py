@@ -33,6 +33,7 @@ class Simulation:
     robot: Robot
     server: RobotServer
     node: Node
+    network: MemoryNetwork
 
 
 @contextlib.contextmanager
@@ -48,7 +49,7 @@ def _simulate(grid, clock, config, *, namespace="", pose=None):
         server = RobotServer(robot, node=robot_node)
         server.start()
         try:
-            yield Simulation(world, robot, server, node)
+            yield Simulation(world, robot, server, node, network)
         finally:
             server.close()
 
