@@ -2,12 +2,14 @@
 
     GET  /                    the page
     GET  /api/events          everything about one machine as server-sent events:
-                              snap, facts, machines, and unnamed batches of events
+                              snap, facts, machines, actions, and unnamed batches of events
     GET  /api/model           structure of a machine
     GET  /api/picture         svg, png, pdf or dot
     GET  /api/export          the run as .html or .jsonl
     GET  /api/statistics      of recorded runs
+    GET  /api/action          what a form for a goal of an action needs
     POST /api/control         a command
+    POST /api/action          check or send a goal, or cancel one
 
 Nothing here holds up a machine: a page is sent what it has not seen yet when it can take it, and
 one that is too far behind gets a snapshot instead.
@@ -28,6 +30,7 @@ from starlette.routing import Route
 
 from smachpy.exceptions import SmachError
 from viz.live import page
+from viz.live.actions import GoalRefusedError
 from viz.live.security import Guard, refuse_command
 
 if TYPE_CHECKING:
@@ -35,17 +38,24 @@ if TYPE_CHECKING:
 
     from starlette.requests import Request
 
+    from viz.live.actions import Actions
     from viz.live.machines import Machine, Machines
 
 COALESCE_S = 0.004
 """Events wait so long for others, besides what their link has gathered already."""
 
 LIST_S = 0.5
+ACTIONS_S = 0.15
+"""Between two messages about goals that were sent from here."""
+
 BEAT_S = 5.0
 FARTHEST = 3_000
 """A page that is more events behind gets a snapshot."""
 
 MOST_PAGES = 64
+LONGEST_COMMAND = 1_000_000
+"""Bytes of a command."""
+
 PICTURES = {
     "svg": "image/svg+xml",
     "png": "image/png",
@@ -65,6 +75,8 @@ class Viewer:
         send: Sends a command to a machine and returns the answer; blocks.
         follow: Whether pages follow the active states from the start.
         statistics: Of recorded runs, by machine label.
+        hosts: Names that the server goes by, besides addresses.
+        actions: On the network, for the page that sends goals; None shows none.
     """
 
     def __init__(
@@ -76,8 +88,10 @@ class Viewer:
         follow: bool = False,
         statistics: Callable[[str], dict[str, Any] | None] = lambda _label: None,
         hosts: tuple[str, ...] = (),
+        actions: Actions | None = None,
     ) -> None:
         self._machines = machines
+        self._actions = actions
         self._token = token
         self._send = send
         self._follow = follow
@@ -86,7 +100,9 @@ class Viewer:
         self._drawing = asyncio.Semaphore(1)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._woken = False
-        machines.listen(self._on_change)
+        machines.listen(lambda _machine: self._on_change())
+        if actions is not None:
+            actions.listen(self._on_change)
         self.app = Starlette(
             routes=[
                 Route("/", self._index),
@@ -98,6 +114,8 @@ class Viewer:
                 Route("/api/export", self._export),
                 Route("/api/statistics", self._runs),
                 Route("/api/control", self._control, methods=["POST"]),
+                Route("/api/action", self._action, methods=["GET"]),
+                Route("/api/action", self._command_action, methods=["POST"]),
                 Route("/{name:path}", self._file),
             ],
             middleware=[Middleware(Guard, hosts=hosts)],
@@ -122,7 +140,7 @@ class Viewer:
             one.closed = True
             one.news.set()
 
-    def _on_change(self, _machine: Machine) -> None:
+    def _on_change(self) -> None:
         """Wake the pages; from any thread, and once until they have woken."""
         loop = self._loop
         if loop is None or self._woken:
@@ -209,17 +227,36 @@ class Viewer:
         if reason is not None or self._send is None:
             return JSONResponse({"ok": False, "text": reason}, status_code=403)
         name = request.query_params.get("machine", "")
-        try:
-            command = await request.json()
-        except ValueError:
-            command = None
-        if not isinstance(command, dict):
-            text = "command: got no JSON object; expected one."
-            return JSONResponse({"ok": False, "text": text}, status_code=400)
+        command = await _read_command(request)
+        if command is None:
+            return _no_command()
         try:
             return JSONResponse(await run_in_threadpool(self._send, name, command))
         except SmachError as error:
             return JSONResponse({"ok": False, "text": str(error)}, status_code=409)
+
+    async def _action(self, request: Request) -> Response:
+        if self._actions is None:
+            return _unknown(request)
+        name = request.query_params.get("name", "")
+        try:
+            return JSONResponse(await run_in_threadpool(self._actions.definition, name))
+        except GoalRefusedError as error:
+            return JSONResponse({"ok": False, "text": str(error)}, status_code=409)
+
+    async def _command_action(self, request: Request) -> Response:
+        reason = refuse_command(request, self._token)
+        if reason is not None or self._actions is None:
+            return JSONResponse({"ok": False, "text": reason}, status_code=403)
+        command = await _read_command(request)
+        if command is None:
+            return _no_command()
+        try:
+            answer = await run_in_threadpool(_do, self._actions, command)
+        except GoalRefusedError as error:
+            told = {"ok": False, "text": str(error), "problems": error.problems}
+            return JSONResponse(told, status_code=409)
+        return JSONResponse({"ok": True, **answer})
 
     async def _events(self, request: Request) -> Response:
         if len(self._pages) >= MOST_PAGES:
@@ -229,6 +266,7 @@ class Viewer:
             request.query_params.get("machine", ""),
             request.headers.get("last-event-id", ""),
             {"follow": self._follow, "control": self._token is not None},
+            self._actions,
         )
         return StreamingResponse(self._stream(one), media_type="text/event-stream")
 
@@ -248,7 +286,12 @@ class _Page:
     """One open page: what it has been sent, and what it has not."""
 
     def __init__(
-        self, machines: Machines, name: str, last_id: str, settings: dict[str, Any]
+        self,
+        machines: Machines,
+        name: str,
+        last_id: str,
+        settings: dict[str, Any],
+        actions: Actions | None,
     ) -> None:
         self.news = asyncio.Event()
         self.closed = False
@@ -261,6 +304,9 @@ class _Page:
         self._facts: dict[str, Any] = {}
         self._list = ""
         self._listed = 0.0
+        self._actions = actions
+        self._told = -1  # revision of the actions
+        self._told_at = 0.0
 
     async def messages(self) -> AsyncIterator[str]:
         """Yield what to send, for ever."""
@@ -280,12 +326,22 @@ class _Page:
                     self._list = text
                     yield f"event: machines\ndata: {text}\n\n"
                 due = BEAT_S
+            if self._actions is not None and self._told != self._actions.revision:
+                wait = self._told_at + ACTIONS_S - loop.time()
+                if wait <= 0:
+                    yield self._tell_actions(self._actions, loop.time())
+                else:
+                    due = min(due, wait)
             try:
                 await asyncio.wait_for(self.news.wait(), max(due, COALESCE_S))
                 await asyncio.sleep(COALESCE_S)
             except TimeoutError:
                 if due >= BEAT_S:
                     yield ": beat\n\n"
+
+    def _tell_actions(self, actions: Actions, now: float) -> str:
+        self._told, self._told_at = actions.revision, now
+        return f"event: actions\ndata: {json.dumps(actions.summary())}\n\n"
 
     def _choose(self) -> Machine | None:
         """The machine that the page shows: the one it names, else the first there is."""
@@ -314,6 +370,41 @@ class _Page:
             data = f"[{','.join(behind)}]"
             texts.append(f"id: {self._epoch}:{self._seq}\ndata: {data}\n\n")
         return texts
+
+
+async def _read_command(request: Request) -> dict[str, Any] | None:
+    """The JSON object that came with a request; None when it is none, or too long."""
+    body = b""
+    async for chunk in request.stream():
+        body += chunk
+        if len(body) > LONGEST_COMMAND:
+            return None
+    try:
+        command = json.loads(body)
+    except ValueError:
+        return None
+    return command if isinstance(command, dict) else None
+
+
+def _no_command() -> Response:
+    text = f"command: got no JSON object of at most {LONGEST_COMMAND} bytes; expected one."
+    return JSONResponse({"ok": False, "text": text}, status_code=400)
+
+
+def _do(actions: Actions, command: dict[str, Any]) -> dict[str, Any]:
+    """Carry out what the page asks of an action."""
+    match command:
+        case {"command": "check", "name": str(name), "yaml": str(text)}:
+            return actions.check(name, text)
+        case {"command": "send", "name": str(name), "yaml": str(text)}:
+            return {"goal": actions.send(name, text)}
+        case {"command": "cancel", "goal": str(goal)}:
+            actions.cancel(goal)
+            return {}
+    raise GoalRefusedError(
+        f"command: got {sorted(command)}; expected `check` or `send` with name and yaml, "
+        "or `cancel` with goal."
+    )
 
 
 def _unknown(request: Request) -> Response:

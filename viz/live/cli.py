@@ -10,11 +10,12 @@ from smachpy.cli import UsageError
 if TYPE_CHECKING:
     import argparse
 
+    from actionlib_core.node import Node
     from viz.live.machines import Machines
 
 EXAMPLES = """examples:
   smachpy view                         every machine that runs on this network
-  smachpy view --control               with pause, step, jump, preempt
+  smachpy view --control               with pause, step, jump, preempt, and goals to actions
   smachpy view run.jsonl               a recorded run
   smachpy view --runs runs/            with the statistics of recorded runs on the graph
 """
@@ -64,13 +65,14 @@ def _run(args: argparse.Namespace) -> int:
     try:
         if args.tui:
             return _show_in_terminal(machines, network, control=args.control)
-        return _serve(args, machines, network)
+        return _serve(args, machines, network, get_node())
     finally:
         network.close()
 
 
-def _serve(args: argparse.Namespace, machines: Machines, network: Any) -> int:
+def _serve(args: argparse.Namespace, machines: Machines, network: Any, node: Node) -> int:
     try:
+        from viz.live.actions import Actions
         from viz.live.app import Viewer
         from viz.live.server import PageServer
     except ModuleNotFoundError as error:
@@ -81,6 +83,7 @@ def _serve(args: argparse.Namespace, machines: Machines, network: Any) -> int:
     from viz.runs.statistics import StatisticsOfFiles
 
     token = make_token() if args.control else None
+    actions = Actions(node)
     viewer = Viewer(
         machines,
         token=token,
@@ -88,12 +91,16 @@ def _serve(args: argparse.Namespace, machines: Machines, network: Any) -> int:
         follow=args.auto_focus,
         statistics=StatisticsOfFiles(args.runs).of,
         hosts=(args.host,),
+        actions=actions,
     )
     server = PageServer(viewer, args.host, args.port)
     print(server.address + (f"#token={token}" if token else ""), flush=True)
     if args.child:
         _end_with_parent(server)
-    server.serve_here()
+    try:
+        server.serve_here()
+    finally:
+        actions.close()
     return 0
 
 

@@ -31,7 +31,8 @@ MODULES = {
         f"viewer/{name}": f"js/{name}.js"
         for name in (
             "fold", "model", "measure", "layout", "diagram", "viewport", "timeline", "store",
-            "follow", "source", "statistics", "panels", "inspector", "controls", "keys", "app",
+            "follow", "source", "statistics", "panels", "inspector", "controls", "keys", "actions",
+            "goalform", "app",
         )
     },
 }  # fmt: skip

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from typing import TYPE_CHECKING
 
 from actionlib_core.clock import current_clock
+from actionlib_core.interfaces._registry import registry
+from actionlib_core.interfaces._sources import BUNDLED, PATH_VARIABLE
 from smachpy.exceptions import SmachError
 
 if TYPE_CHECKING:
@@ -27,7 +30,7 @@ class ViewerProcess:
     """Runs the viewer; a context manager.
 
     It finds the machine over the network as any other viewer does, so that nothing it does, or
-    fails to do, reaches the mission.
+    fails to do, reaches the mission. It knows the interface definitions of this process's folders.
 
     Args:
         arguments: Further arguments of `smachpy view`.
@@ -53,6 +56,7 @@ class ViewerProcess:
             text=True,
             errors="replace",
             start_new_session=True,
+            env={**os.environ, PATH_VARIABLE: _interface_path()},
         )
         assert self._process.stdout is not None
         stuck = current_clock().call_later(_START_S, self._process.kill)  # then there is no line
@@ -99,3 +103,8 @@ class ViewerProcess:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+
+
+def _interface_path() -> str:
+    """The folders in which this process looks for definitions, for the environment."""
+    return os.pathsep.join(str(p) for p in registry.sources.search_path() if p != BUNDLED)

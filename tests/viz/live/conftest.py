@@ -58,6 +58,12 @@ def start_robot(*arguments):
     return child
 
 
+def start_simulation():
+    child = Child("-m", "missions.move_base", "--child")
+    assert "ready" in child.said
+    return child
+
+
 class View(Child):
     """`smachpy view`."""
 
@@ -101,6 +107,10 @@ def start(domain):
             self.children.append(start_robot(*arguments))
             return self.children[-1]
 
+        def simulation(self):
+            self.children.append(start_simulation())
+            return self.children[-1]
+
         def view(self, *arguments, port=0):
             self.children.append(View(*arguments, port=port))
             return self.children[-1]
@@ -119,6 +129,14 @@ def delivery(domain):
     yield view
     view.end()
     robot.end()
+
+
+@pytest.fixture(scope="module")
+def simulation(domain):
+    """The simulated robot with its actions."""
+    child = start_simulation()
+    yield child
+    child.end()
 
 
 @pytest.fixture(scope="module")  # its event loop would be in the way of other modules' tests

@@ -13,6 +13,7 @@ import { Timeline } from "viewer/timeline";
 import { Inspector } from "viewer/inspector";
 import { listen } from "viewer/keys";
 import { Empty, Help, Legend, Notice, TopBar, Tree } from "viewer/panels";
+import { ActionsPage } from "viewer/actions";
 import { weights } from "viewer/statistics";
 import { ms } from "viewer/fold";
 
@@ -346,6 +347,7 @@ function App({ page }) {
   const paused = store.facts.value?.control?.paused && store.cursor.value === null;
   return html`<div class=${`app ${paused ? "paused" : ""}`}>
     <${TopBar} page=${page} /><${Tree} page=${page} /><${Stage} page=${page} /><${Inspector} page=${page} />
+    <${ActionsPage} />
     <div id="spoken" class="hidden" aria-live="polite"></div><${Notice} /><${Help} /></div>`;
 }
 

@@ -1,6 +1,6 @@
 // The keyboard: everything the pointer can do.
 import * as store from "viewer/store";
-import { canControl, command } from "viewer/source";
+import { canControl, command, isFile, showActions } from "viewer/source";
 
 const STEP = 80;
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
@@ -13,10 +13,15 @@ export function listen(page) {
     "+": () => page.view.zoom(1.25), "=": () => page.view.zoom(1.25), "-": () => page.view.zoom(0.8),
     ",": () => store.seekEvent(-1), ".": () => store.seekEvent(1), l: () => page.timeline.live(),
     i: () => page.setImplicit(!store.implicit.value),
+    a: () => { if (!isFile()) showActions(!store.actionsOpen.value); },
     d: () => page.setTheme(isDark() ? "light" : "dark"),
     "?": () => { store.help.value = !store.help.value; },
     Enter: () => page.toggleSelected(),
-    Escape: () => { store.help.value = false; page.select(null); },
+    Escape: () => {
+      if (store.help.value) store.help.value = false;
+      else if (store.actionsOpen.value) showActions(false);
+      else page.select(null);
+    },
     " ": () => { if (canControl()) command(store.facts.value.control.paused ? "resume" : "pause"); },
     s: () => { if (canControl()) command("step"); },
   };
@@ -27,6 +32,7 @@ export function listen(page) {
       return;
     }
     if (e.target.tagName === "BUTTON" && (e.key === "Enter" || e.key === " ")) return;
+    if (store.actionsOpen.value && !["a", "d", "?", "Escape"].includes(e.key)) return;
     if (e.key in ARROWS) {
       const [dx, dy] = ARROWS[e.key];
       if (store.selected.value && !e.shiftKey) page.step(dx, dy);

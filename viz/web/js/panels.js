@@ -6,6 +6,7 @@ import * as store from "viewer/store";
 import { choose, isFile, link } from "viewer/source";
 import { MODES } from "viewer/statistics";
 import { Controls } from "viewer/controls";
+import { ActionsButton } from "viewer/actions";
 import { KIND_NAMES, outcomeClass } from "viewer/model";
 
 export const html = htm.bind(h);
@@ -28,6 +29,7 @@ export function TopBar({ page }) {
     <${Search} page=${page} />
     <${Toggle} on=${store.follow.value} onClick=${() => page.setFollow(!store.follow.value)} title="show what runs (o)">Follow<//>
     <${View} page=${page} />
+    <${ActionsButton} />
     <${Controls} />
   </header>`;
 }
@@ -171,7 +173,7 @@ export function Notice() {
 
 const KEYS = [["/", "search"], ["f", "fit everything"], ["o", "follow what runs"], ["+ \u2212", "zoom"], ["\u2190 \u2191 \u2192 \u2193", "move the view, or step to a neighbour of the selected state"],
   ["Enter", "open or close the selected state"], [", .", "one event back or on"], ["l", "back to now"], ["1 \u2026 9", "levels to open"],
-  ["i", "transitions nobody wrote down"], ["d", "dark or light"], ["Space", "pause or go on (with control)"], ["s", "step (with control)"], ["Esc", "select nothing"]];
+  ["i", "transitions nobody wrote down"], ["a", "actions"], ["d", "dark or light"], ["Space", "pause or go on (with control)"], ["s", "step (with control)"], ["Esc", "select nothing"]];
 
 export function Help() {
   if (!store.help.value) return null;

@@ -33,6 +33,7 @@ export async function connect(handlers) {
     store.statistics.value = run.statistics ?? null;
     return;
   }
+  if (new URLSearchParams(location.search).has("actions")) showActions(true);
   open();
 }
 
@@ -44,6 +45,8 @@ function takeToken() {
   } catch { token = given; }
   if (given) history.replaceState(null, "", location.pathname + location.search);
 }
+
+export const hasToken = () => token !== null && store.settings.value.control;
 
 export const canControl = () =>
   store.settings.value.control && token !== null && store.facts.value?.control != null &&
@@ -58,8 +61,8 @@ export function choose(name) {
   open();
 }
 
-const ask = (name) => encodeURIComponent(name ?? store.facts.value?.name ?? "");
-export const link = (what, more = "") => `/api/${what}?machine=${ask()}${more}`;
+const named = (name) => encodeURIComponent(name ?? store.facts.value?.name ?? "");
+export const link = (what, more = "") => `/api/${what}?machine=${named()}${more}`;
 
 function open() {
   stream?.close();
@@ -68,6 +71,7 @@ function open() {
     stream.addEventListener(name, (message) => take(JSON.parse(message.data)));
   on("settings", (s) => { store.settings.value = s; store.connection.value = "live"; });
   on("machines", (list) => { store.machines.value = list; });
+  on("actions", (found) => { store.actions.value = found; });
   on("facts", takeFacts);
   on("snap", takeSnap);
   stream.onmessage = (message) => onEvents(JSON.parse(message.data));
@@ -102,28 +106,37 @@ async function takeSnap(snap, payload) {
 }
 
 async function load(facts) {
-  const answer = await fetch(`/api/model?machine=${ask(facts.name)}`);
+  const answer = await fetch(`/api/model?machine=${named(facts.name)}`);
   if (!answer.ok) return;
   store.setModel(await answer.json());
-  fetch(`/api/statistics?machine=${ask(facts.name)}`).then(async (found) => {
+  fetch(`/api/statistics?machine=${named(facts.name)}`).then(async (found) => {
     if (found.ok) store.statistics.value = await found.json();
   });
   onMachine();
 }
 
+// The JSON answer of the server; when it does not answer, the same shape.
+export async function ask(address, options = {}) {
+  try { return await (await fetch(address, options)).json(); }
+  catch (error) { return { ok: false, text: `The viewer\u2019s server does not answer (${error.message}).` }; }
+}
+const post = (address, data) => ask(address, {
+  method: "POST",
+  headers: { "content-type": "application/json", "x-smachpy-token": token ?? "" },
+  body: JSON.stringify(data),
+});
+export const askAction = (data) => post("/api/action", data);
+
+export function showActions(open) {
+  store.actionsOpen.value = open;
+  const address = new URL(location.href);
+  if (open) address.searchParams.set("actions", ""); else address.searchParams.delete("actions");
+  history.replaceState(null, "", address);
+}
+
 export async function command(name, more = {}) {
-  try {
-    const answer = await fetch(link("control"), {
-      method: "POST",
-      headers: { "content-type": "application/json", "x-smachpy-token": token ?? "" },
-      body: JSON.stringify({ command: name, ...more }),
-    });
-    const result = await answer.json();
-    if (result.ok) store.say(`${name}${more.path ? ` ${more.path}` : ""}: done`);
-    else store.say(result.text ?? "refused", "error");
-    return result.ok;
-  } catch (error) {
-    store.say(`${name}: the viewer's server does not answer (${error.message})`, "error");
-    return false;
-  }
+  const result = await post(link("control"), { command: name, ...more });
+  if (result.ok) store.say(`${name}${more.path ? ` ${more.path}` : ""}: done`);
+  else store.say(`${name}: ${result.text ?? "refused"}`, "error");
+  return result.ok;
 }

@@ -31,6 +31,9 @@ export const opened = signal(new Set());
 export const statistics = signal(null);
 export const notice = signal(null);
 export const help = signal(false);
+export const actions = signal({ actions: [], goals: [] }); // on the network; goals sent from here
+export const actionsOpen = signal(false);
+export const picked = signal(null); // name of the action whose form is shown
 export const logFilter = signal("all");
 
 export let run = new Run(emptyState(), []);

@@ -1,0 +1,202 @@
+"""Actions as the page's server sees them: on virtual time, in one process."""
+
+from __future__ import annotations
+
+import pytest
+
+from actionlib_core.interfaces import define_action, get_action
+from actionlib_core.interfaces.actionlib import msg
+from actionlib_core.node import Node
+from actionlib_core.simple_action_server import SimpleActionServer
+from actionlib_core.transport.memory import MemoryNetwork
+from viz.live.actions import KEPT_GOALS, MOST_RUNNING, Actions, GoalRefusedError
+
+
+class World:
+    def __init__(self, clock):
+        self.clock = clock
+        self.network = MemoryNetwork(clock)
+        self.viewer = Node("viewer", transport=self.network.session(), clock=clock)
+        self.robot = Node("robot", transport=self.network.session(), clock=clock)
+        self.changes = 0
+        self.actions = Actions(self.viewer, self.count)
+
+    def count(self):
+        self.changes += 1
+
+    def serve(self, execute=None, name="count", spec=msg.TestAction):
+        def at_once(_goal):
+            server.set_succeeded()
+
+        server = SimpleActionServer(
+            name, spec, execute or at_once, auto_start=False, node=self.robot
+        )
+        server.start()
+        self.clock.sleep(0.5)
+        return server
+
+    def close(self):
+        self.actions.close()
+        for node in (self.viewer, self.robot):
+            node.close()
+            node.transport.close()
+        self.clock.sleep(60.0)  # servers end their last goal
+
+    def goal(self):
+        return self.actions.summary()["goals"][0]
+
+
+@pytest.fixture
+def world(clock):
+    world = World(clock)
+    yield world
+    world.close()
+
+
+def counting(world):
+    def execute(goal):
+        for left in range(goal.goal, 0, -1):
+            server.publish_feedback(msg.TestFeedback(left))
+            if server.is_preempt_requested():
+                server.set_preempted(text="stopped")
+                return
+            world.clock.sleep(1.0)
+        server.set_succeeded(msg.TestResult(goal.goal), "done")
+
+    server = world.serve(execute)
+    return server
+
+
+def test_actions_are_found_and_forgotten(world):
+    assert world.actions.summary() == {"actions": [], "goals": []}
+    server = world.serve()
+    (found,) = world.actions.summary()["actions"]
+    assert found == {"name": "count", "type": "actionlib/Test", "node": "robot", "servers": 1}
+    assert world.changes
+    server.action_server.stop()
+    world.clock.sleep(0.5)
+    assert world.actions.summary()["actions"] == []
+
+
+def test_a_form_is_told_of_the_fields(world):
+    world.serve()
+    form = world.actions.definition("count")
+    assert form["type"] == "actionlib/Test"
+    assert [(one["name"], one["kind"]) for one in form["fields"]] == [("goal", "integer")]
+    assert form["values"] == {"goal": "0"}
+    assert form["yaml"].startswith("goal: 0")
+
+
+def test_a_goal_with_feedback_and_result(world):
+    counting(world)
+    sent = world.actions.send("count", "{goal: 3}")
+    world.clock.sleep(1.5)
+    goal = world.goal()
+    assert (goal["id"], goal["state"], goal["ended"]) == (sent, "ACTIVE", None)
+    assert goal["feedback"] == "feedback: 2"
+    world.clock.sleep(5.0)
+    goal = world.goal()
+    assert (goal["status"], goal["text"], goal["result"]) == ("SUCCEEDED", "done", "result: 3")
+    assert goal["heard"] == 3
+    assert goal["ended"] - goal["sent"] == pytest.approx(3e9, rel=0.1)
+
+
+def test_cancel(world):
+    counting(world)
+    sent = world.actions.send("count", "{goal: 30}")
+    world.clock.sleep(1.5)
+    world.actions.cancel(sent)
+    assert world.goal()["cancelled"]
+    world.clock.sleep(2.0)
+    assert (world.goal()["status"], world.goal()["text"]) == ("PREEMPTED", "stopped")
+    with pytest.raises(GoalRefusedError, match="has ended already: PREEMPTED"):
+        world.actions.cancel(sent)
+    with pytest.raises(GoalRefusedError, match="not sent from here"):
+        world.actions.cancel("another")
+
+
+def test_bad_values_are_named_with_their_fields_and_nothing_is_sent(world):
+    world.serve()
+    for do in (world.actions.send, world.actions.check):
+        with pytest.raises(GoalRefusedError) as caught:
+            do("count", "{goal: many, gaol: 1}")
+        assert [one["path"] for one in caught.value.problems] == ["$.goal", "$.gaol"]
+    assert world.actions.summary()["goals"] == []
+
+
+def test_what_is_checked_comes_back_in_both_forms(world):
+    world.serve()
+    found = world.actions.check("count", "{goal: 0x10}")
+    assert found["values"] == {"goal": "16"}
+    assert found["yaml"].startswith("goal: 16")
+
+
+def test_a_server_that_dies_loses_its_goal_and_says_so(world):
+    counting(world)
+    world.actions.send("count", "{goal: 30}")
+    world.clock.sleep(1.5)
+    world.robot.transport.kill()
+    world.clock.sleep(1.0)
+    goal = world.goal()
+    assert goal["status"] == "LOST"
+    assert goal["ended"] is not None
+    assert goal["text"]
+    with pytest.raises(GoalRefusedError, match="/count: got no server; expected one"):
+        world.actions.send("count", "{goal: 1}")
+
+
+def test_a_definition_that_is_not_known_here_names_the_way_out(world):
+    spec = define_action("gone_msgs/Vanish", "---\n---\n")
+    server = world.serve(spec=spec, name="vanish")
+    from actionlib_core.interfaces._registry import registry
+
+    assert server
+    (end,) = (world.actions._server("vanish"),)
+    world.actions._servers["vanish"] = {"x": end._replace(type="nowhere_msgs/NothingAction")}
+    with pytest.raises(GoalRefusedError, match="SMACHPY_INTERFACE_PATH"):
+        world.actions.definition("vanish")
+    world.actions._servers["vanish"] = {"x": end._replace(md5="0" * 32)}
+    with pytest.raises(GoalRefusedError, match="is not that of the server"):
+        world.actions.definition("vanish")
+    assert registry.action("gone_msgs/Vanish") is spec
+
+
+def test_installed_packages_make_their_definitions_known(world, monkeypatch):
+    loaded = []
+
+    class Point:
+        value = "own.interfaces"
+
+        def load(self):
+            loaded.append(self.value)
+            define_action("late_msgs/Late", "uint8 x\n---\n---")
+
+    class Broken(Point):
+        def load(self):
+            raise RuntimeError("broken package")
+
+    monkeypatch.setattr("viz.live.actions.entry_points", lambda group: [Broken(), Point()])
+    world.serve()
+    end = world.actions._server("count")
+    other = get_action("actionlib/Test")
+    assert other._md5sum == end.md5
+    world.actions._servers["late"] = {"x": end._replace(type="late_msgs/LateAction")}
+    with pytest.raises(GoalRefusedError, match="is not that of the server"):  # but it is found
+        world.actions.definition("late")
+    assert loaded == ["own.interfaces"]
+
+
+def test_ended_goals_are_forgotten_and_running_ones_are_limited(world):
+    world.serve()
+    for _ in range(KEPT_GOALS + 5):
+        world.actions.send("count", "{goal: 0}")
+        world.clock.sleep(0.2)
+    assert len(world.actions.summary()["goals"]) == KEPT_GOALS
+    from actionlib_core.action_server import ActionServer
+
+    ActionServer("many", msg.TestAction, lambda handle: handle.set_accepted(), node=world.robot)
+    world.clock.sleep(0.5)
+    for _ in range(MOST_RUNNING):
+        world.actions.send("many", "{goal: 1}")
+    with pytest.raises(GoalRefusedError, match=f"expected fewer than {MOST_RUNNING}"):
+        world.actions.send("many", "{goal: 1}")
