@@ -1,4 +1,8 @@
-"""Virtual time: real threads, one at a time, and time that jumps when all of them wait."""
+"""Virtual time: real threads, one at a time, and time that jumps when all of them wait.
+
+The participants are threads of the operating system, so that thread identity, thread-local data and
+stacks are what user code expects. `benchmarks/virtual_time.py` measures what they cost.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +11,16 @@ import contextvars
 import heapq
 import itertools
 import operator
+import os
 import random
 import threading
 import time
+import weakref
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from actionlib_core.clock._gates import make_gate
 from actionlib_core.clock._real import RealEvent
 from actionlib_core.clock._serial import report_thread_exception
-from actionlib_core.clock._threads import ThreadCache
 from actionlib_core.clock._virtual_parts import (
     Deadlock,
     Participant,
@@ -37,9 +43,7 @@ START_TIME_NS = 1_000_000_000 * 1_000_000_000  # 2001-09-09T01:46:40Z: stamps of
 INTERRUPT_S = 1.0  # real seconds that an interrupted thread waits for its turn
 JOIN_S = 5.0  # real seconds that `close` gives a thread to unwind
 
-# Operating-system threads, so that thread identity, thread-local data and stacks are what user code
-# expects; a hand-over between two of them costs about 20 us, a start from this cache about 60 us.
-_THREADS = ThreadCache()
+_clocks: weakref.WeakSet[VirtualClock] = weakref.WeakSet()
 
 
 class VirtualClock:
@@ -80,20 +84,22 @@ class VirtualClock:
             raise ValueError(f"virtual clock: rate: got {rate!r}; expected a number over 0.")
         self.seed = seed
         self.rate = rate
-        self._choose_by = choose or _picker(seed)
+        self._pick = _picker(seed, choose)
         self.limit: float | None = None
         self._now = 0.0
         self._stepped = time.monotonic()
         self._poke = RealEvent()
         self._lock = threading.RLock()
         self._ready: list[Participant | VirtualTimer] = []
-        self._deadlines: list[tuple[float, int, Participant | VirtualTimer, int]] = []
+        self._deadlines: list[tuple[float, int, Participant | VirtualTimer]] = []
         self._count = itertools.count()
         self._waits: dict[Participant, int] = {}
         self._owner = Participant(threading.current_thread().name)
+        self._owner.gate = make_gate()
         self._participants: dict[int, Participant] = {threading.get_ident(): self._owner}
         self._in_callback = False
         self._closed = False
+        _clocks.add(self)
 
     # -- the protocol --------------------------------------------------------------------------
 
@@ -111,8 +117,10 @@ class VirtualClock:
         return VirtualEvent(self, name)
 
     def spawn(self, target: Callable[[], object], *, name: str) -> VirtualTask:
-        task = self.adopt(target, name=name)
-        _THREADS.start(task)
+        task = VirtualTask(self, target, contextvars.copy_context(), name)
+        task.participant.job = task
+        with self._lock:
+            self._ready.append(task.participant)
         return task
 
     def call_later(self, delay: float, callback: Callable[[], object]) -> VirtualTimer:
@@ -121,8 +129,9 @@ class VirtualClock:
             if delay <= 0:
                 self._ready.append(timer)
             else:
-                self._push(self._now + delay, timer, 0)
-        self._poke.set()
+                heapq.heappush(self._deadlines, (self._now + delay, next(self._count), timer))
+        if self.rate is not None:
+            self._poke.set()
         return timer
 
     def run_async(self, main: Coroutine[object, object, T]) -> T:
@@ -176,6 +185,7 @@ class VirtualClock:
             if not others:
                 break
             for participant in others:
+                participant.begin()
                 participant.gate.release()
             for participant in others:
                 participant.ended.wait(JOIN_S)
@@ -200,6 +210,7 @@ class VirtualClock:
     def adopt(self, target: Callable[[], object], *, name: str) -> VirtualTask:
         """Make a participant whose thread is the caller's business: it calls `VirtualTask.run`."""
         task = VirtualTask(self, target, contextvars.copy_context(), name)
+        task.participant.gate = make_gate()
         with self._lock:
             self._ready.append(task.participant)
         return task
@@ -225,19 +236,11 @@ class VirtualClock:
 
     # -- scheduling ----------------------------------------------------------------------------
 
-    def _push(self, due: float, what: Participant | VirtualTimer, wait: int) -> None:
-        heapq.heappush(self._deadlines, (due, next(self._count), what, wait))
-
     def _wait(self, event: VirtualEvent | None, timeout: float | None) -> bool:
         """Let others run until `event` is set or `timeout` has passed; whether it was set."""
         me = self._participants.get(threading.get_ident())
-        if me is None:
-            raise RuntimeError(
-                f"virtual clock: thread {threading.current_thread().name!r} may not wait; expected "
-                "a thread started by the clock. Try clock.spawn(...) instead of threading.Thread."
-            )
-        if self._in_callback:
-            raise RuntimeError("virtual clock: a callback may not wait. Try clock.spawn(...).")
+        if me is None or self._in_callback:
+            raise _refusal(in_callback=me is not None)
         with self._lock:
             if self._closed:
                 raise Stopped
@@ -245,14 +248,12 @@ class VirtualClock:
             if deadline is not None and self._is_alone(deadline):
                 self._now = deadline
                 return False
-            wait = next(self._count)
-            self._waits[me] = wait
-            me.event, me.woken = event, False
-            me.waiting = _describe(event, deadline)
+            # Noted in the heap only when another participant gets the turn: most never need it.
+            me.turn = self._waits[me] = next(self._count)
+            me.event, me.deadline, me.woken = event, deadline, False
+            me.noted = deadline is None
             if event is not None:
                 event._waiters.append(me)  # noqa: SLF001
-            if deadline is not None:
-                self._push(deadline, me, wait)
         self._hand_over(me)
         if me.error is not None:
             error, me.error = me.error, None
@@ -272,8 +273,7 @@ class VirtualClock:
             raise Stopped
 
     def _enter(self, me: Participant) -> bool:
-        """Take the first turn in a new thread; False when the clock was closed before it came."""
-        me.gate.acquire()
+        """Begin the first turn in a new thread; False when the clock was closed before it came."""
         with self._lock:
             self._participants[threading.get_ident()] = me
         return not self._closed
@@ -283,11 +283,12 @@ class VirtualClock:
         steps: list[object] = []  # what was done when a signal handler raises: nothing, given, had
         chosen: Participant | None = None
         try:
-            chosen = self._next_turn()
+            chosen = self._next_turn(me)
             if chosen is me:
                 return
             gates: tuple[Any, ...] = (me.gate.acquire,)
             if chosen is not None:
+                chosen.begin()
                 gates = (chosen.gate.release, me.gate.acquire)
             steps.extend(map(operator.call, gates))  # no signal handler gets in between the two
         except BaseException as error:
@@ -298,7 +299,7 @@ class VirtualClock:
                     self._ready[:0] = [] if chosen in {None, me} else [chosen]
                     raise
             self._poke.set()
-            if len(steps) == 1 and not me.gate.acquire(timeout=INTERRUPT_S):
+            if len(steps) == 1 and not me.gate.acquire_within(INTERRUPT_S):
                 self._closed = True  # another participant never waits: this clock is broken
                 raise
             me.error = error
@@ -310,29 +311,40 @@ class VirtualClock:
             closed = self._closed
         chosen = None if closed else self._next_turn()
         if chosen is not None:
+            chosen.begin()
             chosen.gate.release()
         me.ended.set()
 
-    def _next_turn(self) -> Participant | None:
-        """Run callbacks and choose who goes on; None when nobody can."""
+    def _next_turn(self, me: Participant | None = None) -> Participant | None:
+        """Run callbacks and choose who goes on, `me` who waits or another; None when nobody can."""
         while True:
-            with self._lock:
-                pause = self._pause()
-                chosen = None if pause else self._choose()
+            pause = 0.0 if self.rate is None else self._pause(me)
             if pause:
                 self._pace(pause)
-            elif isinstance(chosen, VirtualTimer):
-                self._call(chosen)
-            else:
-                return chosen
+                continue
+            with self._lock:
+                chosen = self._choose(me)
+                if not isinstance(chosen, VirtualTimer):
+                    if chosen is not me:
+                        self._note(me)
+                    return chosen
+            self._call(chosen)
 
-    def _pause(self) -> float:
+    def _note(self, me: Participant | None) -> None:
+        """Put the deadline of `me`, who waits, into the heap, where others see it."""
+        if me is not None and me.deadline is not None and not me.noted:
+            me.noted = True
+            heapq.heappush(self._deadlines, (me.deadline, me.turn, me))
+
+    def _pause(self, me: Participant | None) -> float:
         """Return the real seconds to wait before the next jump."""
-        self._poke.clear()
-        due = self._next_due()
-        if self.rate is None or self._ready or due is None:
-            return 0.0
-        return max(0.0, (due - self._now) / self.rate - (time.monotonic() - self._stepped))
+        with self._lock:
+            self._poke.clear()
+            self._note(me)
+            due = self._next_due()
+            if self.rate is None or self._ready or due is None:
+                return 0.0
+            return max(0.0, (due - self._now) / self.rate - (time.monotonic() - self._stepped))
 
     def _pace(self, pause: float) -> None:
         """Let real time pass; a call from outside ends it early, with the time it took."""
@@ -344,44 +356,48 @@ class VirtualClock:
                 self._now = passed if due is None else min(passed, due)
                 self._stepped = real
 
-    def _choose(self) -> Participant | VirtualTimer | None:
-        if not self._ready:
-            self._jump()
-        if self._ready:
-            if len(self._ready) == 1:
-                return self._ready.pop()
-            return self._ready.pop(self._choose_by(self._ready_names()))
+    def _choose(self, me: Participant | None) -> Participant | VirtualTimer | None:
+        ready = self._ready
+        if not ready:
+            self._jump(me)
+        if ready:
+            return ready.pop(0 if len(ready) == 1 or self._pick is None else self._pick(ready))
         if self._owner in self._waits:
             waits = name_waits(self._waits, self._participants)
             over = self.limit is not None and self._next_due() is not None
             self._owner.error = TimeLimit(self._now, waits) if over else Deadlock(waits)
             self._wake(self._owner)
-            self._ready.clear()
+            ready.clear()
             return self._owner
         return None
-
-    def _ready_names(self) -> list[str]:
-        return [ready.name for ready in self._ready]
 
     def _is_past(self, due: float) -> bool:
         return self.limit is not None and due > self.limit
 
     def _next_due(self) -> float | None:
         """Return the next deadline that still matters."""
-        while self._deadlines:
-            due, _, what, wait = self._deadlines[0]
+        deadlines = self._deadlines
+        while deadlines:
+            due, turn, what = deadlines[0]
             if (
                 what.callback is not None
                 if isinstance(what, VirtualTimer)
-                else (self._waits.get(what) == wait)
+                else self._waits.get(what) == turn
             ):
                 return due
-            heapq.heappop(self._deadlines)
+            heapq.heappop(deadlines)
         return None
 
-    def _jump(self) -> None:
+    def _jump(self, me: Participant | None) -> None:
         """Advance to the next deadline; all that are due become ready."""
         due = self._next_due()
+        if me is not None and me.deadline is not None and not me.noted:
+            if (due is None or me.deadline < due) and not self._is_past(me.deadline):
+                self._now = me.deadline
+                self._end_wait(me, woken=False)
+                return
+            self._note(me)
+            due = self._next_due()
         if due is None or self._is_past(due):
             return
         self._now = max(due, self._now)
@@ -409,7 +425,8 @@ class VirtualClock:
         with self._lock:
             for participant in tuple(waiters):
                 self._wake(participant)
-        self._poke.set()
+        if self.rate is not None:
+            self._poke.set()
 
     def _wake(self, participant: Participant) -> None:
         if participant in self._waits:
@@ -420,17 +437,37 @@ class VirtualClock:
         event, participant.event = participant.event, None
         if event is not None and participant in event._waiters:  # noqa: SLF001
             event._waiters.remove(participant)  # noqa: SLF001
+        participant.noted = True
         participant.woken = woken
         self._ready.append(participant)
 
 
-def _describe(event: VirtualEvent | None, deadline: float | None) -> str:
-    what = "time to pass" if event is None else event.name
-    return what if deadline is None else f"{what} (until {deadline:.6g} s)"
+def _refusal(*, in_callback: bool) -> RuntimeError:
+    if in_callback:
+        return RuntimeError("virtual clock: a callback may not wait. Try clock.spawn(...).")
+    return RuntimeError(
+        f"virtual clock: thread {threading.current_thread().name!r} may not wait; expected "
+        "a thread started by the clock. Try clock.spawn(...) instead of threading.Thread."
+    )
 
 
-def _picker(seed: int | None) -> Callable[[list[str]], int]:
+def _picker(
+    seed: int | None, choose: Callable[[list[str]], int] | None
+) -> Callable[[list[Participant | VirtualTimer]], int] | None:
+    """Return what gives the index of the next one; None takes the first."""
+    if choose is not None:
+        return lambda ready: choose([each.name for each in ready])
     if seed is None:
-        return lambda _: 0
+        return None
     pick = random.Random(seed).randrange  # noqa: S311  no secret
-    return lambda names: pick(len(names))
+    return lambda ready: pick(len(ready))
+
+
+def _forget_all() -> None:
+    """Take a forked child out of every clock: its parent's participants are not in it."""
+    for clock in _clocks:
+        clock._participants.clear()  # noqa: SLF001  one module
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget_all)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import _thread
 import sys
 import threading
 from typing import TYPE_CHECKING, Any
@@ -10,12 +9,15 @@ from typing import TYPE_CHECKING, Any
 from actionlib_core.clock._real import RealEvent
 from actionlib_core.clock._serial import report_thread_exception
 from actionlib_core.clock._threads import mark_idle
+from actionlib_core.clock._turns import take_worker
 
 if TYPE_CHECKING:
     import contextvars
     from collections.abc import Callable, Mapping
     from types import FrameType
 
+    from actionlib_core.clock._gates import Gate
+    from actionlib_core.clock._turns import Worker
     from actionlib_core.clock._virtual import VirtualClock
 
 
@@ -56,19 +58,52 @@ class Stopped(BaseException):
 
 
 class Participant:
-    """One thread under the clock; `gate` is locked while it must not run."""
+    """One thread under the clock; it runs while it has taken its turn from `gate`.
 
-    __slots__ = ("ended", "error", "event", "gate", "name", "waiting", "woken")
+    Attributes:
+        name: Says who it is.
+        gate: Gives it the turn; that of its thread, from `begin` on.
+        job: What its thread is to run; None when that runs, or is not ours.
+        ended: It has given its last turn away.
+        event: What it waits for.
+        deadline: When its wait ends [s]; None: when its event is set.
+        noted: Whether the clock's heap has that deadline, or need not have it.
+        turn: Number of its wait.
+        woken: Whether the event ended its wait.
+        error: What its wait is to raise.
+    """
+
+    __slots__ = (
+        "deadline",
+        "ended",
+        "error",
+        "event",
+        "gate",
+        "job",
+        "name",
+        "noted",
+        "turn",
+        "woken",
+    )
 
     def __init__(self, name: str) -> None:
         self.name = name
+        self.gate: Gate
+        self.job: VirtualTask | None = None
         self.ended = RealEvent()
-        self.gate = _thread.allocate_lock()
-        self.gate.acquire()
-        self.waiting = ""
         self.event: VirtualEvent | None = None
+        self.deadline: float | None = None
+        self.noted = True
+        self.turn = 0
         self.woken = True
         self.error: BaseException | None = None
+
+    def begin(self) -> None:
+        """See that it has a thread, which waits for the turn."""
+        if self.job is not None:
+            worker = take_worker()
+            worker.give(self.job)
+            self.gate, self.job = worker.gate, None
 
 
 class VirtualEvent:
@@ -102,7 +137,7 @@ class VirtualEvent:
 
 
 class VirtualTask:
-    """A participant as its starter sees it; `run` is its thread's side."""
+    """A participant as its starter sees it; `run` or `run_turns` is its thread's side."""
 
     __slots__ = ("_clock", "_context", "_done", "_target", "error", "ident", "name", "participant")
 
@@ -129,6 +164,12 @@ class VirtualTask:
         return self._done.wait(timeout)
 
     def run(self) -> None:
+        """Run in a thread that somebody else made and ends."""
+        self.participant.gate.acquire()
+        self.run_turns()
+
+    def run_turns(self, worker: Worker | None = None) -> None:
+        """Run in a thread that has its first turn."""
         try:
             if self._clock._enter(self.participant):  # noqa: SLF001  the two are one secret
                 self.ident = threading.get_ident()
@@ -144,6 +185,8 @@ class VirtualTask:
             del self._target, self._context
             mark_idle()
             self._done.set()
+            if worker is not None:
+                worker.free()
             self._clock._leave(self.participant)  # noqa: SLF001
 
 
@@ -178,9 +221,15 @@ def name_waits(
             number += 1
             name = f"{participant.name} ({number})"
         frame = frames.get(threads.get(participant, 0))
-        unnamed = participant.waiting.startswith(UNNAMED)
-        named[name] = participant.waiting + (_where(frame) if unnamed else "")
+        what = _describe(participant)
+        named[name] = what + (_where(frame) if what.startswith(UNNAMED) else "")
     return named
+
+
+def _describe(participant: Participant) -> str:
+    event, deadline = participant.event, participant.deadline
+    what = "time to pass" if event is None else event.name
+    return what if deadline is None else f"{what} (until {deadline:.6g} s)"
 
 
 def _where(frame: FrameType | None) -> str:
