@@ -64,6 +64,9 @@ class ServerListener(Protocol):
     def on_question(self, goal_id: str) -> tuple[Any, bytes]:
         """Return the class and the bytes that answer "what of this goal?"."""
 
+    def on_goal_question(self, goal_id: str) -> bytes | None:
+        """Return the XActionGoal of a goal; None when it is not known, or no more."""
+
     def on_client_lost(self, client: str) -> None:
         """Take the death of a client's session."""
 
@@ -136,6 +139,7 @@ class ServerPort:
             transport.subscribe(self.keys.cancel, self._on_cancel, history=False),
             transport.subscribe(self.keys.ack, self._on_ack, history=False),
             transport.queryable(self.keys.result, self._on_query),
+            transport.queryable(self.keys.goal, self._on_goal_query),
         ]
         self._token = transport.declare_alive(token_key(self.endpoint))
         self._declared += [
@@ -256,6 +260,21 @@ class ServerPort:
         else:
             message_class, payload = self._listener.on_question(goal_id)
             query.reply(payload, encoding_of(message_class))
+        query.finish()
+
+    def _on_goal_query(self, query: Query) -> None:
+        try:
+            goal_id, _ = unpack_goal_id(query.payload)
+        except ValueError as error:
+            query.reply_error(f"action '{self.name}': {error}; expected an actionlib_msgs/GoalID")
+        else:
+            payload = self._listener.on_goal_question(goal_id)
+            if payload is None:
+                query.reply_error(
+                    f"action '{self.name}': goal {goal_id!r} is not known, or no more"
+                )
+            else:
+                query.reply(payload, encoding_of(self._types.action_goal))
         query.finish()
 
     def _is_readable(self, sample: Sample, message_class: Any) -> bool:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from actionlib_core._action_wire import (
     ActionTypes,
     StatusEntry,
+    pack_goal,
     pack_report,
     pack_status,
     pack_statuses,
@@ -436,6 +437,15 @@ class ActionServer:
                 return GoalStatus, pack_status(entry_of(goal))
             status = self._goals.past_status(goal_id) or Status.LOST
             return GoalStatus, pack_status(StatusEntry(goal_id, 0, status, text_of_past(status)))
+
+    def on_goal_question(self, goal_id: str) -> bytes | None:
+        """Answer what a goal was; not for users."""
+        with self.lock:
+            goal = self._goals.find(goal_id)
+            if goal is None or not isinstance(goal.tag, StatusTracker):
+                return None
+            content = goal.tag.content
+        return pack_goal(self._clock.time_ns(), goal.id, goal.stamp_ns, content.to_bytes())
 
     def on_conflict(self, error: ServerConflictError) -> None:
         """Leave the name to the older server; not for users."""

@@ -5,9 +5,10 @@ from __future__ import annotations
 import contextlib
 import difflib
 import os
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from actionlib_core.cli import UsageError
+from actionlib_core.cli._packages import known
 from actionlib_core.presence import Endpoint, Kind, list_endpoints, parse_token, token_pattern
 
 if TYPE_CHECKING:
@@ -197,7 +198,7 @@ def action_class(type_name: str) -> Any:
     """
     from actionlib_core.interfaces import get_action
 
-    return get_action(type_name)
+    return known(get_action, type_name)
 
 
 class Answer(NamedTuple):
@@ -207,8 +208,14 @@ class Answer(NamedTuple):
     payload: bytes
 
 
-def ask(node: Node, name: str, goal_id: str) -> Answer:
+def ask(node: Node, name: str, goal_id: str, about: Literal["result", "goal"] = "result") -> Answer:
     """Ask the server of an action about a goal, or about all ("").
+
+    Args:
+        node: Asks.
+        name: The action.
+        goal_id: The goal, "" for all.
+        about: What became of it, or what it was.
 
     Raises:
         UsageError: no answer came.
@@ -223,7 +230,7 @@ def ask(node: Node, name: str, goal_id: str) -> Answer:
     done = node.clock.event()
     full = node.resolve(name, "action name")
     node.transport.query(
-        action_keys(full).result,
+        getattr(action_keys(full), about),
         pack_goal_id(goal_id, 0),
         encoding=encoding_of(GoalID),
         timeout=ASK_S,
@@ -234,6 +241,8 @@ def ask(node: Node, name: str, goal_id: str) -> Answer:
     for reply in replies:
         if not reply.error:
             return Answer(reply.encoding, reply.payload)
+    if replies:
+        raise UsageError(replies[0].error)
     raise UsageError(
         f"action '/{full}': got no answer within {ASK_S:g} s; expected one. Try 'actionlib info'."
     )

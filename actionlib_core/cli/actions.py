@@ -106,5 +106,6 @@ def _find(args: argparse.Namespace) -> int:
     elif args.count_actions:
         print(len(names))
     else:
-        print("\n".join(names))
+        for name in names:
+            print(name)
     return 0

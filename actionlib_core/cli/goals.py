@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.cli import EXIT_FAILED, UsageError
@@ -40,11 +41,18 @@ def register(subparsers: Any) -> None:
     verb.add_argument("-c", "--count", action="store_true", help="only how many")
     add_json(verb)
     verb.set_defaults(run=_list)
-    verb = verbs.add_parser("info", help="show the status, and the result when there is one")
+    verb = verbs.add_parser(
+        "info",
+        help="show a goal, its status, and its result when there is one",
+        description="A server keeps the goal and the result until the client has the result; "
+        "then only the status is left.",
+    )
     verb.add_argument("name", metavar="NAME", help="the action")
     verb.add_argument("id", metavar="ID", help="the goal's id")
-    verb.add_argument("--status-only", action="store_true", help="only the status")
-    verb.add_argument("--result-only", action="store_true", help="only the result")
+    only = verb.add_mutually_exclusive_group()
+    only.add_argument("--goal-only", action="store_true", help="only the goal")
+    only.add_argument("--status-only", action="store_true", help="only the status")
+    only.add_argument("--result-only", action="store_true", help="only the result")
     add_json(verb)
     verb.set_defaults(run=_info)
 
@@ -81,28 +89,68 @@ def _list(args: argparse.Namespace) -> int:
 
 
 def _info(args: argparse.Namespace) -> int:
+    with open_node(args) as node:
+        spec = action_class(find_server(node, args.name).type)
+        entry, result = _status(node, args, spec)
+        goal = None if args.status_only or args.result_only else _goal(node, args, spec)
+    if args.goal_only and goal is None:
+        return _not_there(entry, "goal", args)
+    if args.result_only and result is None:
+        return _not_there(entry, "result", args)
+    status = _describe(entry)
+    if args.json:
+        parts = {
+            "goal": None if goal is None else goal.to_dict(),
+            "result": None if result is None else result.to_dict(),
+        }
+        only = [key for key in parts if getattr(args, f"{key}_only")]
+        whole = status if args.status_only else {**status, **parts}
+        print(json.dumps(parts[only[0]] if only else whole))
+    else:
+        _print_info(args, entry, goal, result)
+    return EXIT_FAILED if status["status"] == "LOST" else 0
+
+
+def _print_info(args: argparse.Namespace, entry: StatusEntry, goal: Any, result: Any) -> None:
+    if not (args.goal_only or args.result_only):
+        print(f"Goal: {entry.id}\nStatus: {_describe(entry)['status']}\nText: {entry.text}")
+    if goal is not None:
+        print_message("Goal:" if args.goal_only else "Content:", goal)
+    if result is not None and not (args.goal_only or args.status_only):
+        print_message("Result:", result)
+
+
+def _not_there(entry: StatusEntry, what: str, args: argparse.Namespace) -> int:
+    status = _describe(entry)["status"]
+    print(
+        f"actionlib: goal {args.id}: its {what} is not there; its status is {status}.",
+        file=sys.stderr,
+    )
+    return EXIT_FAILED
+
+
+def _status(node: Node, args: argparse.Namespace, spec: Any) -> tuple[StatusEntry, Any]:
+    """Return the status of a goal and its result, None when it is not there."""
     from actionlib_core._action_wire import unpack_report, unpack_status
     from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
     from actionlib_core.wire import encoding_of
 
-    with open_node(args) as node:
-        spec = action_class(find_server(node, args.name).type)
-        answer: Answer = ask(node, args.name, args.id)
-    result = None
+    answer: Answer = ask(node, args.name, args.id)
     if answer.encoding == encoding_of(GoalStatus):
-        entry = unpack_status(answer.payload)
-    else:
-        entry, start = unpack_report(answer.payload)
-        result = type(spec().action_result.result).from_bytes(answer.payload[start:])
-    status = _describe(entry)
-    if args.json:
-        print(json.dumps({**status, "result": None if result is None else result.to_dict()}))
-    else:
-        if not args.result_only:
-            print(f"Goal: {entry.id}\nStatus: {status['status']}\nText: {entry.text}")
-        if result is not None and not args.status_only:
-            print_message("Result:", result)
-    return EXIT_FAILED if status["status"] == "LOST" else 0
+        return unpack_status(answer.payload), None
+    entry, start = unpack_report(answer.payload)
+    return entry, type(spec().action_result.result).from_bytes(answer.payload[start:])
+
+
+def _goal(node: Node, args: argparse.Namespace, spec: Any) -> Any:
+    """Return what a goal was, None when the server has let go of it."""
+    from actionlib_core._action_wire import unpack_goal
+
+    try:
+        answer = ask(node, args.name, args.id, "goal")
+    except UsageError:
+        return None
+    return type(spec().action_goal.goal).from_bytes(unpack_goal(answer.payload)[2])
 
 
 def _cancel(args: argparse.Namespace) -> int:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from typing import TYPE_CHECKING, Any
+
+from actionlib_core.cli._packages import known, load_packages
 
 if TYPE_CHECKING:
     import argparse
@@ -60,9 +63,9 @@ def _show(args: argparse.Namespace) -> int:
     from actionlib_core.interfaces import _cli
 
     if args.json:
-        print(json.dumps(_cli.describe(args.name), indent=2))
+        print(json.dumps(known(_cli.describe, args.name), indent=2))
     else:
-        print(_cli.show(args.name, all_comments=args.all_comments))
+        print(known(partial(_cli.show, all_comments=args.all_comments), args.name))
     return 0
 
 
@@ -75,6 +78,7 @@ def _list(args: argparse.Namespace) -> int:
         "action": args.only_actions,
     }
     kinds = [kind for kind, wanted in asked.items() if wanted or not any(asked.values())]
+    load_packages()
     found = _cli.list_interfaces(kinds)
     if args.json:
         print(json.dumps(found, indent=2))
@@ -89,6 +93,7 @@ def _list(args: argparse.Namespace) -> int:
 def _stubs(args: argparse.Namespace) -> int:
     from actionlib_core.interfaces import _cli
 
+    load_packages()
     written = [str(path) for path in _cli.write_stubs(args.folder, args.packages)]
     print(json.dumps(written) if args.json else "\n".join(written))
     return 0

@@ -10,6 +10,7 @@ from actionlib_core.cli import EXIT_FAILED, UsageError
 from actionlib_core.cli._ends import ends_by_name, find_ends, only_type, types_of
 from actionlib_core.cli._network import SETTLE_S, open_node
 from actionlib_core.cli._numbers import rate, seconds
+from actionlib_core.cli._packages import known
 from actionlib_core.exceptions import ServiceException
 from actionlib_core.presence import Kind
 
@@ -121,7 +122,7 @@ def _service_class(node: Node, name: str, type_name: str) -> type[ServiceType]:
     if not type_name:
         ends = find_ends(node, name, KINDS, "service")
         type_name = only_type(ends, name, "service")
-    return get_service(type_name)
+    return known(get_service, type_name)
 
 
 def _note(args: argparse.Namespace, text: str) -> None:

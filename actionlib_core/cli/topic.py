@@ -16,6 +16,7 @@ from actionlib_core.cli._feed import Feed
 from actionlib_core.cli._filter import Filter
 from actionlib_core.cli._network import open_node
 from actionlib_core.cli._numbers import count, rate, seconds, size
+from actionlib_core.cli._packages import known
 from actionlib_core.presence import Kind, parse_token, token_pattern
 
 if TYPE_CHECKING:
@@ -218,9 +219,9 @@ def _message_class(node: Node, args: argparse.Namespace) -> type[Message]:
     from actionlib_core.interfaces import get_message
 
     if args.type:
-        return get_message(args.type)
+        return known(get_message, args.type)
     ends = find_ends(node, args.name, ENDS, "topic")
-    return get_message(only_type(ends, args.name, "topic"))
+    return known(get_message, only_type(ends, args.name, "topic"))
 
 
 def _echo(args: argparse.Namespace) -> int:
@@ -277,7 +278,7 @@ def _pub(args: argparse.Namespace) -> int:
     from actionlib_core.interfaces import get_message
     from actionlib_core.topic import Publisher
 
-    message_class = get_message(args.type)
+    message_class = known(get_message, args.type)
     times = 1 if args.once else args.times
     wanted = args.wait_matching_subscriptions
     if wanted is None:

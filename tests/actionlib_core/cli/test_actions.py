@@ -203,6 +203,16 @@ def test_goals_are_listed_shown_and_cancelled(shell, network, clock):
     assert shell("goal", "list", "keep", "-c") == "2\n"
     assert f"{ids[0]} ACTIVE 1000000000.000 yours\n" in shell("goal", "list", "keep")
     assert "Status: ACTIVE" in shell("goal", "info", "keep", ids[0])
+    assert shell("goal", "info", "keep", ids[0]).endswith("Content:\n    goal: 1\n\n")
+    assert shell("goal", "info", "keep", ids[0], "--goal-only") == "Goal:\n    goal: 1\n\n"
+    assert "goal: 1" not in shell("goal", "info", "keep", ids[0], "--status-only")
+    assert shell.json("goal", "info", "keep", ids[1], "--goal-only") == {"goal": 2}
+    shown = shell.json("goal", "info", "keep", ids[1])
+    assert (shown["status"], shown["goal"], shown["result"]) == ("ACTIVE", {"goal": 2}, None)
+    shown = shell("goal", "info", "keep", ids[0], "--result-only", code=1)
+    assert "its result is not there; its status is ACTIVE." in shown
+    shown = shell("goal", "info", "keep", "unknown", "--goal-only", code=1)
+    assert "its goal is not there; its status is LOST." in shown
     assert shell("cancel", "keep", "--before", "1000000000.5") == (
         f"Cancel requested for goal {ids[0]}\n"
     )
@@ -216,6 +226,12 @@ def test_goals_are_listed_shown_and_cancelled(shell, network, clock):
     assert "Status: PREEMPTED" in shown
     assert "Status: LOST" in shell("goal", "info", "keep", "never-1-1.1", code=1)
     node.close()
+
+
+def test_definitions_of_installed_packages_are_known(shell, capsys):
+    assert shell("find", "mission_msgs/Charge") == ""
+    assert "mission_msgs/action/Charge" in shell("interface", "list", "-a")
+    assert "until" in shell("interface", "show", "mission_msgs/Charge")
 
 
 def test_echo_prints_what_passes(shell, counting, clock, capsys):
