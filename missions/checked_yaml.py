@@ -111,7 +111,7 @@ class Section:
         """Return the line of `key`, of the section when it is not there."""
         try:
             return int(self._data.lc.key(key)[0]) + 1
-        except KeyError:
+        except (KeyError, TypeError):  # a mapping that is not in the file has no lines at all
             return self._line
 
     def problem(self, key: str, expected: str, hint: str = "") -> None:

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from actionlib_core.interfaces.geometry_msgs.msg import Pose
 
 SIGNAL_TIMEOUT: Final = 5.0  # [s] the robot's own topics answer within this, or never
+DRIVE_TIMEOUT: Final = 600.0  # [s] no way in a building takes longer
+TURN_TIMEOUT: Final = 60.0  # [s]
 
 
 def pose_of(message: Pose) -> Pose2D:
@@ -45,6 +47,7 @@ def note_pose(userdata: UserData, odometry: Odometry) -> bool:
 
 def drive_to(pose: Pose2D, **options: Any) -> SimpleActionState:
     """Drive to a pose in the map frame."""
+    options.setdefault("exec_timeout", DRIVE_TIMEOUT)
     return SimpleActionState("move_base", MoveBaseAction, goal=goal_at(pose), **options)
 
 
@@ -52,6 +55,7 @@ def turn(degrees: float, **options: Any) -> SimpleActionState:
     """Turn on the spot, anticlockwise, by at most half a circle; the shorter way round."""
     pose = Pose2D(0.0, 0.0, math.radians(degrees))
     goal = goal_at(pose, frame="base_link")
+    options.setdefault("exec_timeout", TURN_TIMEOUT)
     return SimpleActionState("move_base", MoveBaseAction, goal=goal, **options)
 
 

@@ -52,14 +52,12 @@ class Waypoint:
         pose: In the map frame.
         dwell: How long to stay there [s].
         task: What to do there after that.
-        door: The door that leads there; "" when there is none.
     """
 
     name: str
     pose: Pose2D
     dwell: float = 0.0
     task: Task | None = None
-    door: str = ""
 
     def goal(self) -> MoveBaseGoal:
         """Return the `move_base` goal that drives here."""
@@ -97,6 +95,21 @@ class Tour:
 
 
 @dataclass(frozen=True, slots=True)
+class Place:
+    """Where a delivery goes.
+
+    Attributes:
+        goal: The place itself.
+        door: The name of the door that leads there; "" when there is none.
+        wait: Where to stand until the door is open; None when there is none.
+    """
+
+    goal: Waypoint
+    door: str = ""
+    wait: Waypoint | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Places:
     """Where deliveries go.
 
@@ -106,7 +119,7 @@ class Places:
     """
 
     home: Waypoint
-    places: dict[str, Waypoint]
+    places: dict[str, Place]
 
 
 def goal_at(pose: Pose2D, frame: str = "map") -> MoveBaseGoal:
@@ -172,12 +185,12 @@ def load_places(path: Path) -> Places:
     top = document.top
     floor = _floor(top, path)
     home = _place(top.section("home"), "home", floor)
-    places: dict[str, Waypoint] = {}
+    places: dict[str, Place] = {}
     for row in top.rows("places"):
         place = _behind_door(row, floor)
-        if place.name in places:
+        if place.goal.name in places:
             row.problem("name", "a name that no other place has")
-        places[place.name] = place
+        places[place.goal.name] = place
     top.close()
     document.check()
     return Places(home, places)
@@ -238,12 +251,15 @@ def _task(row: Section) -> Task | None:
     return Task(kind, angle, service) if "task" in row else None
 
 
-def _behind_door(row: Section, floor: Floor | None) -> Waypoint:
+def _behind_door(row: Section, floor: Floor | None) -> Place:
     """Read a place with the door that leads there."""
     row.text("name", REQUIRED)
     door = _name(row, "door")
-    place = _place(row, "-", floor)
-    return Waypoint(place.name, place.pose, door=door)
+    before = row.section("wait")
+    wait = _place(before, "before the door", floor) if "wait" in row or door else None
+    if wait is not None and not door:
+        row.problem("wait", "a door to wait for", "Try: door: NAME.")
+    return Place(_place(row, "-", floor), door, wait)
 
 
 def _name(row: Section, key: str) -> str:

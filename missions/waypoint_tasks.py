@@ -10,7 +10,7 @@ from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.sensor_msgs.msg import LaserScan
 from actionlib_core.interfaces.std_srvs.srv import Trigger
 from missions.move_base.geometry import Pose2D
-from missions.parts import SIGNAL_TIMEOUT, locate
+from missions.parts import SIGNAL_TIMEOUT, TURN_TIMEOUT, locate
 from missions.waypoint_file import goal_at
 from smachpy import MonitorState, ServiceState, SimpleActionState, State, StateMachine, UserData
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from missions.waypoint_file import Task, Waypoint
 
 SERVICE_TIMEOUT = 60.0  # [s] for a service at a waypoint to appear and to answer
-TURN_TIMEOUT = 60.0  # [s]
 
 
 def choose_task(userdata: UserData) -> str:

@@ -1,0 +1,298 @@
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
+from actionlib_core.interfaces.std_msgs.msg import Bool, String
+from actionlib_core.interfaces.std_srvs.srv import SetBool
+from missions.delivery import delivery
+from missions.exceptions import InputFileError, MissionError
+from missions.maps import OFFICE_MAP, OFFICE_ROBOT
+from smachpy import events as ev
+from smachpy.checks import check
+from smachpy.checks.suppression import read_settings
+
+LAB, WAIT, HOME = (17.9, 5.4), (18.0, 7.7), (9.8, 7.1)
+
+
+@pytest.fixture(scope="module")
+def machine():
+    return delivery()  # reading the map takes longer than a run
+
+
+@pytest.fixture
+def robot(mission):
+    server = mission.action_server("move_base", MoveBaseAction)
+    server.default_result(duration=10)
+    return server
+
+
+@pytest.fixture
+def door(mission):
+    """The door's service; the door is open three seconds after each call."""
+    leaf = mission.topic("doors/lab/open", Bool)
+    leaf.publish(Bool(data=False), latch=True)
+    service = mission.service_server("doors/lab/set", SetBool)
+
+    def set_door(request):
+        mission.clock.call_later(3.0, partial(leaf.publish, Bool(data=request.data), latch=True))
+        return True, ""
+
+    service.set_door = set_door
+    for _ in range(20):
+        service.custom_reply(set_door)
+    return service
+
+
+@pytest.fixture
+def answer(mission):
+    """`answer(state, text)`: the operator answers two seconds after that state began."""
+    topic = mission.topic("operator/answer", String)
+    return lambda at, text: topic.publish_at(at, String(text))
+
+
+def places(robot):
+    stamped = [
+        goal.target_pose for goal in robot.goals if goal.target_pose.header.frame_id == "map"
+    ]
+    return [(pose.pose.position.x, pose.pose.position.y) for pose in stamped]
+
+
+def test_it_brings_it_through_the_door_and_comes_home(mission, machine, robot, door, answer):
+    answer(30.0, "yes")
+    run = mission(machine)
+    run.assert_outcome("succeeded")
+    run.assert_path(
+        [
+            *("APPROACH", "GO/OPEN/CALL", "GO/OPEN/WAIT", "ENTER", "CONFIRM"),
+            *("TURN", "RELEASE", "NOTE"),
+            *("COME_BACK/OPEN/CALL", "COME_BACK/OPEN/WAIT", "DRIVE_HOME", "CLOSE", "REPORT"),
+        ]
+    )
+    assert places(robot) == [WAIT, LAB, HOME]
+    assert [request.data for request in door.requests] == [True, True, False]
+    assert run.duration == 30 + 10 + 3 + 10
+
+
+def test_it_does_not_enter_before_the_door_is_open(mission, machine, robot, door, answer):
+    answer(30.0, "yes")
+    run = mission(machine)
+    entered = {event.path: event.t for event in run.events if isinstance(event, ev.Entered)}
+    assert entered["/DELIVERY/GO/ENTER"] - entered["/DELIVERY/GO/OPEN/CALL"] == 3.0
+
+
+@pytest.mark.parametrize(("word", "asked"), [("no", 30.0), (None, 23.0 + 45.0)])
+def test_without_a_yes_it_brings_it_back(mission, robot, door, answer, word, asked):
+    if word is not None:
+        answer(asked, word)
+    run = mission(delivery(patience=45.0))
+    run.assert_outcome("brought_back")
+    run.assert_not_visited("HAND_OVER")
+    assert places(robot) == [WAIT, LAB, HOME]
+    assert run.duration == asked + 10
+
+
+@pytest.mark.parametrize("fault", ["refuses", "raises", "dies", "is silent", "is not there"])
+def test_a_door_that_does_not_open_sends_it_home(mission, machine, robot, fault):
+    if fault != "is not there":
+        service = mission.service_server("doors/lab/set", SetBool)
+        for _ in range(20):
+            {
+                "refuses": lambda: service.reply({"success": False, "message": "locked"}),
+                "raises": lambda: service.fail("no power"),
+                "dies": lambda: service.die(),
+                "is silent": lambda: service.never_answer(),
+            }[fault]()
+    run = mission(machine)
+    run.assert_outcome("brought_back")
+    run.assert_not_visited("ENTER", "CONFIRM")
+    assert places(robot) == [WAIT, HOME]
+
+
+def test_a_door_that_says_yes_and_stays_shut_sends_it_home(mission, machine, robot):
+    mission.topic("doors/lab/open", Bool).publish(Bool(data=False), latch=True)
+    mission.service_server("doors/lab/set", SetBool).default_response({"success": True})
+    run = mission(machine)
+    run.assert_outcome("brought_back")
+    run.assert_not_visited("ENTER")
+    assert run.outcomes("GO/OPEN/WAIT") == ("aborted",)
+
+
+def test_a_door_that_hesitates_is_asked_again(mission, machine, robot, answer):
+    mission.topic("doors/lab/open", Bool).publish(Bool(data=True), latch=True)
+    service = mission.service_server("doors/lab/set", SetBool)
+    service.default_response({"success": True})
+    service.reply({"success": False, "message": "someone stands in the doorway"})
+    answer(30.0, "yes")
+    mission(machine).assert_outcome("succeeded")
+    assert [request.data for request in service.requests] == [True, True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("where", "visited"), [(WAIT, [WAIT, HOME]), (LAB, [WAIT, LAB, HOME])], ids=["before", "behind"]
+)
+def test_a_blocked_way_sends_it_home(mission, machine, robot, door, where, visited):
+    def goes_there(goal):
+        position = goal.target_pose.pose.position
+        return (position.x, position.y) == where
+
+    robot.reply_conditionally(goes_there, status="aborted", duration=5)
+    mission(machine).assert_outcome("brought_back")
+    assert places(robot) == visited
+
+
+def test_a_tray_that_cannot_be_turned_is_brought_back(mission, machine, robot, door, answer):
+    answer(30.0, "yes")
+    robot.reply_conditionally(
+        lambda goal: goal.target_pose.header.frame_id == "base_link", status="aborted"
+    )
+    mission(machine).assert_outcome("brought_back")
+
+
+def goes_home(goal):
+    return goal.target_pose.header.frame_id == "map" and goal.target_pose.pose.position.x == HOME[0]
+
+
+def test_a_robot_that_cannot_get_home_asks_for_help(mission, robot, door, answer):
+    answer(30.0, "yes")
+    blocked = robot.reply_conditionally(goes_home, status="aborted", duration=5)
+    # It asks when three tries of 5 s, and the 5 s and 10 s between them, are over.
+    asked = 30 + 13 + 3 * 5 + 15
+    answer(asked + 20.0, "yes")
+    mission.clock.call_later(asked + 10.0, lambda: setattr(blocked, "status", "succeeded"))
+    run = mission(delivery())
+    run.assert_outcome("succeeded")
+    assert run.visits("DRIVE_HOME") == 2
+    assert places(robot).count(HOME) == 4
+
+
+def test_and_stays_where_it_is_when_nobody_helps(mission, robot, door, answer):
+    answer(30.0, "yes")
+    robot.reply_conditionally(goes_home, status="aborted", duration=5)
+    run = mission(delivery(patience=100.0))
+    run.assert_outcome("aborted")
+    assert run.outcomes("HELP") == ("no_answer",)
+    assert run.userdata["delivered"] is True
+
+
+def test_a_door_that_cannot_be_closed_behind_it_spoils_nothing(mission, machine, robot, answer):
+    mission.topic("doors/lab/open", Bool).publish(Bool(data=True), latch=True)
+    service = mission.service_server("doors/lab/set", SetBool)
+    service.default_response({"success": False})
+    service.reply({"success": True})
+    service.reply({"success": True})
+    answer(30.0, "yes")
+    mission(machine).assert_outcome("succeeded")
+    assert [request.data for request in service.requests] == [True, True, False, False, False]
+
+
+def test_a_robot_that_dies_and_comes_back_is_sent_home(mission, machine, robot, door):
+    robot.reply(duration=10)
+    robot.die(after=3, back_after=1)
+    mission(machine).assert_outcome("brought_back")
+
+
+@pytest.mark.parametrize(
+    "state", ["APPROACH", "GO/OPEN/WAIT", "ENTER", "CONFIRM", "TURN", "RELEASE", "DRIVE_HOME"]
+)
+def test_a_preempt_stops_it_anywhere(mission, machine, robot, door, answer, state):
+    answer(30.0, "yes")
+    mission.preempt(on=state, after=1.0)
+    run = mission(machine)
+    run.assert_outcome("preempted")
+    assert run.goals_left == ()
+
+
+def test_a_second_run_begins_anew(mission, machine, robot, door, answer):
+    answer(30.0, "yes")
+    mission(machine).assert_outcome("succeeded")
+    mission(machine).assert_outcome("brought_back")
+
+
+def test_a_place_without_a_door(mission, robot, answer):
+    answer(15.0, "yes")
+    run = mission(delivery(to="kitchen"))
+    run.assert_outcome("succeeded")
+    run.assert_path(["ENTER", "CONFIRM", "TURN", "RELEASE", "NOTE", "DRIVE_HOME", "REPORT"])
+
+
+# -- bad input -------------------------------------------------------------------------------------
+
+
+def test_an_unknown_place_is_named_with_the_nearest():
+    with pytest.raises(MissionError, match=r"got 'lap'; expected one of .* Did you mean 'lab'\?"):
+        delivery(to="lap")
+
+
+def test_every_problem_of_the_places_is_named(tmp_path):
+    path = tmp_path / "places.yaml"
+    path.write_text(
+        f"map: {OFFICE_MAP}\nrobot: {OFFICE_ROBOT}\nhome: {{x: 0.5, y: 5}}\n"
+        "places:\n"
+        "  - {name: lab, x: 17.9, y: 5.4, door: lab}\n"
+        "  - {name: lab, x: 17.9, y: 5.4}\n"
+        "  - {name: den, x: 17.9, y: 5.4, wait: {x: 18, y: 7.7}}\n"
+        "  - {x: 17.9, y: .nan, door: my door}\n"
+    )
+    with pytest.raises(InputFileError) as error:
+        delivery(places=path)
+    found = [str(problem).removeprefix(f"{path}:") for problem in error.value.problems]
+    assert [text.split(";")[0] for text in found] == [
+        "3: home.x: got 0.5",
+        "5: places[0].wait.x: got nothing",
+        "5: places[0].wait.y: got nothing",
+        "6: places[1].name: got 'lab'",
+        "7: places[2].wait: got {'x': 18, 'y': 7.7}",
+        "8: places[3].name: got nothing",
+        "8: places[3].door: got 'my door'",
+        "8: places[3].wait.x: got nothing",
+        "8: places[3].wait.y: got nothing",
+        "8: places[3].y: got nan",
+    ]
+
+
+# -- the whole -------------------------------------------------------------------------------------
+
+
+def test_a_check_finds_no_problems(machine):
+    settings = read_settings(Path(__file__).parents[2])
+    report = check(machine, ignores=settings.ignores, name="DELIVERY")
+    assert report.ok, report
+
+
+def hands_over_only_after_a_yes(run):
+    return not run.visits("TURN") or "yes" in run.outcomes("CONFIRM")
+
+
+def ends_at_home_or_says_that_it_does_not(run):
+    home = run.outcomes("DRIVE_HOME")[-1:] == ("succeeded",)
+    return run.outcome == "preempted" or home == (run.outcome in {"succeeded", "brought_back"})
+
+
+def succeeds_only_with_what_was_delivered(run):
+    return (run.outcome == "succeeded") <= bool(run.visits("NOTE"))
+
+
+def test_whatever_happens_it_comes_home_or_says_so(mission, machine):
+    found = mission.explore(
+        machine,
+        keep=["NOTE", "REPORT"],
+        invariants=[
+            hands_over_only_after_a_yes,
+            ends_at_home_or_says_that_it_does_not,
+            succeeds_only_with_what_was_delivered,
+        ],
+        max_runs=300,
+        max_time=40,
+    )
+    assert found.ok, found
+
+
+def test_whatever_servers_do_it_ends(mission, machine):
+    found = mission.explore(
+        machine, real_actions=True, interleavings=False, max_runs=60, max_time=40
+    )
+    assert found.ok, found
