@@ -108,4 +108,4 @@ def test_rows_must_be_mappings(tmp_path):
 def test_fields_of_a_section_that_is_not_there_are_named_with_a_line(tmp_path):
     doc = document(tmp_path, "other: 1\n")
     doc.top.section("dock").number("x", REQUIRED)
-    assert str(doc.problems[0]).endswith("a.yaml:1: dock.x: got nothing; expected a number")
+    assert str(doc.problems[0]).endswith("a.yaml:1: dock.x: got nothing; expected a number.")
