@@ -58,7 +58,9 @@ class Narrator:
             ev.Left: self._left,
             ev.Failed: self._failed,
             ev.Finished: self._finished,
-            ev.PreemptRequested: lambda e: self._line(e, Text("asked to stop", "yellow")),
+            ev.PreemptRequested: lambda e: self._line(
+                e, Text(f"asked to stop by {shorten(e.asker, 60)}", "yellow")
+            ),
             ev.CallbackFailed: lambda e: self._line(
                 e, Text(f"callback {shorten(e.callback)}: {_error(e.error)}", "red")
             ),

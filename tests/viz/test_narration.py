@@ -35,7 +35,7 @@ def tell(patrol):
         (ev.Left(GO, 102.0, 0, "succeeded"), "succeeded \u2192 NEXT_WAYPOINT  2.0 s"),
         (ev.Left(GO, 102.0, 0, "preempted"), "preempted  2.0 s"),
         (ev.Failed(GO, 102.0, 0, "ValueError: no map"), "ValueError: no map  2.0 s"),
-        (ev.PreemptRequested(GO, 102.0, 0), "asked to stop"),
+        (ev.PreemptRequested(GO, 102.0, 0, "signal", "SIGINT"), "asked to stop by signal SIGINT"),
         (ev.TimedOut(GO, 102.0, 0, 1.5), "timeout of 1.5 s"),
         (ev.Retried(GO, 102.0, 0, 1, "aborted"), "again, attempt 1 ended with aborted"),
         (ev.Abandoned(GO, 102.0, 0, 2.0, "File …"), "left behind: it ignored its preempt for 2 s"),

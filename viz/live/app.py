@@ -230,6 +230,8 @@ class Viewer:
         command = await _read_command(request)
         if command is None:
             return _no_command()
+        client = request.client.host if request.client else "?"
+        command = {"by": f"page at {client}", **command}
         try:
             return JSONResponse(await run_in_threadpool(self._send, name, command))
         except SmachError as error:

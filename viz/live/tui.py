@@ -11,6 +11,7 @@ from textual.app import App, ComposeResult
 from textual.containers import Horizontal, Vertical
 from textual.widgets import DataTable, Footer, Input, RichLog, Static, Tree
 
+from smachpy.events import asker_text
 from smachpy.exceptions import SmachError
 from smachpy.run_state import RunState
 from viz.model import outcome_class
@@ -27,7 +28,10 @@ if TYPE_CHECKING:
 
 FRAME_S = 0.2
 BAR = 20
-LOGGED = {"Started", "Finished", "Left", "Failed", "PreemptRequested", "GoalDone", "Retried"}
+LOGGED = {
+    *("Started", "Finished", "Left", "Failed", "GoalDone", "Retried"),
+    *("PreemptRequested", "PreemptServiced", "Abandoned"),
+}
 
 
 class MissionApp(App[None]):
@@ -41,6 +45,7 @@ class MissionApp(App[None]):
     TITLE = "smachpy"
     CSS = """
     #status { height: 1; background: $panel; padding: 0 1; }
+    #preempt { height: auto; max-height: 6; background: $warning 20%; padding: 0 1; }
     #left { width: 45%; } Tree { height: 1fr; } #search { display: none; dock: bottom; }
     #goals { height: auto; max-height: 9; padding: 0 1; } DataTable { height: 1fr; }
     RichLog { height: 1fr; border-top: solid $panel; }
@@ -73,6 +78,7 @@ class MissionApp(App[None]):
     def compose(self) -> ComposeResult:
         """Lay the widgets out."""
         yield Static(id="status")
+        yield Static(id="preempt")
         with Horizontal():
             with Vertical(id="left"):
                 yield Tree[Any]("no machine yet", id="tree")
@@ -101,7 +107,9 @@ class MissionApp(App[None]):
         self._draw_status(machine)
         events = machine.events()
         ended = (machine.stale is not None or machine.recorded) and events
-        self._draw_tree(events[-1]["stamp_ns"] if ended else time.time_ns())
+        now = events[-1]["stamp_ns"] if ended else time.time_ns()
+        self._draw_preempt(now)
+        self._draw_tree(now)
         self._draw_goals()
 
     def _first(self) -> Machine | None:
@@ -149,6 +157,8 @@ class MissionApp(App[None]):
             word, style = f"ended: {data['outcome']}", STYLES[outcome_class(data["outcome"])]
         elif machine.control and machine.control["paused"]:
             word, style = "paused", "magenta"
+        elif self._state.holding_up():
+            word, style = "preempting", "yellow"
         else:
             word, style = "running", "blue"
         active = self._state.active()
@@ -158,6 +168,29 @@ class MissionApp(App[None]):
             (f" {machine.name} ", "bold"), (f" {word} ", f"{style} reverse"), f"  {trail}"
         )
         self.query_one("#status", Static).update(text)
+
+    def _draw_preempt(self, now: int) -> None:
+        """Who asked for the preempt that is under way, and who holds it up."""
+        widget = self.query_one("#preempt", Static)
+        states = self._state.data["states"]
+        holds = self._state.holding_up()
+        widget.display = bool(holds)
+        if not holds:
+            return
+        first = min((states[p] for p in states if _asked(states[p])), key=lambda s: s["preempt"])
+        lines = Text.assemble(
+            ("preempt", "bold yellow"),
+            (f" by {_asker(first['asked'])}", "yellow"),
+            (f", {(now - first['preempt']) / 1e9:.1f} s ago", "dim"),
+        )
+        for path in holds[:4]:
+            state = states[path]
+            grace = (state["asked"] or {}).get("grace")
+            lines.append(f"\n\u25a0 {shorten(path.rpartition('/')[2])}", "bold")
+            lines.append(f" holds it up for {(now - state['preempt']) / 1e9:.1f} s")
+            lines.append("" if grace is None else f" of {grace:g} s", "dim")
+            lines.append(", cleaning up" if state["serviced"] else "", "dim")
+        widget.update(lines)
 
     def _draw_tree(self, now: int) -> None:
         for path, node in self._places.items():
@@ -237,11 +270,32 @@ class MissionApp(App[None]):
             self.call_from_thread(self.notify, "this viewer only looks; try --control")
             return
         try:
-            answer = self._send(name, {"command": command})
+            answer = self._send(name, {"command": command, "by": f"terminal of {_user()}"})
             text = answer["text"] or f"{command}: done"
         except SmachError as error:
             text = str(error)
         self.call_from_thread(self.notify, text)
+
+
+def _user() -> str:
+    import getpass
+    import socket
+
+    try:
+        return f"{getpass.getuser()}@{socket.gethostname()}"
+    except (KeyError, OSError):  # a user without a name, in a container
+        return socket.gethostname()
+
+
+def _asked(state: dict[str, Any]) -> bool:
+    return state["since"] is not None and bool(state.get("preempt"))
+
+
+def _asker(asked: dict[str, Any] | None) -> str:
+    """Who asked, in one phrase; recordings of older versions do not say."""
+    if not asked or not asked.get("source"):
+        return "someone"
+    return asker_text(asked["source"], asked["by"], asked["why"])
 
 
 def _inside(path: str, active: list[str]) -> bool:
@@ -256,7 +310,10 @@ def _label(record: StateRecord, state: dict[str, Any] | None, now: int) -> Text:
     if state["since"] is not None:
         style = "bold yellow" if state.get("preempt") else "bold blue"
         text = Text.assemble((name, style), (f"  {(now - state['since']) / 1e9:.1f} s", "dim"))
-        return text.append("  asked to stop", "yellow") if state.get("preempt") else text
+        if not state.get("preempt"):
+            return text
+        word = "takes its preempt up" if state.get("serviced") else "asked to stop"
+        return text.append(f"  {word}", "yellow")
     text = Text(name)
     if state["outcome"]:
         text.append(f"  {shorten(state['outcome'], 20)}", STYLES[outcome_class(state["outcome"])])
@@ -266,7 +323,13 @@ def _label(record: StateRecord, state: dict[str, Any] | None, now: int) -> Text:
 def _line(event: dict[str, Any]) -> Text:
     words = event.get("outcome") or event.get("error") or event.get("status") or event["kind"]
     style = STYLES[outcome_class(str(words))]
-    words = {"PreemptRequested": "asked to stop", "Started": "started"}.get(str(words), words)
+    if event["kind"] == "PreemptRequested":
+        words, style = f"asked to stop by {_asker(event)}", "yellow"
+    words = {
+        "PreemptServiced": "takes its preempt up",
+        "Abandoned": "left behind",
+        "Started": "started",
+    }.get(str(words), words)
     clock = time.strftime("%H:%M:%S", time.localtime(event["stamp_ns"] / 1e9))
     name = shorten(event["path"].rpartition("/")[2])
     return Text.assemble(

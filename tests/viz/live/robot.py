@@ -49,6 +49,20 @@ class Stubborn(State):
         return "preempted"
 
 
+class Tidy(State):
+    """Takes its preempt up at once, and then cleans up for a while."""
+
+    def __init__(self, seconds):
+        super().__init__(outcomes=OUTCOMES)
+        self.seconds = seconds
+
+    def execute(self, userdata):
+        self.sleep(60.0)
+        self.service_preempt()
+        threading.Event().wait(self.seconds)
+        return "preempted"
+
+
 def small(pace, args):
     """INIT -> PICK (a machine) -> TRANSPORT (a concurrence) -> PLACE -> INIT ..."""
     sm = StateMachine(outcomes=OUTCOMES, name="DELIVER")
@@ -66,16 +80,13 @@ def small(pace, args):
         outcome_map={"succeeded": {"NAVIGATE": "succeeded", "WATCH": "succeeded"}},
     )
     with transport:
-        Concurrence.add("NAVIGATE", Work(pace))
-        Concurrence.add("WATCH", Work(pace))
+        Concurrence.add("NAVIGATE", Tidy(args.stubborn / 2) if args.stubborn else Work(pace))
+        Concurrence.add("WATCH", Stubborn(args.stubborn) if args.stubborn else Work(pace))
     with sm:
         StateMachine.add("INIT", Work(pace), {"succeeded": "PICK"})
         StateMachine.add("PICK", pick, {"succeeded": "TRANSPORT"})
         StateMachine.add("TRANSPORT", transport, {"succeeded": "PLACE"})
-        if args.stubborn:
-            StateMachine.add("PLACE", Stubborn(args.stubborn), {"succeeded": "INIT"})
-        else:
-            StateMachine.add("PLACE", Work(pace), {"succeeded": "INIT"})
+        StateMachine.add("PLACE", Work(pace), {"succeeded": "INIT"})
     return sm
 
 

@@ -142,7 +142,7 @@ def test_the_page_folds_events_as_the_server_does(delivery, shared):
     for event in theirs:
         state.fold(event)
     for path, facts in state.data["states"].items():
-        for key in ("visits", "outcome", "outcomes", "since", "preempt"):
+        for key in ("visits", "outcome", "outcomes", "since", "preempt", "asked", "serviced"):
             assert mine["states"][path].get(key) == facts.get(key), (path, key)
     assert mine["run"] == state.data["run"]
     assert {k: v["writer"] for k, v in mine["userdata"].items()} == {
@@ -240,16 +240,54 @@ def test_ten_clients_at_once_hear_the_same(delivery, shared):
 
 
 def test_a_preempt_is_a_process_one_can_watch(start, look):
-    start.robot("--name", "slow", "--rate", 20, "--control", "--stubborn", 3)
+    start.robot("--name", "slow", "--rate", 20, "--control", "--stubborn", 4)
     view = start.view("--control")
     page = look(view.address.replace("/#", "/?machine=slow#"))
-    wait_for(page, "document.querySelector('g.active[data-path=\"/DELIVER/PLACE\"]')")
+    watch, navigate = "/DELIVER/TRANSPORT/WATCH", "/DELIVER/TRANSPORT/NAVIGATE"
+    wait_for(page, f"document.querySelector('g.active[data-path=\"{watch}\"]')")
     page.click("text=Preempt")
     page.click("text=Yes")
-    wait_for(page, "document.querySelector('g.preempting[data-path=\"/DELIVER/PLACE\"]')")
-    wait_for(page, "document.querySelector('.waterfall')")
-    assert "Held up by PLACE" in page.text_content(".inspector")
+    wait_for(page, f"document.querySelector('g.preempting[data-path=\"{watch}\"]')")
+    # Who asked, who has taken it up, who holds it up: on the picture, in words, in the log.
+    wait_for(page, f"document.querySelector('g.serviced[data-path=\"{navigate}\"]')")
+    assert page.query_selector(f'g.serviced[data-path="{watch}"]') is None
+    wait_for(page, "document.querySelector('.preempt-banner')")
+    banner = page.text_content(".preempt-banner")
+    assert "operator page at 127.0.0.1: preempt /DELIVER" in banner
+    assert "WATCH" in banner
+    assert "of 10 s" in banner.replace("10.0", "10")
+    wait_for(page, "document.querySelectorAll('.waterfall > div').length === 4")
+    told = page.text_content(".preempt")
+    assert "operator page at 127.0.0.1: preempt /DELIVER" in told
+    assert "cleans up" in told
+    assert "asked to stop by operator" in page.text_content(".log")
+    assert "takes the preempt up" in page.text_content(".log")
+    assert "takes it up" in page.get_attribute(group(navigate), "aria-label")
     wait_for(page, "smachpy.store.runStatus.value.word === 'ended: preempted'")
+    wait_for(page, "document.querySelector('.preempt').textContent.includes('longest: WATCH')")
+    # The same at an earlier instant, and in the file that can be mailed.
+    when = page.evaluate("""() => { const { store } = smachpy;
+        const t = store.run.preempts[0].from + 1500; store.seek(t); return t; }""")
+    wait_for(page, "document.querySelector('.preempt')?.textContent.includes('held up by')")
+    exported = view.get("/api/export?machine=slow&format=html")[2]
+    page = look("about:blank", drawn=False)
+    page.set_content(exported.decode())
+    page.wait_for_selector("html[data-drawn]", timeout=20_000)
+    page.evaluate(f"() => smachpy.store.seek({when})")
+    wait_for(page, "document.querySelector('.preempt')?.textContent.includes('held up by')")
+
+
+def test_askers_are_called_the_same_here_and_there(shared):
+    from smachpy.events import SOURCES, asker_text
+
+    page = shared()
+    for source in [*SOURCES, "novel"]:
+        for by, why in [("", ""), ("x", ""), ("x", "y")]:
+            asked = {"source": source, "by": by, "why": why}
+            mine = page.evaluate(
+                "async (asked) => (await import('viewer/fold')).askerText(asked)", asked
+            )
+            assert mine.replace("\u2019", "'") == asker_text(source, by, why)
 
 
 def test_a_run_opens_as_one_file_without_a_server(start, look, tmp_path):

@@ -10,12 +10,12 @@ import { Diagram } from "viewer/diagram";
 import { Viewport } from "viewer/viewport";
 import { Layout } from "viewer/layout";
 import { Timeline } from "viewer/timeline";
-import { Inspector } from "viewer/inspector";
+import { Inspector, holdText } from "viewer/inspector";
 import { listen } from "viewer/keys";
 import { Empty, Help, Legend, Notice, TopBar, Tree } from "viewer/panels";
 import { ActionsPage } from "viewer/actions";
 import { weights } from "viewer/statistics";
-import { ms } from "viewer/fold";
+import { askerText, ms } from "viewer/fold";
 
 const html = htm.bind(h);
 const PANELS_MS = 160; // the panels are drawn again at most so often
@@ -331,7 +331,18 @@ function Overlay({ page }) {
     return html`<div class="banner waiting">The viewer\u2019s server does not answer; this is what was last heard. Trying again\u2026</div>`;
   if (store.cursor.value !== null)
     return html`<div class="banner preempted">You see an earlier instant. <button onClick=${() => page.timeline.live()}>Back to ${store.facts.value?.recorded || isFile() ? "the end" : "now"}</button></div>`;
-  return null;
+  return html`<${PreemptBanner} page=${page} />`;
+}
+
+// A preempt on its way: who asked, and who holds it up.
+function PreemptBanner({ page }) {
+  store.tick.value;
+  const now = store.nowMs(), found = store.run.now.ended == null ? store.run.preemptAt(now) : null;
+  if (!found || found.to !== null) return null;
+  const name = (path) => store.model.value?.get(path)?.name ?? path;
+  const by = askerText(found.rows[0].asked);
+  return html`<div class="banner preempted preempt-banner" role="status"><span>Preempt${by ? html` by <b>${by}</b>` : ""}. Held up by </span>${found.holds.slice(0, 3).map((row, i) => html`${i > 0 ? ", " : ""}<button class="link" onClick=${() => page.goTo(row.path)}>${name(row.path)}</button>
+    <span class="times"> for ${holdText(row, now)}</span>`)}${found.holds.length > 3 ? ` and ${found.holds.length - 3} more` : ""}</div>`;
 }
 
 function TimeTools({ page }) {

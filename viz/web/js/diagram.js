@@ -237,6 +237,7 @@ export class Diagram {
     const kind = state?.outcome != null ? outcomeClass(state.outcome) : null;
     classes.toggle("active", active);
     classes.toggle("preempting", active && !!state.preempt);
+    classes.toggle("serviced", active && !!state.preempt && !!state.serviced);
     classes.toggle("waiting", !!state?.waits || (active && goal?.status === "PENDING"));
     classes.toggle("visited", (state?.visits ?? 0) > 0);
     for (const name of ["success", "failure", "preempted", "other"])
@@ -246,7 +247,7 @@ export class Diagram {
     group.glyph.textContent = glyph(state, active, kind);
     group.badge.textContent = active ? elapsed(state, now) : "";
     if (group.bar) group.bar.style.transform = `scaleX(${active ? goal?.progress?.fraction ?? 0 : 0})`;
-    const status = active ? "running" : state?.outcome ?? "not visited";
+    const status = active ? (state.preempt ? `asked to stop${state.serviced ? ", takes it up" : ""}` : "running") : state?.outcome ?? "not visited";
     group.setAttribute("aria-label", `${path}, ${status}`);
     this.minis.get(path)?.classList.toggle("active", active);
   }
@@ -307,7 +308,7 @@ const longest = (points) => {
 
 function glyph(state, active, kind) {
   if (state?.waits) return "\u23f8";
-  if (active && state.preempt) return "\u25a0";
+  if (active && state.preempt) return state.serviced ? "\u2713" : "\u25a0";
   if (active || !kind) return "";
   if (state.error) return "\u26a0";
   return { success: "\u2713", failure: "\u2715", preempted: "\u25a0", other: "" }[kind];
@@ -324,7 +325,10 @@ function elapsed(state, now) {
   const parts = [];
   if (state.item != null) parts.push(`#${state.item + 1}`);
   if (state.attempt > 1) parts.push(`attempt ${state.attempt}`);
-  if (state.preempt) parts.push(`asked to stop ${span(Math.max(0, now - ms(state.preempt)) / 1000)} ago`);
+  if (state.preempt) {
+    const grace = state.asked?.grace, asked = span(Math.max(0, now - ms(state.preempt)) / 1000);
+    parts.push(state.serviced ? `cleans up ${span(Math.max(0, now - ms(state.serviced)) / 1000)}` : `asked to stop ${asked}${grace != null ? ` of ${span(grace)}` : ""}`);
+  }
   else parts.push(span(Math.max(0, now - ms(state.since)) / 1000));
   return parts.join(" \u00b7 ");
 }

@@ -4,6 +4,18 @@
 export const RAISED = "exception";
 const KEYFRAME = 400; // events between two stored states
 const ENDED_GOALS = 20;
+const NOT_ASKED = { preempt: null, asked: null, serviced: null, abandoned: null };
+const SOURCES = { // as in smachpy/events.py
+  signal: "signal", shutdown: "the program\u2019s end", operator: "operator", timeout: "timeout of",
+  concurrence: "concurrence, after", action: "action", state: "state", test: "test", program: "program",
+};
+
+// Who asked for a preempt, in one phrase; null when an older recording does not say.
+export function askerText(asked) {
+  if (!asked?.source) return null;
+  const who = `${SOURCES[asked.source] ?? asked.source} ${asked.by ?? ""}`.trim();
+  return asked.why ? `${who}: ${asked.why}` : who;
+}
 
 export const emptyState = () => ({
   run: 0, started: null, ended: null, outcome: null, states: {}, goals: {}, userdata: {},
@@ -15,14 +27,20 @@ const stateOf = (data, path) =>
 function enter(data, e) {
   const s = stateOf(data, e.path);
   s.visits += 1;
-  Object.assign(s, { since: e.stamp_ns, preempt: null, waits: null, error: null, attempt: 1 });
+  Object.assign(s, { since: e.stamp_ns, ...NOT_ASKED, waits: null, error: null, attempt: 1 });
 }
 
 function leave(data, e, outcome) {
   const s = stateOf(data, e.path);
   if (s.since != null) s.seconds += (e.stamp_ns - s.since) / 1e9;
-  Object.assign(s, { since: null, outcome, preempt: null, waits: null, left: e.stamp_ns });
+  Object.assign(s, { since: null, outcome, ...NOT_ASKED, waits: null, left: e.stamp_ns });
   s.outcomes[outcome] = (s.outcomes[outcome] ?? 0) + 1;
+}
+
+const askedIn = (e) => ({ source: e.source, by: e.by, why: e.why, grace: e.grace });
+function answer(data, e, fact) {
+  const s = stateOf(data, e.path);
+  if (s.preempt) s[fact] = e.stamp_ns;
 }
 
 const RULES = {
@@ -30,7 +48,7 @@ const RULES = {
     data.run += 1;
     Object.assign(data, { started: e.stamp_ns, ended: null, outcome: null });
     for (const s of Object.values(data.states))
-      Object.assign(s, { since: null, preempt: null, waits: null });
+      Object.assign(s, { since: null, ...NOT_ASKED, waits: null });
     enter(data, e);
   },
   Finished(data, e) {
@@ -46,8 +64,11 @@ const RULES = {
   },
   PreemptRequested(data, e) {
     const s = stateOf(data, e.path);
-    if (s.since != null && !s.preempt) s.preempt = e.stamp_ns;
+    if (s.since == null || s.preempt) return;
+    Object.assign(s, { preempt: e.stamp_ns, asked: askedIn(e) });
   },
+  PreemptServiced: (data, e) => answer(data, e, "serviced"),
+  Abandoned: (data, e) => answer(data, e, "abandoned"),
   Retried: (data, e) => { stateOf(data, e.path).attempt = e.attempt + 1; },
   Iterated: (data, e) => { stateOf(data, e.path).item = e.number; },
   Paused: (data, e) => { stateOf(data, e.path).waits = e.reason; },
@@ -95,7 +116,7 @@ export class Run {
     this.frames = [];
     this.spans = [];
     this.open = new Map();
-    this.marks = [];
+    this.preempts = []; // each: from, and a row for every state that was asked
     this.begun = null;
     for (const [path, s] of Object.entries(this.now.states))
       if (s.since != null) this.#openSpan(path, ms(s.since));
@@ -112,7 +133,7 @@ export class Run {
   }
 
   #openSpan(path, from) {
-    const span = { path, from, to: null, outcome: null, preempt: null };
+    const span = { path, from, to: null, outcome: null, preempt: null, asked: null, serviced: null, abandoned: null };
     this.open.set(path, span);
     this.spans.push(span);
     if (this.begun == null || from < this.begun) this.begun = from;
@@ -130,10 +151,29 @@ export class Run {
       this.open.delete(e.path);
     } else if (e.kind === "PreemptRequested") {
       const span = this.open.get(e.path);
-      if (span) span.preempt ??= t;
-    } else if (e.kind === "Abandoned" || e.kind === "Jumped" || e.kind === "OutcomeForced") {
-      this.marks.push({ t, path: e.path, kind: e.kind });
+      if (!span || span.preempt !== null) return;
+      Object.assign(span, { preempt: t, asked: askedIn(e) });
+      const last = this.preempts.at(-1);
+      if (last?.rows.some((row) => row.to === null && this.open.get(row.path) === row)) last.rows.push(span);
+      else this.preempts.push({ from: t, rows: [span] });
+    } else if (e.kind === "PreemptServiced" || e.kind === "Abandoned") {
+      const span = this.open.get(e.path);
+      if (span?.preempt != null) span[e.kind === "Abandoned" ? "abandoned" : "serviced"] = t;
     }
+  }
+
+  // The newest preempt that had begun at the instant t [ms], as it was then; null: none.
+  preemptAt(t) {
+    const found = this.preempts.findLast((one) => one.from <= t);
+    if (!found) return null;
+    const until = (at) => (at !== null && at <= t ? at : null);
+    const rows = found.rows.filter((row) => row.preempt <= t).map((row) => ({
+      ...row, to: until(row.to), serviced: until(row.serviced), abandoned: until(row.abandoned),
+    }));
+    const running = rows.filter((row) => row.to === null);
+    const holds = running.filter((row) => !running.some((other) => other.path.startsWith(`${row.path}/`)));
+    const to = running.length ? null : Math.max(...rows.map((row) => row.to));
+    return { from: found.from, to, rows, holds };
   }
 
   first() { return this.begun ?? (this.events.length ? ms(this.events[0].stamp_ns) : null); }

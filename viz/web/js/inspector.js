@@ -3,16 +3,18 @@ import { h } from "preact";
 import { useState } from "preact/hooks";
 import htm from "htm";
 import * as store from "viewer/store";
-import { ms } from "viewer/fold";
+import { askerText, ms } from "viewer/fold";
 import { KIND_NAMES, outcomeClass } from "viewer/model";
 import { span } from "viewer/diagram";
 import { StateControls } from "viewer/controls";
-import { coverage, failureShare } from "viewer/statistics";
+import { coverage } from "viewer/statistics";
 
 const html = htm.bind(h);
 const FLASH_MS = 900;
 const LOG_LINES = 70;
 const SHORT = 160;
+const RECENT_MS = 30_000; // a preempt that is over is shown so long while the mission goes on
+const MOST_ROWS = 24;
 
 const Section = ({ title, count, children }) =>
   html`<section><h2>${title}${count != null && html` <span class="number">${count}</span>`}</h2>${children}</section>`;
@@ -29,11 +31,11 @@ export function Inspector({ page }) {
   return html`<aside class="inspector" aria-label="details">
     ${store.gap.value && html`<p class="hint">This page could not follow; what happened before is not in the timeline.</p>`}
     <${Selected} page=${page} data=${data} now=${now} model=${model} />
-    <${Preempts} page=${page} data=${data} now=${now} model=${model} />
+    <${Preempts} page=${page} data=${data} now=${now} />
     <${Goals} page=${page} data=${data} now=${now} />
     <${Userdata} page=${page} data=${data} now=${now} />
     <${Difference} page=${page} />
-    <${Numbers} data=${data} />
+    <${Numbers} />
     <${Problems} page=${page} />
     <${Log} page=${page} />
   </aside>`;
@@ -72,24 +74,46 @@ function Selected({ page, data, now, model }) {
   <//>`;
 }
 
-// A preempt as something that takes time: who was asked, who has answered, who holds it up.
-function Preempts({ page, data, now, model }) {
-  const asked = model.order.filter((n) => data.states[n.path]?.since != null && data.states[n.path].preempt);
-  if (!asked.length) return null;
-  const first = Math.min(...asked.map((n) => ms(data.states[n.path].preempt)));
-  const answered = store.run.spans.filter((s) => s.preempt != null && s.preempt >= first - 1 && s.to !== null && s.to <= now);
-  const holds = asked.filter((n) => !asked.some((other) => other.path.startsWith(n.path + "/")));
-  const whole = Math.max(now - first, 1);
-  const bar = (from, to, kind) => html`<i class=${kind} style=${{ left: `${((from - first) / whole) * 100}%`, width: `${Math.max(1.5, ((to - from) / whole) * 100)}%` }}></i>`;
-  return html`<${Section} title="Preempt">
-    <p class="hint">Asked ${span((now - first) / 1000)} ago, first at <${State} path=${asked.find((n) => ms(data.states[n.path].preempt) === first)?.path ?? asked[0].path} page=${page} />.
-      ${" "}${holds.length ? html`Held up by ${holds.map((n, i) => html`${i > 0 ? ", " : ""}<b><${State} path=${n.path} page=${page} /></b>`)}.` : ""}</p>
-    <div class="waterfall">
-      ${answered.slice(-8).map((s) => html`<div><${State} path=${s.path} page=${page} /><span>${bar(s.preempt, s.to, "success")}</span><small>\u2713 ${span((s.to - s.preempt) / 1000)}</small></div>`)}
-      ${asked.map((n) => html`<div><${State} path=${n.path} page=${page} /><span>${bar(ms(data.states[n.path].preempt), now, "preempted")}</span>
-        <small>${holds.includes(n) ? "\u25a0 " : ""}${span((now - ms(data.states[n.path].preempt)) / 1000)}</small></div>`)}
-    </div><//>`;
+// A preempt as something that takes time: who asked, who has taken it up, who holds it up.
+function Preempts({ page, data, now }) {
+  const found = store.run.preemptAt(now);
+  if (!found || found.from < (ms(data.started) ?? 0)) return null;
+  if (found.to !== null && data.ended == null && now - found.to > RECENT_MS) return null;
+  const end = found.to ?? now, whole = Math.max(end - found.from, 1);
+  const askers = [...new Set(found.rows.map((row) => askerText(row.asked) ?? "not recorded"))];
+  const at = (t) => `${((t - found.from) / whole) * 100}%`;
+  const bar = (from, to, kind) => html`<i class=${kind} style=${{ left: at(from), width: `${Math.max(1.5, ((to - from) / whole) * 100)}%` }}></i>`;
+  const rows = [...found.rows].sort((x, y) => x.path.split("/").length - y.path.split("/").length || x.preempt - y.preempt).slice(0, MOST_ROWS);
+  return html`<${Section} title="Preempt"><div class="preempt">
+    <dl class="facts"><dt>asked by</dt><dd>${askers.map((one) => html`<div>${one}</div>`)}</dd>
+      <dt>first asked</dt><dd><${State} path=${found.rows[0].path} page=${page} /> ${span((now - found.from) / 1000)} ago</dd>
+      ${found.to === null ? html`<dt>held up by</dt><dd>${found.holds.map((row, i) => html`${i > 0 ? ", " : ""}<b><${State} path=${row.path} page=${page} /></b> for ${holdText(row, now)}`)}</dd>`
+        : html`<dt>took</dt><dd>${span(whole / 1000)}; longest: <${State} path=${longest(found.rows).path} page=${page} /></dd>`}</dl>
+    <div class="waterfall" role="list">${rows.map((row) => {
+      const until = row.to ?? now, holds = found.holds.some((one) => one.path === row.path);
+      const cut = row.abandoned ?? row.serviced ?? until;
+      const word = row.abandoned !== null ? "\u2715 left behind" : row.to !== null ? `\u2713 ${span((row.to - row.preempt) / 1000)}`
+        : row.serviced !== null ? `\u2713 cleans up ${span((now - row.serviced) / 1000)}` : holds ? `\u25a0 ${span((now - row.preempt) / 1000)}` : "waits for children";
+      return html`<div role="listitem" title=${waterfallTitle(row, until)}><${State} path=${row.path} page=${page} />
+        <span aria-hidden="true">${bar(row.preempt, cut, row.to === null && row.serviced === null ? "preempted" : "asked")}${cut < until && bar(cut, until, row.abandoned !== null ? "failure" : "success")}
+          ${row.serviced !== null && html`<b style=${{ left: at(row.serviced) }}></b>`}</span><small>${word}</small></div>`;
+    })}${found.rows.length > MOST_ROWS && html`<div class="hint">and ${found.rows.length - MOST_ROWS} more</div>`}</div>
+    <p class="hint key"><i class="preempted"></i> asked, not taken up <i class="asked"></i> until taken up <i class="success"></i> cleaning up</p></div><//>`;
 }
+
+const longest = (rows) => {
+  const leaves = rows.filter((row) => !rows.some((other) => other.path.startsWith(`${row.path}/`)));
+  return leaves.reduce((a, b) => (b.to - b.preempt > a.to - a.preempt ? b : a));
+};
+export const holdText = (row, now) => {
+  const grace = row.asked?.grace;
+  return `${span((now - row.preempt) / 1000)}${grace != null ? ` of ${span(grace)}` : ""}${row.serviced !== null ? ", cleaning up" : ""}`;
+};
+const waterfallTitle = (row, until) => [row.path, `asked by ${askerText(row.asked) ?? "?"}`,
+  row.serviced !== null && `taken up after ${((row.serviced - row.preempt) / 1000).toFixed(3)} s`,
+  row.abandoned !== null && `left behind after ${((row.abandoned - row.preempt) / 1000).toFixed(3)} s`,
+  row.to !== null && `ended with ${row.outcome} after ${((until - row.preempt) / 1000).toFixed(3)} s`,
+  row.asked?.grace != null && `left behind after ${row.asked.grace} s at the latest`].filter(Boolean).join("\n");
 
 function Goals({ page, data, now }) {
   const goals = Object.entries(data.goals).map(([id, g]) => ({ id, ...g }))
@@ -177,12 +201,11 @@ function Difference({ page }) {
     })}<//>`;
 }
 
-function Numbers({ data }) {
+function Numbers() {
+  store.slowTick.value;
   if (store.heat.value === "none") return null;
   const { taken, all } = coverage();
   const recorded = store.statistics.value;
-  const bad = Object.values(data.states).reduce((n, s) => n + failureShare(s.outcomes) * 0, 0);
-  void bad;
   return html`<${Section} title="Numbers"><dl class="facts">
     <dt>transitions taken</dt><dd>${taken} of ${all} (${all ? Math.round((taken / all) * 100) : 0} %)</dd>
     ${recorded && html`<dt>recorded runs</dt><dd>${recorded.runs}, median ${span(recorded.median ?? 0)}</dd>
@@ -201,7 +224,8 @@ function Problems({ page }) {
 const LINES = {
   Started: () => ["started", "active"], Finished: (e) => [`ended: ${e.outcome ?? "exception"}`, outcomeClass(e.outcome ?? "exception")],
   Left: (e) => [e.outcome, outcomeClass(e.outcome)], Failed: (e) => [e.error, "failure"],
-  PreemptRequested: () => ["asked to stop", "preempted"], Abandoned: (e) => [`left behind after ${e.grace} s`, "failure"],
+  PreemptRequested: (e) => [`asked to stop${askerText(e) ? ` by ${askerText(e)}` : ""}${e.grace != null ? `, within ${span(e.grace)}` : ""}`, "preempted"],
+  PreemptServiced: () => ["takes the preempt up", "preempted"], Abandoned: (e) => [`left behind after ${e.grace} s`, "failure"],
   TimedOut: (e) => [`timeout of ${e.timeout} s`, "preempted"], Retried: (e) => [`again: ${e.reason}`, "preempted"],
   Iterated: (e) => [`item ${e.number + 1}`, "other"], CallbackFailed: (e) => [`${e.callback}: ${e.error}`, "failure"],
   Paused: (e) => [`paused (${e.reason})`, "waiting"], Resumed: () => ["goes on", "active"], Jumped: (e) => [`sent to ${e.label}`, "waiting"],
@@ -210,9 +234,10 @@ const LINES = {
   UserdataWritten: (e) => [`${e.key} = ${brief(e.value).slice(0, 60)}`, "other"],
 };
 const GROUPS = { all: null, transitions: ["Started", "Finished", "Left", "Failed"], goals: ["GoalSent", "GoalDone"],
-  userdata: ["UserdataWritten"], trouble: ["Failed", "PreemptRequested", "Abandoned", "TimedOut", "Retried", "CallbackFailed"] };
+  userdata: ["UserdataWritten"], trouble: ["Failed", "PreemptRequested", "PreemptServiced", "Abandoned", "TimedOut", "Retried", "CallbackFailed"] };
 
 function Log({ page }) {
+  store.slowTick.value; // components that read signals are drawn again only when those change
   const [text, setText] = useState("");
   const run = store.run, kinds = GROUPS[store.logFilter.value];
   const end = store.cursor.value === null ? run.events.length : run.indexAt(store.cursor.value);

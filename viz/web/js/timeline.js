@@ -1,7 +1,7 @@
 // The run over time: a lane per container, a lane for each region of a concurrence; drag to wind.
 import * as store from "viewer/store";
 import { outcomeClass } from "viewer/model";
-import { ms } from "viewer/fold";
+import { askerText, ms } from "viewer/fold";
 
 const NAMES = 168, RIGHT = 14, FOOT = 18, LANE = 19, LEAST_SPAN = 0.5, LIVE_SPAN = 30_000;
 
@@ -183,6 +183,14 @@ export class Timeline {
       g.restore();
     }
     g.stroke();
+    for (const [t, name] of [[span.serviced, "preempted"], [span.abandoned, "failure"]]) { // taken up, left behind
+      if (t === null || t > now) continue;
+      g.fillStyle = this.#colour(name);
+      g.beginPath();
+      const px = Math.min(x(t), a + wide);
+      g.moveTo(px - 3.5, top - 1); g.lineTo(px + 3.5, top - 1); g.lineTo(px, top + 5); g.fill();
+      g.fillRect(px - 0.75, top, 1.5, tall);
+    }
     this.hits.push({ a, b: a + wide, top, bottom: top + tall, span });
     if (wide > 26 && tall > 8) {
       g.fillStyle = this.#colour(`${kind}-text`);
@@ -280,6 +288,8 @@ const clock = (s) => {
 };
 const describe = (span) => {
   const lasted = span.to === null ? "runs" : `${((span.to - span.from) / 1000).toFixed(3)} s, ${span.outcome}`;
-  const asked = span.preempt ? `\nasked to stop ${((span.preempt - span.from) / 1000).toFixed(3)} s after it began` : "";
-  return `${span.path}\n${lasted}${asked}`;
+  const after = (t) => `${((t - span.preempt) / 1000).toFixed(3)} s later`;
+  const asked = span.preempt === null ? [] : [`asked to stop ${((span.preempt - span.from) / 1000).toFixed(3)} s after it began, by ${askerText(span.asked) ?? "?"}`,
+    span.serviced !== null && `taken up ${after(span.serviced)}`, span.abandoned !== null && `left behind ${after(span.abandoned)}`];
+  return [span.path, lasted, ...asked].filter(Boolean).join("\n");
 };
