@@ -206,6 +206,7 @@ class Subscriber(_TopicEnd, Generic[M]):
 
     _kind = Kind.SUBSCRIBER
     _counterpart = Kind.PUBLISHER
+    _call: Callable[[Callable[[], None]], object]
 
     def __init__(
         self,
@@ -225,8 +226,11 @@ class Subscriber(_TopicEnd, Generic[M]):
         self._lock = threading.Lock()
         self._waiting: deque[Sample] = deque()
         self._dropped = 0
-        self._calls = CallbackQueue(self.node, f"topic {self.name}")
+        self._call = self._caller()
         self._join(lambda: self.node.transport.subscribe(self.resolved_name, self._on_sample))
+
+    def _caller(self) -> Callable[[Callable[[], None]], object]:
+        return CallbackQueue(self.node, f"topic {self.name}").call
 
     @property
     def dropped(self) -> int:
@@ -241,7 +245,7 @@ class Subscriber(_TopicEnd, Generic[M]):
                 self._waiting.append(sample)
                 return  # the call for the dropped one takes this one
             self._waiting.append(sample)
-        self._calls.call(self._deliver)
+        self._call(self._deliver)
 
     def _deliver(self) -> None:
         with self._lock:
@@ -258,6 +262,17 @@ class Subscriber(_TopicEnd, Generic[M]):
             self.callback(message)
         else:
             self.callback(message, self.callback_args)
+
+
+class NotingSubscriber(Subscriber[M]):
+    """A subscriber whose callback only takes note of the message: no thread is needed for that.
+
+    Threads: the callback runs on the network's thread, which it must not hold up: it may keep the
+        message and set an event, and knows no clock and node of its own. The rest as above.
+    """
+
+    def _caller(self) -> Callable[[Callable[[], None]], object]:
+        return lambda deliver: deliver()
 
 
 def _sender_of(sample: Sample) -> Endpoint:
@@ -292,7 +307,7 @@ def wait_for_message(
         return subscriber.take(to_seconds(timeout))
 
 
-class _OneMessage(Subscriber[M]):
+class _OneMessage(NotingSubscriber[M]):
     """A subscriber that is waited for."""
 
     def __init__(self, topic: str, topic_type: type[M], node: Node | None) -> None:

@@ -6,7 +6,7 @@ from collections import deque
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from actionlib_core.time import to_seconds
-from actionlib_core.topic import Subscriber
+from actionlib_core.topic import NotingSubscriber
 from smachpy import log
 from smachpy._runtime.interface import adopt_interface, name_of
 from smachpy._runtime.wakeup import Wakeup
@@ -88,7 +88,7 @@ class MonitorState(State):
                 inbox.append(message)
                 wake.set()
 
-            with Subscriber(self._topic, self._msg_type, note, node=self._node):
+            with NotingSubscriber(self._topic, self._msg_type, note, node=self._node):
                 return self._watch(ud, wake, inbox)
 
     def _watch(self, ud: Any, wake: Wakeup, inbox: deque[Any]) -> str:

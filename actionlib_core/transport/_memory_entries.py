@@ -31,11 +31,10 @@ CLOSE_WAIT_S = 0.9  # how long `close` waits for a callback that is running in a
 class Inbox:
     """What waits for one session, first in, first out."""
 
-    __slots__ = ("_clock", "_deaf", "_idle", "_items", "_lock", "_running")
+    __slots__ = ("_clock", "_deaf", "_idle", "_items", "_running")
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self._lock = threading.Lock()
         self._items: deque[Callable[[], object]] = deque()
         self._running: int | None = None
         self._idle: Event | None = None
@@ -45,22 +44,20 @@ class Inbox:
         self._items.append(item)
         self._clock.call_later(0.0, self._deliver)
 
+    # No lock: who delivers says so before it looks whether it may, and who shuts says so before it
+    # looks whether somebody delivers.
     def _deliver(self) -> None:
-        with self._lock:
-            item = self._items.popleft()
-            if self._deaf:
-                return
-            self._running = threading.get_ident()
+        item = self._items.popleft()
+        self._running = threading.get_ident()
         try:
-            item()
+            if not self._deaf:
+                item()
         except Exception:  # noqa: BLE001  a border: reported, the next item is delivered
             report_thread_exception()
         finally:
-            with self._lock:
-                self._running = None
-                idle = self._idle
-            if idle is not None:
-                idle.set()
+            self._running = None
+            if self._idle is not None:
+                self._idle.set()
 
     def shut(self, *, wait: bool) -> None:
         """Deliver nothing more.
@@ -68,12 +65,10 @@ class Inbox:
         Blocks: if `wait`, until a callback running in another thread has returned, `CLOSE_WAIT_S`
             at most.
         """
-        with self._lock:
-            self._deaf = True
-            busy = self._running not in {None, threading.get_ident()}
-            if busy:
-                self._idle = self._clock.event()
-        if busy and wait and self._idle is not None:
+        if wait:
+            self._idle = self._clock.event()
+        self._deaf = True
+        if self._idle is not None and self._running not in {None, threading.get_ident()}:
             self._idle.wait(CLOSE_WAIT_S)
 
 
