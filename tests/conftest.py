@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
 import threading
 import time
 from pathlib import Path
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 # Test runs on one machine, and the workers of one run, do not find each other's processes.
 if "SMACHPY_DOMAIN" not in os.environ or "PYTEST_XDIST_WORKER" in os.environ:
     os.environ["SMACHPY_DOMAIN"] = str(1 + os.getpid() % 9999)
+
+# A shell's background job ignores Ctrl-C, and so would all that it starts.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # A busy computer is no failure: pytest's timeout is the only one.
 settings.register_profile(
