@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections import deque
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from types import TracebackType
     from typing import IO, Self
 
+    from actionlib_core.shutdown import Shutdown
+
 _GRACE: Final = 1.5  # [s] from the end of its standard input until it is terminated
 _LAST_GRACE: Final = 1.0  # [s] from then until it is killed
 _BAD_INPUT: Final = 2  # its exit code when something it was given does not fit
@@ -22,7 +25,7 @@ _KEPT_LINES: Final = 40  # of what it said
 
 
 class RobotProcess:
-    """Runs `python -m missions.move_base`; a context manager.
+    """Runs `python -m missions.move_base`, or a module like it; a context manager.
 
     The robot lives as long as its standard input is open: when this process ends, however it ends,
     the system closes the pipe and the robot goes. It has a session of its own, so that Ctrl-C in
@@ -31,14 +34,19 @@ class RobotProcess:
     Args:
         arguments: Further arguments for it (`--map`, `--config`, `--pose`, ...).
         on_change: Called when the robot is ready, and when the process has ended.
+        module: What to run. It prints a line when it is ready, and ends with its standard input.
 
     Threads: `on_change` is called from threads of the clock.
     """
 
     def __init__(
-        self, arguments: Sequence[str] = (), *, on_change: Callable[[], object] = lambda: None
+        self,
+        arguments: Sequence[str] = (),
+        *,
+        on_change: Callable[[], object] = lambda: None,
+        module: str = "missions.move_base",
     ) -> None:
-        self._command = [sys.executable, "-m", "missions.move_base", "--child", *arguments]
+        self._command = [sys.executable, "-m", module, "--child", *arguments]
         self._on_change = on_change
         self._on_refusal: Callable[[], object] = lambda: None
         self._said: deque[str] = deque(maxlen=_KEPT_LINES)
@@ -142,3 +150,13 @@ class RobotProcess:
         if self.refused():
             self._on_refusal()
         self._on_change()
+
+
+def end_with_stdin(ending: Shutdown) -> None:
+    """Ask this process to end when nobody holds the other end of its standard input any more.
+
+    Blocks: until then; for a thread of its own in the child.
+    """
+    while os.read(sys.stdin.fileno(), 4096):  # not through the buffer: its lock outlives the thread
+        pass
+    ending.request("the parent has gone")

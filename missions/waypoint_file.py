@@ -122,6 +122,25 @@ class Places:
     places: dict[str, Place]
 
 
+@dataclass(frozen=True, slots=True)
+class Site:
+    """Where a fleet works.
+
+    Attributes:
+        docks: Where robots charge.
+        homes: Where they wait, one each.
+        places: Where parcels come from and go to.
+        low_battery: A robot below this charges before its next order, 0 to 1.
+        charge_until: It leaves the dock at this charge, 0 to 1.
+    """
+
+    docks: tuple[Waypoint, ...]
+    homes: tuple[Waypoint, ...]
+    places: tuple[Waypoint, ...]
+    low_battery: float
+    charge_until: float
+
+
 def goal_at(pose: Pose2D, frame: str = "map") -> MoveBaseGoal:
     """Return the `move_base` goal that drives to a pose in the frame "map" or "base_link"."""
     turn = Quaternion(*quaternion_of(pose.yaw))
@@ -141,10 +160,7 @@ def load_route(path: Path) -> Route:
     document = Document(path)
     top = document.top
     floor = _floor(top, path)
-    low = top.number("low_battery", 0.3, _SHARE)
-    until = top.number("charge_until", 0.9, _SHARE)
-    if "charge_until" in top and until <= low:
-        top.problem("charge_until", f"more than low_battery ({low:g})")
+    low, until = _charges(top)
     dock = _place(top.section("dock"), "dock", floor)
     waypoints = tuple(
         _place(row, f"waypoint {i}", floor) for i, row in enumerate(top.rows("waypoints"), 1)
@@ -194,6 +210,43 @@ def load_places(path: Path) -> Places:
     top.close()
     document.check()
     return Places(home, places)
+
+
+def load_site(path: Path) -> Site:
+    """Read where a fleet works: the lists `docks`, `homes` and `places`.
+
+    Raises:
+        InputFileError: with the line and field of every problem.
+    """
+    document = Document(path)
+    top = document.top
+    floor = _floor(top, path)
+    low, until = _charges(top)
+    docks, homes, places = (_named(top.rows(key), floor) for key in ("docks", "homes", "places"))
+    top.close()
+    document.check()
+    return Site(docks, homes, places, low, until)
+
+
+def _named(rows: list[Section], floor: Floor | None) -> tuple[Waypoint, ...]:
+    """Read places whose names differ."""
+    found: dict[str, Waypoint] = {}
+    for row in rows:
+        row.text("name", REQUIRED)
+        place = _place(row, "-", floor)
+        if place.name in found:
+            row.problem("name", "a name that no other place has")
+        found[place.name] = place
+    return tuple(found.values())
+
+
+def _charges(top: Section) -> tuple[float, float]:
+    """Read below which charge to charge, and up to which."""
+    low = top.number("low_battery", 0.3, _SHARE)
+    until = top.number("charge_until", 0.9, _SHARE)
+    if "charge_until" in top and until <= low:
+        top.problem("charge_until", f"more than low_battery ({low:g})")
+    return low, until
 
 
 def _floor(top: Section, path: Path, map_file: Path | None = None) -> Floor | None:

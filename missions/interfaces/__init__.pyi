@@ -203,11 +203,13 @@ class DeliverGoal(_Message):
     ) -> None: ...
 
 class DeliverResult(_Message):
-    aboard: bool  # whether the robot has the parcel on board now
-    text: str  # how it ended, in words
+    aboard: bool  # whether the parcel is on the robot now
+    charge: float  # of its battery, 0 to 1; below 0: not known
+    text: str  # what it was doing when it ended
     def __init__(
         self,
         aboard: bool | None = None,
+        charge: float | None = None,
         text: str | None = None,
     ) -> None: ...
 
@@ -339,10 +341,14 @@ class RechargeGoal(_Message):
     ) -> None: ...
 
 class RechargeResult(_Message):
-    left: bool  # whether the robot has left the dock, or never went there
+    left: bool  # whether the robot has left the dock
+    charge: float  # of its battery, 0 to 1; below 0: not known
+    text: str  # what it was doing when it ended
     def __init__(
         self,
         left: bool | None = None,
+        charge: float | None = None,
+        text: str | None = None,
     ) -> None: ...
 
 class RechargeFeedback(_Message):
