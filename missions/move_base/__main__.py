@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,11 +15,20 @@ from missions.exceptions import MissionError, NavigationError
 from missions.maps import OFFICE_MAP, OFFICE_ROBOT
 from missions.move_base.config import SimConfig, load_config
 from missions.move_base.geometry import Pose2D, finite, wrap_angle
+from missions.move_base.server import RobotServer
+from missions.robot_process import end_with_stdin
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from actionlib_core.node import Node
+    from missions.move_base.server import RobotServer
+    from missions.move_base.simulation import Simulation
+    from missions.move_base.world import Robot
+    from missions.move_base.world_file import WorldSpec
+
 EXIT_BAD_INPUT = 2
+_MOST_ROBOTS = 1000
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -42,42 +50,78 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def serve(args: argparse.Namespace) -> int:
-    """Put the robot on the floor and serve it.
+    """Put the robots on the floor and serve them.
 
     Raises:
-        InputFileError: the map or the config is wrong.
-        NavigationError: it cannot stand where it should start.
+        InputFileError: the map, the config or the world file is wrong.
+        NavigationError: a robot cannot stand where it should start.
         ServerConflictError: there is a robot of that name already.
     """
     from actionlib_core.node import Node
-    from missions.move_base.occupancy import load_map
     from missions.move_base.server import RobotServer
-    from missions.move_base.world import Robot, World
+    from missions.move_base.simulation import Simulation
 
     with shutdown.handle_signals() as ending:
         if args.child:
-            current_clock().spawn(lambda: _end_with_stdin(ending), name="lifeline")
-        config, grid = load_config(args.config), load_map(args.map)
-        pose = Pose2D(args.pose[0], args.pose[1], wrap_angle(args.pose[2])) if args.pose else None
-        try:
-            robot = Robot(World(grid), config, pose or config.start, current_clock().now())
-        except NavigationError as error:
-            where = "--pose" if pose else args.config
-            raise NavigationError(f"{where}: {error}. Try --pose X Y YAW.") from error
-        with Node("move_base", namespace=args.namespace) as node:
-            server = RobotServer(robot, node=node)
+            current_clock().spawn(lambda: end_with_stdin(ending), name="lifeline")
+        served = _one_robot(args) if args.world is None and not args.robots else None
+        spec = _world(args) if served is None else None
+        with Node("move_base" if served else "simulation", namespace=args.namespace) as node:
+            server: RobotServer | Simulation
+            if served is not None:
+                server = RobotServer(served, node=node)
+            else:
+                assert spec is not None
+                server = Simulation(spec.build(current_clock().now()), node=node)
             try:
                 server.start()
-                x, y, _ = robot.body.pose
-                name = node.resolve("move_base")
-                where = f"{args.map.name} at ({x:.2f}, {y:.2f})"
-                print(f"{name}: ready on {where}; Ctrl-C ends it", flush=True)
+                print(_ready(server, node, args), flush=True)
                 forget = ending.on_shutdown(server.close)
                 server.wait()
                 forget()
             finally:
                 server.close()
     return 0
+
+
+def _one_robot(args: argparse.Namespace) -> Robot:
+    from missions.move_base.occupancy import load_map
+    from missions.move_base.world import Robot, World
+
+    config, grid = load_config(args.config), load_map(args.map)
+    pose = Pose2D(args.pose[0], args.pose[1], wrap_angle(args.pose[2])) if args.pose else None
+    try:
+        return Robot(World(grid), config, pose or config.start, current_clock().now())
+    except NavigationError as error:
+        where = "--pose" if pose else args.config
+        raise NavigationError(f"{where}: {error}. Try --pose X Y YAW.") from error
+
+
+def _world(args: argparse.Namespace) -> WorldSpec:
+    from missions.move_base.occupancy import load_map
+    from missions.move_base.world_file import WorldSpec, load_world, place_robots
+
+    if args.world is not None:
+        return load_world(args.world)
+    config, grid = load_config(args.config), load_map(args.map)
+    if args.pose:
+        config = dataclasses.replace(config, start=Pose2D(*args.pose))
+    return WorldSpec(args.map.name, grid, place_robots(grid, config, args.robots))
+
+
+def _ready(server: RobotServer | Simulation, node: Node, args: argparse.Namespace) -> str:
+    """Return the line that says what is served."""
+    from missions.move_base.server import RobotServer
+
+    if isinstance(server, RobotServer):
+        x, y, _ = server.robot.body.pose
+        where = f"{args.map.name} at ({x:.2f}, {y:.2f})"
+        return f"{node.resolve('move_base')}: ready on {where}; Ctrl-C ends it"
+    floor = args.world.name if args.world else args.map.name
+    names = list(server.robots)
+    robots = f"{names[0]} to {names[-1]}" if len(names) > 1 else names[0]
+    doors = f", doors {', '.join(server.world.doors)}" if server.world.doors else ""
+    return f"{node.resolve('simulation')}: ready on {floor}: {robots}{doors}; Ctrl-C ends it"
 
 
 def parameters() -> str:
@@ -100,18 +144,18 @@ def parameters() -> str:
     return "\n".join(lines)
 
 
-def _end_with_stdin(ending: shutdown.Shutdown) -> None:
-    """Ask the process to end when nobody holds the other end of its standard input any more."""
-    while os.read(sys.stdin.fileno(), 4096):  # not through the buffer: its lock outlives the thread
-        pass
-    ending.request("the parent has gone")
+def _count(text: str) -> int:
+    """Read how many robots."""
+    if not (text.isdecimal() and 1 <= int(text) <= _MOST_ROBOTS):
+        raise argparse.ArgumentTypeError(f"got {text!r}; expected 1 to {_MOST_ROBOTS}")
+    return int(text)
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m missions.move_base",
-        description="A simulated robot with the actions move_base and charge and the topics odom "
-        "and battery.",
+        description="A simulated robot with the actions move_base and charge and the topics odom, "
+        "battery, scan and cmd_vel; or a world of several.",
     )
     parser.add_argument("--map", type=Path, default=OFFICE_MAP, help="map_server YAML file")
     parser.add_argument("--config", type=Path, default=OFFICE_ROBOT, help="its parameters, YAML")
@@ -123,6 +167,13 @@ def _parser() -> argparse.ArgumentParser:
         help="where it starts [m, m, rad]",
     )
     parser.add_argument("--namespace", default="", help="in front of its names, robot_1 say")
+    several = parser.add_mutually_exclusive_group()
+    several.add_argument(
+        "--world", type=Path, help="a world file, YAML: robots, doors, docks, moving obstacles"
+    )
+    several.add_argument(
+        "--robots", type=_count, metavar="N", help="N robots in namespaces robot_0, robot_1, ..."
+    )
     parser.add_argument("--parameters", action="store_true", help="list all parameters and end")
     parser.add_argument("--child", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--debug", action="store_true", help="show tracebacks of errors")

@@ -17,6 +17,8 @@ class Body:
     """Where the robot is and how it moves.
 
     Attributes:
+        name: What the robot is called.
+        radius: [m].
         x: [m], map frame.
         y: [m], map frame.
         yaw: Heading [rad] in [-pi, pi).
@@ -24,10 +26,12 @@ class Body:
         turn_rate: [rad/s], anticlockwise.
     """
 
-    __slots__ = ("_limits", "speed", "turn_rate", "x", "y", "yaw")
+    __slots__ = ("_limits", "name", "radius", "speed", "turn_rate", "x", "y", "yaw")
 
-    def __init__(self, limits: RobotConfig, pose: Pose2D) -> None:
+    def __init__(self, limits: RobotConfig, pose: Pose2D, name: str = "robot") -> None:
         self._limits = limits
+        self.name = name
+        self.radius = limits.radius
         self.x, self.y, self.yaw = pose
         self.speed = 0.0
         self.turn_rate = 0.0
@@ -36,6 +40,10 @@ class Body:
     def pose(self) -> Pose2D:
         """Where it is."""
         return Pose2D(self.x, self.y, self.yaw)
+
+    def velocity(self) -> tuple[float, float]:
+        """Return how it moves: (x, y) [m/s], map frame."""
+        return self.speed * math.cos(self.yaw), self.speed * math.sin(self.yaw)
 
     @property
     def standing(self) -> bool:

@@ -98,6 +98,9 @@ class RecoveryConfig:
     attempts: int = _count(3, "Recoveries before the goal is aborted.", low=0, high=100)
     back_up: float = _quantity(0.3, "m", "How far it backs up.", low=0, high=5)
     patience: float = _quantity(1.0, "s", "Wait before it looks again.", low=0, high=600)
+    traffic_patience: float = _quantity(
+        20.0, "s", "It waits so long for somebody in its way.", low=0, high=3600
+    )
 
 
 @dataclass(frozen=True, slots=True)

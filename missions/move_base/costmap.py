@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from typing import TYPE_CHECKING
 
@@ -16,9 +17,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from missions.move_base.config import PlannerConfig
-    from missions.move_base.floor import Obstacle
+    from missions.move_base.floor import Thing
     from missions.move_base.occupancy import OccupancyMap
+    from missions.move_base.traffic import Sighting
 
+_WIDE_BERTH = 0.02  # [m] besides the margin, to what moves
+_SHY = 0.4  # [m] further out than needed, it is dearer to pass something that moves
+_SHY_COST = 2.0  # what a metre costs more right beside it
 _DECAY = 3.0  # the extra cost falls to exp(-3), a twentieth, at `wall_distance`
 
 
@@ -37,7 +42,7 @@ class Costmap(Floor):
         grid: OccupancyMap,
         body_radius: float,
         config: PlannerConfig,
-        obstacles: Iterable[Obstacle] = (),
+        obstacles: Iterable[Thing] = (),
     ) -> None:
         super().__init__(grid, body_radius, config, obstacles)
         clearance = _clearance(self.solid, grid.resolution)
@@ -49,6 +54,31 @@ class Costmap(Floor):
         self._height, self._width = grid.height, grid.width
         origin, scale = grid.origin, 1.0 / grid.resolution
         self._ux, self._uy = math.cos(origin.yaw) * scale, math.sin(origin.yaw) * scale
+
+    def among(self, discs: Iterable[Sighting]) -> Costmap:
+        """Return this costmap with things in it that move: blocked where they are now.
+
+        Args:
+            discs: Each inflated by this robot's body and margin; close by, a metre costs more.
+        """
+        other = copy.copy(self)
+        other.blocked, other.cost = self.blocked.copy(), self.cost.copy()
+        grid = self.map
+        for disc in discs:
+            inner = disc.radius + self.radius + _WIDE_BERTH
+            outer = inner + _SHY
+            row, column = grid.row_column(disc.x, disc.y)
+            reach = math.ceil(outer / grid.resolution) + 1
+            r0, r1 = max(0, row - reach), min(grid.height, row + reach + 1)
+            c0, c1 = max(0, column - reach), min(grid.width, column + reach + 1)
+            if r0 < r1 and c0 < c1:
+                x, y = grid.centres(*np.mgrid[r0:r1, c0:c1])
+                distance = np.hypot(x - disc.x, y - disc.y)
+                other.blocked[r0:r1, c0:c1] |= distance < inner
+                extra = _SHY_COST * np.clip((outer - distance) / _SHY, 0.0, 1.0)
+                other.cost[r0:r1, c0:c1] += extra.astype(np.float32)
+        other._free = (~other.blocked).tobytes()  # noqa: SLF001  one of us
+        return other
 
     def is_free(self, x: float, y: float) -> bool:
         """Tell whether the robot's centre may be at this point of the map frame."""
@@ -85,6 +115,17 @@ class Costmap(Floor):
         if self.blocked[rows, columns].any():
             return math.inf
         return length * float(self.cost[rows, columns].mean())
+
+    def are_free(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell for many points of the map frame whether the robot's centre may be there."""
+        origin = self.map.origin
+        dx, dy = x - origin.x, y - origin.y
+        columns = np.floor(self._ux * dx + self._uy * dy).astype(np.intp)
+        rows = np.floor(self._ux * dy - self._uy * dx).astype(np.intp)
+        inside = (rows >= 0) & (rows < self._height) & (columns >= 0) & (columns < self._width)
+        free = np.zeros(x.shape, dtype=np.bool_)
+        free[inside] = ~self.blocked[rows[inside], columns[inside]]
+        return free
 
     def polyline_is_free(self, points: Sequence[tuple[float, float]]) -> bool:
         """Tell whether every point (x, y) of a way may be driven over."""

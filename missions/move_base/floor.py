@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from missions.move_base.config import PlannerConfig
     from missions.move_base.occupancy import OccupancyMap
 
-_SOLID_FROM = 50  # `scale` and `raw` maps: this occupancy and more counts as solid
+SOLID_FROM = 50  # `scale` and `raw` maps: this occupancy and more counts as solid
 
 
 class Obstacle(NamedTuple):
@@ -33,6 +33,68 @@ class Obstacle(NamedTuple):
     x: float
     y: float
     radius: float
+
+    def gap(self, x: float, y: float) -> float:
+        """Return the distance [m] from a point to its surface, negative inside."""
+        return math.hypot(self.x - x, self.y - y) - self.radius
+
+    def covers(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell which of many points lie inside."""
+        return np.hypot(x - self.x, y - self.y) <= self.radius
+
+    def middle(self) -> tuple[float, float]:
+        """Return its middle."""
+        return self.x, self.y
+
+    def reach(self) -> float:
+        """Return how far [m] it extends from its middle."""
+        return self.radius
+
+
+class Bar(NamedTuple):
+    """A straight thing with round ends that is not on the map: the leaf of a door.
+
+    Attributes:
+        x0: One end [m], map frame.
+        y0: [m].
+        x1: The other end [m].
+        y1: [m].
+        radius: Half its thickness [m].
+        name: What to call it.
+    """
+
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+    radius: float
+    name: str
+
+    def gap(self, x: float, y: float) -> float:
+        """Return the distance [m] from a point to its surface, negative inside."""
+        ux, uy = self.x1 - self.x0, self.y1 - self.y0
+        square = ux * ux + uy * uy
+        along = ((x - self.x0) * ux + (y - self.y0) * uy) / square if square else 0.0
+        along = max(0.0, min(1.0, along))
+        return math.hypot(self.x0 + along * ux - x, self.y0 + along * uy - y) - self.radius
+
+    def covers(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell which of many points lie inside."""
+        ux, uy = self.x1 - self.x0, self.y1 - self.y0
+        square = ux * ux + uy * uy or 1.0
+        along = np.clip(((x - self.x0) * ux + (y - self.y0) * uy) / square, 0.0, 1.0)
+        return np.hypot(self.x0 + along * ux - x, self.y0 + along * uy - y) <= self.radius
+
+    def middle(self) -> tuple[float, float]:
+        """Return its middle."""
+        return (self.x0 + self.x1) / 2.0, (self.y0 + self.y1) / 2.0
+
+    def reach(self) -> float:
+        """Return how far [m] it extends from its middle."""
+        return math.hypot(self.x1 - self.x0, self.y1 - self.y0) / 2.0 + self.radius
+
+
+Thing = Obstacle | Bar
 
 
 class Floor:
@@ -50,16 +112,16 @@ class Floor:
         grid: OccupancyMap,
         body_radius: float,
         config: PlannerConfig,
-        obstacles: Iterable[Obstacle] = (),
+        obstacles: Iterable[Thing] = (),
     ) -> None:
         self.map = grid
         self.radius = body_radius + config.margin
         self.obstacles = tuple(obstacles)
-        self.solid: NDArray[np.bool_] = grid.cells >= _SOLID_FROM
+        self.solid: NDArray[np.bool_] = grid.cells >= SOLID_FROM
         if not config.unknown_is_free:
             self.solid |= grid.cells == UNKNOWN
         for obstacle in self.obstacles:
-            _stamp(self.solid, grid, obstacle)
+            stamp(self.solid, grid, obstacle)
 
     def check_place(self, x: float, y: float) -> tuple[int, int]:
         """Return the cell (row, column) of a place where the robot is to stand.
@@ -92,15 +154,12 @@ class Floor:
         return (cells - 0.5) * resolution
 
 
-def _stamp(solid: NDArray[np.bool_], grid: OccupancyMap, obstacle: Obstacle) -> None:
-    """Make the cells under an obstacle solid."""
-    centre = grid.cell(obstacle.x, obstacle.y)
-    if centre is None:
-        return
-    reach = math.ceil(obstacle.radius / grid.resolution) + 1
-    row, column = centre
+def stamp(solid: NDArray[np.bool_], grid: OccupancyMap, thing: Thing) -> None:
+    """Make the cells under a thing solid."""
+    reach = math.ceil(thing.reach() / grid.resolution) + 1
+    row, column = grid.row_column(*thing.middle())
     r0, r1 = max(0, row - reach), min(grid.height, row + reach + 1)
     c0, c1 = max(0, column - reach), min(grid.width, column + reach + 1)
-    rows, columns = np.mgrid[r0:r1, c0:c1]
-    near = np.hypot(rows - row, columns - column) * grid.resolution <= obstacle.radius
-    solid[r0:r1, c0:c1] |= near
+    if r0 < r1 and c0 < c1:
+        rows, columns = np.mgrid[r0:r1, c0:c1]
+        solid[r0:r1, c0:c1] |= thing.covers(*grid.centres(rows, columns))

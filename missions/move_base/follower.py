@@ -7,10 +7,14 @@ import math
 from enum import Enum, auto
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
 from missions.move_base.geometry import wrap_angle
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from numpy.typing import NDArray
 
     from missions.move_base.body import Body
     from missions.move_base.config import ControlConfig, RobotConfig
@@ -43,6 +47,8 @@ class Follower:
     Attributes:
         stage: What it is doing.
         points: The way, (x, y) [m].
+        robot: The limits it keeps to.
+        control: How it follows.
     """
 
     def __init__(
@@ -55,13 +61,13 @@ class Follower:
         self.points = points
         self.stage = Stage.DRIVE
         self._goal = goal
-        self._robot = robot
-        self._control = control
+        self.robot = robot
+        self.control = control
         self._at = 0  # index of the nearest point
         self._ahead = 0  # index of the point steered to
         self._lengths = _lengths(points)
         self._limits = _speed_limits(points, self._lengths, robot)
-        self._first = True
+        self._arrays: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
     @property
     def remaining(self) -> float:
@@ -75,6 +81,15 @@ class Follower:
             end += 1
         return self.points[self._at : end]
 
+    def ahead(self, distance: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the points (n, 2) of the next `distance` metres, and how far each is [m]."""
+        if self._arrays is None:
+            self._arrays = np.array(self.points), np.array(self._lengths)
+        points, lengths = self._arrays
+        here = self._lengths[self._at]
+        end = int(np.searchsorted(lengths, here + distance, side="right"))
+        return points[self._at : end], lengths[self._at : end] - here
+
     def command(self, body: Body) -> tuple[float, float]:
         """Return the speed [m/s] and turn rate [rad/s] to steer with now; moves the stage on."""
         if self.stage in {Stage.TURN, Stage.DRIVE}:
@@ -85,7 +100,7 @@ class Follower:
             self.stage = Stage.FACE
         if self.stage is Stage.FACE:
             error = wrap_angle(self._goal.yaw - body.yaw)
-            if abs(error) > self._control.yaw_tolerance / 2.0:
+            if abs(error) > self.control.yaw_tolerance / 2.0:
                 return 0.0, self._turn(error)
             if body.standing:
                 self.stage = Stage.DONE
@@ -95,7 +110,7 @@ class Follower:
         x, y = body.x, body.y
         self._progress(x, y)
         left = math.hypot(self._goal.x - x, self._goal.y - y)
-        if left < self._control.xy_tolerance / 2.0 or self._overshot(x, y, left):
+        if left < self.control.xy_tolerance / 2.0 or self._overshot(x, y, left):
             self.stage = Stage.BRAKE
             return 0.0, 0.0
         target_x, target_y = self.points[self._look(body.speed)]
@@ -104,10 +119,10 @@ class Follower:
         if self._must_turn(error):
             return 0.0, self._turn(error)
         speed = max(_CREEP, self._limits[self._at])
-        speed = max(_CREEP, min(speed, math.sqrt(2.0 * _SHARE * self._robot.braking * left)))
+        speed = max(_CREEP, min(speed, math.sqrt(2.0 * _SHARE * self.robot.braking * left)))
         curvature = 2.0 * math.sin(error) / max(distance, 1e-3)
         turn_rate = speed * curvature
-        most = _SHARE * self._robot.max_turn_rate
+        most = _SHARE * self.robot.max_turn_rate
         if abs(turn_rate) > most:
             speed *= most / abs(turn_rate)
             turn_rate = math.copysign(most, turn_rate)
@@ -118,14 +133,14 @@ class Follower:
         if self.stage is Stage.TURN:
             if abs(error) < _FACING:
                 self.stage = Stage.DRIVE
-        elif abs(error) > self._control.turn_on_spot:
+        elif abs(error) > self.control.turn_on_spot:
             self.stage = Stage.TURN
         return self.stage is Stage.TURN
 
     def _turn(self, error: float) -> float:
         """Return the turn rate for a turn by `error` [rad] that ends at rest."""
-        rate = math.sqrt(2.0 * _SHARE * self._robot.turn_acceleration * abs(error)) * _SHARE
-        return math.copysign(max(_CREEP_TURN, min(rate, self._robot.max_turn_rate)), error)
+        rate = math.sqrt(2.0 * _SHARE * self.robot.turn_acceleration * abs(error)) * _SHARE
+        return math.copysign(max(_CREEP_TURN, min(rate, self.robot.max_turn_rate)), error)
 
     def _progress(self, x: float, y: float) -> None:
         """Move the nearest point forward, never back: ways may cross themselves."""
@@ -143,7 +158,7 @@ class Follower:
 
     def _look(self, speed: float) -> int:
         """Return the index of the point to steer to."""
-        control = self._control
+        control = self.control
         reach = self._lengths[self._at] + max(
             control.lookahead_min, abs(speed) * control.lookahead_time
         )
@@ -156,7 +171,7 @@ class Follower:
     def _overshot(self, x: float, y: float, left: float) -> bool:
         """Tell whether it is at the end of the way and the goal is no longer in front."""
         last = len(self.points) - 1
-        if self._at < last or left > self._control.xy_tolerance or last == 0:
+        if self._at < last or left > self.control.xy_tolerance or last == 0:
             return False
         (px, py), (qx, qy) = self.points[max(0, last - _BEND_REACH)], self.points[last]
         return (qx - x) * (qx - px) + (qy - y) * (qy - py) <= 0.0

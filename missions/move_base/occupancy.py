@@ -48,12 +48,18 @@ class OccupancyMap:
         """Number of columns."""
         return int(self.cells.shape[1])
 
-    def cell(self, x: float, y: float) -> tuple[int, int] | None:
-        """Return (row, column) of a point in the map frame; None outside the map."""
+    def row_column(self, x: float, y: float) -> tuple[int, int]:
+        """Return (row, column) of a point in the map frame, which may be outside the map."""
         dx, dy = x - self.origin.x, y - self.origin.y
         c, s = math.cos(self.origin.yaw), math.sin(self.origin.yaw)
-        column = math.floor((c * dx + s * dy) / self.resolution)
-        row = math.floor((c * dy - s * dx) / self.resolution)
+        return (
+            math.floor((c * dy - s * dx) / self.resolution),
+            math.floor((c * dx + s * dy) / self.resolution),
+        )
+
+    def cell(self, x: float, y: float) -> tuple[int, int] | None:
+        """Return (row, column) of a point in the map frame; None outside the map."""
+        row, column = self.row_column(x, y)
         if 0 <= row < self.height and 0 <= column < self.width:
             return row, column
         return None
@@ -61,6 +67,14 @@ class OccupancyMap:
     def centre(self, row: int, column: int) -> tuple[float, float]:
         """Return the centre (x, y) [m] of a cell in the map frame."""
         u, v = (column + 0.5) * self.resolution, (row + 0.5) * self.resolution
+        c, s = math.cos(self.origin.yaw), math.sin(self.origin.yaw)
+        return self.origin.x + c * u - s * v, self.origin.y + s * u + c * v
+
+    def centres(
+        self, rows: NDArray[np.intp], columns: NDArray[np.intp]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the centres x and y [m] of many cells in the map frame."""
+        u, v = (columns + 0.5) * self.resolution, (rows + 0.5) * self.resolution
         c, s = math.cos(self.origin.yaw), math.sin(self.origin.yaw)
         return self.origin.x + c * u - s * v, self.origin.y + s * u + c * v
 

@@ -9,15 +9,19 @@ from collections import OrderedDict
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from scipy.ndimage import minimum_filter1d, uniform_filter1d
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from missions.exceptions import NavigationError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
     from numpy.typing import NDArray
 
     from missions.move_base.costmap import Costmap
+    from missions.move_base.traffic import Sighting
 
 Point = tuple[float, float]  # (x, y) [m], map frame
 Cell = tuple[int, int]  # (row, column)
@@ -28,6 +32,13 @@ _KEPT_WAYS: Final = 256  # finished ways kept, one per start cell and goal
 _SPACING: Final = 0.05  # [m] between the points of a finished way
 _ROUNDS: Final = 3  # of corner cutting
 _SLACK: Final = 1.02  # a straight line may cost this much more than the bends it replaces
+_AROUND: Final = 3.0  # [m] on each side: where a way around something that moves is looked for
+_LANE_STEPS: Final = (0.1, 0.2, 0.3, 0.4)  # [m] to the right
+_LANE_SPARE: Final = 0.05  # [m] this much farther must be free as well
+_TAPER: Final = 20  # points over which a shift grows
+_DIRECTION: Final = 4  # points on each side over which the direction of a way is measured
+_EVERY: Final = 3  # of the points of a way that is to be left: enough to tell how far off it is
+_SQUEEZE: Final = 0.2  # [m] a robot so near to something that moves may drive off
 _RESCUE: Final = 0.5  # [m] a robot that stands too near to something may creep out of it
 
 
@@ -65,15 +76,71 @@ class Planner:
                     self._ways.popitem(last=False)
         return [start, *way[1:]]
 
+    def around(
+        self, start: Point, rest: Sequence[Point], discs: Iterable[Sighting]
+    ) -> list[Point] | None:
+        """Return a way that leaves `rest`, passes the discs and comes back to it.
+
+        Only a few metres around `start` are searched.
+
+        Args:
+            start: Where the robot is.
+            rest: The way from there on.
+            discs: What moves, where it is now.
+
+        Returns:
+            The new way to the end of `rest`; None when there is none.
+        """
+        window = _Window(self.costmap.among(discs), start, _AROUND)
+        back = window.rejoin(rest)
+        if back is None or window.source is None:
+            return None
+        target = self.costmap.map.row_column(*rest[back])
+        _, tree = window.search(target)
+        if tree[window.index(window.source)] < 0 and window.source != target:
+            return None
+        cells = window.walk(tree, window.index(window.source))
+        return [*window.line(cells, start, rest[back]), *rest[back + 1 :]]
+
+    def refuge(
+        self, start: Point, avoid: Sequence[Point], clearance: float, discs: Iterable[Sighting]
+    ) -> list[Point] | None:
+        """Return the way to the nearest place that is off somebody's way.
+
+        Only a few metres around `start` are searched.
+
+        Args:
+            start: Where the robot is.
+            avoid: The way to get off.
+            clearance: How far from it [m] is far enough.
+            discs: What moves, where it is now.
+        """
+        window = _Window(self.costmap.among(discs), start, _AROUND)
+        if not avoid or window.source is None:
+            return None
+        rows, columns = np.mgrid[window.r0 : window.r1, window.c0 : window.c1]
+        x, y = self.costmap.map.centres(rows, columns)
+        far = np.ones(x.shape, dtype=np.bool_)
+        for ax, ay in avoid[::_EVERY]:
+            far &= (x - ax) ** 2 + (y - ay) ** 2 > clearance * clearance
+        cost, tree = window.search(window.source)
+        cost = np.where(far.ravel(), cost, np.inf)
+        best = int(np.argmin(cost))
+        if not math.isfinite(cost[best]):
+            return None
+        cells = window.walk(tree, best)
+        cells.reverse()
+        return window.line(cells, start, self.costmap.map.centre(*cells[-1]))
+
     def _make_way(self, source: Cell, target: Cell, start: Point, goal: Point) -> list[Point]:
         cells = self._walk(source, target)
-        corners = [self.costmap.map.centre(*cell) for cell in self._straighten(cells)]
+        corners = [self.costmap.map.centre(*cell) for cell in _straighten(self.costmap, cells)]
         if self.costmap.is_free(*start):
             corners[0] = start
         else:
             corners.insert(0, start)
         corners[-1] = goal
-        return self._smooth(corners)
+        return _smooth(self.costmap, corners)
 
     def _start_cell(self, start: Point) -> Cell:
         """Return the cell to search from: the robot's own, or the nearest one that is free."""
@@ -84,16 +151,13 @@ class Planner:
             )
         if not self.costmap.blocked[cell]:
             return cell
-        reach = math.ceil(_RESCUE / self.costmap.map.resolution)
-        r0, c0 = max(0, cell[0] - reach), max(0, cell[1] - reach)
-        window = self.costmap.blocked[r0 : cell[0] + reach + 1, c0 : cell[1] + reach + 1]
-        rows, columns = np.nonzero(~window)
-        if not rows.size:
+        resolution = self.costmap.map.resolution
+        nearest = _nearest_free(self.costmap.blocked, cell, _RESCUE, resolution)
+        if nearest is None:
             raise NavigationError(
                 f"no way: the robot at ({start[0]:.2f}, {start[1]:.2f}) is shut in on all sides"
             )
-        nearest = int(np.argmin(np.hypot(rows + r0 - cell[0], columns + c0 - cell[1])))
-        return int(rows[nearest]) + r0, int(columns[nearest]) + c0
+        return nearest
 
     def _walk(self, source: Cell, target: Cell) -> list[Cell]:
         """Follow the goal's tree from the start."""
@@ -114,7 +178,7 @@ class Planner:
         tree = self._trees.get(target)
         if tree is None:
             if self._graph is None:
-                self._graph = _graph(self.costmap)
+                self._graph = _graph(self.costmap.blocked, self.costmap.cost)
             root = target[0] * self.costmap.map.width + target[1]
             _, tree = dijkstra(self._graph, indices=root, return_predecessors=True)
             self._trees[target] = tree
@@ -124,50 +188,153 @@ class Planner:
             self._trees.move_to_end(target)
         return tree
 
-    def _straighten(self, cells: list[Cell]) -> list[Cell]:
-        """Replace bends by straight lines wherever those cost no more."""
-        cost = self.costmap.cost
-        rows, columns = np.array(cells, dtype=np.intp).T
-        steps = np.hypot(np.diff(rows), np.diff(columns))
-        along = cost[rows, columns]
-        spent = np.concatenate(([0.0], np.cumsum(steps * (along[1:] + along[:-1]) / 2.0)))
-        kept, here, last = [cells[0]], 0, len(cells) - 1
-        while here < last:
-            jump = 1
-            while jump * 2 <= last - here and self._may_cut(cells, spent, here, here + jump * 2):
-                jump *= 2
-            low, high = here + jump, min(here + jump * 2, last)
-            while low < high:  # the farthest cell that can be reached straight
-                middle = (low + high + 1) // 2
-                if self._may_cut(cells, spent, here, middle):
-                    low = middle
-                else:
-                    high = middle - 1
-            here = low
-            kept.append(cells[here])
-        return kept if len(kept) > 1 else [cells[0], cells[-1]]
 
-    def _may_cut(
-        self, cells: list[Cell], spent: NDArray[np.float64], first: int, last: int
-    ) -> bool:
-        allowed = float(spent[last] - spent[first]) * _SLACK
-        return self.costmap.line_cost(cells[first], cells[last]) <= allowed
+def keep_right(costmap: Costmap, way: list[Point]) -> list[Point]:
+    """Shift a way to the right where there is room, so that two who meet can pass."""
+    points = np.array(way)
+    if len(points) < 2 * _TAPER:
+        return way
+    ahead = np.roll(points, -_DIRECTION, axis=0) - np.roll(points, _DIRECTION, axis=0)
+    ahead[:_DIRECTION], ahead[-_DIRECTION:] = ahead[_DIRECTION], ahead[-_DIRECTION - 1]
+    length = np.hypot(ahead[:, 0], ahead[:, 1])
+    length[length == 0.0] = 1.0
+    right = np.column_stack((ahead[:, 1], -ahead[:, 0])) / length[:, None]
+    shift = np.zeros(len(points))
+    free = np.ones(len(points), dtype=np.bool_)
+    for step in _LANE_STEPS:  # the farthest that can be reached through free cells
+        moved = points + (step + _LANE_SPARE) * right
+        free &= costmap.are_free(moved[:, 0], moved[:, 1])
+        shift[free] = step
+    ends = np.minimum(np.arange(len(points)), np.arange(len(points))[::-1]) / _TAPER
+    shift = np.minimum(shift, _LANE_STEPS[-1] * np.clip(ends - 0.5, 0.0, 1.0))
+    shift = uniform_filter1d(minimum_filter1d(shift, _TAPER), _TAPER)
+    moved = points + shift[:, None] * right
+    moved[0], moved[-1] = points[0], points[-1]
+    if not costmap.are_free(moved[1:, 0], moved[1:, 1]).all():
+        return way
+    return [(float(x), float(y)) for x, y in moved]
 
-    def _smooth(self, corners: list[Point]) -> list[Point]:
-        """Cut the corners (Chaikin) as far as that stays free, then space the points evenly."""
-        points = corners
-        for _ in range(_ROUNDS):
-            rounder = _cut_corners(points)
-            if not self.costmap.polyline_is_free(_space(rounder)[1:]):
+
+class _Window:
+    """The cells a few metres around a point, to search in.
+
+    Attributes:
+        r0, r1: First row and the row after the last.
+        c0, c1: First column and the column after the last.
+        source: The free cell at the point or close by; None when there is none.
+    """
+
+    def __init__(self, costmap: Costmap, middle: Point, reach: float) -> None:
+        self._costmap = costmap
+        grid = costmap.map
+        row, column = grid.row_column(*middle)
+        cells = math.ceil(reach / grid.resolution)
+        self.r0, self.r1 = max(0, row - cells), min(grid.height, row + cells + 1)
+        self.c0, self.c1 = max(0, column - cells), min(grid.width, column + cells + 1)
+        self._width = self.c1 - self.c0
+        self.source: Cell | None = None
+        if self.holds((row, column)):
+            self.source = _nearest_free(costmap.blocked, (row, column), _SQUEEZE, grid.resolution)
+
+    def holds(self, cell: Cell) -> bool:
+        """Tell whether a cell is inside."""
+        return self.r0 <= cell[0] < self.r1 and self.c0 <= cell[1] < self.c1
+
+    def index(self, cell: Cell) -> int:
+        """Return the number of a cell, as `search` counts them."""
+        return (cell[0] - self.r0) * self._width + cell[1] - self.c0
+
+    def rejoin(self, rest: Sequence[Point]) -> int | None:
+        """Return the index of the last point of a way that is free and still inside."""
+        found = None
+        for i, point in enumerate(rest):
+            cell = self._costmap.map.row_column(*point)
+            if not self.holds(cell):
                 break
-            points = rounder
-        return _space(points)
+            if not self._costmap.blocked[cell]:
+                found = i
+        return found
+
+    def search(self, root: Cell) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+        """Return for each cell the cost to get to `root`, and the next cell on the way there."""
+        rows, columns = slice(self.r0, self.r1), slice(self.c0, self.c1)
+        graph = _graph(self._costmap.blocked[rows, columns], self._costmap.cost[rows, columns])
+        cost, tree = dijkstra(graph, indices=self.index(root), return_predecessors=True)
+        return cost, tree
+
+    def walk(self, tree: NDArray[np.int32], node: int) -> list[Cell]:
+        """Return the cells from a node of the tree to its root."""
+        cells = []
+        while node >= 0:
+            cells.append((node // self._width + self.r0, node % self._width + self.c0))
+            node = int(tree[node])
+        return cells
+
+    def line(self, cells: list[Cell], start: Point, end: Point) -> list[Point]:
+        """Return a smooth way along the cells."""
+        corners = [self._costmap.map.centre(*cell) for cell in _straighten(self._costmap, cells)]
+        corners[0], corners[-1] = start, end
+        return _smooth(self._costmap, corners)
 
 
-def _graph(costmap: Costmap) -> csr_array:
+def _straighten(costmap: Costmap, cells: list[Cell]) -> list[Cell]:
+    """Replace bends by straight lines wherever those cost no more."""
+    rows, columns = np.array(cells, dtype=np.intp).T
+    steps = np.hypot(np.diff(rows), np.diff(columns))
+    along = costmap.cost[rows, columns]
+    spent = np.concatenate(([0.0], np.cumsum(steps * (along[1:] + along[:-1]) / 2.0)))
+
+    def may_cut(first: int, last: int) -> bool:
+        allowed = float(spent[last] - spent[first]) * _SLACK
+        return costmap.line_cost(cells[first], cells[last]) <= allowed
+
+    kept, here, last = [cells[0]], 0, len(cells) - 1
+    while here < last:
+        jump = 1
+        while jump * 2 <= last - here and may_cut(here, here + jump * 2):
+            jump *= 2
+        low, high = here + jump, min(here + jump * 2, last)
+        while low < high:  # the farthest cell that can be reached straight
+            middle = (low + high + 1) // 2
+            if may_cut(here, middle):
+                low = middle
+            else:
+                high = middle - 1
+        here = low
+        kept.append(cells[here])
+    return kept if len(kept) > 1 else [cells[0], cells[-1]]
+
+
+def _smooth(costmap: Costmap, corners: list[Point]) -> list[Point]:
+    """Cut the corners (Chaikin) as far as that stays free, then space the points evenly."""
+    points = corners
+    for _ in range(_ROUNDS):
+        rounder = _cut_corners(points)
+        if not costmap.polyline_is_free(_space(rounder)[1:]):
+            break
+        points = rounder
+    return _space(points)
+
+
+def _nearest_free(
+    blocked: NDArray[np.bool_], cell: Cell, reach: float, resolution: float
+) -> Cell | None:
+    """Return the free cell nearest to `cell`, `reach` [m] away at most."""
+    if not blocked[cell]:
+        return cell
+    cells = math.ceil(reach / resolution)
+    r0, c0 = max(0, cell[0] - cells), max(0, cell[1] - cells)
+    rows, columns = np.nonzero(~blocked[r0 : cell[0] + cells + 1, c0 : cell[1] + cells + 1])
+    if not rows.size:
+        return None
+    nearest = int(np.argmin(np.hypot(rows + r0 - cell[0], columns + c0 - cell[1])))
+    return int(rows[nearest]) + r0, int(columns[nearest]) + c0
+
+
+def _graph(blocked: NDArray[np.bool_], costs: NDArray[np.float32]) -> csr_array:
     """Return the 8-connected graph of the free cells; an edge weighs its length times its cost."""
-    height, width = costmap.blocked.shape
-    cost = np.pad(np.where(costmap.blocked, np.inf, costmap.cost), 1, constant_values=np.inf)
+    height, width = blocked.shape
+    cost = np.pad(np.where(blocked, np.inf, costs), 1, constant_values=np.inf)
     inner = cost[1:-1, 1:-1]
     index = np.arange(height * width, dtype=np.int32).reshape(height, width)
     weights = np.empty((height, width, len(_NEIGHBOURS)))

@@ -33,6 +33,7 @@ from missions.move_base.geometry import Pose2D, quaternion_of, yaw_of
 from missions.move_base.navigation import STOP
 from missions.move_base.pilot import Pilot
 from missions.move_base.stepper import Stepper
+from missions.move_base.world import AT_DOCK
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -48,7 +49,6 @@ MAP_FRAME: Final = "map"
 ODOM_FRAME: Final = "odom"  # the same place as the map frame: the odometry does not drift
 BASE_FRAME: Final = "base_link"
 _UNHEARD: Final = 10  # battery periods between two messages that nobody hears
-_AT_DOCK: Final = 0.2  # [m] the charger reaches this far
 _CHARGE_PERIOD: Final = 0.5  # [s] between two feedback messages of `charge`
 _JUST_PAST: Final = 1e-3  # [s] waited longer, as a rounding error would never pass
 _SHORTEST_ROTATION: Final = 1e-3  # a quaternion shorter than this is no rotation
@@ -97,6 +97,11 @@ class RobotServer:
         )
         self._move.register_preempt_callback(self._wake.set)
         self._charge.register_preempt_callback(self._charge_wake.set)
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self._robot
 
     def start(self) -> None:
         """Show the robot on the network and take goals.
@@ -317,16 +322,20 @@ class RobotServer:
         self._charge.set_succeeded(self._charge_result(), text="charged")
 
     def _why_not_charge(self, until: float) -> str:
-        dock, body = self._robot.config.dock, self._robot.body
+        body = self._robot.body
         if not 0.0 < until <= 1.0:
             return f"until: got {until:g}; expected more than 0, at most 1"
+        dock = self._robot.nearest_dock()
         if dock is None:
             return "this robot has no dock"
-        distance = body.pose.distance(dock)
-        if distance > _AT_DOCK:
+        distance = body.pose.distance(dock.pose)
+        if distance > AT_DOCK:
+            which = f"dock {dock.name}" if dock.name else "its dock"
+            holder = self._robot.world.holder(dock)
+            held = f"; {holder} holds it" if holder else ""
             return (
-                f"the robot is {distance:.1f} m away from its dock; drive to "
-                f"({dock.x:.2f}, {dock.y:.2f}) first"
+                f"the robot is {distance:.1f} m away from {which}; drive to "
+                f"({dock.pose.x:.2f}, {dock.pose.y:.2f}) first{held}"
             )
         return "" if body.standing else "the robot is still moving"
 

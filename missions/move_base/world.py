@@ -5,54 +5,213 @@ from __future__ import annotations
 import math
 import threading
 from collections import OrderedDict
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
+
+import numpy as np
 
 from missions.exceptions import NavigationError
 from missions.move_base.battery import Battery
 from missions.move_base.body import Body
 from missions.move_base.costmap import Costmap
-from missions.move_base.floor import Obstacle
+from missions.move_base.doors import Door
+from missions.move_base.floor import Bar, Obstacle
 from missions.move_base.planner import Planner
+from missions.move_base.raycast import Raycaster
+from missions.move_base.traffic import Mover, Sighting
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from missions.move_base.config import PlannerConfig, SimConfig
+    from missions.move_base.floor import Thing
+    from missions.move_base.follower import Follower
     from missions.move_base.geometry import Pose2D
     from missions.move_base.occupancy import OccupancyMap
+    from missions.move_base.traffic import Disc
 
+AT_DOCK: Final = 0.2  # [m] the charger reaches this far
 _ROOM_BESIDE: Final = 0.2  # [m] looked for ahead besides the braking distance
 _KEPT_PLANNERS: Final = 8  # of the last sets of obstacles
+_NEAR_STEPS: Final = 4  # steps between two looks at who is near
+_NEAR_SPARE: Final = 1.5  # [m] what is near may come closer by so much until the next look
+_PLACES_AGE: Final = 0.2  # [s] that the array of places may be old
+_TOLD: Final = 4.0  # [m] of its way that a robot tells others
+_ASKED: Final = 3.0  # [s] that a request for room counts
+_CLOSE: Final = 1.5  # [m] between two robots that are in each other's way, at most
+_MANY: Final = 16  # discs from which an array is worth it
+
+
+@dataclass(frozen=True, slots=True)
+class Dock:
+    """A place where any robot may charge, one at a time.
+
+    Attributes:
+        name: One word; "" for a robot's own.
+        pose: Where the robot stands while it charges, in the map frame.
+    """
+
+    name: str
+    pose: Pose2D
 
 
 class World:
-    """A map and the obstacles that came later; robots on one floor share its planners.
+    """A map, what stands and moves on it, and the robots; robots alike share their planners.
 
-    Threads: `add_obstacle` and `remove_obstacle` may be called while robots drive.
+    Threads: `add_obstacle` and `remove_obstacle` may be called while robots drive. The rest is
+    changed by one thread at a time: `Stepper.lock` keeps them apart.
 
     Attributes:
         map: What was known from the start.
-        obstacles: What stands there besides. Replaced as a whole, never changed in place.
+        obstacles: What stands there besides, closed doors included. Replaced as a whole, never
+            changed in place.
+        robots: In the order they came.
+        movers: The moving obstacles.
+        doors: By name.
+        docks: Where any robot may charge.
     """
 
     def __init__(self, grid: OccupancyMap) -> None:
         self.map = grid
-        self.obstacles: tuple[Obstacle, ...] = ()
+        self.obstacles: tuple[Thing, ...] = ()
+        self.robots: tuple[Robot, ...] = ()
+        self.movers: tuple[Mover, ...] = ()
+        self.doors: dict[str, Door] = {}
+        self.docks: tuple[Dock, ...] = ()
+        self.discs: tuple[Disc, ...] = ()
         self._lock = threading.Lock()
         self._planners: OrderedDict[tuple[object, ...], Planner] = OrderedDict()
+        self._rays: Raycaster | None = None
+        self._places: np.ndarray[tuple[int, int], np.dtype[np.float64]] | None = None
+        self._places_from = -math.inf
+
+    # -- what is there -------------------------------------------------------------------------
 
     def add_obstacle(self, x: float, y: float, radius: float) -> Obstacle:
         """Put a round obstacle on the floor."""
         obstacle = Obstacle(x, y, radius)
-        with self._lock:
-            self.obstacles = (*self.obstacles, obstacle)
+        self.add_thing(obstacle)
         return obstacle
 
     def remove_obstacle(self, obstacle: Obstacle) -> None:
         """Take it away again; nothing happens when it is not there."""
+        self.remove_thing(obstacle)
+
+    def add_thing(self, thing: Thing) -> None:
+        """Put anything on the floor; nothing happens when it is there."""
         with self._lock:
-            self.obstacles = tuple(o for o in self.obstacles if o != obstacle)
+            if thing not in self.obstacles:
+                self.obstacles = (*self.obstacles, thing)
+
+    def remove_thing(self, thing: Thing) -> None:
+        """Take it away again; nothing happens when it is not there."""
+        with self._lock:
+            self.obstacles = tuple(o for o in self.obstacles if o != thing)
+
+    def add_door(
+        self,
+        name: str,
+        ends: tuple[float, float, float, float],
+        *,
+        travel: float = 3.0,
+        is_open: bool = False,
+    ) -> Door:
+        """Put a door between the two ends (x0, y0, x1, y1) [m] of a doorway.
+
+        Args:
+            name: One word.
+            ends: Where its leaf is when closed.
+            travel: How long it takes to open or to close [s].
+            is_open: How it begins.
+        """
+        door = self.doors[name] = Door(self, name, ends, travel=travel, is_open=is_open)
+        return door
+
+    def add_mover(
+        self,
+        name: str,
+        places: Sequence[tuple[float, float]],
+        *,
+        radius: float = 0.3,
+        speed: float = 0.8,
+        loop: bool = False,
+    ) -> Mover:
+        """Let a moving obstacle walk from place to place; see `Mover`."""
+        mover = Mover(self, name, places, radius=radius, speed=speed, loop=loop)
+        self.movers = (*self.movers, mover)
+        self.discs = (*self.discs, mover)
+        return mover
+
+    def add_dock(self, name: str, pose: Pose2D) -> Dock:
+        """Put a dock on the floor, where any robot may charge."""
+        dock = Dock(name, pose)
+        self.docks = (*self.docks, dock)
+        return dock
+
+    def enter(self, robot: Robot) -> None:
+        """Take a robot in."""
+        self.robots = (*self.robots, robot)
+        self.discs = (*self.discs, robot.body)
+
+    def leave(self, robot: Robot) -> None:
+        """Take a robot off the floor; nothing happens when it was not there."""
+        self.robots = tuple(other for other in self.robots if other is not robot)
+        self.discs = tuple(disc for disc in self.discs if disc is not robot.body)
+
+    # -- time ----------------------------------------------------------------------------------
+
+    def is_changing(self) -> bool:
+        """Tell whether anything but the robots moves."""
+        return bool(self.movers) or any(door.is_moving for door in self.doors.values())
+
+    def step(self, dt: float) -> None:
+        """Let `dt` seconds pass for everything but the robots."""
+        for mover in self.movers:
+            mover.step(dt)
+        for door in self.doors.values():
+            door.step(dt)
+
+    # -- questions -----------------------------------------------------------------------------
+
+    @property
+    def rays(self) -> Raycaster:
+        """Rays over the map, made when they are first asked for."""
+        if self._rays is None:
+            self._rays = Raycaster(self.map)
+        return self._rays
+
+    def near(self, me: Disc, reach: float, now: float) -> list[Disc]:
+        """Return who else may be within `reach` [m] of `me`; some may be a little farther."""
+        discs = self.discs
+        if len(discs) < _MANY:
+            return [
+                disc
+                for disc in discs
+                if disc is not me and math.hypot(disc.x - me.x, disc.y - me.y) <= reach
+            ]
+        places = self._places
+        if places is None or len(places) != len(discs) or now - self._places_from > _PLACES_AGE:
+            places = self._places = np.array([(disc.x, disc.y) for disc in discs])
+            self._places_from = now
+        distances = np.hypot(places[:, 0] - me.x, places[:, 1] - me.y)
+        return [discs[i] for i in np.flatnonzero(distances <= reach) if discs[i] is not me]
+
+    def who_is_at(self, thing: Thing) -> str:
+        """Return the name of somebody who touches a thing; "" for nobody."""
+        for disc in self.discs:
+            if thing.gap(disc.x, disc.y) <= disc.radius:
+                return disc.name
+        return ""
+
+    def holder(self, dock: Dock) -> str:
+        """Return the name of the robot that stands at a dock; "" for none."""
+        for robot in self.robots:
+            if robot.body.pose.distance(dock.pose) <= AT_DOCK:
+                return robot.name
+        return ""
 
     def planner(
-        self, body_radius: float, config: PlannerConfig, obstacles: tuple[Obstacle, ...]
+        self, body_radius: float, config: PlannerConfig, obstacles: tuple[Thing, ...]
     ) -> Planner:
         """Return the planner for a body among these obstacles; robots alike share it."""
         key = (body_radius, config, frozenset(obstacles))
@@ -63,6 +222,8 @@ class World:
                 self._planners[key] = planner
                 if len(self._planners) > _KEPT_PLANNERS:
                     self._planners.popitem(last=False)
+            else:
+                self._planners.move_to_end(key)
         return planner
 
 
@@ -72,41 +233,69 @@ class Robot:
     Threads: one thread steers it at a time; pose and battery may be read from any thread.
 
     Attributes:
+        world: The floor it is on.
+        name: What it is called.
         body: Where it is and how it moves.
         battery: How full it is.
-        planner: Finds ways among what the robot knows.
+        planner: Finds ways among what stands still, as far as the robot knows.
+        traffic: What moves, where the robot saw it last.
         bumped: Whether its last step was stopped by something solid.
         odometer: Distance driven [m].
+        follower: Follows its way; None when it has none.
+        held_by: Who stands in its way, as far as it has looked.
+        now: Time of its last step [s].
     """
 
-    def __init__(self, world: World, config: SimConfig, pose: Pose2D, now: float) -> None:
+    def __init__(
+        self, world: World, config: SimConfig, pose: Pose2D, now: float, name: str = "robot"
+    ) -> None:
         """Put a robot on the floor.
 
         Raises:
             NavigationError: it cannot stand at `pose`.
         """
         self.config = config
-        self._world = world
-        self._known: tuple[Obstacle, ...] = ()
+        self.name = name
+        self.world = world
+        self._known: tuple[Thing, ...] = ()
         self.planner = self._planner(())
         try:
             self.check_place(pose.x, pose.y)
         except NavigationError as error:
             raise NavigationError(f"start pose: {error}".replace("goal ", "", 1)) from None
-        self.body = Body(config.robot, pose)
+        self.body = Body(config.robot, pose, name)
+        for other in world.discs:
+            if math.hypot(other.x - pose.x, other.y - pose.y) < other.radius + self.body.radius:
+                where = f"({pose.x:.2f}, {pose.y:.2f})"
+                raise NavigationError(f"start pose: {where} is taken by {other.name}")
         self.battery = Battery(config.battery, now)
+        self.traffic: dict[Disc, Sighting] = {}
         self.bumped = False
         self.odometer = 0.0
+        self.follower: Follower | None = None
+        self.held_by: Sighting | None = None
+        self._own_rank = (math.inf, 0)
+        self._asked: tuple[Robot, tuple[float, int], float] | None = None
+        self.now = now
         self._share = 0.0
+        self._near: list[Disc] = []
+        self._near_steps = 0
+        world.enter(self)
+
+    # -- moving --------------------------------------------------------------------------------
 
     def step(self, now: float, dt: float, command: tuple[float, float]) -> None:
         """Drive for `dt` seconds towards a command (speed [m/s], turn rate [rad/s])."""
+        self.now = now
+        self._near_steps -= 1
+        if self._near_steps < 0:
+            self._meet()
         body = self.body
         x, y, yaw = body.x, body.y, body.yaw
         body.steer(command[0], command[1], dt)
         body.advance(dt)
         self.bumped = False
-        if self._hits(x, y, body.x, body.y):
+        if (body.x != x or body.y != y) and self._hits(x, y, body.x, body.y):
             body.x, body.y, body.yaw, body.speed = x, y, yaw, 0.0
             self.bumped = True
         self.odometer += abs(body.speed) * dt
@@ -124,7 +313,7 @@ class Robot:
         body = self.body
         fastest = max(abs(speed), abs(body.speed))
         braking = fastest * fastest / self.config.robot.braking + _ROOM_BESIDE
-        step = math.copysign(self._world.map.resolution / 2.0, speed)
+        step = math.copysign(self.world.map.resolution / 2.0, speed)
         turn = turn_rate * step / speed if speed else 0.0
         x, y, yaw = body.pose
         done = 0.0
@@ -137,13 +326,16 @@ class Robot:
             done += abs(step)
         return done
 
+    # -- knowing -------------------------------------------------------------------------------
+
     def look(self) -> bool:
         """Compare the floor in sight with what is known.
 
         Returns:
-            Whether something appeared or went; `planner` then knows it.
+            Whether something that stands appeared or went; `planner` then knows it.
         """
-        real, known = self._world.obstacles, self._known
+        self._watch_traffic()
+        real, known = self.world.obstacles, self._known
         if real == known:
             return False
         seen = tuple(o for o in real if o in known or self._sees(o))
@@ -155,10 +347,67 @@ class Robot:
         return True
 
     def forget(self) -> None:
-        """Forget the obstacles that are out of sight: they may have gone."""
+        """Forget what stood or moved there and is out of sight: it may have gone."""
         self._known = tuple(o for o in self._known if self._sees(o))
         self.planner = self._planner(self._known)
+        self.traffic.clear()
+        self._meet()
         self.look()
+
+    def nearest_dock(self) -> Dock | None:
+        """Return the dock nearest to it, its own or one for all; None when there is none."""
+        docks = list(self.world.docks)
+        if self.config.dock is not None:
+            docks.append(Dock("", self.config.dock))
+        return min(docks, key=lambda dock: self.body.pose.distance(dock.pose), default=None)
+
+    def ahead(self) -> Sequence[tuple[float, float]]:
+        """Return the next metres of the way that it follows; empty when there is none."""
+        return self.follower.rest(_TOLD) if self.follower is not None else ()
+
+    # -- right of way --------------------------------------------------------------------------
+
+    def rank(self) -> tuple[float, int]:
+        """Return its right of way, the lowest goes first: who set out first, or asked for it."""
+        if self._asked is None or self.asker() is None:
+            return self._own_rank
+        return min(self._own_rank, self._asked[1])
+
+    def set_out(self) -> None:
+        """A drive begins now."""
+        self._own_rank = (self.now, self.world.robots.index(self))
+        self._asked = None
+
+    def asker(self) -> Robot | None:
+        """Return the robot that has asked for room lately."""
+        if self._asked is None:
+            return None
+        asker, _, until = self._asked
+        return asker if self.now < until and asker.follower is not None else None
+
+    def ask_for_room(self) -> None:
+        """Ask the robot that stands in the way to make room."""
+        seen = self.held_by
+        for other in self.world.robots:
+            if seen is not None and other.name == seen.name:
+                other.be_asked(self)
+
+    def ask_all_for_room(self) -> None:
+        """Ask all robots close by to make room."""
+        for other in self.world.robots:
+            gap = math.hypot(other.body.x - self.body.x, other.body.y - self.body.y)
+            if other is not self and gap < _CLOSE:
+                other.be_asked(self)
+
+    def be_asked(self, other: Robot) -> None:
+        """Hear another robot ask for room; one that has the right of way does not listen."""
+        rank = other.rank()
+        if rank < self._own_rank and (self.asker() is None or rank <= self.rank()):
+            self._asked = (other, rank, self.now + _ASKED)
+
+    def thank(self) -> None:
+        """Nobody asks for room any more."""
+        self._asked = None
 
     def check_place(self, x: float, y: float) -> None:
         """Check a place against the map alone: obstacles may go, walls do not.
@@ -169,24 +418,68 @@ class Robot:
         self._planner(()).costmap.check_place(x, y)
 
     @property
-    def known_obstacles(self) -> tuple[Obstacle, ...]:
-        """What it has seen that is not on the map."""
+    def known_obstacles(self) -> tuple[Thing, ...]:
+        """What it has seen that stands there and is not on the map."""
         return self._known
 
-    def _planner(self, obstacles: tuple[Obstacle, ...]) -> Planner:
-        return self._world.planner(self.config.robot.radius, self.config.planner, obstacles)
+    def closed_doors(self) -> str:
+        """Return the names of the closed doors it knows of."""
+        return ", ".join(thing.name for thing in self._known if isinstance(thing, Bar))
 
-    def _sees(self, obstacle: Obstacle) -> bool:
-        distance = math.hypot(obstacle.x - self.body.x, obstacle.y - self.body.y)
-        return distance <= self.config.robot.sight + obstacle.radius
+    def _planner(self, obstacles: tuple[Thing, ...]) -> Planner:
+        return self.world.planner(self.config.robot.radius, self.config.planner, obstacles)
+
+    def _sees(self, thing: Thing) -> bool:
+        return thing.gap(self.body.x, self.body.y) <= self.config.robot.sight
+
+    def _meet(self) -> None:
+        """Look who is near."""
+        self._near_steps = _NEAR_STEPS
+        if len(self.world.discs) > 1:
+            reach = self.config.robot.sight + _NEAR_SPARE
+            self._near = self.world.near(self.body, reach, self.now)
+        else:
+            self._near = []
+
+    def _watch_traffic(self) -> None:
+        """Note where those are that move, as far as they are in sight."""
+        near, traffic = self._near, self.traffic
+        if not (near or traffic):
+            return
+        body, sight = self.body, self.config.robot.sight
+        x, y = body.x, body.y
+        close = [d for d in near if math.hypot(d.x - x, d.y - y) - d.radius <= sight]
+        places = [*((d.x, d.y) for d in close), *((s.x, s.y) for s in traffic.values())]
+        if not places:
+            return
+        visible = self.world.rays.sees(x, y, np.array(places))
+        known = list(traffic.items())
+        for (disc, seen), clear in zip(known, visible[len(close) :], strict=True):
+            if clear and math.hypot(seen.x - x, seen.y - y) <= sight:
+                del traffic[disc]
+        for disc, clear in zip(close, visible[: len(close)], strict=True):
+            if clear:
+                traffic[disc] = Sighting(disc.x, disc.y, disc.radius, disc.name)
+
+    # -- touching ------------------------------------------------------------------------------
 
     def _hits(self, x: float, y: float, new_x: float, new_y: float) -> bool:
         """Tell whether the body would run into something; out of something it may always go."""
-        return self._touches(new_x, new_y) and not self._touches(x, y)
+        if self._touches(new_x, new_y) and not self._touches(x, y):
+            self.held_by = None
+            return True
+        radius = self.body.radius
+        for disc in self._near:
+            dx, dy, reach = disc.x - new_x, disc.y - new_y, disc.radius + radius
+            square = dx * dx + dy * dy
+            if square < reach * reach and square < (disc.x - x) ** 2 + (disc.y - y) ** 2:
+                self.held_by = Sighting(disc.x, disc.y, disc.radius, disc.name)
+                return True
+        return False
 
     def _touches(self, x: float, y: float) -> bool:
-        """Tell whether a body at (x, y) would overlap something solid."""
+        """Tell whether a body at (x, y) would overlap something that stands there."""
         if self.planner.costmap.touches(x, y):
             return True
-        radius = self.config.robot.radius
-        return any(math.hypot(o.x - x, o.y - y) < o.radius + radius for o in self._world.obstacles)
+        radius = self.body.radius
+        return any(thing.gap(x, y) < radius for thing in self.world.obstacles)

@@ -75,10 +75,10 @@ def test_it_does_not_swing_about_the_way(robot):
     assert changes <= 12
 
 
-def test_the_same_drive_twice_is_the_same(world, config):
+def test_the_same_drive_twice_is_the_same(grid, config):
     drives = []
     for _ in range(2):
-        robot = Robot(world, config, START, 0.0)
+        robot = Robot(World(grid), config, START, 0.0)
         drives.append(run(robot, drive_to(robot, Pose2D(2.0, 3.0, 0))))
     assert drives[0] == drives[1]
 
