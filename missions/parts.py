@@ -13,6 +13,7 @@ from smachpy import MonitorState, SimpleActionState, State, UserData
 
 if TYPE_CHECKING:
     from actionlib_core.interfaces.geometry_msgs.msg import Pose
+    from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseGoal
 
 SIGNAL_TIMEOUT: Final = 5.0  # [s] the robot's own topics answer within this, or never
 DRIVE_TIMEOUT: Final = 600.0  # [s] no way in a building takes longer
@@ -49,6 +50,22 @@ def drive_to(pose: Pose2D, **options: Any) -> SimpleActionState:
     """Drive to a pose in the map frame."""
     options.setdefault("exec_timeout", DRIVE_TIMEOUT)
     return SimpleActionState("move_base", MoveBaseAction, goal=goal_at(pose), **options)
+
+
+def drive_back() -> SimpleActionState:
+    """Drive to the pose in the userdata key `home`, trying three times."""
+
+    def home_goal(userdata: UserData, _default: MoveBaseGoal) -> MoveBaseGoal:
+        return goal_at(userdata.home)
+
+    return SimpleActionState(
+        "move_base",
+        MoveBaseAction,
+        goal_cb=home_goal,
+        input_keys=["home"],
+        exec_timeout=DRIVE_TIMEOUT,
+        retry=(3, 5.0, ["aborted"]),
+    )
 
 
 def turn(degrees: float, **options: Any) -> SimpleActionState:
