@@ -88,7 +88,7 @@ class Container(Openable, Callbacks, State):
         state = dict(self.__dict__)
         for name in ("_lock", "_frame", "_plan", "_control", "_group"):
             state.pop(name, None)
-        return {**state, "_listeners": (), "_end_waiters": (), "_open_tokens": []}
+        return {**state, "_listeners": (), "_tapes": (), "_end_waiters": (), "_open_tokens": []}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Take the structure and userdata over; not running."""
@@ -242,7 +242,7 @@ class Container(Openable, Callbacks, State):
         self._frame = frame
         token = FRAME.set(frame)
         try:
-            if self._listeners:
+            if self._listeners or self._tapes:
                 frame.run.watched = True
             if parent_ud is not None:
                 self._copy_input_keys(parent_ud, self.userdata)

@@ -15,7 +15,7 @@ import threading
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from smachpy._runtime.asker import asking
-from smachpy._runtime.frame import Override
+from smachpy._runtime.frame import HEARING, Override
 from smachpy.events import Paused, Resumed
 from smachpy.exceptions import SmachError, did_you_mean
 
@@ -242,6 +242,7 @@ class Control:
             run.control = self
         if run is not None:
             run.watched = run.careful = True
+            HEARING.now = object()
 
     # -- finding -------------------------------------------------------------------------------
 

@@ -12,7 +12,6 @@ no commands are obeyed).
 
 from __future__ import annotations
 
-import itertools
 import json
 import threading
 import uuid
@@ -24,14 +23,15 @@ from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import Trigger
 from actionlib_core.service import Service
 from actionlib_core.topic import Publisher
-from smachpy.events import Started, to_record
+from smachpy.events import Started
 from smachpy.introspection import describe
 from smachpy.run_state import RunState
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from actionlib_core.node import Node
     from smachpy.container import Container
-    from smachpy.events import Event
     from smachpy.remote_control import ControlServer
 
 EVENTS_TOPIC = "/smach/events"
@@ -50,8 +50,16 @@ STOP_S = 1.0
 class Feed:
     """Sends description and events of a machine, and remembers the newest events.
 
-    The listener turns events into text at once, as their values may change later; another thread
-    sends them, so that the machine never waits for the network.
+    The machine only takes its events down (`smachpy.tape`); another thread makes text of them and
+    sends it, so that the machine never waits for the network.
+
+    Args:
+        server_name: First part of the topics' names.
+        machine: What is shown.
+        path: What to call it.
+        node: Where to send.
+        control: Obeys commands, where they are obeyed.
+        on_paths: Called with path -> kind of its newest event, for the events that were just sent.
     """
 
     def __init__(
@@ -62,14 +70,14 @@ class Feed:
         node: Node,
         *,
         control: ControlServer | None = None,
+        on_paths: Callable[[dict[str, str]], object] = lambda _kinds: None,
     ) -> None:
         self._machine = machine
         self._path = path
-        self._root = path
         self._control = control
+        self._on_paths = on_paths
         self._epoch = uuid.uuid4().hex
         self._lock = threading.Lock()
-        self._numbers = itertools.count(1)
         self._kept: deque[tuple[dict[str, Any], str]] = deque()
         self._base = RunState()
         self._queue: deque[str] = deque()
@@ -82,38 +90,54 @@ class Feed:
         self._describe()
         self._history = Service(server_name + HISTORY_SERVICE, Trigger, self._tell, node=node)
         self._events = Publisher(server_name + EVENTS_TOPIC, String, node=node)  # what viewers seek
-        self._unsubscribe = machine.subscribe(self._on_event)
+        self._tape = machine.tape(self._on_news, limit=QUEUED_EVENTS, name=path)
 
     def close(self) -> None:
         """Send what waits, leave the topics.
 
         Blocks: 1 s at most.
         """
-        self._unsubscribe()
+        self._tape.close()
+        self._on_news()
         self._executor.join(STOP_S)
         self._descriptions.unregister()
         self._history.close()
         self._events.unregister()
 
-    def _on_event(self, event: Event) -> None:
-        record = to_record(event)
-        if isinstance(event, Started):
-            self._root = event.path
-            self._executor.submit(self._describe)
-        record["path"] = self._rename(event.path)
+    def _on_news(self) -> None:
+        self._executor.submit(self._work)
+
+    def _work(self) -> None:
+        """Send what was taken down, and again until there is no more."""
+        kinds = self._collect()
+        self._on_paths(kinds)
+        self._send()
+        if kinds:
+            self._on_news()
+
+    def _collect(self) -> dict[str, str]:
+        """Make text of what was taken down; return path -> kind of its newest event."""
+        kinds: dict[str, str] = {}
         with self._lock:
-            record["seq"] = next(self._numbers)
-            text = json.dumps(record)
-            self._kept.append((record, text))
-            if len(self._kept) > KEPT_EVENTS:
-                self._base.fold(self._kept.popleft()[0])
-            if not self._events.get_num_connections() or len(self._queue) >= QUEUED_EVENTS:
-                return
-            self._queue.append(text)
-        self._executor.submit(self._send)
+            wanted = self._events.get_num_connections() > 0
+            for record in self._tape.read():
+                kinds[record["path"]] = record["kind"]
+                if record["kind"] == Started.__name__:
+                    self._executor.submit(self._describe)
+                text = json.dumps(record)
+                self._kept.append((record, text))
+                if len(self._kept) > KEPT_EVENTS:
+                    self._base.fold(self._kept.popleft()[0])
+                if wanted and len(self._queue) < QUEUED_EVENTS:
+                    self._queue.append(text)
+        return kinds
 
     def _tell(self, _request: object) -> tuple[bool, str]:
         """Answer with the history."""
+        kinds = self._collect()
+        if kinds:
+            self._executor.submit(lambda: self._on_paths(kinds))
+            self._on_news()
         head = {
             "epoch": self._epoch,
             "description": json.loads(self._description),
@@ -126,15 +150,9 @@ class Feed:
         text = json.dumps(head)[:-1]
         return True, f'{text}, "base": {base}, "events": [{", ".join(kept)}]}}'
 
-    def _rename(self, path: str) -> str:
-        """Return a path of this run under the name that the machine has here."""
-        frame = self._machine._frame  # noqa: SLF001  the machine's own path, which a parent decides
-        if frame is not None:
-            self._root = frame.path
-        return self._path + path.removeprefix(self._root)
-
     def _send(self) -> None:
-        self._events.publish(self._queue.popleft())
+        while self._queue:
+            self._events.publish(self._queue.popleft())
 
     def _describe(self) -> None:
         text = describe(self._machine, name=self._path.strip("/")).to_json()

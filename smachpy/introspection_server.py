@@ -47,8 +47,8 @@ if TYPE_CHECKING:
     from actionlib_core.node import Node
     from actionlib_core.time import Duration
     from actionlib_core.transport import PublisherPort
-    from smachpy.events import Event
     from smachpy.state import State
+    from smachpy.tape import Tape
 
 __all__ = [
     "DESCRIPTION_TOPIC",
@@ -142,6 +142,9 @@ class ContainerProxy:
         update_rate: As SMACH takes it; there are no heartbeats here.
         node: Where to send; the current node when None.
 
+    Attributes:
+        path: What the container is called.
+
     Raises:
         InvalidStateError: `container` is none.
     """
@@ -162,13 +165,13 @@ class ContainerProxy:
         del update_rate
         self._server_name = server_name
         self._container = container
-        self._path = path
+        self.path = path
         self._node = node
         self._own_topics: _Topics | None = None
         self._topics: _Topics | None = None
         self._commands: Subscriber[Any] | None = None
         self._pace: Pace | None = None
-        self._unsubscribe: Callable[[], None] | None = None
+        self._tape: Tape | None = None
         self._forget: Callable[[], None] | None = None
         self._info = "Initial state"
         self._sent: dict[str, Any] = {}
@@ -185,13 +188,26 @@ class ContainerProxy:
         )
         self._forget = node.on_close(self.stop)  # the newest are closed first: before our topics
 
-    def show(self, topics: _Topics) -> None:
-        """Send structure and status on `topics`, and from now on what changes."""
+    def show(self, topics: _Topics, *, listen: bool = True) -> None:
+        """Send structure and status on `topics`, and from now on what changes.
+
+        Args:
+            topics: Where to.
+            listen: Find out by itself when something changes; else `mark` is called.
+        """
         self._topics = topics
         clock = topics.status.node.clock
-        self._pace = Pace(clock, topics.executor, self._update, STATUS_INTERVAL_S)
+        pace = self._pace = Pace(clock, topics.executor, self._update, STATUS_INTERVAL_S)
         self._update()
-        self._unsubscribe = self._container.subscribe(self._on_event)
+        if listen:
+            self._tape = self._container.tape(pace.mark, limit=1)
+
+    def mark(self, kind: str) -> None:
+        """Send what has changed, soon; `kind` of event tells why."""
+        self._info = kind
+        pace = self._pace
+        if pace is not None:
+            pace.mark()
 
     def stop(self) -> None:
         """Send the last status and leave the topics; a second call does nothing."""
@@ -199,14 +215,15 @@ class ContainerProxy:
         if topics is None or pace is None:
             return
         pace.close()
-        for end in (self._forget, self._unsubscribe):
-            if end is not None:
-                end()
+        if self._forget is not None:
+            self._forget()
+        if self._tape is not None:
+            self._tape.close()
         if self._commands is not None:
             self._commands.unregister()
         topics.executor.join(STOP_S)
         self._update()
-        self._topics = self._pace = self._forget = self._unsubscribe = self._commands = None
+        self._topics = self._pace = self._forget = self._tape = self._commands = None
         self._sent.clear()
         if self._own_topics is not None:
             self._own_topics.close()
@@ -218,7 +235,7 @@ class ContainerProxy:
         The answer is a status whose `info` begins with the command's request id (the entry "$id" of
         its userdata, if any) and goes on with "REMOTE_INIT", or "REMOTE_INIT_REFUSED: " and why.
         """
-        if command.path != self._path:
+        if command.path != self.path:
             return False
         request = ""
         try:
@@ -228,25 +245,21 @@ class ContainerProxy:
             userdata.update(values)
             self._container.set_initial_state(list(command.initial_states), userdata)
         except (SmachError, ValueError) as error:
-            log.logwarn(f"{self._path}: initial state was not set from remote: {error}")
+            log.logwarn(f"{self.path}: initial state was not set from remote: {error}")
             self._send_status(f"{request}{REFUSED}{error}")
         else:
-            log.loginfo(f"{self._path}: initial state set from remote: {command.initial_states}")
+            log.loginfo(f"{self.path}: initial state set from remote: {command.initial_states}")
             self._send_status(f"{request}{REMOTE_INIT}")
         return True
 
-    def _on_event(self, event: Event) -> None:
-        self._info = type(event).__name__
-        pace = self._pace
-        if pace is not None:
-            pace.mark()
-
     def _update(self) -> None:
         """Send what has changed."""
+        while self._tape is not None and (records := self._tape.read()):
+            self._info = records[-1]["kind"]
         structure = self._describe_structure()
         if self._topics is not None and structure != self._sent.get("structure"):
             self._sent["structure"] = structure
-            self._topics.structure.publish(self._path, structure)
+            self._topics.structure.publish(self.path, structure)
         self._send_status(self._info, only_changes=True)
 
     def _send_status(self, info: str, *, only_changes: bool = False) -> None:
@@ -254,12 +267,12 @@ class ContainerProxy:
         if self._topics is None or (only_changes and status == self._sent.get("status")):
             return
         self._sent["status"] = status
-        self._topics.status.publish(self._path, status | {"info": info})
+        self._topics.status.publish(self.path, status | {"info": info})
 
     def _describe_structure(self) -> dict[str, Any]:
         edges = list(self._container.get_internal_edges())
         return {
-            "path": self._path,
+            "path": self.path,
             "children": list(self._container.get_children()),
             "internal_outcomes": [str(outcome) for outcome, _, _ in edges],
             "outcomes_from": [str(source) for _, source, _ in edges],
@@ -269,7 +282,7 @@ class ContainerProxy:
 
     def _describe_status(self) -> dict[str, Any]:
         return {
-            "path": self._path,
+            "path": self.path,
             "initial_states": list(self._container.get_initial_states()),
             "active_states": list(self._container.get_active_states()),
             "local_data": _describe_userdata(self._container.userdata),
@@ -341,11 +354,18 @@ class IntrospectionServer:
         self.construct(self._server_name, self._state, self._path)
         self._topics = _Topics(self._server_name, node)
         for proxy in self._proxies:
-            proxy.show(self._topics)
+            proxy.show(self._topics, listen=False)
         assert isinstance(self._state, Container)
         if self._controlled:
             self._control = ControlServer(self._server_name, self._state, self._path, node)
-        self._feed = Feed(self._server_name, self._state, self._path, node, control=self._control)
+        self._feed = Feed(
+            self._server_name,
+            self._state,
+            self._path,
+            node,
+            control=self._control,
+            on_paths=self._mark,
+        )
         if self._obey:
             self._commands = Subscriber(
                 self._server_name + INIT_TOPIC,
@@ -385,9 +405,20 @@ class IntrospectionServer:
             proxy.stop()
         self._proxies.clear()
 
+    def _mark(self, kinds: dict[str, str]) -> None:
+        """Let the containers at the paths in `kinds`, and above them, send what has changed."""
+        touched: dict[str, str] = {}
+        for path, kind in kinds.items():
+            while path:
+                touched[path] = kind
+                path = path.rpartition("/")[0]  # noqa: PLW2901  one up
+        for proxy in self._proxies:
+            if proxy.path in touched:
+                proxy.mark(touched[proxy.path])
+
     def _on_command(self, command: Any) -> None:
         if not any(proxy.obey(command) for proxy in self._proxies):
             log.logwarn(
                 f"{self._server_name}: initial state was not set from remote: got path "
-                f"{command.path!r}; expected one of {[p._path for p in self._proxies]}."  # noqa: SLF001
+                f"{command.path!r}; expected one of {[p.path for p in self._proxies]}."
             )

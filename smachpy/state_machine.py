@@ -11,8 +11,9 @@ from smachpy._core.spec import ChildSpec, MachineSpec
 from smachpy._core.validate import machine_problems
 from smachpy._runtime.asker import asking
 from smachpy._runtime.failures import unknown_outcome, user_error
+from smachpy._runtime.frame import HEARING
 from smachpy._runtime.interrupt import Interruption
-from smachpy._runtime.step import End, Step, run_watched
+from smachpy._runtime.step import End, Step, publish_left, publish_raised, run_watched, taping
 from smachpy._runtime.watch import disarm, has_answered
 from smachpy.container import Container
 from smachpy.events import Jumped, OutcomeForced, Preempted
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from smachpy._runtime.step import Following
     from smachpy.introspection import Kind
     from smachpy.state import State, StateOptions
+    from smachpy.tape import Tape
     from smachpy.user_data import UserData
 
 __all__ = ["StateMachine"]
@@ -333,6 +335,13 @@ class StateMachine(Container):
                     following = self._careful(frame, step)
                 else:
                     if run.watched:
+                        tape = taping(frame)
+                        if tape is not None:
+                            following = self._taped(frame, step, tape)
+                            if following.final:
+                                return following
+                            step = following
+                            continue
                         outcome = run_watched(frame, step)
                     else:
                         outcome = step.execute(step.userdata)
@@ -350,7 +359,55 @@ class StateMachine(Container):
         except SmachError:
             raise
         except Exception as error:  # noqa: BLE001  raised again, as what it means
-            self._raise_user_error(frame, step, error)
+            self._raise_user_error(frame, frame.step, error)
+
+    def _taped(self, frame: Frame, step: Step, tape: Tape) -> Following:
+        """Run step after step as `_loop` does while one tape is all that wants to know.
+
+        Returns how the machine goes on when something else comes up. One entry says that a step
+        ended and that the next began, with one look at the clock: there is nothing in between.
+        """
+        run, hearing = frame.run, HEARING
+        heard = hearing.now
+        if self._transition_cbs or run.careful:
+            return step
+        base, now = frame.path, run.clock.now
+        run.flush()
+        tape.put((now(), base, None, None, step))
+        while True:
+            rounds, note = tape.room()
+            for _ in rounds:
+                try:
+                    window = step.watched_userdata(frame) if step.writes else step.userdata
+                    outcome = step.execute(window)
+                except (Exception, Interruption) as error:
+                    publish_raised(frame, error)
+                    raise
+                if (
+                    self._preempt_requested
+                    or frame.told is not None
+                    or step.state._preempt_requested  # noqa: SLF001
+                ):
+                    publish_left(frame, step, outcome)
+                    return self._follow(frame, step, outcome)
+                try:
+                    following: Following = step.next[outcome]
+                except (KeyError, TypeError):
+                    publish_left(frame, step, outcome)
+                    self._raise_bad_outcome(frame, step, outcome)
+                if following.final:
+                    tape.put((now(), base, step, outcome, None))
+                    return following
+                frame.step = following  # first the mark, then the look: see `Container._run`
+                if self._preempt_requested or frame.told is not None or hearing.now is not heard:
+                    frame.step = step
+                    publish_left(frame, step, outcome)
+                    frame.step = following
+                    return following
+                note((now(), base, step, outcome, following))
+                if tape.quiet:
+                    tape.ring()
+                step = following
 
     def _careful(self, frame: Frame, step: Step) -> Following:
         """Run one step with everything that may want to know of it."""

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from smachpy.control import Control
     from smachpy.events import Event
     from smachpy.state import State
+    from smachpy.tape import Tape
 
 
 class Run:
@@ -66,6 +67,36 @@ class Run:
             frame.publish(event)
 
 
+class _Hearing:
+    """Changes when somebody wants to hear, see or steer more or less than before."""
+
+    now = object()
+
+
+HEARING = _Hearing()
+
+
+class Ears:
+    """Who hears the events of a frame, as long as nobody comes or goes.
+
+    Attributes:
+        at: `HEARING.now` then.
+        listeners: Those of the container, then those of the containers above.
+        tapes: Likewise.
+        tape: The only one that hears anything, if it is a tape.
+    """
+
+    __slots__ = ("at", "listeners", "tape", "tapes")
+
+    def __init__(
+        self, at: object, listeners: tuple[Callable[[Event], object], ...], tapes: tuple[Tape, ...]
+    ) -> None:
+        self.at = at
+        self.listeners = listeners
+        self.tapes = tapes
+        self.tape = tapes[0] if len(tapes) == 1 and not listeners else None
+
+
 class Override(NamedTuple):
     """What an operator wants instead of a child's own outcome: another one, or a jump."""
 
@@ -107,6 +138,7 @@ class Frame:
     dead = False
     ended = False
     serviced = False
+    _ears: Ears | None = None
     _path: str | None = None
 
     def __init__(self, container: Container, parent: Frame) -> None:
@@ -139,14 +171,36 @@ class Frame:
 
         A listener that raises is reported to the others and to the log; it hurts nobody.
         """
-        frame: Frame | None = self
-        while frame is not None:
-            for listener in frame.container._listeners:  # noqa: SLF001  one machinery
-                try:
-                    listener(event)
-                except Exception as error:  # noqa: BLE001  a border: reported below
-                    self._listener_failed(listener, error, event)
-            frame = frame.parent
+        ears = self._ears
+        if ears is None or ears.at is not HEARING.now:
+            ears = self.find_ears()
+        if ears.tapes:
+            for tape in ears.tapes:
+                tape.take(event)
+        for listener in ears.listeners:
+            try:
+                listener(event)
+            except Exception as error:  # noqa: BLE001  a border: reported below
+                self._listener_failed(listener, error, event)
+
+    def find_ears(self) -> Ears:
+        """Return who hears the events of this frame now."""
+        at = HEARING.now
+        container, parent = self.container, self.parent
+        above = None
+        if parent is not None:
+            above = parent._ears  # noqa: SLF001  one class
+            if above is None or above.at is not at:
+                above = parent.find_ears()
+        own, tapes = container._listeners, container._tapes  # noqa: SLF001  one machinery
+        for tape in tapes:
+            tape.begin(self.path, self.run.clock)
+        if above is None:
+            above = Ears(at, own, tapes)
+        elif own or tapes:
+            above = Ears(at, own + above.listeners, tapes + above.tapes)
+        self._ears = above
+        return above
 
     def emit(self, kind: Callable[..., Event], *fields: Any) -> None:
         """Publish an event about the state that runs now."""

@@ -61,7 +61,7 @@ def _run_root(
     control = root._control  # noqa: SLF001  one machinery
     if control is not None:
         control.attach(run)
-    if root._listeners:  # noqa: SLF001  one machinery
+    if root._listeners or root._tapes:  # noqa: SLF001  one machinery
         run.watched = True
     if not run.watched:
         return _run_in(root, frame, parent_ud)

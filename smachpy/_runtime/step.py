@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
 
+from smachpy._runtime.frame import HEARING
 from smachpy._runtime.guarded import runner_of
 from smachpy._runtime.interrupt import Interruption
 from smachpy._runtime.watch import note_answer
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
     from smachpy._runtime.frame import Frame
     from smachpy.state import State
+    from smachpy.tape import Tape
     from smachpy.user_data import UserData
 
 
@@ -152,17 +154,40 @@ def run_watched(frame: Frame, step: Step) -> Any:
     try:
         window = step.watched_userdata(frame) if step.writes else step.userdata
         outcome = step.execute(window)
-    except Exception as error:
-        frame.emit(Failed, f"{type(error).__name__}: {error}")
+    except (Exception, Interruption) as error:
+        publish_raised(frame, error)
         raise
-    except Interruption:
+    if frame.told is not None or run.pending or run.control is not None:
+        publish_left(frame, step, outcome)
+    else:
+        frame.publish(_new(Left, (path, clock.now(), clock.time_ns(), outcome)))
+    return outcome
+
+
+def publish_raised(frame: Frame, error: BaseException) -> None:
+    """Publish that the step that runs was ended by `error`."""
+    if isinstance(error, Interruption):
         frame.emit(Left, "preempted")
-        raise
+    else:
+        frame.emit(Failed, f"{type(error).__name__}: {error}")
+
+
+def publish_left(frame: Frame, step: Step, outcome: Any) -> None:
+    """Publish that `step` has just ended, and what goes with it."""
+    run = frame.run
+    clock = run.clock
     if frame.told is not None:
         note_answer(frame, outcome)
     if run.pending:
         run.flush()
-    frame.publish(_new(Left, (path, clock.now(), clock.time_ns(), outcome)))
+    frame.publish(_new(Left, (step.path_in(frame), clock.now(), clock.time_ns(), outcome)))
     if run.control is not None:
         run.control.note_outcome(frame, step, outcome)
-    return outcome
+
+
+def taping(frame: Frame) -> Tape | None:
+    """Return the tape that is the only one to hear the events of `frame`; None if there is none."""
+    ears = frame._ears  # noqa: SLF001  one machinery
+    if ears is None or ears.at is not HEARING.now:
+        ears = frame.find_ears()
+    return ears.tape

@@ -10,24 +10,20 @@ from __future__ import annotations
 
 import itertools
 import json
-import threading
-from collections import deque
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.clock import SerialExecutor, current_clock
 from smachpy import log
-from smachpy.events import to_record
 from smachpy.exceptions import SmachError
 from smachpy.introspection import StateRecord, describe
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Iterable, Iterator
     from typing import Self, TextIO
 
     from smachpy.container import Container
-    from smachpy.events import Event
 
 FORMAT = "smachpy-run"
 VERSION = 1
@@ -98,12 +94,9 @@ class Recorder:
         self._path = Path(path)
         clock = current_clock()
         self._executor = SerialExecutor(clock, f"recording {self._path.name}")
-        self._lock = threading.Lock()
         self._numbers = itertools.count(1)
-        self._waiting: deque[str] = deque()
-        self._scheduled = False
         self._failed = False
-        self.dropped = 0
+        self._unwritten = 0
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
             self._file: TextIO = self._path.open("x", encoding="utf-8")
@@ -115,7 +108,7 @@ class Recorder:
             ) from error
         except OSError as error:
             raise RecordingError(path, f"cannot write: {error.strerror or error}.") from error
-        self._unsubscribe: Callable[[], None] = machine.subscribe(self.on_event)
+        self._tape = machine.tape(self._on_news, limit=WAITING_EVENTS)
 
     def __enter__(self) -> Self:
         return self
@@ -128,8 +121,15 @@ class Recorder:
 
         Blocks: 2 s at most.
         """
-        self._unsubscribe()
-        if not self._executor.join(CLOSE_S) or self._file.closed:
+        self._tape.close()
+        self._on_news()
+        if not self._executor.join(CLOSE_S):
+            log.logwarn(
+                f"recording {str(self._path)!r}: the disk is behind; the end of the run is lost if "
+                "the program ends now."
+            )
+            return
+        if self._file.closed:
             return
         try:
             self._file.close()
@@ -138,33 +138,31 @@ class Recorder:
         if self.dropped:
             log.logwarn(f"recording {str(self._path)!r}: {self.dropped} events were dropped.")
 
-    def on_event(self, event: Event) -> None:
-        """Take one event in."""
-        record = to_record(event)
-        with self._lock:
-            if self._failed or len(self._waiting) >= WAITING_EVENTS:
-                self.dropped += 1
-                return
-            self._waiting.append(event_line(record | {"seq": next(self._numbers)}))
-            scheduled, self._scheduled = self._scheduled, True
-        if not scheduled:
-            self._executor.submit(self._write)
+    @property
+    def dropped(self) -> int:
+        """So many events were not written: the disk hung, or failed."""
+        return self._tape.dropped + self._unwritten
+
+    def _on_news(self) -> None:
+        self._executor.submit(self._write)
 
     def _write(self) -> None:
-        with self._lock:
-            lines = list(self._waiting)
-            self._waiting.clear()
-            self._scheduled = False
-        try:
-            self._file.write("".join(lines))
-            self._file.flush()
-        except OSError as error:
-            self._fail(error)
+        """Write what was taken down, until there is no more."""
+        while records := self._tape.read():
+            if self._failed:
+                self._unwritten += len(records)
+                continue
+            lines = [event_line(one | {"seq": next(self._numbers)}) for one in records]
+            try:
+                self._file.write("".join(lines))
+                self._file.flush()
+            except OSError as error:
+                self._unwritten += len(records)
+                self._fail(error)
 
     def _fail(self, error: OSError) -> None:
-        with self._lock:
-            failed, self._failed = self._failed, True
-        if not failed:
+        if not self._failed:
+            self._failed = True
             log.logerr(f"recording {str(self._path)!r}: ends here: {error.strerror or error}.")
 
 

@@ -11,7 +11,7 @@ from smachpy import CBState, StateMachine, describe
 from viz.live.machines import Machine, Machines
 from viz.runs.html import standalone_page
 from viz.runs.recording import Recorder, RecordingError, find_recordings, read_recording
-from viz.runs.statistics import compare, count, never_taken, quantile
+from viz.runs.statistics import count, never_taken, quantile
 
 
 def make_machine(*, failing=False, extra=False):
@@ -138,18 +138,6 @@ def test_statistics_over_runs(record):
     assert never_taken(runs[0].record, statistics) == []
     assert quantile([], 0.5) is None
     assert quantile([3.0, 1.0, 2.0], 0.5) == 2.0
-
-
-def test_two_versions_compared(record):
-    old, new = (
-        read_recording(record("a.jsonl")),
-        read_recording(record("b.jsonl", extra=True, failing=True)),
-    )
-    difference = compare([old], [new])
-    assert difference.added == ("/EXTRA",)
-    assert difference.removed == ()
-    assert "/FIRST" in difference.changed
-    assert json.dumps(difference.to_json())
 
 
 def test_a_machine_tells_who_comes_late_and_drops_who_is_too_far_behind(record):

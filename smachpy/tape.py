@@ -1,0 +1,219 @@
+"""A machine's events taken down now and read later: the way to hear of it that costs it least.
+
+    tape = machine.tape()
+    machine.execute()
+    for record in tape.read():
+        ...
+
+A listener (`Container.subscribe`) is called at each event and holds the machine up; a tape takes
+half a microsecond for a transition and builds its records when somebody reads them, in another
+thread if you like. Recordings and the feed of viewers are made of it.
+"""
+
+from __future__ import annotations
+
+import threading
+from itertools import repeat
+from typing import TYPE_CHECKING, Any
+
+from smachpy import log
+from smachpy.events import GoalDone, GoalFeedback, GoalSent, UserdataWritten, to_record
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from actionlib_core.clock import Clock
+    from smachpy._runtime.callbacks import Callbacks
+    from smachpy.events import Event
+
+__all__ = ["Tape"]
+
+LONGEST = 100_000
+"""So many entries wait for a reader; an entry is an event, or a transition of two."""
+
+_CHANGING: tuple[type, ...] = (UserdataWritten, GoalSent, GoalFeedback, GoalDone)
+"""Events with values that may change later: they become records at once."""
+
+_NOTHING = (None, None, None)
+_ROUNDS = 256  # so many transitions between two looks at the limit
+_SAME_NS = 1_000_000  # a wall clock that goes back by less than this was only read inexactly
+
+
+_SLOTS = 5
+"""An entry is so many elements of a flat list: a tuple each would cost the machine more than all
+the rest, mostly in Python's garbage collector. `list.extend` with a tuple is one atomic step.
+
+    time [s], path of the container, step that ended or None, its outcome, step that begins or None
+    None, event or record or `_Begin`, None, None, None
+"""
+
+
+class _Begin:
+    """Entry: the tape's machine has this path from here on."""
+
+    __slots__ = ("path",)
+
+    def __init__(self, path: str) -> None:
+        self.path = path
+
+
+class Tape:
+    """The events of a container and of all below it, from now on; made by `Container.tape`.
+
+    Args:
+        machine: The container.
+        on_news: Called when there is something to read, once until `read` has found nothing more;
+            in the thread of the machine, which it holds up: let it wake a thread that reads.
+        limit: So many entries wait at most; when they are not read, the newest are dropped, which
+            `read` shows by a gap in `seq`.
+        name: What to call the machine in the records, "/SM_ROOT"; "" leaves its own path.
+
+    Attributes:
+        dropped: So many events were dropped.
+
+    Threads: the machine's threads write; `read` may be called from any thread, one at a time.
+    """
+
+    def __init__(
+        self,
+        machine: Callbacks,
+        on_news: Callable[[], object] | None = None,
+        *,
+        limit: int = LONGEST,
+        name: str = "",
+    ) -> None:
+        self.dropped = 0
+        self.quiet = True
+        self._entries: list[Any] = []
+        self._lost: list[Any] = []
+        self._most = limit * _SLOTS
+        self.path = ""
+        self._machine = machine
+        self._on_news = on_news
+        self._name = name
+        self._read_path = ""
+        self._lock = threading.Lock()
+        self._seq = 0
+        self._seen_dropped = 0
+        self._clock: Clock | None = None
+        self._offset_ns = 0
+        self._last_ns = 0
+
+    def close(self) -> None:
+        """Take nothing more down; what is there can still be read. A second call does nothing."""
+        self._machine._remove_tape(self)  # noqa: SLF001  one machinery
+
+    def read(self) -> list[dict[str, Any]]:
+        """Return the records (`smachpy.events.to_record`) since the last call, in order.
+
+        Each has `seq`, the number of the event on this tape, from 1; dropped events count too.
+        """
+        with self._lock:
+            found = self._take_all()
+            if not found:
+                self.quiet = True
+                # Whoever writes appends first and looks at `quiet` then: one sees the other.
+                found = self._take_all()
+                if not found:
+                    return []
+                self.quiet = False
+            self._set_clock()
+            places = range(0, len(found), _SLOTS)
+            records = [self._number(record) for at in places for record in self._records(found, at)]
+            self._count_lost()  # those are newer than what was found, as the tape was full
+            self._seq += self.dropped - self._seen_dropped
+            self._seen_dropped = self.dropped
+            return records
+
+    # -- for the machinery ---------------------------------------------------------------------
+
+    def take(self, event: Event) -> None:
+        """Take an event down."""
+        self.put((None, to_record(event) if isinstance(event, _CHANGING) else event, *_NOTHING))
+
+    def put(self, entry: tuple[Any, ...]) -> None:
+        """Append an entry, see `_SLOTS`, and say so."""
+        (self._lost if len(self._entries) >= self._most else self._entries).extend(entry)
+        if self.quiet:
+            self.ring()
+
+    def room(self) -> tuple[Iterator[None], Callable[[tuple[Any, ...]], object]]:
+        """Return how often to append before asking again, and what to append with."""
+        free = (self._most - len(self._entries)) // _SLOTS
+        if free > 0:
+            return repeat(None, min(free, _ROUNDS)), self._entries.extend
+        with self._lock:
+            self._count_lost()
+        return repeat(None, _ROUNDS), self._lost.extend
+
+    def ring(self) -> None:
+        """Say that there is something to read."""
+        self.quiet = False
+        if self._on_news is not None:
+            try:
+                self._on_news()
+            except Exception as error:  # noqa: BLE001  a border: reported, the machine goes on
+                log.log_exception(f"tape of {self.path}: on_news raised {error!r}", error)
+
+    def begin(self, path: str, clock: Clock) -> None:
+        """Note where the machine runs and by which clock."""
+        self._clock = clock
+        if path != self.path:
+            self.path = path
+            self._entries.extend((None, _Begin(path), *_NOTHING))
+
+    # -- reading -------------------------------------------------------------------------------
+
+    def _set_clock(self) -> None:
+        """Find out how wall time follows from the clock's monotonic time now."""
+        clock = self._clock
+        if clock is None:
+            return
+        tries = []
+        for _ in range(3):
+            before, stamp, after = clock.now(), clock.time_ns(), clock.now()
+            tries.append((after - before, stamp - round((before + after) / 2 * 1e9)))
+        _, self._offset_ns = min(tries)
+
+    def _stamp_of(self, t: float) -> int:
+        stamp = self._offset_ns + round(t * 1e9)
+        return self._last_ns if 0 < self._last_ns - stamp < _SAME_NS else stamp
+
+    def _take_all(self) -> list[Any]:
+        entries = self._entries
+        found = entries[:]
+        del entries[: len(found)]
+        return found
+
+    def _count_lost(self) -> None:
+        """Count the events that there was no room for; with the lock held."""
+        lost = self._lost
+        found = lost[:]
+        del lost[: len(found)]
+        ended, begun = found[2::_SLOTS], found[4::_SLOTS]
+        events = found[0::_SLOTS].count(None)
+        self.dropped += len(ended) - ended.count(None) + len(begun) - begun.count(None) + events
+
+    def _records(self, found: list[Any], at: int) -> Iterator[dict[str, Any]]:
+        t, what, left, outcome, entered = found[at : at + _SLOTS]
+        if t is None:
+            if isinstance(what, _Begin):
+                self._read_path = what.path
+            else:
+                yield what if type(what) is dict else to_record(what)
+            return
+        stamp = self._stamp_of(t)
+        if left is not None:
+            path = f"{what}/{left.label}"
+            yield {"kind": "Left", "path": path, "t": t, "stamp_ns": stamp, "outcome": outcome}
+        if entered is not None:
+            path = f"{what}/{entered.label}"
+            yield {"kind": "Entered", "path": path, "t": t, "stamp_ns": stamp}
+
+    def _number(self, record: dict[str, Any]) -> dict[str, Any]:
+        self._seq += 1
+        record["seq"] = self._seq
+        self._last_ns = record["stamp_ns"]
+        if self._name:
+            record["path"] = self._name + record["path"].removeprefix(self._read_path)
+        return record

@@ -1,0 +1,319 @@
+"""Tapes: what they take down is what a listener hears, whatever happens, and costs no more."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import smachpy
+from actionlib_core.clock import RealClock, VirtualClock, use_clock
+from smachpy import Concurrence, Iterator, State, StateMachine
+from smachpy.events import to_record
+
+
+class Work(State):
+    def __init__(self, seconds=1.0, outcome="ok"):
+        super().__init__([outcome, "preempted"], output_keys=["who"])
+        self.seconds = seconds
+        self.outcome = outcome
+
+    def execute(self, userdata):
+        userdata.who = self.outcome
+        if self.sleep(self.seconds):
+            self.service_preempt()
+            return "preempted"
+        return self.outcome
+
+
+class Quick(State):
+    def __init__(self, *outcomes):
+        super().__init__(outcomes or ["ok"])
+
+    def execute(self, userdata):
+        return self.get_registered_outcomes()[0]
+
+
+def mission():
+    inner = StateMachine(["done", "preempted"])
+    with inner:
+        StateMachine.add("A", Work(1.0), {"ok": "B"})
+        StateMachine.add("B", Quick(), {"ok": "C"})
+        StateMachine.add("C", Quick(), {"ok": "done"})
+    loop = Iterator(["done", "preempted"], [], [], it=range(3), exhausted_outcome="done")
+    with loop:
+        Iterator.set_contained_state("EACH", Work(0.5), loop_outcomes=["ok"])
+    both = Concurrence(["done", "preempted"], "done")
+    with both:
+        Concurrence.add("INNER", inner)
+        Concurrence.add("LOOP", loop)
+    sm = StateMachine(["done", "preempted"], name="M")
+    with sm:
+        StateMachine.add("FIRST", Work(1.0), {"ok": "Q1", "preempted": "STOP"})
+        StateMachine.add("Q1", Quick(), {"ok": "BOTH"})
+        StateMachine.add("BOTH", both, {"done": "LAST"})
+        StateMachine.add("LAST", Work(1.0), {"ok": "done"})
+        StateMachine.add("STOP", Quick(), {"ok": "done"})
+    return sm
+
+
+def without_seq(records):
+    return [{key: value for key, value in one.items() if key != "seq"} for one in records]
+
+
+def story(listen, act, *, seed=None, make=mission):
+    """Run a machine while `act(clock, machine)` happens; return what was heard or taken down."""
+    with VirtualClock(seed) as clock, use_clock(clock):
+        sm = make()
+        heard = []
+        if listen:
+            sm.subscribe(lambda event: heard.append(json.loads(json.dumps(to_record(event)))))
+        else:
+            tape = sm.tape()
+        act(clock, sm)
+        sm.execute()
+        return heard if listen else json.loads(json.dumps(without_seq(tape.read())))
+
+
+def both_ways(act, **how):
+    taken, heard = story(False, act, **how), story(True, act, **how)
+    assert taken == heard
+    return taken
+
+
+def test_a_whole_run():
+    records = both_ways(lambda clock, sm: None)
+    assert [r["kind"] for r in records[:3]] == ["Started", "Entered", "UserdataWritten"]
+    assert records[-1]["kind"] == "Finished"
+
+
+@pytest.mark.parametrize("seed", [None, 1, 2, 3])
+@pytest.mark.parametrize("at", [i * 0.25 for i in range(17)])
+def test_a_preempt_at_any_instant(at, seed):
+    both_ways(lambda clock, sm: clock.call_later(at, sm.request_preempt), seed=seed)
+
+
+@pytest.mark.parametrize("at", [0.25, 1.25, 2.25])
+def test_an_operator_at_any_instant(at):
+    def act(clock, sm):
+        clock.call_later(at, sm.control.pause)
+        clock.call_later(at + 3.0, sm.control.step)
+        clock.call_later(at + 6.0, sm.control.resume)
+
+    records = both_ways(act)
+    assert "Paused" in {record["kind"] for record in records}
+
+
+@pytest.mark.parametrize("what", ["raises", "unknown", "preempt in callback", "breakpoint"])
+def test_trouble(what):
+    def make():
+        class Bad(Quick):
+            def execute(self, userdata):
+                if what == "raises":
+                    raise ValueError("motor")
+                if what == "preempt in callback":
+                    sm.request_preempt()
+                return "nowhere" if what == "unknown" else "ok"
+
+        sm = StateMachine(["ok", "preempted"], name="M")
+        with sm:
+            StateMachine.add("A", Quick(), {"ok": "B"})
+            StateMachine.add("B", Bad(), {"ok": "C"})
+            StateMachine.add("C", Quick())
+        return sm
+
+    def act(clock, sm):
+        if what == "breakpoint":
+            sm.control.add_breakpoint("/M/B", "ok")
+            clock.call_later(1.0, sm.control.resume)
+        inner = sm.execute
+
+        def execute():
+            try:
+                return inner()
+            except smachpy.SmachError:
+                return None
+
+        sm.execute = execute
+
+    records = both_ways(act, make=make)
+    kinds = [record["kind"] for record in records]
+    assert kinds[-1] == "Finished"
+    assert ("Failed" in kinds) == (what == "raises")
+
+
+ACTS = st.lists(
+    st.tuples(
+        st.sampled_from(
+            ["preempt", "pause", "step", "resume", "jump", "force", "listen", "forget"]
+        ),
+        st.integers(0, 16).map(lambda n: n * 0.25),
+    ),
+    max_size=6,
+)
+
+
+@settings(max_examples=60)
+@given(ACTS, st.integers(0, 1000))
+def test_whatever_happens_a_second_tape_and_a_listener_agree(acts, seed):
+    """Listeners that come and go change the way that events are taken down, not the events."""
+    with VirtualClock(seed) as clock, use_clock(clock):
+        sm = mission()
+        tape = sm.tape()
+        forget = []
+
+        def do(what):
+            try:
+                if what == "preempt":
+                    sm.request_preempt()
+                elif what == "jump":
+                    sm.control.jump("/M/LAST")
+                elif what == "force":
+                    sm.control.force_outcome("/M/FIRST", "ok")
+                elif what == "listen":
+                    forget.append(sm.subscribe(lambda event: None))
+                elif what == "forget":
+                    forget.pop()() if forget else None
+                else:
+                    getattr(sm.control, what)()
+            except smachpy.SmachError:
+                return
+
+        for what, at in acts:
+            clock.call_later(at, lambda what=what: do(what))
+        clock.call_later(30.0, sm.control.resume)
+        outcome = sm.execute()
+        records = tape.read()
+    assert [record["seq"] for record in records] == list(range(1, len(records) + 1))
+    assert records[-1]["outcome"] == outcome
+    active = []
+    for record in records:
+        if record["kind"] in ("Entered", "Started"):
+            active.append(record["path"])
+        elif record["kind"] in ("Left", "Finished"):
+            active.remove(record["path"])
+    assert active == []
+    times = [record["t"] for record in records]
+    assert times == sorted(times)
+
+
+def ring(rounds, outcome="ok"):
+    class Last(State):
+        def __init__(self):
+            super().__init__(["again", "ok"])
+            self.left = rounds
+
+        def execute(self, userdata):
+            self.left -= 1
+            return "again" if self.left else outcome
+
+    sm = StateMachine(["ok"], name="R")
+    with sm:
+        StateMachine.add("A", Quick(), {"ok": "B"})
+        StateMachine.add("B", Last(), {"again": "A"})
+    return sm
+
+
+def test_who_does_not_read_loses_the_newest_and_sees_it(clock):
+    sm = ring(1000)
+    tape = sm.tape(limit=100)
+    sm.execute()
+    first = tape.read()
+    assert [record["seq"] for record in first] == list(range(1, len(first) + 1))
+    assert 100 <= len(first) <= 200
+    assert tape.dropped + len(first) == 2 + 4 * 1000
+    sm["B"].left = 1
+    sm.execute()
+    assert tape.read()[0]["seq"] == first[-1]["seq"] + tape.dropped + 1
+
+
+def test_news_are_told_once_until_everything_is_read(clock):
+    told = []
+    sm = ring(3)
+    tape = sm.tape(lambda: told.append(len(told)))
+    sm.execute()
+    assert told == [0]
+    assert tape.read()
+    assert tape.read() == []
+    sm["B"].left = 1
+    sm.execute()
+    assert told == [0, 1]
+
+
+def test_a_reader_that_cannot_be_told_hurts_nobody(clock, caplog):
+    sm = ring(1)
+    tape = sm.tape(lambda: 1 / 0)
+    assert sm.execute() == "ok"
+    assert len(tape.read()) == 6
+    assert "on_news" in caplog.text
+
+
+def test_a_closed_tape_takes_nothing_down(clock):
+    sm = ring(1)
+    tape = sm.tape()
+    tape.close()
+    tape.close()
+    sm.execute()
+    assert tape.read() == []
+
+
+def test_a_tape_of_a_part_and_under_another_name(clock):
+    sm = mission()
+    part = sm["BOTH"]["INNER"].tape(name="/SHOWN")
+    whole = sm.tape(name="/ROBOT/M")
+    sm.execute()
+    paths = {record["path"] for record in part.read()}
+    assert paths == {"/SHOWN/A", "/SHOWN/B", "/SHOWN/C"}
+    assert "/ROBOT/M/BOTH/INNER/A" in {record["path"] for record in whole.read()}
+
+
+def test_a_value_is_taken_down_as_it_was_then(clock):
+    class Writes(State):
+        def __init__(self):
+            super().__init__(["ok"], output_keys=["found"])
+
+        def execute(self, userdata):
+            found = [1]
+            userdata.found = found
+            found.append(2)
+            return "ok"
+
+    sm = StateMachine(["ok"])
+    sm.add("A", Writes())
+    tape = sm.tape()
+    sm.execute()
+    (written,) = [r for r in tape.read() if r["kind"] == "UserdataWritten"]
+    assert written["value"] == [1]
+
+
+def test_times_are_those_of_the_computer():
+    with use_clock(RealClock()) as clock:
+        sm = mission_of_quick_states()
+        tape = sm.tape()
+        before = clock.now(), clock.time_ns()
+        sm.execute()
+        records = tape.read()
+        after = clock.now(), clock.time_ns()
+    assert [r["t"] for r in records] == sorted(r["t"] for r in records)
+    stamps = [r["stamp_ns"] for r in records]
+    assert stamps == sorted(stamps)
+    assert before[0] <= records[0]["t"] <= records[-1]["t"] <= after[0]
+    assert before[1] - 1_000_000 <= stamps[0] <= stamps[-1] <= after[1] + 1_000_000
+
+
+def mission_of_quick_states():
+    sm = StateMachine(["ok"], name="M")
+    with sm:
+        StateMachine.add("A", Quick(), {"ok": "B"})
+        StateMachine.add("B", Quick(), {"ok": "C"})
+        StateMachine.add("C", Quick())
+    return sm
+
+
+def test_two_tapes_hear_the_same(clock):
+    sm = mission()
+    one, two = sm.tape(), sm.tape()
+    sm.execute()
+    assert one.read() == two.read()
