@@ -104,6 +104,20 @@ class RecoveryConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class ScanConfig:
+    """The laser scanner, in the middle of the robot."""
+
+    rate: float = _quantity(5.0, "Hz", "Scans a second, while somebody listens.", above=0, high=50)
+    rays: int = _count(271, "Rays of a scan.", low=2, high=10_000)
+    field: float = _quantity(
+        4.712389, "rad", "Angle from the first ray to the last.", above=0, high=6.2832
+    )
+    range_min: float = _quantity(0.05, "m", "Nearer than this it sees nothing.", low=0, high=10)
+    range_max: float = _quantity(8.0, "m", "Nor farther than this.", above=0, high=100)
+    noise: float = _quantity(0.0, "m", "Standard deviation of a range.", low=0, high=1)
+
+
+@dataclass(frozen=True, slots=True)
 class BatteryConfig:
     """The battery and the charger of the dock."""
 
@@ -129,6 +143,7 @@ class SimConfig:
     planner: PlannerConfig = PlannerConfig()
     control: ControlConfig = ControlConfig()
     recovery: RecoveryConfig = RecoveryConfig()
+    scan: ScanConfig = ScanConfig()
     battery: BatteryConfig = BatteryConfig()
     start: Pose2D = ORIGIN
     dock: Pose2D | None = None
@@ -147,6 +162,7 @@ def load_config(path: Path) -> SimConfig:
         planner=_read(top.section("planner"), PlannerConfig),
         control=_read(top.section("control"), ControlConfig),
         recovery=_read(top.section("recovery"), RecoveryConfig),
+        scan=_read(top.section("scan"), ScanConfig),
         battery=_read(top.section("battery"), BatteryConfig),
         start=read_pose(top.section("start")) if "start" in top else ORIGIN,
         dock=read_pose(top.section("dock")) if "dock" in top else None,

@@ -85,10 +85,11 @@ def cast_at(things: Iterable[Thing], x: float, y: float, bearings: Floats) -> Fl
     nearest = np.full(bearings.shape, np.inf)
     for thing in things:
         for disc in _discs(thing):
-            np.minimum(nearest, _meet_disc(disc.x - x, disc.y - y, disc.radius, ux, uy), nearest)
+            met = _meet_disc(disc.x - x, disc.y - y, disc.radius, ux, uy)
+            nearest = np.minimum(nearest, met)
         if isinstance(thing, Bar):
             for end in _sides(thing):
-                np.minimum(nearest, _meet_line(end, x, y, ux, uy), nearest)
+                nearest = np.minimum(nearest, _meet_line(end, x, y, ux, uy))
             if thing.gap(x, y) <= 0.0:
                 nearest[:] = 0.0
     return nearest

@@ -19,7 +19,7 @@ from actionlib_core.interfaces.geometry_msgs.msg import (
 )
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseFeedback
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
-from actionlib_core.interfaces.sensor_msgs.msg import BatteryState
+from actionlib_core.interfaces.sensor_msgs.msg import BatteryState, LaserScan
 from actionlib_core.interfaces.std_msgs.msg import Header
 from actionlib_core.interfaces.std_srvs.srv import Empty, EmptyResponse
 from actionlib_core.node import get_node
@@ -32,6 +32,7 @@ from missions.interfaces import ChargeAction, ChargeFeedback, ChargeResult
 from missions.move_base.geometry import Pose2D, quaternion_of, yaw_of
 from missions.move_base.navigation import STOP
 from missions.move_base.pilot import Pilot
+from missions.move_base.scanner import Scanner
 from missions.move_base.stepper import Stepper
 from missions.move_base.world import AT_DOCK
 
@@ -81,7 +82,8 @@ class RobotServer:
             self._clock, rate=control.rate, reports=control.feedback_rate
         )
         self._report_period = 1.0 / control.feedback_rate
-        self._reported = self._battery_told = -math.inf
+        self._reported = self._battery_told = self._scanned = -math.inf
+        self._scanner = Scanner(robot)
         self._moved = False
         self._closing = self._clock.event("the robot closes")
         self._wake = self._clock.event("the end of the drive")
@@ -89,6 +91,7 @@ class RobotServer:
         self._parts: list[Publisher | Subscriber[Twist] | Service] = []
         self._odom = Publisher("odom", Odometry, latch=True, node=self._node)
         self._battery = Publisher("battery", BatteryState, latch=True, node=self._node)
+        self._scan = Publisher("scan", LaserScan, node=self._node)
         self._move = SimpleActionServer(
             "move_base", MoveBaseAction, self._drive, auto_start=False, node=self._node
         )
@@ -114,6 +117,7 @@ class RobotServer:
         self._parts = [
             self._odom,
             self._battery,
+            self._scan,
             Subscriber("cmd_vel", Twist, self._on_cmd_vel, queue_size=1, node=self._node),
             Service("move_base/clear_costmaps", Empty, self._on_clear, node=self._node),
         ]
@@ -150,13 +154,14 @@ class RobotServer:
     # -- steps: the stepper's thread -----------------------------------------------------------
 
     def is_busy(self, now: float) -> bool:
-        """Tell whether the robot moves or is to move."""
-        return self._pilot.is_busy(now)
+        """Tell whether the robot moves, is to move, or looks about for somebody."""
+        return self._pilot.is_busy(now) or self._scan.get_num_connections() > 0
 
     def step(self, now: float, dt: float) -> None:
         """Drive for `dt` seconds."""
-        self._moved = True
-        self._pilot.step(now, dt)
+        if self._pilot.is_busy(now):
+            self._moved = True
+            self._pilot.step(now, dt)
 
     def report(self, now: float) -> None:
         """Send feedback, odometry and battery where they are due; tell what has ended."""
@@ -166,11 +171,35 @@ class RobotServer:
             self._publish_feedback()
             if self._odom.get_num_connections() or self._robot.body.standing:
                 self._publish_odometry()
+        self._report_scan(now)
         self._report_battery(now)
         with self._stepper.lock:
             ended = self._pilot.take_ends()
         for tell in ended:
             tell()
+
+    def _report_scan(self, now: float) -> None:
+        """Publish a scan when it is due and somebody listens."""
+        config = self._robot.config.scan
+        if now - self._scanned < 1.0 / config.rate - _JUST_PAST:
+            return
+        if not self._scan.get_num_connections():
+            return
+        self._scanned = now
+        with self._stepper.lock:
+            ranges = self._scanner.scan()
+        self._scan.publish(
+            LaserScan(
+                header=self._header(BASE_FRAME),
+                angle_min=self._scanner.first,
+                angle_max=-self._scanner.first,
+                angle_increment=self._scanner.step,
+                scan_time=1.0 / config.rate,
+                range_min=config.range_min,
+                range_max=config.range_max,
+                ranges=ranges,
+            )
+        )
 
     # -- by hand -------------------------------------------------------------------------------
 
