@@ -15,6 +15,7 @@ from smachpy.events import Abandoned, Finished, PreemptRequested
 from smachpy.exceptions import SmachError
 from smachpy.introspection import describe
 from smachpy.testing._core.search import Choice, Search
+from smachpy.testing._core.values import Snapshot
 from smachpy.testing.action_choices import serve_actions
 from smachpy.testing.doubles import Places
 from smachpy.testing.explorers import Explorer, Options, kept_by
@@ -239,7 +240,7 @@ class _Runner:
         self.real_actions = real_actions
         self._places = Places()
         self._machine: Container | None = None
-        self._snapshot: list[tuple[Container, dict[str, Any]]] = []
+        self._snapshot: list[tuple[Container, Snapshot]] = []
         self._around = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
@@ -263,7 +264,10 @@ class _Runner:
         machine = source if isinstance(source, Container) else source()
         self._machine = machine
         self.explorer = Explorer(machine, self.options)
-        self._snapshot = [(c, dict(c.userdata._data)) for c in _containers(machine)]  # noqa: SLF001
+        self._snapshot = [
+            (container, Snapshot(dict(container.userdata._data)))  # noqa: SLF001  one house
+            for container in _containers(machine)
+        ]
         named = kept_by(self.keep)
 
         def kept(path: str, state: Any) -> bool:
@@ -274,7 +278,7 @@ class _Runner:
     def _restore_userdata(self) -> None:
         for container, data in self._snapshot:
             container.userdata._data.clear()  # noqa: SLF001  one house
-            container.userdata._data.update(copy.deepcopy(data))  # noqa: SLF001
+            container.userdata._data.update(data.copy())  # noqa: SLF001
 
     def run(self, told: Sequence[int | str]) -> tuple[Run, Exception | None]:
         """Run once; what it raised comes back with the run."""

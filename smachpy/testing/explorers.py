@@ -10,6 +10,7 @@ from smachpy.container import Container
 from smachpy.events import Entered, Iterated, Left
 from smachpy.introspection import describe
 from smachpy.testing._core.search import Choice
+from smachpy.testing._core.values import Values
 from smachpy.testing.doubles import Double, Places
 
 if TYPE_CHECKING:
@@ -75,6 +76,7 @@ class Explorer:
         self._options = options
         self.now: Callable[[], float] = float
         self._told: Sequence[int | str] = ()
+        self._values = Values()
         self.begin(())
 
     def begin(self, told: Sequence[int | str]) -> None:
@@ -158,7 +160,7 @@ class Explorer:
                 )
             ),
             tuple(sorted((p, i) for p, i in self._items.items() if p in running)),
-            _userdata(self._root),
+            _userdata(self._root, self._values),
         )
 
     # -- doubles -------------------------------------------------------------------------------
@@ -250,12 +252,12 @@ class Explorer:
             self._root.request_preempt()
 
 
-def _userdata(container: Container) -> Hashable:
+def _userdata(container: Container, values: Values) -> Hashable:
     """Return the userdata of a container and of all below it, to be compared."""
     data = container.userdata
-    own = tuple((key, repr(data[key])) for key in sorted(data.keys()))
+    own = tuple((key, values.comparable(data[key])) for key in sorted(data.keys()))
     inner = tuple(
-        _userdata(child)
+        _userdata(child, values)
         for child in container.get_children().values()
         if isinstance(child, Container)
     )
