@@ -10,6 +10,8 @@ from smachpy.cli import UsageError
 
 if TYPE_CHECKING:
     from smachpy.introspection import StateRecord
+    from viz.model import Marks
+    from viz.runs.statistics import Statistics
 
 FORMATS = "svg, png, pdf, dot, json, mmd or txt"
 EXAMPLES = """examples:
@@ -17,6 +19,7 @@ EXAMPLES = """examples:
   smachpy render my_robot.missions:deliver -o deliver.png --theme dark --depth 2
   smachpy render mission.py -o - --active /MISSION/DRIVE > mission.svg
   smachpy render mission.py --atlas pages/
+  smachpy render patrol -o patrol.svg --runs runs/    with the numbers of recorded runs
 """
 
 
@@ -56,6 +59,19 @@ def register_render(
     parser.add_argument(
         "--atlas", metavar="DIR", help="one linked SVG page per container, from index.svg"
     )
+    parser.add_argument(
+        "--runs",
+        metavar="FILE|DIR",
+        action="append",
+        default=[],
+        help="recorded runs (`smachpy run --record`): counts, shares, times and heat",
+    )
+    parser.add_argument(
+        "--heat",
+        choices=("time", "failures"),
+        default="time",
+        help="what colours the states of --runs (default: %(default)s)",
+    )
     parser.set_defaults(run=_run)
 
 
@@ -73,8 +89,10 @@ def _run(args: argparse.Namespace) -> int:
             "smachpy render: got neither -o nor --atlas; expected where to draw. "
             f"Try -o {Path(args.target).stem or 'machine'}.svg"
         )
-    record = _record(args.target)
+    record = read_record(args.target)
     looks = {"theme": args.theme, "show_implicit": args.show_implicit}
+    if args.runs:
+        looks |= {"run": _runs(args, record), "legend": _legend(args, record)}
     if args.atlas:
         part = extract.find(record, args.path) if args.path else record
         print(drawing.atlas(part, args.atlas, **looks))
@@ -89,8 +107,44 @@ def _run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _record(text: str) -> StateRecord:
-    """The record of a machine that can be loaded, or one that was written down."""
+def _statistics(args: argparse.Namespace, record: StateRecord) -> Statistics:
+    from viz.runs.statistics import StatisticsOfFiles
+
+    counted = StatisticsOfFiles(args.runs).counted()
+    if record.label not in counted:
+        there = ", ".join(map(repr, counted)) or "no recordings"
+        raise UsageError(
+            f"smachpy render: --runs: got runs of {there}; expected some of {record.label!r}. "
+            f"Try: smachpy run {args.target} --record {args.runs[0]}/1.jsonl"
+        )
+    return counted[record.label]
+
+
+def _runs(args: argparse.Namespace, record: StateRecord) -> Marks:
+    from viz.runs.statistics import marks_of
+
+    return marks_of(_statistics(args, record), record, heat=args.heat)
+
+
+def _legend(args: argparse.Namespace, record: StateRecord) -> tuple[tuple[str, str], ...]:
+    """What the numbers and colours of recorded runs mean, for the picture."""
+    found = _statistics(args, record)
+    ends = ", ".join(f"{outcome} \u00d7{n}" for outcome, n in found.outcomes.items())
+    words = {"time": "the longer in all", "failures": "the more failed"}[args.heat]
+    return (
+        ("", f"{found.runs} runs: {ends or 'none has ended'}"),
+        ("heat", f"the warmer, {words}"),
+        ("", "\u00d7: visits, then their median time"),
+    )
+
+
+def read_record(text: str) -> StateRecord:
+    """Return the record of a machine that can be loaded, or one that was written down.
+
+    Raises:
+        UsageError: there is no such file, or it is no record.
+        SmachError: the target cannot be loaded.
+    """
     from smachpy.introspection import StateRecord, describe
     from smachpy.targets import load_target
 
@@ -101,6 +155,6 @@ def _record(text: str) -> StateRecord:
         return StateRecord.from_json(Path(text).read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise UsageError(
-            f"smachpy render: {text!r}: got {error}; expected a record that "
+            f"{text!r}: got {error}; expected a record that "
             "`smachpy render TARGET -o FILE.json` wrote."
         ) from error

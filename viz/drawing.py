@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import secrets
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 SHARP = 144
 """Dots per inch of a PNG."""
+_DRAWN: tuple[engine.Format, ...] = ("svg", "png", "pdf")
 MOST_PIXELS = 16000
 """Longest side of a PNG."""
 
@@ -44,11 +45,13 @@ class Look:
         theme: `light` or `dark`.
         depth: Container levels to open; None opens as many as stay readable.
         show_implicit: Draw the transitions nobody wrote down as well.
+        legend: What signs mean, beside the title.
     """
 
     theme: str = "light"
     depth: int | None = None
     show_implicit: bool = False
+    legend: tuple[tuple[str, str], ...] = ()
 
 
 def render(
@@ -59,8 +62,9 @@ def render(
     depth: int | None = None,
     path: str | None = None,
     active: Iterable[str] = (),
-    run: History | Iterable[Event] | None = None,
+    run: History | Iterable[Event] | Marks | None = None,
     show_implicit: bool = False,
+    legend: tuple[tuple[str, str], ...] = (),
 ) -> Path:
     """Draw a machine into a file.
 
@@ -71,8 +75,10 @@ def render(
         depth: Container levels to open; None opens as many as stay readable (60 states).
         path: Draw only the container at this path.
         active: Paths of states to mark as running.
-        run: The history or the events of a run, whose states and transitions are marked.
+        run: The history or the events of a run, whose states and transitions are marked; or the
+            marks of many (`viz.runs.statistics.marks_of`).
         show_implicit: Draw the transitions nobody wrote down as well.
+        legend: What signs mean, beside the title (`viz.model.Diagram`).
 
     Returns:
         The file.
@@ -94,6 +100,7 @@ def render(
         active=active,
         run=run,
         show_implicit=show_implicit,
+        legend=legend,
     )
     _write(target, content)
     return target
@@ -107,8 +114,9 @@ def picture(
     depth: int | None = None,
     path: str | None = None,
     active: Iterable[str] = (),
-    run: History | Iterable[Event] | None = None,
+    run: History | Iterable[Event] | Marks | None = None,
     show_implicit: bool = False,
+    legend: tuple[tuple[str, str], ...] = (),
 ) -> bytes:
     """Return what `render` would write into a file of the format `form`.
 
@@ -116,13 +124,39 @@ def picture(
     """
     whole = machine if isinstance(machine, StateRecord) else describe(machine)
     record = whole if path is None else extract.find(whole, path)
-    look = Look(theme, depth, show_implicit)
+    look = Look(theme, depth, show_implicit, legend)
     make = _FORMS.get(form)
     if make is None:
         raise PictureError(
             f"picture: format: got {form!r}; expected one of {', '.join(sorted(_FORMS))}."
         )
     return make(record, look, _marks(whole, active, run))
+
+
+def draw(diagram: Diagram, form: str, *, theme: str = "light") -> bytes:
+    """Return a picture of a diagram that somebody has made: svg, png, pdf or dot.
+
+    Raises, Blocks: as `render`.
+    """
+    if form in {"dot", "gv"}:
+        colours = _theme(theme)
+        return dot.dot_text(graph.draw(diagram, colours), colours).encode("utf-8", "replace")
+    if form not in _DRAWN:
+        raise PictureError(
+            f"picture: format: got {form!r}; expected one of {', '.join((*_DRAWN, 'dot'))}."
+        )
+    return _draw(diagram, form, theme)
+
+
+def write(content: bytes, file: str | os.PathLike[str]) -> Path:
+    """Write a picture into a file, whole or not at all.
+
+    Raises:
+        PictureError: it cannot be written.
+    """
+    target = Path(file)
+    _write(target, content)
+    return target
 
 
 def svg(machine: State | StateRecord) -> str:
@@ -135,8 +169,9 @@ def atlas(
     folder: str | os.PathLike[str],
     *,
     theme: str = "light",
-    run: History | Iterable[Event] | None = None,
+    run: History | Iterable[Event] | Marks | None = None,
     show_implicit: bool = False,
+    legend: tuple[tuple[str, str], ...] = (),
 ) -> Path:
     """Draw one SVG page per container into `folder`, each state linked to its own page.
 
@@ -158,7 +193,8 @@ def atlas(
         links = {path: names[path] for path in (c.path for c in state.children) if path in names}
         if state.path in above:
             links[state.path] = names[above[state.path]]
-        pages.append(graph.draw(Diagram(node, marks, links), colours))
+        shown = legend if state is record else ()
+        pages.append(graph.draw(Diagram(node, marks, links, shown), colours))
     geometries = engine.lay_out(partial(layout.compose_all, pages, colours))
     texts = [dot.dot_text(p, colours, g) for p, g in zip(pages, geometries, strict=True)]
     place = Path(folder)
@@ -168,20 +204,25 @@ def atlas(
 
 
 def _marks(
-    record: StateRecord, active: Iterable[str], run: History | Iterable[Event] | None
+    record: StateRecord, active: Iterable[str], run: History | Iterable[Event] | Marks | None
 ) -> Marks:
-    history = run if isinstance(run, History) else History()
-    if run is not None and not isinstance(run, History):
-        for event in run:
-            history.on_event(event)
-    marks = history.marks()
+    marks = run if isinstance(run, Marks) else _history(run).marks()
     named = {extract.find(record, path).path for path in active}
     paths = {
         state.path
         for state in record.walk()
         if any(path == state.path or path.startswith(state.path + "/") for path in named)
     }
-    return Marks(marks.active | paths, marks.visits, marks.last, marks.taken)
+    return replace(marks, active=marks.active | paths)
+
+
+def _history(run: History | Iterable[Event] | None) -> History:
+    if isinstance(run, History):
+        return run
+    history = History()
+    for event in run or ():
+        history.on_event(event)
+    return history
 
 
 def _theme(name: str) -> Theme:
@@ -196,13 +237,18 @@ def _node(record: StateRecord, look: Look) -> Node:
 
 def _drawn(form: engine.Format) -> Callable[[StateRecord, Look, Marks], bytes]:
     def make(record: StateRecord, look: Look, marks: Marks) -> bytes:
-        colours = _theme(look.theme)
-        pieces = graph.draw(Diagram(_node(record, look), marks), colours)
-        places = engine.lay_out(partial(layout.compose, pieces, colours))
-        text = dot.dot_text(pieces, colours, places)
-        return engine.draw(text, form, dots_per_inch=_resolution(places))
+        diagram = Diagram(_node(record, look), marks, legend=look.legend)
+        return _draw(diagram, form, look.theme)
 
     return make
+
+
+def _draw(diagram: Diagram, form: engine.Format, theme: str) -> bytes:
+    colours = _theme(theme)
+    pieces = graph.draw(diagram, colours)
+    places = engine.lay_out(partial(layout.compose, pieces, colours))
+    text = dot.dot_text(pieces, colours, places)
+    return engine.draw(text, form, dots_per_inch=_resolution(places))
 
 
 def _resolution(places: layout.Geometry) -> int:
@@ -213,7 +259,7 @@ def _resolution(places: layout.Geometry) -> int:
 
 def _dot(record: StateRecord, look: Look, marks: Marks) -> bytes:
     colours = _theme(look.theme)
-    pieces = graph.draw(Diagram(_node(record, look), marks), colours)
+    pieces = graph.draw(Diagram(_node(record, look), marks, legend=look.legend), colours)
     return dot.dot_text(pieces, colours).encode("utf-8", "replace")
 
 

@@ -13,10 +13,14 @@ from typing import TYPE_CHECKING
 from viz import style
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from viz.model import Diagram, Edge, Node, Rule
     from viz.theme import Theme
+
+
+SURE = 0.995
+"""A share from which on it is not worth a number."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +181,8 @@ class _Interior:
                 counts={o: self._marks.taken.get((path, o), 0) for o in outcomes},
                 labelled=source.entry is None and not same_name,
                 implicit=edge.implicit,
+                change=edge.change if self._diagram.compared else None,
+                remark=edge.note or self._share(path, outcomes),
             )
             head = (
                 self._outcome(edge.target)
@@ -185,6 +191,11 @@ class _Interior:
             )
             back = edge.back and edge.source != edge.target
             self._arrow(self._exit(edge.source, outcomes[0]), head, attributes, back=back)
+
+    def _share(self, path: str, outcomes: Sequence[str]) -> str:
+        """How often many runs took an arrow when they had the choice."""
+        share = self._marks.share(path, outcomes) if self._marks.runs else None
+        return "" if share is None or not 0 < share < SURE else f"{share:.0%}"
 
     def _decisions(self) -> None:
         """Rules over several states meet in a bar; one over a single state is a plain arrow."""
@@ -196,7 +207,7 @@ class _Interior:
                 self._by_itself(rule)
             elif len({label for label, _ in conditions}) == 1 or rule.text.startswith("any of"):
                 for label, outcome in conditions:
-                    self._decide(label, outcome, self._outcome(rule.outcome), rule.outcome)
+                    self._decide(label, outcome, self._outcome(rule.outcome), rule)
             else:
                 self._join(rule, conditions)
 
@@ -213,21 +224,21 @@ class _Interior:
         self._joins.append(Vertex(f"{self._name}_{part}", style.join(rule.text, self._theme)))
         bar = Anchor(self._name, part, is_open=True)
         for label, outcome in conditions:
-            self._decide(label, outcome, bar, rule.outcome)
-        decision = dict(self._deciding(self._node, rule.outcome, named=False))
+            self._decide(label, outcome, bar, rule)
+        decision = dict(self._deciding(self._node, rule.outcome, rule, named=False))
         quorum = rule.text.partition(" of ")[0]
         if quorum.isdigit():
             decision["label"] = style.note(f"{quorum} of {len(conditions)}", self._theme)
         self._arrow(bar, self._outcome(rule.outcome), decision)
 
-    def _decide(self, label: str, child_outcome: str, head: Anchor, outcome: str) -> None:
-        named = self._boxes[label].entry is None and child_outcome != outcome
+    def _decide(self, label: str, child_outcome: str, head: Anchor, rule: Rule) -> None:
+        named = self._boxes[label].entry is None and child_outcome != rule.outcome
         if (label, child_outcome, head) not in self._decided:
             self._decided.add((label, child_outcome, head))
-            attributes = self._deciding(self._nodes[label], child_outcome, named=named)
+            attributes = self._deciding(self._nodes[label], child_outcome, rule, named=named)
             self._arrow(self._exit(label, child_outcome), head, attributes)
 
-    def _deciding(self, node: Node, outcome: str, *, named: bool) -> Mapping[str, str]:
+    def _deciding(self, node: Node, outcome: str, rule: Rule, *, named: bool) -> Mapping[str, str]:
         return style.transition(
             [outcome],
             self._theme,
@@ -235,6 +246,7 @@ class _Interior:
             counts={outcome: self._marks.taken.get((node.path, outcome), 0)},
             labelled=named,
             implicit=False,
+            change=rule.change if self._diagram.compared else None,
         )
 
     def _exit(self, label: str, outcome: str) -> Anchor:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
 OutcomeClass = Literal["success", "failure", "preempted", "other"]
 
@@ -52,6 +52,8 @@ class Edge:
         outcomes: The outcomes of `source` that lead there.
         implicit: Nobody wrote these transitions down: an outcome of the same name took them.
         back: Points against the reading direction.
+        change: `added` or `removed`, where two versions are compared.
+        note: Numbers, for its label.
     """
 
     source: str
@@ -60,6 +62,8 @@ class Edge:
     outcomes: tuple[str, ...]
     implicit: bool = False
     back: bool = False
+    change: str = ""
+    note: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,11 +74,13 @@ class Rule:
         outcome: The container's outcome.
         conditions: Pairs (child label, child outcome).
         text: The rule in words.
+        change: As that of `Edge`.
     """
 
     outcome: str
     conditions: tuple[tuple[str, str], ...]
     text: str
+    change: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +107,8 @@ class Node:
         children: Empty for a plain state and for a closed container.
         initial: Labels of the children that start first.
         pills: Outcomes drawn on the border of an open container.
+        change: `added`, `removed` or `changed`, where two versions are compared.
+        note: Numbers, for a second line of its label.
     """
 
     path: str
@@ -117,6 +125,8 @@ class Node:
     rules: tuple[Rule, ...] = ()
     default_outcome: str | None = None
     pills: tuple[Pill, ...] = ()
+    change: str = ""
+    note: str = ""
 
     @property
     def is_open(self) -> bool:
@@ -139,12 +149,24 @@ class Marks:
         visits: Times each state was entered, by path.
         last: Outcome with which each state was last left, by path.
         taken: Times each transition was taken, by (path of the state left, outcome).
+        runs: Number of recorded runs that were counted; 0: it is one run, and its end is shown.
+        heat: How hot each state is, 0 to 1, by path.
+        notes: Numbers for a second line of a state's label, by path.
     """
 
     active: frozenset[str] = frozenset()
     visits: Mapping[str, int] = field(default_factory=dict)
     last: Mapping[str, str] = field(default_factory=dict)
     taken: Mapping[tuple[str, str], int] = field(default_factory=dict)
+    runs: int = 0
+    heat: Mapping[str, float] = field(default_factory=dict)
+    notes: Mapping[str, str] = field(default_factory=dict)
+
+    def share(self, path: str, outcomes: Sequence[str]) -> float | None:
+        """Return the share of a state's ends that were one of `outcomes`; None without ends."""
+        ends = {key: n for key, n in self.taken.items() if key[0] == path}
+        total = sum(ends.values())
+        return sum(ends.get((path, o), 0) for o in outcomes) / total if total else None
 
     @property
     def has_run(self) -> bool:
@@ -160,8 +182,12 @@ class Diagram:
         root: The outermost state.
         marks: What to highlight.
         links: Address of the page of a container, by path, for linked pages.
+        legend: What the signs mean, as pairs (change or "", words); beside the title.
+        compared: Whether two versions are compared, so that what is the same stands back.
     """
 
     root: Node
     marks: Marks = field(default_factory=Marks)
     links: Mapping[str, str] = field(default_factory=dict)
+    legend: tuple[tuple[str, str], ...] = ()
+    compared: bool = False

@@ -7,6 +7,7 @@ name can break a picture, whatever it contains.
 from __future__ import annotations
 
 import re
+from math import log2
 from string import punctuation
 from typing import TYPE_CHECKING
 
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     Attributes = dict[str, str]
 
 TOOLTIP_LENGTH = 600
+SIGNS = {"added": "+", "removed": "\u2212", "changed": "\u2260"}
+"""What stands before the name of what has changed: never its colour alone."""
+
 # Graphviz stumbles over more than XML's five characters, over a closing bracket for one.
 _ENTITIES = {ord(mark): f"&#{ord(mark)};" for mark in punctuation if mark not in "_-."}
 _BACKSLASH = re.compile(r"\\(?=[\w\\])")
@@ -108,8 +112,10 @@ def state(node: Node, diagram: Diagram, theme: Theme) -> Attributes:
     attributes = {**_identity(node, diagram), "label": _state_label(node, marks, theme)}
     if node.hidden:
         attributes["peripheries"] = "2"
+    if diagram.compared:
+        return attributes | _compared(node, theme)
     swatch, extra = _status(node, marks, theme)
-    return attributes | _swatch(swatch) | extra
+    return attributes | _swatch(swatch) | extra | _heated(node, marks, theme)
 
 
 def container(node: Node, depth: int, diagram: Diagram, theme: Theme) -> Attributes:
@@ -117,10 +123,15 @@ def container(node: Node, depth: int, diagram: Diagram, theme: Theme) -> Attribu
     marks = diagram.marks
     active = node.path in marks.active
     word = KIND_WORDS.get(node.kind, "")
-    title = f"<b>{markup(node.label)}</b>"
+    title = f"{_sign(node, theme)}<b>{markup(node.label)}</b>"
     if word:
         title += f'<font point-size="9" color="{theme.muted}">&#160;&#160;{word}</font>'
-    title += _count(marks.visits.get(node.path, 0), theme.muted)
+    if not marks.notes:
+        title += _count(marks.visits.get(node.path, 0), theme.muted)
+    title += _note(node, marks, theme, before="&#160;&#160;")
+    if depth == 0 and diagram.legend:
+        title += f'<br align="left"/>{_legend(diagram, theme)}'
+    changed = _change_line(node, theme) if node.change else {}
     return {
         **_identity(node, diagram),
         "color": theme.active.stroke if active else theme.border,
@@ -130,7 +141,7 @@ def container(node: Node, depth: int, diagram: Diagram, theme: Theme) -> Attribu
         "margin": "11",
         "penwidth": "2.2" if active else "1",
         "style": "rounded,filled,dashed" if node.kind == "concurrence" else "rounded,filled",
-    }
+    } | changed
 
 
 def entry(theme: Theme, *, touched: bool) -> Attributes:
@@ -201,6 +212,8 @@ def transition(
     counts: Mapping[str, int],
     labelled: bool,
     implicit: bool,
+    change: str | None = None,
+    remark: str = "",
 ) -> Attributes:
     """An arrow that one or several outcomes of a state take.
 
@@ -211,7 +224,11 @@ def transition(
         counts: Times each outcome was taken here.
         labelled: Whether to write the names.
         implicit: Whether nobody wrote the transition down.
+        change: Where two versions are compared, what has become of it, "" if nothing.
+        remark: Numbers, for the label.
     """
+    if change is not None:
+        return _compared_transition(outcomes, theme, change, remark, labelled=labelled)
     kinds = {outcome_class(outcome) for outcome in outcomes}
     kind: OutcomeClass = kinds.pop() if len(kinds) == 1 else "other"
     swatch = theme.outcome(kind)
@@ -225,11 +242,116 @@ def transition(
     if implicit:
         attributes |= {"style": "dotted", "arrowsize": "0.5"}
     if taken:
-        attributes |= {"penwidth": "2.6"}
-    if labelled or taken > 1:
+        wide = min(4.0, 1.2 + 0.6 * log2(1 + taken)) if marks.runs else 2.6
+        attributes |= {"penwidth": f"{wide:.2g}"}
+    if labelled or taken > 1 or remark:
         lines = [_outcome_line(o, theme, marks, counts, labelled=labelled) for o in outcomes]
+        if remark:
+            lines[-1] += f'<font color="{theme.muted}">&#160;{markup(remark)}</font>'
         attributes["label"] = _beside(lines)
     return attributes
+
+
+def _compared_transition(
+    outcomes: Sequence[str], theme: Theme, change: str, remark: str, *, labelled: bool
+) -> Attributes:
+    """An arrow of two versions: thick when added, dotted when removed, faint when neither."""
+    swatch = _change_swatch(change, theme)
+    look = {
+        "added": {"penwidth": "2.8"},
+        "removed": {"penwidth": "2", "style": "dotted"},
+    }.get(change, {"penwidth": "1.2"})
+    ink = swatch.text if change else theme.muted
+    sign = f"<b>{SIGNS[change]}</b>&#160;" if change else ""
+    names = [markup(outcome) if labelled else "" for outcome in outcomes]
+    lines = [f"{sign}{name}" for name in names] if sign or labelled else []
+    if remark:
+        lines.append(markup(remark))
+    attributes = {
+        "color": swatch.stroke if change else theme.border,
+        "tooltip": plain(", ".join(outcomes) + (f" ({change})" if change else "")),
+        **look,
+    }
+    if lines:
+        attributes["label"] = _beside([f'<font color="{ink}">{line}</font>' for line in lines])
+    return attributes
+
+
+def _change_swatch(change: str, theme: Theme) -> Swatch:
+    return {
+        "added": theme.success,
+        "removed": theme.failure,
+        "changed": theme.preempted,
+    }.get(change, theme.inactive)
+
+
+def _change_line(node: Node, theme: Theme) -> Attributes:
+    """The border of a state that has changed: thick, dotted or dashed."""
+    look = {
+        "added": ("2.8", "rounded,filled"),
+        "removed": ("2.2", "rounded,filled,dotted"),
+        "changed": ("2.4", "rounded,filled,dashed"),
+    }
+    width, line = look[node.change]
+    return {
+        "color": _change_swatch(node.change, theme).stroke,
+        "penwidth": width,
+        "style": line,
+    }
+
+
+def _compared(node: Node, theme: Theme) -> Attributes:
+    if not node.change:
+        return _swatch(theme.inactive) | {"color": theme.border, "penwidth": "1"}
+    return _swatch(_change_swatch(node.change, theme)) | _change_line(node, theme)
+
+
+def _sign(node: Node, theme: Theme) -> str:
+    if not node.change:
+        return ""
+    ink = _change_swatch(node.change, theme).text
+    return f'<font color="{ink}"><b>{SIGNS[node.change]}</b>&#160;</font>'
+
+
+def _legend(diagram: Diagram, theme: Theme) -> str:
+    parts = []
+    for change, words in diagram.legend:
+        if change == "heat":
+            parts.append(_heat_key(words, theme))
+            continue
+        ink = _change_swatch(change, theme).text if change else theme.muted
+        sign = f"<b>{SIGNS[change]}</b>&#160;" if change else ""
+        parts.append(f'<font point-size="9" color="{ink}">{sign}{markup(words)}</font>')
+    return "&#160;&#160;&#160;".join(parts)
+
+
+def _heat_key(words: str, theme: Theme) -> str:
+    """A row of ever warmer squares."""
+    steps = [_mix(theme.inactive.fill, theme.heat, share) for share in (0.25, 0.5, 0.75, 1.0)]
+    squares = "".join(f'<font point-size="11" color="{colour}">\u25a0</font>' for colour in steps)
+    return f'{squares}<font point-size="9" color="{theme.muted}">&#160;{markup(words)}</font>'
+
+
+def _note(node: Node, marks: Marks, theme: Theme, *, before: str) -> str:
+    text = node.note or marks.notes.get(node.path, "")
+    if not text:
+        return ""
+    ink = theme.ink if marks.heat.get(node.path) else theme.muted  # legible on every warmth
+    return f'{before}<font point-size="8.5" color="{ink}">{markup(text)}</font>'
+
+
+def _heated(node: Node, marks: Marks, theme: Theme) -> Attributes:
+    """The fill of a state by how hot it is."""
+    heat = marks.heat.get(node.path)
+    if not heat:
+        return {}
+    return {"fillcolor": _mix(theme.inactive.fill, theme.heat, heat)}
+
+
+def _mix(cold: str, hot: str, share: float) -> str:
+    """A colour between two, `share` of the way from the first."""
+    pairs = [(int(cold[i : i + 2], 16), int(hot[i : i + 2], 16)) for i in (1, 3, 5)]
+    return "#" + "".join(f"{round(a + (b - a) * share):02X}" for a, b in pairs)
 
 
 def note(text: str, theme: Theme) -> str:
@@ -272,6 +394,7 @@ def _state_label(node: Node, marks: Marks, theme: Theme) -> str:
     glyph = GLYPHS.get(node.kind, "")
     name = markup(node.label)
     text = f'<font color="{theme.muted}" point-size="10">{glyph}&#160;</font>' if glyph else ""
+    text = _sign(node, theme) + text
     text += f"<b>{name}</b>" if node.path in marks.active or node.hidden else name
     if node.kind == MISSING:
         return f"<{name} <i>missing</i>>"
@@ -279,7 +402,9 @@ def _state_label(node: Node, marks: Marks, theme: Theme) -> str:
         word = KIND_WORDS.get(node.kind, "")
         note = f"{word}, {node.hidden} states" if word else f"{node.hidden} states"
         text += f'<br/><font point-size="8.5" color="{theme.muted}">{note}</font>'
-        return f"<{text}>"
+        return f"<{text}{_note(node, marks, theme, before='<br/>')}>"
+    if marks.notes or node.note:
+        return f"<{text}{_note(node, marks, theme, before='<br/>')}>"
     text += _count(marks.visits.get(node.path, 0), theme.muted)
     last = marks.last.get(node.path)
     if last is not None and node.path not in marks.active and ENDINGS[outcome_class(last)]:
@@ -302,6 +427,8 @@ def _status(node: Node, marks: Marks, theme: Theme) -> tuple[Swatch, Attributes]
         return theme.failure, {"penwidth": "2.2", "style": "rounded,filled,dotted"}
     if node.path in marks.active:
         return theme.active, {"penwidth": "2.4"}
+    if marks.runs and node.path in marks.visits:
+        return theme.inactive, {"penwidth": "1.6"}
     if last is not None:
         return _ended(outcome_class(last), theme)
     if marks.has_run:

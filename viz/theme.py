@@ -34,6 +34,7 @@ class Theme:
         name: `light` or `dark`.
         containers: Fill by nesting depth; deeper levels alternate the last two.
         faint: Strokes of what a run never touched.
+        heat: Fill of the hottest state, between which and the usual fill all others are.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Theme:
     preempted: Swatch
     other: Swatch
     waiting: Swatch
+    heat: str
 
     def container(self, depth: int) -> str:
         """Return the fill of a container at `depth`; the outermost is 0."""
@@ -83,6 +85,7 @@ LIGHT = Theme(
     preempted=Swatch("#FFF1CC", "#B07C00", "#6B4C00"),
     other=Swatch("#E8EDF3", "#52606D", "#323F4B"),
     waiting=Swatch("#F1E1EC", "#521A47", "#521A47"),
+    heat="#F5B56A",
 )
 
 DARK = Theme(
@@ -101,6 +104,7 @@ DARK = Theme(
     preempted=Swatch("#3D2F06", "#C79A12", "#FFE29A"),
     other=Swatch("#27333F", "#9AA5B1", "#CBD2D9"),
     waiting=Swatch("#3B2335", "#E7A7DA", "#FADCF3"),
+    heat="#7A4A0C",
 )
 
 THEMES = {theme.name: theme for theme in (LIGHT, DARK)}

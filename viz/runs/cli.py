@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from viz.runs.recording import Recording
+    from viz.runs.union import Side
 
 EXAMPLES = """examples:
   smachpy run patrol --record runs/1.jsonl    record a run
@@ -20,6 +21,7 @@ EXAMPLES = """examples:
   smachpy runs show runs/1.jsonl              what happened in it
   smachpy runs show runs/                     what all of them add up to
   smachpy runs compare old.jsonl new.jsonl    two runs, or two versions of a machine
+  smachpy runs compare old.json my_robot.missions:deliver -o diff.svg    the same as a picture
   smachpy runs export runs/1.jsonl -o 1.html  a page that opens without a server
   smachpy runs export runs/1.jsonl -o 1.mcap  for Foxglove
   smachpy view runs/1.jsonl                   see it again in the browser
@@ -46,8 +48,17 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     show.add_argument("places", nargs="+", metavar="FILE|DIR")
     show.set_defaults(run=_show)
     two = actions.add_parser("compare", help="how the second differs from the first")
-    two.add_argument("first", metavar="FILE|DIR")
-    two.add_argument("second", metavar="FILE|DIR")
+    what = "recordings, or a machine: a mission's name, module:factory, path.py, a record .json"
+    two.add_argument("first", metavar="FILE|DIR|TARGET", help=what)
+    two.add_argument("second", metavar="FILE|DIR|TARGET", help="the same")
+    two.add_argument(
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="draw both into one picture: svg, png, pdf or dot; - is svg",
+    )
+    two.add_argument("--theme", choices=("light", "dark"), default="light")
+    two.add_argument("--depth", type=int, metavar="N", help="container levels to open")
     two.set_defaults(run=_compare)
     export = actions.add_parser("export", help="as a page (.html), for Foxglove (.mcap), a picture")
     export.add_argument("file", metavar="FILE")
@@ -147,21 +158,54 @@ def _seconds(value: float | None) -> str:
 
 
 def _compare(args: argparse.Namespace) -> int:
-    from viz.runs.statistics import compare
+    from viz.runs.union import unite
 
-    difference = compare(_read(args.first), _read(args.second))
-    console = _console()
-    lines = [f"+ {path}" for path in difference.added]
-    lines += [f"- {path}" for path in difference.removed]
-    lines += [f"moved {old} -> {new}" for old, new in difference.moved]
-    lines += [f"leads elsewhere: {path} {outcome}" for path, outcome in difference.rewired]
-    for path, (old, new) in difference.changed.items():
-        lines.append(
-            f"{path or '(the whole)'}: median {_seconds(old['median'])} -> "
-            f"{_seconds(new['median'])}, failed {old['failures']:.0%} -> {new['failures']:.0%}"
-        )
-    console.print("\n".join(lines or ["no notable difference"]), markup=False)
+    old, new = _side(args.first), _side(args.second)
+    if args.output:
+        _draw_both(args, old, new)
+        return 0
+    signs = {"added": "+", "removed": "-", "changed": "~", "numbers": " "}
+    lines = [
+        f"{signs[one['change']]} {one['path']}  {one['text']}".rstrip()
+        for one in unite(old, new).listed()
+    ]
+    _console().print("\n".join(lines or ["no notable difference"]), markup=False)
     return 0
+
+
+def _draw_both(args: argparse.Namespace, old: Side, new: Side) -> None:
+    import sys
+
+    from viz import drawing
+    from viz.runs.union import drawing as drawn
+    from viz.runs.union import unite
+
+    form = "svg" if args.output == "-" else Path(args.output).suffix.lstrip(".").lower()
+    diagram = drawn(unite(old, new), old, new, depth=args.depth)
+    content = drawing.draw(diagram, form, theme=args.theme)
+    if args.output == "-":
+        sys.stdout.buffer.write(content)
+    else:
+        print(drawing.write(content, args.output))
+
+
+def _side(place: str) -> Side:
+    """What is to be compared: recordings, or a machine that has not run."""
+    from viz.runs.statistics import count
+    from viz.runs.union import Side
+
+    if not place.endswith(".jsonl") and not Path(place).is_dir():
+        from viz.cli import read_record
+
+        return Side(place, read_record(place))
+    recordings = _read(place)
+    labels = {one.record.label for one in recordings}
+    if len(labels) > 1:
+        raise UsageError(
+            f"smachpy runs compare: {place!r}: got runs of {sorted(labels)}; expected those of one "
+            "machine. Try naming the files."
+        )
+    return Side(place, recordings[-1].record, count(recordings))
 
 
 def _export(args: argparse.Namespace) -> int:

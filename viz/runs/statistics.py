@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from smachpy.run_state import RAISED
-from viz.model import outcome_class
+from viz.model import Marks, outcome_class
 from viz.runs.recording import find_recordings, read_recording
 
 if TYPE_CHECKING:
@@ -100,35 +100,6 @@ class Statistics:
         return self.states[path]
 
 
-@dataclass(frozen=True, slots=True)
-class Difference:
-    """How two machines, or two sets of runs, differ.
-
-    Attributes:
-        added: Paths that only the second machine has.
-        removed: Paths that only the first has.
-        moved: Pairs (old path, new path) of states of one label and kind.
-        rewired: Pairs (path, outcome) whose target is another.
-        changed: By path: what the numbers were and are, where they differ notably.
-    """
-
-    added: tuple[str, ...]
-    removed: tuple[str, ...]
-    moved: tuple[tuple[str, str], ...]
-    rewired: tuple[tuple[str, str], ...]
-    changed: dict[str, tuple[dict[str, Any], dict[str, Any]]]
-
-    def to_json(self) -> dict[str, Any]:
-        """Return it as plain data."""
-        return {
-            "added": list(self.added),
-            "removed": list(self.removed),
-            "moved": [list(pair) for pair in self.moved],
-            "rewired": [list(pair) for pair in self.rewired],
-            "changed": {path: list(pair) for path, pair in self.changed.items()},
-        }
-
-
 def quantile(values: Sequence[float], share: float) -> float | None:
     """Return the smallest value that `share` of the values do not exceed; None of none."""
     if not values:
@@ -160,69 +131,65 @@ def _taken(statistics: Statistics, path: str, edge: Any) -> bool:
     return state is not None and edge.outcome in state.outcomes
 
 
+def marks_of(statistics: Statistics, record: StateRecord, *, heat: str = "time") -> Marks:
+    """Return what recorded runs leave on a picture of their machine.
+
+    Args:
+        statistics: Of the runs.
+        record: The machine; states of other names are left out.
+        heat: What makes a state hot: `time`, its share of all time spent in states that have no
+            states inside, against the greatest; or `failures`, the share of its visits that failed.
+    """
+    there = {state.path: state for state in record.walk()}
+    states = {path: s for path, s in statistics.states.items() if path in there}
+    totals = {path: sum(s.durations) for path, s in states.items() if not there[path].children}
+    most = max(totals.values(), default=0.0)
+    if heat == "failures":
+        hot = {path: s.failures() for path, s in states.items() if not there[path].children}
+    else:
+        hot = {path: total / most for path, total in totals.items() if most}
+    return Marks(
+        visits={path: s.visits for path, s in states.items()},
+        taken={(path, o): n for path, s in states.items() for o, n in s.outcomes.items()},
+        runs=max(statistics.runs, 1),
+        heat=hot,
+        notes={path: _note(s) for path, s in states.items()},
+    )
+
+
+def _note(state: StateStatistics) -> str:
+    median = quantile(state.durations, 0.5)
+    words = [f"\u00d7{state.visits}"]
+    words += [f"{median:.3g} s"] if median is not None else []
+    words += [f"{state.failures():.0%} failed"] if state.failures() >= LEAST_SHARE else []
+    return ", ".join(words)
+
+
+LEAST_SHARE = 0.005
 SLOWER = 1.2
 """Medians that differ by less than this factor are no change."""
 
 LEAST_S = 0.005
 
 
-def compare(first: Sequence[Recording], second: Sequence[Recording]) -> Difference:
-    """Return how the second runs, and their machine, differ from the first."""
-    old, new = first[-1].record, second[-1].record
-    old_states = {state.path.removeprefix(old.path): state for state in old.walk()}
-    new_states = {state.path.removeprefix(new.path): state for state in new.walk()}
-    added = [path for path in new_states if path not in old_states]
-    removed = [path for path in old_states if path not in new_states]
+def moved_states(old: StateRecord, new: StateRecord) -> list[tuple[str, str]]:
+    """Return pairs (old path, new path), from the root, of states that are elsewhere now."""
+    before = {state.path.removeprefix(old.path): state for state in old.walk()}
+    after = {state.path.removeprefix(new.path): state for state in new.walk()}
+    fresh = [path for path in after if path not in before]
     moved = []
-    for path in list(removed):
-        state = old_states[path]
-        for other in added:
-            twin = new_states[other]
+    for path, state in before.items():
+        if path in after:
+            continue
+        for other in fresh:
+            twin = after[other]
             if (twin.label, twin.kind, twin.type_name) == (
                 state.label, state.kind, state.type_name,
             ):  # fmt: skip
                 moved.append((path, other))
-                added.remove(other)
-                removed.remove(path)
+                fresh.remove(other)
                 break
-    changed = _changed(count(first), old.path, count(second), new.path)
-    rewired = _rewired(old, new)
-    return Difference(tuple(added), tuple(removed), tuple(moved), rewired, changed)
-
-
-def _rewired(old: StateRecord, new: StateRecord) -> tuple[tuple[str, str], ...]:
-    before, after = _targets(old), _targets(new)
-    return tuple(key for key, target in after.items() if before.get(key, target) != target)
-
-
-def _targets(record: StateRecord) -> dict[tuple[str, str], str]:
-    return {
-        (f"{state.path.removeprefix(record.path)}/{edge.source}", edge.outcome): edge.target
-        for state in record.walk()
-        for edge in state.transitions
-    }
-
-
-def _changed(
-    first: Statistics, first_root: str, second: Statistics, second_root: str
-) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
-    after = {path.removeprefix(second_root): state for path, state in second.states.items()}
-    found = {}
-    for path, state in first.states.items():
-        twin = after.get(path.removeprefix(first_root))
-        if twin is None:
-            continue
-        old, new = state.to_json(), twin.to_json()
-        if _differs(old, new):
-            found[path.removeprefix(first_root)] = old, new
-    return found
-
-
-def _differs(old: dict[str, Any], new: dict[str, Any]) -> bool:
-    if old["failures"] != new["failures"] or set(old["outcomes"]) != set(new["outcomes"]):
-        return True
-    low, high = sorted((old["median"] or 0.0, new["median"] or 0.0))
-    return bool(high - low > LEAST_S and high > SLOWER * low)
+    return moved
 
 
 class StatisticsOfFiles:
@@ -234,7 +201,7 @@ class StatisticsOfFiles:
 
     def __init__(self, places: Iterable[str | Path]) -> None:
         self._places = list(places)
-        self._found: dict[str, dict[str, Any]] | None = None
+        self._found: dict[str, Statistics] | None = None
 
     def of(self, label: str) -> dict[str, Any] | None:
         """Return the statistics of the machine of that name; None when there are no runs of it.
@@ -242,10 +209,15 @@ class StatisticsOfFiles:
         Raises:
             RecordingError: a file cannot be read.
         """
+        found = self.counted().get(label)
+        return None if found is None else found.to_json()
+
+    def counted(self) -> dict[str, Statistics]:
+        """Return the statistics by machine; raises as `of`."""
         if self._found is None:
             groups: dict[str, list[Recording]] = {}
             for path in find_recordings(self._places):
                 recording = read_recording(path)
                 groups.setdefault(recording.record.label, []).append(recording)
-            self._found = {name: count(runs).to_json() for name, runs in groups.items()}
-        return self._found.get(label)
+            self._found = {name: count(runs) for name, runs in groups.items()}
+        return self._found

@@ -106,7 +106,7 @@ def test_the_yaml_has_types_units_comments_and_reads_back():
         speed=st.integers(0, 255),
         label=st.text(),
         rest=st.integers(-(2**31), 2**31 - 1),
-        mixture=st.lists(st.floats(width=32), min_size=3, max_size=3),
+        mixture=st.lists(st.floats(width=32, allow_nan=False), min_size=3, max_size=3),
         names=st.lists(st.text(), max_size=3),
         corners=st.lists(st.builds(Pose), max_size=2),
         serial=st.integers(-(2**63), 2**63 - 1),
