@@ -1,0 +1,257 @@
+"""Explore: look at everything that can be reached, draw a map of it, come back.
+
+    EXPLORE
+      REMEMBER      where the robot stands now
+      LOOK_AROUND   the first scan
+      SEARCH        both children at once; the first that ends calls the other off
+        LOOK        one frontier after the other: where the seen ends, until there is none
+          GO        there
+        MAP         adds every scan to what has been seen; ends when the scanner is silent
+      SAVE          the map, in the form of ROS map_server
+      COME_BACK     to where the robot stood
+      REPORT        succeeded, or incomplete
+
+Run it: `smachpy run explore --start-robot`
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
+from actionlib_core.interfaces.nav_msgs.msg import Odometry
+from actionlib_core.interfaces.sensor_msgs.msg import LaserScan
+from actionlib_core.topic import Subscriber
+from missions.exceptions import MissionError
+from missions.parts import DRIVE_TIMEOUT, SIGNAL_TIMEOUT, drive_back, locate, pose_of
+from missions.progress import Progress
+from missions.waypoint_file import goal_at
+from smachpy import (
+    CBState,
+    Concurrence,
+    Iterator,
+    MonitorState,
+    SimpleActionState,
+    State,
+    StateMachine,
+    UserData,
+)
+from smachpy.log import logwarn
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator as Items
+
+    from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseGoal
+    from missions.move_base.geometry import Pose2D
+    from missions.seen_map import Frontier
+
+IN_VAIN = 5  # so many frontiers in a row out of reach: something is wrong with the robot
+POSES_KEPT = 50  # of which a scan takes the one with the nearest stamp
+
+
+def explore(
+    map_file: str | Path = "explored.yaml", most: int = 0, smallest: float = 1.0
+) -> StateMachine:
+    """Look at all that can be reached, save a map of it, come back.
+
+    Args:
+        map_file: The map to write, with an image beside it.
+        most: Look at so many frontiers at most; 0: at all.
+        smallest: Borders between seen and unseen that are shorter are not worth a look [m].
+
+    Raises:
+        MissionError: an argument makes no sense.
+    """
+    path = Path(map_file)
+    if path.suffix not in {".yaml", ".yml"}:
+        raise MissionError(f"map_file: got {str(path)!r}; expected a name that ends with .yaml.")
+    if most < 0:
+        raise MissionError(f"most: got {most}; expected 0 (all) or more.")
+    if not smallest > 0.0:
+        raise MissionError(f"smallest: got {smallest:g}; expected more than 0 [m].")
+    search = Search(path, most, smallest)
+    sm = StateMachine(["succeeded", "incomplete", "aborted", "preempted"], name="EXPLORE")
+    sm.register_start_cb(lambda _userdata, _initial: search.begin())
+    with sm:
+        sm.add("REMEMBER", locate(), {"valid": "LOOK_AROUND", "invalid": "aborted"})
+        sm.add(
+            "LOOK_AROUND",
+            MonitorState(
+                "scan",
+                LaserScan,
+                search.first_look,
+                max_checks=1,
+                input_keys=["here"],
+                timeout=SIGNAL_TIMEOUT,
+            ),
+            {"valid": "SEARCH", "invalid": "aborted"},
+        )
+        sm.add("SEARCH", look_and_map(search), {"all_seen": "SAVE", "blind": "SAVE"})
+        saving = CBState(search.save, outcomes=["saved", "failed"])
+        sm.add("SAVE", saving, {"saved": "COME_BACK", "failed": "COME_BACK"})
+        sm.add("COME_BACK", drive_back(), {"succeeded": "REPORT"}, {"home": "here"})
+        sm.add("REPORT", CBState(search.report, outcomes=["succeeded", "incomplete"]))
+    return sm
+
+
+def look_and_map(search: Search) -> Concurrence:
+    """Drive to frontiers, and keep the map meanwhile."""
+    both = Concurrence(
+        outcomes=["all_seen", "blind", "preempted"],
+        default_outcome="blind",
+        output_keys=["progress"],
+        outcome_map={"all_seen": {"LOOK": "all_seen"}},
+        child_termination_cb=lambda _outcomes: True,
+    )
+    look = Iterator(
+        outcomes=["preempted"],
+        input_keys=[],
+        output_keys=["progress"],
+        it=search.frontiers,
+        it_label="frontier",
+        exhausted_outcome="all_seen",
+    )
+    with look:
+        go = SimpleActionState(
+            "move_base",
+            MoveBaseAction,
+            goal_cb=frontier_goal,
+            input_keys=["frontier"],
+            output_keys=["progress"],
+            exec_timeout=DRIVE_TIMEOUT,
+            on_exit=search.note,
+        )
+        Iterator.set_contained_state("GO", go, loop_outcomes=["succeeded", "aborted"])
+    with both:
+        Concurrence.add("LOOK", look)
+        Concurrence.add("MAP", Mapper(search))
+    return both
+
+
+def frontier_goal(userdata: UserData, _default: MoveBaseGoal) -> MoveBaseGoal:
+    """Make the goal that drives to the frontier."""
+    return goal_at(userdata.frontier.goal)
+
+
+class Search:
+    """What has been seen, and where to look next.
+
+    Args:
+        path: Of the map to write.
+        most: So many frontiers; 0: all.
+        smallest: Shorter borders are not worth a look [m].
+
+    Threads: `add` runs in the mapper's thread, everything else in the one that drives.
+    """
+
+    def __init__(self, path: Path, most: int, smallest: float) -> None:
+        self.path = path
+        self.most = most
+        self.smallest = smallest
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget everything."""
+        from missions.seen_map import SeenMap
+
+        self.seen = SeenMap(smallest=self.smallest)
+        self.here: Pose2D | None = None
+        self.reached = self.saved = self.blind = False
+        self.looks = self.missed = 0
+
+    def add(self, scan: LaserScan, pose: Pose2D) -> None:
+        """Take in a scan made at `pose`."""
+        self.seen.add(scan, pose)
+        self.here = pose
+
+    def first_look(self, userdata: UserData, scan: LaserScan) -> bool:
+        """Take in the first scan; false when it shows nothing at all."""
+        self.add(scan, userdata.here)
+        return self.seen.area() > 0.0
+
+    def frontiers(self) -> Items[Frontier]:
+        """Yield the nearest frontier, as long as there is one; each after the last was tried."""
+        in_vain = 0
+        while in_vain < IN_VAIN and not 0 < self.most <= self.looks:
+            frontier = None if self.here is None else self.seen.nearest_frontier(self.here)
+            if frontier is None:
+                return
+            self.reached = False
+            yield frontier
+            self.seen.leave(frontier, reached=self.reached)
+            self.looks += 1
+            self.missed += not self.reached
+            in_vain = 0 if self.reached else in_vain + 1
+
+    def note(self, userdata: UserData, outcome: str) -> None:
+        """Remember whether the frontier was reached; say how much has been seen."""
+        self.reached = outcome == "succeeded"
+        text = f"{self.looks + 1} looks, {self.seen.area():.0f} m² seen"
+        userdata.progress = Progress(None, None, text)
+
+    def save(self, _userdata: UserData) -> str:
+        """Write the map."""
+        from missions.map_file import write_map
+
+        try:
+            write_map(self.path, self.seen.occupancy())
+        except OSError as error:
+            logwarn(f"{self.path}: {error.strerror or error}; the map is not saved")
+            return "failed"
+        self.saved = True
+        return "saved"
+
+    def report(self, _userdata: UserData) -> str:
+        """Name the end: was everything seen and saved?"""
+        all_well = self.saved and not self.missed and not self.blind
+        return "succeeded" if all_well else "incomplete"
+
+
+class Mapper(State):
+    """Adds every scan to what has been seen. Outcomes: 'blind', 'preempted'.
+
+    Args:
+        search: Takes the scans.
+    """
+
+    def __init__(self, search: Search) -> None:
+        super().__init__(outcomes=["blind", "preempted"])
+        self._search = search
+
+    def execute(self, userdata: UserData) -> str:
+        """Add scans until a preempt; 'blind' when none came for five seconds.
+
+        Blocks: until then.
+        """
+        del userdata
+        wake = self._clock().event("a scan")
+        poses: deque[Odometry] = deque(maxlen=POSES_KEPT)
+        scans: deque[LaserScan] = deque(maxlen=1)
+
+        def on_scan(scan: LaserScan) -> None:
+            scans.append(scan)
+            wake.set()
+
+        forget = self._on_preempt(wake.set)
+        try:
+            with Subscriber("odom", Odometry, poses.append), Subscriber("scan", LaserScan, on_scan):
+                while wake.wait(SIGNAL_TIMEOUT) and not self.preempt_requested():
+                    wake.clear()
+                    if scans and poses:
+                        scan = scans.pop()
+                        self._search.add(scan, pose_at(poses, scan))
+        finally:
+            forget()
+        if self.preempt_requested():
+            return "preempted"
+        self._search.blind = True
+        return "blind"
+
+
+def pose_at(poses: deque[Odometry], scan: LaserScan) -> Pose2D:
+    """Return the pose whose stamp is nearest to the scan's."""
+    stamp = scan.header.stamp.to_sec()
+    nearest = min(tuple(poses), key=lambda pose: abs(pose.header.stamp.to_sec() - stamp))
+    return pose_of(nearest.pose.pose)
