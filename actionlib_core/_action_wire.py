@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 _U32 = struct.Struct("<I")
-_TIME = struct.Struct("<II")
-_HEADER = struct.Struct("<IIII")  # seq, stamp, length of an empty frame_id
+_HEADER = struct.Struct("<IIII")  # seq, stamp, length of the frame_id
+_ID = struct.Struct("<III")  # stamp, length of the id
+_FRONT = struct.Struct("<IIIIIII")  # a header with an empty frame_id, then stamp, length of the id
 _TAIL = struct.Struct("<BI")  # status, length of its text
 _NS = 1_000_000_000
 
@@ -116,7 +117,7 @@ def _reads(what: str) -> Callable[[Callable[[bytes], T]], Callable[[bytes], T]]:
 
 def pack_goal(sent_ns: int, goal_id: str, goal_stamp_ns: int, goal: bytes) -> bytes:
     """Write an XActionGoal: header, goal id, goal."""
-    return _pack_header(sent_ns) + pack_goal_id(goal_id, goal_stamp_ns) + goal
+    return _pack_front(sent_ns, goal_id, goal_stamp_ns) + goal
 
 
 @_reads("XActionGoal")
@@ -126,16 +127,14 @@ def unpack_goal(payload: bytes) -> tuple[str, int, bytes]:
     Raises:
         ValueError: the bytes are cut short or are not text where text belongs.
     """
-    at = _skip_header(payload)
-    secs, nsecs = _TIME.unpack_from(payload, at)
-    goal_id, at = _read_text(payload, at + 8)
-    return goal_id, secs * _NS + nsecs, payload[at:]
+    goal_id, stamp_ns, at = _read_id(payload, 16 + int(_U32.unpack_from(payload, 12)[0]))
+    return goal_id, stamp_ns, payload[at:]
 
 
 def pack_goal_id(goal_id: str, stamp_ns: int) -> bytes:
     """Write an actionlib_msgs/GoalID."""
     raw = goal_id.encode()
-    return _TIME.pack(*divmod(stamp_ns, _NS)) + _U32.pack(len(raw)) + raw
+    return _ID.pack(stamp_ns // _NS, stamp_ns % _NS, len(raw)) + raw
 
 
 @_reads("GoalID")
@@ -145,8 +144,8 @@ def unpack_goal_id(payload: bytes) -> tuple[str, int]:
     Raises:
         ValueError: the bytes are cut short or are not text where text belongs.
     """
-    secs, nsecs = _TIME.unpack_from(payload, 0)
-    return _read_text(payload, 8)[0], secs * _NS + nsecs
+    goal_id, stamp_ns, _ = _read_id(payload, 0)
+    return goal_id, stamp_ns
 
 
 def pack_status(entry: StatusEntry) -> bytes:
@@ -168,7 +167,10 @@ def unpack_status(payload: bytes) -> StatusEntry:
 
 def pack_report(sent_ns: int, entry: StatusEntry, body: bytes) -> bytes:
     """Write an XActionResult or XActionFeedback: header, status, result or feedback."""
-    return _pack_header(sent_ns) + pack_status(entry) + body
+    goal_id, stamp_ns, status, text = entry
+    raw = text.encode()
+    front = _pack_front(sent_ns, goal_id, stamp_ns)
+    return b"".join((front, _TAIL.pack(status, len(raw)), raw, body))
 
 
 @_reads("XActionResult or XActionFeedback")
@@ -178,7 +180,7 @@ def unpack_report(payload: bytes) -> tuple[StatusEntry, int]:
     Raises:
         ValueError: the bytes are cut short or are not text where text belongs.
     """
-    return _read_status(payload, _skip_header(payload))
+    return _read_status(payload, 16 + int(_U32.unpack_from(payload, 12)[0]))
 
 
 def pack_statuses(sent_ns: int, entries: Iterable[StatusEntry], frame: str = "") -> bytes:
@@ -195,7 +197,7 @@ def unpack_statuses(payload: bytes) -> list[StatusEntry]:
         ValueError: the bytes are cut short or are not text where text belongs.
     """
     entries = []
-    at = _skip_header(payload)
+    at = 16 + int(_U32.unpack_from(payload, 12)[0])
     (count,) = _U32.unpack_from(payload, at)
     at += 4
     for _ in range(count):
@@ -216,20 +218,29 @@ def unpack_frame(payload: bytes) -> str:
 
 def _pack_header(sent_ns: int, frame: str = "") -> bytes:
     raw = frame.encode()
-    return _HEADER.pack(0, *divmod(sent_ns, _NS), len(raw)) + raw
+    return _HEADER.pack(0, sent_ns // _NS, sent_ns % _NS, len(raw)) + raw
 
 
-def _skip_header(payload: bytes) -> int:
-    return 16 + int(_U32.unpack_from(payload, 12)[0])
+def _pack_front(sent_ns: int, goal_id: str, stamp_ns: int) -> bytes:
+    """Write a header with an empty frame_id and a GoalID."""
+    raw = goal_id.encode()
+    sent, stamp = divmod(sent_ns, _NS), divmod(stamp_ns, _NS)
+    return _FRONT.pack(0, *sent, 0, *stamp, len(raw)) + raw
+
+
+def _read_id(payload: bytes, at: int) -> tuple[str, int, int]:
+    """Read a GoalID: the id, its stamp [ns], where the rest begins."""
+    secs, nsecs, length = _ID.unpack_from(payload, at)
+    at += 12
+    return _text(payload, at, length), secs * _NS + nsecs, at + length
 
 
 def _read_status(payload: bytes, at: int) -> tuple[StatusEntry, int]:
-    secs, nsecs = _TIME.unpack_from(payload, at)
-    goal_id, at = _read_text(payload, at + 8)
+    goal_id, stamp_ns, at = _read_id(payload, at)
     status, length = _TAIL.unpack_from(payload, at)
-    at += _TAIL.size
+    at += 5
     text = _text(payload, at, length) if length else ""
-    return StatusEntry(goal_id, secs * _NS + nsecs, status, text), at + length
+    return StatusEntry(goal_id, stamp_ns, status, text), at + length
 
 
 def _read_text(payload: bytes, at: int) -> tuple[str, int]:

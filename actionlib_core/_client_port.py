@@ -17,6 +17,7 @@ from actionlib_core._action_wire import (
     unpack_status,
     unpack_statuses,
 )
+from actionlib_core._bursts import Bursts
 from actionlib_core.exceptions import ActionlibError, TypeMismatchError
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from actionlib_core.presence import Kind, find_mismatch, parse_token, token_key, token_pattern
@@ -71,12 +72,20 @@ class ClientPort:
         name: The action's full name.
         types: Its message classes.
         listener: Decides.
+        spawn: Starts a named thread for a burst of feedback.
 
     Threads: the `send_` methods may be called from any thread; what arrives is handed to `listener`
-        on the network's thread.
+        on the network's thread, feedback that comes in a burst on one started for it.
     """
 
-    def __init__(self, node: Node, name: str, types: ActionTypes, listener: ClientListener) -> None:
+    def __init__(
+        self,
+        node: Node,
+        name: str,
+        types: ActionTypes,
+        listener: ClientListener,
+        spawn: Callable[[Callable[[], object], str], object],
+    ) -> None:
         self._transport = node.transport
         self._types = types
         self._listener = listener
@@ -98,6 +107,9 @@ class ClientPort:
             self.keys.cancel, encoding_of(GoalID), GOAL
         )
         self._acks: PublisherPort | None = None
+        self._feedback_encoding = encoding_of(types.action_feedback)
+        self._result_encoding = encoding_of(types.action_result)
+        self._feedback: Bursts[Sample] = Bursts(node.clock, spawn, self._read_feedback)
 
     def open(self) -> None:
         """Declare everything; listening comes before the token.
@@ -110,7 +122,7 @@ class ClientPort:
             self._goals,
             self._cancels,
             transport.subscribe(self.keys.status, self._on_status, history=False),
-            transport.subscribe(self.keys.feedback, self._on_feedback, history=False),
+            transport.subscribe(self.keys.feedback, self._feedback.take, history=False),
             transport.subscribe(self.keys.result, self._on_result, history=False),
             transport.declare_alive(token_key(self.endpoint)),
             transport.watch_alive(token_pattern(Kind.ACTION_SERVER, self.name), self._on_presence),
@@ -162,6 +174,7 @@ class ClientPort:
     # -- what arrives --------------------------------------------------------------------------
 
     def _on_status(self, sample: Sample) -> None:
+        self._feedback.flush()
         if self._is_readable(sample, GoalStatusArray):
             try:
                 entries = unpack_statuses(sample.payload)
@@ -175,17 +188,23 @@ class ClientPort:
             else:
                 self._listener.on_statuses(entries, sample.source)
 
-    def _on_feedback(self, sample: Sample) -> None:
-        if self._is_readable(sample, self._types.action_feedback):
-            try:
-                entry, start = unpack_report(sample.payload)
-            except ValueError as error:
-                self._report("feedback", error)
-                return
-            self._listener.on_feedback(entry, sample.payload, start, sample.source)
+    def _read_feedback(self, sample: Sample) -> None:
+        if sample.encoding != self._feedback_encoding and not self._is_readable(
+            sample, self._types.action_feedback
+        ):
+            return
+        try:
+            entry, start = unpack_report(sample.payload)
+        except ValueError as error:
+            self._report("feedback", error)
+            return
+        self._listener.on_feedback(entry, sample.payload, start, sample.source)
 
     def _on_result(self, sample: Sample) -> None:
-        if self._is_readable(sample, self._types.action_result):
+        self._feedback.flush()
+        if sample.encoding == self._result_encoding or self._is_readable(
+            sample, self._types.action_result
+        ):
             self._read_result(sample.payload, sample.source)
 
     def _read_result(self, payload: bytes, source: str) -> None:
@@ -197,6 +216,7 @@ class ClientPort:
         self._listener.on_result(entry, payload[start:], source)
 
     def _on_reply(self, reply: Reply) -> None:
+        self._feedback.flush()
         if reply.error:
             self._report("an answer", reply.payload.decode(errors="replace"))
         elif reply.encoding == encoding_of(GoalStatus):
@@ -204,7 +224,7 @@ class ClientPort:
                 self._listener.on_answer(unpack_status(reply.payload))
             except ValueError as error:
                 self._report("an answer", error)
-        elif reply.encoding == encoding_of(self._types.action_result):
+        elif reply.encoding == self._result_encoding:
             self._read_result(reply.payload, "")
         else:
             self._report("an answer", f"unknown encoding {reply.encoding!r}")
@@ -242,6 +262,7 @@ class ClientPort:
         if server is None:
             return
         if not presence.alive:
+            self._feedback.flush()
             self._listener.on_server_gone(server)
             return
         error = find_mismatch([server], self.endpoint)

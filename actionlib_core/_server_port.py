@@ -101,6 +101,7 @@ class ServerPort:
         self._unaware: set[str] = set()  # tokens of clients that the farewell has not reached
         self._wrong: set[str] = set()
         self._closed = False
+        self._goal_encoding = encoding_of(types.action_goal)
         endpoint = node.endpoint(
             Kind.ACTION_SERVER,
             name,
@@ -223,7 +224,9 @@ class ServerPort:
     # -- what arrives --------------------------------------------------------------------------
 
     def _on_goal(self, sample: Sample) -> None:
-        if not self._is_readable(sample, self._types.action_goal):
+        if sample.encoding != self._goal_encoding and not self._is_readable(
+            sample, self._types.action_goal
+        ):
             return
         try:
             goal_id, stamp_ns, body = unpack_goal(sample.payload)

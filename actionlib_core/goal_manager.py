@@ -28,6 +28,7 @@ log = logging.getLogger(__name__)
 
 TICK_S = 0.05  # repetitions and acknowledgements due within this go out together
 ACK_AT = 64  # so many acknowledgements go out at once
+_ONLY_GOAL: Duty = Duty.GOAL
 STATUSES = {int(status): status for status in Status}
 UNSURE = " and had not acknowledged the goal, which may or may not have begun"
 REMEMBERED = 1024  # ids of ended goals whose result may come again
@@ -62,11 +63,12 @@ class GoalManager:
         self._servers: dict[Endpoint, TypeMismatchError | None] = {}
         self._away: dict[Endpoint, float] = {}
         self._leaving: set[Endpoint] = set()
+        self._current: Endpoint | None = None
         self._waiters: list[Event] = []
         self._timer: Timer | None = None
         self._due = 0.0
         self._closed = False
-        self._port = ClientPort(node, name, types, self)
+        self._port = ClientPort(node, name, types, self, self.callbacks.spawn)
         self._port.open()
 
     def close(self) -> None:
@@ -90,12 +92,12 @@ class GoalManager:
     @property
     def server(self) -> Endpoint | None:
         """The action's server, None while there is none of our type."""
-        with self._lock:
-            return self._server()
+        return self._current
 
-    def _server(self) -> Endpoint | None:
+    def _choose_server(self) -> None:
+        """Find the server after a change. Needs the lock."""
         ends = (end for end, error in self._servers.items() if error is None)
-        return next((end for end in ends if end not in self._leaving), None)
+        self._current = next((end for end in ends if end not in self._leaving), None)
 
     def wait_for_server(self, timeout: float | None) -> bool:
         """Wait for a server; return whether there is one, False also when the client was stopped.
@@ -109,7 +111,7 @@ class GoalManager:
         changed = self._clock.event()
         while True:
             with self._lock:
-                if self._server() is not None:
+                if self._current is not None:
                     return True
                 self._check_types()
                 if self._closed:
@@ -121,7 +123,7 @@ class GoalManager:
                 with self._lock:
                     if changed in self._waiters:
                         self._waiters.remove(changed)
-                    return self._server() is not None
+                    return self._current is not None
 
     def _check_types(self) -> None:
         for error in self._servers.values():
@@ -138,6 +140,7 @@ class GoalManager:
         now = self._clock.now()
         with self._lock:
             self._servers[server] = error
+            self._choose_server()
             if error is None:
                 returned = self._away.pop(server, None) is not None
                 for old in list(self._away):
@@ -147,7 +150,7 @@ class GoalManager:
                     if returned or not machine.goal.acknowledged:
                         machine.goal.hurry(now)
                 self._arm(now)
-            elif self._server() is None:
+            elif self._current is None:
                 for machine in list(self._machines.values()):
                     if not machine.goal.acknowledged:
                         self._take(machine, machine.goal.lose(str(error)))
@@ -158,6 +161,7 @@ class GoalManager:
         with self._lock:
             if server not in self._servers or self._servers.pop(server) is not None:
                 return  # unknown, or of another type
+            self._choose_server()
             if server in self._leaving or self._server_lost_timeout <= 0:
                 self._lose_goals_of(server, "is gone")
             else:
@@ -177,6 +181,7 @@ class GoalManager:
                 return
             if server in self._servers:
                 self._leaving.add(server)
+                self._choose_server()
             for machine in list(self._machines.values()):
                 goal = machine.goal
                 entry = taken.get(goal.id)
@@ -260,7 +265,7 @@ class GoalManager:
         with self._lock:
             if self._closed:
                 raise TransportError(f"action '{self.name}': the client is stopped.")
-            if self._server() is None:
+            if self._current is None:
                 self._check_types()
             now = self._clock.now()
             duty = goal.begin(now)
@@ -321,7 +326,7 @@ class GoalManager:
                 if machine is not None:
                     self._hear(machine, entry, server, now)
             if len(listed) < len(self._machines) or not listed.issuperset(self._machines):
-                answers = self._server() is not None
+                answers = self._current is not None
                 for machine in list(self._machines.values()):
                     if machine.goal.id not in listed:
                         self._take(machine, machine.goal.on_unlisted(now, answers=answers))
@@ -352,10 +357,15 @@ class GoalManager:
                 log.error("action '%s': feedback cannot be read: %s", self.name, error)  # noqa: TRY400
                 return
         with self._lock:
-            if not machine.goal.over:
+            goal = machine.goal
+            if goal.over:
+                return
+            if entry.status == goal.status and server == goal.server and goal.acknowledged:
+                goal.on_sign_of_life(self._clock.now())
+            else:
                 self._hear(machine, entry, server, self._clock.now())
-                if machine.on_feedback is not None:
-                    machine.on_feedback(machine, feedback)
+            if machine.on_feedback is not None:
+                machine.on_feedback(machine, feedback)
 
     def on_result(self, entry: StatusEntry, body: bytes, server: str) -> None:
         """Take a result."""
@@ -393,7 +403,8 @@ class GoalManager:
         with self._lock:
             if server:
                 machine.goal.server = server
-            self._take(machine, machine.goal.on_result(status, text, result, self._clock.now()))
+            now = self._clock.now()
+            self._take(machine, machine.goal.on_result(status, text, result, now))
         self._acknowledge(machine.goal.id)
 
     def _acknowledge(self, goal_id: str) -> None:
@@ -464,17 +475,26 @@ class GoalManager:
     def _fulfil(self, machine: CommStateMachine, duty: Duty) -> None:
         """Send what a goal needs."""
         goal = machine.goal
+        if duty is _ONLY_GOAL:  # by far the most frequent one
+            self._offer(machine)
+            return
         if Duty.CANCEL in duty:
             self._port.send_cancel(goal.id, 0)
-        # Sent only when somebody listens: a goal that was not sent cannot run twice.
-        if Duty.GOAL in duty and self._port.is_heard():
-            with self._lock:
-                server = self._server()
-                goal.on_offered(server.session if server is not None else "")
-            self._port.send_goal(machine.payload)
-            if not goal.offered:  # a farewell came in between: another server may have heard it
-                with self._lock:
-                    goal.on_offered("")
+        if Duty.GOAL in duty:
+            self._offer(machine)
         if Duty.ASK in duty and not machine.asking:
             machine.asking = True
             self._port.ask(goal.id, machine.on_answered)
+
+    def _offer(self, machine: CommStateMachine) -> None:
+        """Send a goal if somebody listens: one that was not sent cannot run twice."""
+        goal = machine.goal
+        if not self._port.is_heard():
+            return
+        with self._lock:
+            server = self._current
+            goal.on_offered(server.session if server is not None else "")
+        self._port.send_goal(machine.payload)
+        if not goal.offered:  # a farewell came in between: another server may have heard it
+            with self._lock:
+                goal.on_offered("")

@@ -152,6 +152,12 @@ class ClientGoal:
             self._due = now + ASK_FIRST_S
         return path
 
+    def on_sign_of_life(self, now: float) -> None:
+        """Take a status that says nothing new, of a goal that is acknowledged."""
+        self._unlisted_since = None
+        if self.comm is CommState.ACTIVE:
+            self._due = now + SILENCE_S
+
     def on_result(self, status: Status, text: str, result: object, now: float) -> Path:
         """Take the result with the final status; return the states passed."""
         if self.over:

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from actionlib_core.clock._protocol import Clock, Task
+    from actionlib_core.clock._protocol import Task
+
+
+class Spawner(Protocol):
+    """What starts a task: a clock, or something in front of one."""
+
+    def spawn(self, target: Callable[[], object], *, name: str) -> Task:
+        """Run `target` in a thread of its own."""
+        ...
 
 
 class SerialExecutor:
@@ -21,7 +29,7 @@ class SerialExecutor:
     Threads: `submit` may be called from any thread and never waits for a callable.
     """
 
-    def __init__(self, clock: Clock, name: str) -> None:
+    def __init__(self, clock: Spawner, name: str) -> None:
         self._clock = clock
         self._name = name
         self._lock = threading.Lock()

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import threading
 from functools import partial
+from threading import get_ident
 from typing import TYPE_CHECKING, TypeVar
 
 from actionlib_core.clock import RealClock
 from actionlib_core.clock._serial import report_thread_exception
+from actionlib_core.transport._pin import pin, pinned
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -21,16 +23,28 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 
-class Inside(threading.local):
-    """How deep this thread is in calls into the library; a callback that finds it > 0 is inline."""
+class Inside:
+    """Which threads are in calls into the library; a callback on one of them is inline.
 
-    depth = 0
+    A dictionary by thread, not a `threading.local`: a foreign thread is a new one to Python each
+    time that it calls back, and would make its part of a local anew.
+
+    Attributes:
+        depths: How deep each thread is; one that is not is not there.
+    """
+
+    def __init__(self) -> None:
+        self.depths: dict[int, int] = {}
 
     def __enter__(self) -> None:
-        self.depth += 1
+        me = get_ident()
+        self.depths[me] = self.depths.get(me, 0) + 1
 
     def __exit__(self, *_: object) -> None:
-        self.depth -= 1
+        me = get_ident()
+        self.depths[me] -= 1
+        if not self.depths[me]:
+            del self.depths[me]
 
 
 inside = Inside()
@@ -41,31 +55,21 @@ class Gate:
 
     Who enters puts itself down before it looks whether the gate is shut, and who shuts it does so
     before looking who is down; list operations are atomic, so no lock is needed.
+
+    Attributes:
+        running: The threads that are in a callback, or about to look whether they may.
+        is_shut: No callback may start.
+        left: Set by each that leaves a gate that is shut.
     """
 
     def __init__(self) -> None:
-        self._running: list[int] = []
-        self._shut = False
-        self._left = RealClock().event()
-
-    def enter(self) -> bool:
-        """Tell whether a callback may start; it then ends with `leave`."""
-        me = threading.get_ident()
-        self._running.append(me)
-        if self._shut:
-            self.leave()
-            return False
-        return True
-
-    def leave(self) -> None:
-        """Note the end of a callback."""
-        self._running.remove(threading.get_ident())
-        if self._shut:
-            self._left.set()
+        self.running: list[int] = []
+        self.is_shut = False
+        self.left = RealClock().event()
 
     def shut(self) -> None:
         """Let no callback start from now on."""
-        self._shut = True
+        self.is_shut = True
 
     def wait_idle(self, timeout: float) -> None:
         """Wait until no callback runs, not counting one that this thread is in itself.
@@ -73,13 +77,13 @@ class Gate:
         Blocks: `timeout` [s] at most.
         """
         deadline = RealClock.now() + timeout
-        me = threading.get_ident()
+        me = get_ident()
         while True:
-            self._left.clear()
+            self.left.clear()
             left = deadline - RealClock.now()
-            if left <= 0 or all(runner == me for runner in tuple(self._running)):
+            if left <= 0 or all(runner == me for runner in tuple(self.running)):
                 return
-            self._left.wait(left)
+            self.left.wait(left)
 
 
 class Inlet:
@@ -106,11 +110,14 @@ class Inlet:
         refuse: Callable[[T], object] | None = None,
     ) -> None:
         """Run `function(item)`, or `refuse(item)` when this is closed."""
-        if inside.depth or self._queued:
+        me = get_ident()
+        if self._queued or me in inside.depths:
             with self._lock:
                 self._queued += 1
             self._submit(partial(self._run_queued, function, item, refuse))
         else:
+            if me not in pinned:
+                pin(me)
             self._run(function, item, refuse)
 
     def _run_queued(
@@ -125,13 +132,17 @@ class Inlet:
     def _run(
         self, function: Callable[[T], object], item: T, refuse: Callable[[T], object] | None
     ) -> None:
-        if self.closed or not self._gate.enter():
-            if refuse is not None:
-                refuse(item)
-            return
+        gate = self._gate
+        me = get_ident()
+        gate.running.append(me)
         try:
-            function(item)
+            if not (self.closed or gate.is_shut):
+                function(item)
+            elif refuse is not None:
+                refuse(item)
         except Exception:  # noqa: BLE001  a border: reported, the next item is delivered
             report_thread_exception()
         finally:
-            self._gate.leave()
+            gate.running.remove(me)
+            if gate.is_shut:
+                gate.left.set()

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import threading
 from functools import partial
+from threading import get_ident
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import zenoh
@@ -82,14 +83,10 @@ class Publisher(Declared):
         if not self._users:
             super().close()
 
-    def _leave(self) -> None:
-        self._users.pop()
-        if self._inlet.closed and not self._users:
-            super().close()
-
     def put(self, payload: bytes, attachment: bytes | None = None) -> None:
         self._users.append(None)
-        inside.depth += 1  # as `with inside`, in half the time
+        depths, me = inside.depths, get_ident()
+        depths[me] = depths.get(me, 0) + 1  # as `with inside`, in half the time
         try:
             if self._inlet.closed:
                 raise TransportError(
@@ -99,8 +96,12 @@ class Publisher(Declared):
         except zenoh.ZError as error:
             raise TransportError(f"{self._key}: cannot send: {error}") from error
         finally:
-            inside.depth -= 1
-            self._leave()
+            depths[me] -= 1
+            if not depths[me]:
+                del depths[me]
+            self._users.pop()
+            if self._inlet.closed:
+                self.close()
 
     def matching(self) -> bool:
         self._users.append(None)
@@ -112,7 +113,9 @@ class Publisher(Declared):
         except zenoh.ZError:  # the session is closed
             return False
         finally:
-            self._leave()
+            self._users.pop()
+            if self._inlet.closed:
+                self.close()
 
 
 class LatchedPublisher(Publisher):
