@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.names import check_name
 from missions.arguments import Text, usage, wants_help
 from missions.exceptions import MissionError
 from missions.maps import OFFICE_MAP, OFFICE_ROBOT
@@ -13,6 +16,9 @@ from missions.move_base.geometry import finite
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from typing import TextIO
+
+    from missions.stage import Pace
 
 
 def register_list(subparsers: Any) -> None:
@@ -48,8 +54,19 @@ def register_run(subparsers: Any) -> None:
         type=_input,
         help="an argument of the mission's function by name, or a userdata key",
     )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="write pictures of the run there")
-    parser.add_argument("--plain", action="store_true", help="lines only, for logs")
+    parser.add_argument(
+        "--time",
+        type=_pace,
+        default="real",
+        metavar="PACE",
+        help="real; virtual: in this process alone, as fast as it can; 10x: so, at that rate",
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="write events, pictures and a summary there"
+    )
+    shown = parser.add_mutually_exclusive_group()
+    shown.add_argument("--plain", action="store_true", help="lines only, for logs")
+    shown.add_argument("--json", action="store_true", help="one event a line, as JSON")
     parser.add_argument(
         "--success",
         action="append",
@@ -71,6 +88,12 @@ def register_run(subparsers: Any) -> None:
         action=argparse.BooleanOptionalAction,
         default=False,
         help="start it for this run (default: use one that runs)",
+    )
+    robot.add_argument(
+        "--robot",
+        default="",
+        metavar="NAME",
+        help="the robot to use: its name is in front of the mission's names",
     )
     robot.add_argument(
         "--map", type=Path, default=OFFICE_MAP, metavar="FILE", help="its map (default: the office)"
@@ -116,7 +139,16 @@ def _list(_args: argparse.Namespace) -> int:
 
 
 def _run(args: argparse.Namespace) -> int:
+    if not args.json:
+        return _run_mission(args, None)
+    events = sys.stdout
+    with contextlib.redirect_stdout(sys.stderr):  # whatever a mission prints: events are alone
+        return _run_mission(args, events)
+
+
+def _run_mission(args: argparse.Namespace, events: TextIO | None) -> int:
     from missions.runner import RunOptions, run_mission
+    from missions.stage import RobotOptions
     from missions.watching import Watching
     from smachpy.targets import load_target
 
@@ -124,22 +156,37 @@ def _run(args: argparse.Namespace) -> int:
     if wants_help(args.words):
         print(usage(target))
         return 0
-    pose: Sequence[float] = args.pose or ()
     options = RunOptions(
         inputs=_inputs(args.input),
         words=args.words,
-        start_robot=args.start_robot,
-        robot_arguments=("--pose", *(str(value) for value in pose)) if pose else (),
-        map=args.map,
-        config=args.config,
+        pace=args.time,
+        robot=RobotOptions(args.start_robot, args.map, args.config, tuple(args.pose or ())),
+        names=args.names,
+        namespace=check_name(args.robot, "robot name") if args.robot else "",
         out=args.out,
         plain=args.plain,
+        events=events,
         success=tuple(args.success),
         server_timeout=args.server_timeout,
         debug=args.debug,
-        watching=Watching(record=args.record, view=args.view, port=args.port, control=args.control),
+        watching=Watching(
+            record=args.record,
+            view=args.view,
+            port=args.port,
+            control=args.control,
+            alone=args.time.virtual,
+        ),
     )
     return run_mission(target, options)
+
+
+def _pace(text: str) -> Pace:
+    from missions.stage import Pace
+
+    try:
+        return Pace.read(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def _inputs(pairs: Sequence[tuple[str, Text]]) -> dict[str, Text]:

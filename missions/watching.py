@@ -25,12 +25,14 @@ class Watching:
         view: Serve the page of the live viewer while it runs.
         port: Of that page; 0 takes any.
         control: Obey pause, step, jump and the like from viewers.
+        alone: Nobody can look in, as the mission is on no network that others are on.
     """
 
     record: Path | None = None
     view: bool = False
     port: int = 8080
     control: bool = False
+    alone: bool = False
 
 
 @contextlib.contextmanager
@@ -55,8 +57,9 @@ def watched(name: str, machine: Container, path: str, watching: Watching) -> Ite
             from viz.runs.recording import Recorder
 
             stack.enter_context(Recorder(watching.record, machine))
-        server.start()
-        stack.callback(server.stop)
+        if not watching.alone:
+            server.start()
+            stack.callback(server.stop)
         if watching.view:
             from viz.live.process import ViewerProcess
 

@@ -68,6 +68,8 @@ class TerminalView:
         plain: Only lines, no panel. A stream that is no terminal is plain in any case.
         console: Where to draw; standard output by default.
         clock: The machine's clock; the current one by default.
+        drawing: The clock to draw by, where the machine's runs faster than people look; the
+            machine's by default.
 
     Attributes:
         history: What the view has heard, also for `viz.render(..., run=view.history)`.
@@ -82,19 +84,21 @@ class TerminalView:
         plain: bool = False,
         console: Console | None = None,
         clock: Clock | None = None,
+        drawing: Clock | None = None,
     ) -> None:
         self.history = History()
         self._record = record
         self._kinds = {state.path: state.kind for state in record.walk() if not state.children}
         self._console = console or _standard_output()
         self._clock = clock or current_clock()
+        self._drawing = drawing or self._clock
         panel = self._console.is_terminal and not plain
         self._live = _live_panel(self._console) if panel else None
         self._narrator = Narrator(record, self.history, feedback=not panel)
         self._lock = threading.Lock()
         self._lines: deque[Text] = deque(maxlen=BACKLOG)
         self._lost = 0
-        self._wake = self._clock.event()
+        self._wake = self._drawing.event()
         self._closing = False
         self._gone = False
         self._task: Task | None = None
@@ -102,7 +106,7 @@ class TerminalView:
     def __enter__(self) -> Self:
         if self._live is not None:
             self._live.start()
-        self._task = self._clock.spawn(self._draw, name="terminal view")
+        self._task = self._drawing.spawn(self._draw, name="terminal view")
         return self
 
     def __exit__(
@@ -157,7 +161,7 @@ class TerminalView:
                 self._wake.clear()
                 self._frame()
                 if not self._closing:
-                    self._clock.sleep(FRAME)
+                    self._drawing.sleep(FRAME)
             self._frame()
             self._release()
         except (OSError, SystemExit):  # a closed pipe, a lost login: the mission goes on unseen

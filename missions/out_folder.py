@@ -1,0 +1,126 @@
+"""What `smachpy run --out DIR` leaves: events, pictures and a summary."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import json
+from typing import TYPE_CHECKING, Any
+
+import viz
+from missions.exceptions import MissionError
+from missions.recorder import TrackRecorder
+from viz.runs.recording import Recorder, RecordingError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from missions.stage import RobotOptions
+    from smachpy.container import Container
+
+
+class OutFolder:
+    """The files of one run, which replace those of the mission's last run.
+
+    Args:
+        folder: Where to write; made when it is not there.
+        name: The mission's, in front of the files' names.
+        machine: The mission.
+        robot: Its map and dock are in the picture of the track.
+
+    Raises:
+        MissionError: a file cannot be written.
+        SmachError: the machine cannot be drawn.
+    """
+
+    def __init__(self, folder: Path, name: str, machine: Container, robot: RobotOptions) -> None:
+        self._folder = folder
+        self._name = name
+        self._machine = machine
+        self._robot = robot
+        self._track = TrackRecorder()
+        self._events = self._path(".jsonl")
+        with self._writing():
+            folder.mkdir(parents=True, exist_ok=True)
+            # What cannot be drawn or written is known before anything moves.
+            viz.render(machine, self._path(".svg"))
+            for old in (self._events, self._path("_summary.json"), self._path("_track.png")):
+                old.unlink(missing_ok=True)
+        importlib.import_module("missions.move_base.track")
+
+    @contextlib.contextmanager
+    def collecting(self) -> Iterator[None]:
+        """Collect events inside the `with` block.
+
+        Raises:
+            MissionError: the file cannot be written.
+        """
+        try:
+            recorder = Recorder(self._events, self._machine)
+        except RecordingError as error:
+            raise MissionError(f"--out {self._folder}: {error}") from error
+        with recorder:
+            forget = self._machine.subscribe(self._track.on_event)
+            try:
+                yield
+            finally:
+                forget()
+
+    def write(self, history: viz.History, facts: dict[str, Any]) -> list[Path]:
+        """Write the pictures and the summary.
+
+        Args:
+            history: The run.
+            facts: How it was started and ended: first in the summary.
+
+        Returns:
+            All files, the events too.
+
+        Raises:
+            MissionError: a file cannot be written.
+        """
+        with self._writing():
+            files = [viz.render(self._machine, self._path(".svg"), run=history)]
+            if self._track.has_goals:
+                files.append(self._draw_track(f"{self._name}: {facts['outcome']}"))
+            path = self._path("_summary.json")
+            path.write_text(json.dumps({**facts, **summary(history)}, indent=2) + "\n", "utf-8")
+        return [*files, self._events, path]
+
+    def _draw_track(self, title: str) -> Path:
+        from missions.move_base.config import load_config
+        from missions.move_base.occupancy import load_map
+
+        path = self._path("_track.png")
+        dock = load_config(self._robot.config).dock
+        self._track.draw(path, load_map(self._robot.map), dock=dock, title=title)
+        return path
+
+    def _path(self, ending: str) -> Path:
+        return self._folder / f"{self._name}{ending}"
+
+    @contextlib.contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise MissionError(
+                f"--out {self._folder}: got {error.strerror or str(error)!r}; expected a folder to "
+                "write to."
+            ) from error
+
+
+def summary(history: viz.History) -> dict[str, Any]:
+    """Return what a run did, as plain data."""
+    return {
+        "seconds": history.seconds,
+        "states": {
+            path: {
+                "visits": visits.count,
+                "seconds": round(visits.seconds, 6),
+                "outcomes": visits.outcomes,
+            }
+            for path, visits in history.visits().items()
+        },
+    }
