@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import threading
 from collections import deque
+from contextvars import copy_context
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.clock import RealClock
 from smachpy._runtime.failures import unknown_outcome
 from smachpy._runtime.frame import FRAME, Frame
 from smachpy._runtime.interrupt import Interruption
@@ -16,7 +18,6 @@ from smachpy.exceptions import InvalidUserCodeError
 
 if TYPE_CHECKING:
     from actionlib_core.clock import Event as ClockEvent
-    from actionlib_core.clock import Task
     from smachpy._runtime.frame import Override
     from smachpy._runtime.step import Step
     from smachpy.container import Container
@@ -29,7 +30,6 @@ class Branch(Frame):
         outcome: What it ended with; None while it runs, or when it raised.
         error: What it raised.
         ended: It has ended, or was abandoned.
-        task: The task that runs it.
     """
 
     path = ""
@@ -47,7 +47,6 @@ class Branch(Frame):
         self.outcome: str | None = None
         self.error: BaseException | None = None
         self.ended = False
-        self.task: Task | None = None
 
     def run_child(self) -> None:
         """Run the child; the task's whole work."""
@@ -114,6 +113,56 @@ class Branch(Frame):
         return self.told is not None
 
 
+class _Crew:
+    """Starts branches in as many threads as they need: one each when they all block.
+
+    Whoever takes a branch calls another thread first if more branches wait, so none ever waits
+    for another one's end. A thread whose child has ended meanwhile takes the next branch itself:
+    children that do little cost no thread each, of which waking up is by far the greatest part.
+
+    Threads: `call` by the container's; `_work` by those that it brings.
+    """
+
+    def __init__(self, clock: RealClock, branches: list[Branch]) -> None:
+        self._clock = clock
+        self._waiting = deque((branch, copy_context()) for branch in branches)
+        self._lock = threading.Lock()
+        self._coming = False
+
+    def call(self) -> None:
+        """Let a thread come for the branches that wait, unless one is on its way."""
+        with self._lock:
+            if self._coming or not self._waiting:
+                return
+            self._coming = True
+            name = self._waiting[0][0].here()
+        self._clock.spawn(self._work, name=name)
+
+    def _work(self) -> None:
+        thread = threading.current_thread()
+        with self._lock:
+            self._coming = False
+        while True:
+            with self._lock:
+                if not self._waiting:
+                    return
+                branch, context = self._waiting.popleft()
+            try:
+                self.call()
+            except RuntimeError as error:  # the system gives no more threads
+                self._fail(error)
+            thread.name = branch.here()
+            context.run(branch.run_child)
+
+    def _fail(self, error: RuntimeError) -> None:
+        """End the branches that no thread can come for."""
+        with self._lock:
+            branches = [branch for branch, _ in self._waiting]
+            self._waiting.clear()
+        for branch in branches:
+            branch.group.end(branch, None, error)
+
+
 class Group:
     """All branches of one run, and the queue on which they report to the container's thread.
 
@@ -136,10 +185,13 @@ class Group:
         self._left = len(steps)
 
     def start(self) -> None:
-        """Start every branch in its task, named after its path."""
-        spawn = self.frame.run.clock.spawn
+        """Start every branch, in a thread named after its path."""
+        clock = self.frame.run.clock
+        if isinstance(clock, RealClock):
+            _Crew(clock, self.branches).call()
+            return
         for branch in self.branches:
-            branch.task = spawn(branch.run_child, name=branch.here())
+            clock.spawn(branch.run_child, name=branch.here())
 
     def tell(self, branches: list[Branch]) -> None:
         """Ask the children of `branches` to stop; with the container's lock held."""
