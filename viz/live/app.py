@@ -7,6 +7,7 @@
     GET  /api/picture         svg, png, pdf or dot
     GET  /api/export          the run as .html or .jsonl
     GET  /api/statistics      of recorded runs
+    GET  /api/compare         a machine and another one in one drawing
     GET  /api/action          what a form for a goal of an action needs
     POST /api/control         a command
     POST /api/action          check or send a goal, or cancel one
@@ -113,6 +114,7 @@ class Viewer:
                 Route("/api/picture", self._picture),
                 Route("/api/export", self._export),
                 Route("/api/statistics", self._runs),
+                Route("/api/compare", self._compare),
                 Route("/api/control", self._control, methods=["POST"]),
                 Route("/api/action", self._action, methods=["GET"]),
                 Route("/api/action", self._command_action, methods=["POST"]),
@@ -189,6 +191,16 @@ class Viewer:
         if machine is None or machine.record is None:
             return _unknown(request)
         return JSONResponse(self._statistics(machine.record.label))
+
+    async def _compare(self, request: Request) -> Response:
+        machine = self._asked(request)
+        other = self._machines.get(request.query_params.get("with", ""))
+        if machine is None or machine.record is None or other is None or other.record is None:
+            return _unknown(request)
+        sides = (other.name, other.record, other.events()), (
+            machine.name, machine.record, machine.events(),
+        )  # fmt: skip
+        return JSONResponse(await run_in_threadpool(_compared, *sides))
 
     async def _picture(self, request: Request) -> Response:
         machine = self._asked(request)
@@ -391,6 +403,25 @@ async def _read_command(request: Request) -> dict[str, Any] | None:
 def _no_command() -> Response:
     text = f"command: got no JSON object of at most {LONGEST_COMMAND} bytes; expected one."
     return JSONResponse({"ok": False, "text": text}, status_code=400)
+
+
+def _compared(old: tuple[str, Any, Any], new: tuple[str, Any, Any]) -> dict[str, Any]:
+    """Two machines, each with name, record and events, in one drawing."""
+    from viz.runs.statistics import Statistics
+    from viz.runs.union import Side, unite
+
+    sides = []
+    for name, record, events in (old, new):
+        statistics = Statistics()
+        statistics.add(events)
+        sides.append(Side(name, record, statistics))
+    union = unite(*sides)
+    return {
+        "with": old[0],
+        "model": page.model(union.record, union.node),
+        "listed": union.listed(),
+        "runs": [side.statistics.runs for side in sides if side.statistics is not None],
+    }
 
 
 def _do(actions: Actions, command: dict[str, Any]) -> dict[str, Any]:

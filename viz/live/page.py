@@ -8,7 +8,7 @@ import hashlib
 import html
 import json
 from dataclasses import asdict
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,10 @@ from viz.extract import extract
 from viz.theme import THEMES, Theme
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from smachpy.introspection import StateRecord
+    from viz.model import Node
 
 WEB = Path(__file__).resolve().parent.parent / "web"
 ALL_LEVELS = 1_000_000
@@ -32,7 +35,7 @@ MODULES = {
         for name in (
             "fold", "model", "measure", "layout", "diagram", "viewport", "timeline", "store",
             "follow", "source", "statistics", "panels", "inspector", "controls", "keys", "actions",
-            "goalform", "app",
+            "goalform", "comparison", "app",
         )
     },
 }  # fmt: skip
@@ -114,11 +117,18 @@ def _variables(theme: Theme) -> str:
     return "".join(f"--{name}:{value};" for name, value in pairs.items())
 
 
-def model(record: StateRecord) -> dict[str, Any]:
-    """Return all that the page draws a machine from, with and without implicit transitions."""
+def model(record: StateRecord, draw: Callable[..., Node] | None = None) -> dict[str, Any]:
+    """Return all that the page draws a machine from, with and without implicit transitions.
+
+    Args:
+        record: The machine.
+        draw: Makes the drawing, with `depth` and `show_implicit` as `extract` takes them; None
+            draws the machine as it is.
+    """
+    draw = draw or partial(extract, record)
     return {
-        "explicit": asdict(extract(record, depth=ALL_LEVELS)),
-        "implicit": asdict(extract(record, depth=ALL_LEVELS, show_implicit=True)),
+        "explicit": asdict(draw(depth=ALL_LEVELS)),
+        "implicit": asdict(draw(depth=ALL_LEVELS, show_implicit=True)),
         "keys": {
             state.path: {
                 "inputs": state.input_keys,

@@ -1,5 +1,5 @@
 // The picture: built once per layout, restyled by class when something happens.
-import { CONTAINERS, KIND_NAMES, classOfAll, outcomeClass } from "viewer/model";
+import { CONTAINERS, KIND_NAMES, SIGNS, classOfAll, outcomeClass, signed } from "viewer/model";
 import { measure } from "viewer/measure";
 import { ms } from "viewer/fold";
 
@@ -68,6 +68,7 @@ export class Diagram {
     this.edgesAbove = document.createDocumentFragment();
     const picture = document.createDocumentFragment();
     this.root = machine.root;
+    this.svg.classList.toggle("compared", machine.order.some((n) => n.change || n.note || n.edges.some((e) => e.change || e.note)));
     this.size = { x: 0, y: 0, w: layout.w + 16, h: layout.h + 16 };
     this.#container(layout, 8, 8, picture);
     this.world.replaceChildren(picture);
@@ -86,7 +87,7 @@ export class Diagram {
     group.append(el("rect", { class: "frame", x, y, width: box.w, height: box.h, rx: 9 }));
     group.firstChild.style.fill = `var(--depth${Math.min(node.depth, 11)})`;
     group.append(icon(node.kind, x + 9, y + 7.5));
-    const title = el("text", { x: x + 24, y: y + 16.5, class: "title" }, node.name);
+    const title = el("text", { x: x + 24, y: y + 16.5, class: "title" }, node.shown);
     if (TAGS[node.kind]) title.append(el("tspan", { dx: 7, class: "tag" }, TAGS[node.kind]));
     group.append(title);
     this.#extras(group, node, { ...box, h: 26 });
@@ -103,11 +104,13 @@ export class Diagram {
   }
 
   #group(node, className) {
-    const group = el("g", { class: className, "data-path": node.path, role: "button", tabindex: -1,
+    const group = el("g", { class: `${className}${node.change ? ` cmp-${node.change}` : ""}`, "data-path": node.path, role: "button", tabindex: -1,
       "aria-label": `${node.label}, ${KIND_NAMES[node.kind] ?? node.kind}` });
     const details = node.details.map(([k, v]) => `${k}: ${v}`).join("\n");
     const found = (this.problems.get(node.path) ?? []).map((p) => `\u26a0 ${p.text}`).join("\n");
-    const words = [node.path, `${node.type_name} (${KIND_NAMES[node.kind] ?? node.kind})`, node.doc, details, found];
+    group.note = node.note;
+    group.change = node.change;
+    const words = [node.path, node.change, node.note, `${node.type_name} (${KIND_NAMES[node.kind] ?? node.kind})`, node.doc, details, found];
     this.nodes.set(node.path, group);
     queueMicrotask(() => group.prepend(el("title", {}, words.filter(Boolean).join("\n").slice(0, 2000))));
     return group;
@@ -125,12 +128,12 @@ export class Diagram {
     bar.style.transformOrigin = `${x + 6}px 0`;
     group.append(bar);
     group.bar = bar;
-    const nameWidth = measure(node.name, 11, true) + 14;
+    const nameWidth = measure(node.shown, 11, true) + 14;
     const spare = closed ? 20 + measure(String(node.total - 1), 9) : 0;
     const left = place.rows ? x + 10 : x + (place.w - nameWidth - spare) / 2;
     const middle = y + place.h / 2;
     group.append(icon(node.kind, left, middle - 5));
-    group.append(el("text", { class: "name", x: left + 14, y: middle + 3.9 }, node.name));
+    group.append(el("text", { class: "name", x: left + 14, y: middle + 3.9 }, node.shown));
     if (closed)
       group.append(el("text", { class: "inside", x: left + nameWidth + 7, y: middle + 3.4 }, `\u229e ${node.total - 1}`));
     for (const dot of place.dots) {
@@ -164,7 +167,8 @@ export class Diagram {
     const points = edge.points.map((p) => ({ x: p.x + x, y: p.y + y }));
     const kind = edge.kind === "link" ? classOfAll(edge.outcomes) : edge.kind;
     const implicit = edge.link?.implicit ? " implicit" : "";
-    const path = el("path", { class: `edge ${kind}${implicit}`, d: rounded(points),
+    const change = edge.link?.change ? ` cmp-${edge.link.change}` : "";
+    const path = el("path", { class: `edge ${kind}${implicit}${change}`, d: rounded(points),
       "marker-end": `url(#arrow-${edge.kind === "link" ? kind : "plain"})` });
     for (const outcome of edge.outcomes) {
       const key = edge.source + SEP + outcome;
@@ -177,12 +181,15 @@ export class Diagram {
   #edgeLabels(edge, x, y, into) {
     for (const label of edge.labels) {
       const text = el("text", { class: `label ${outcomeClass(label.text)}`, x: x + label.x,
-        y: y + label.y + 9.2, "text-anchor": "middle" }, label.text);
+        y: y + label.y + 9.2, "text-anchor": "middle" }, signed(edge.link?.change, label.text));
       into.append(text);
     }
     if (edge.kind !== "link") return;
+    const { change, note } = edge.link;
+    const said = [!edge.labels.length && change ? SIGNS[change] : "", note].filter(Boolean).join(" ");
     const middle = longest(edge.points);
-    const count = el("text", { class: "count", x: x + middle.x + 4, y: y + middle.y - 3 });
+    const count = el("text", { class: "count", x: x + middle.x + 4, y: y + middle.y - 3 }, said);
+    count.said = said;
     into.append(count);
     for (const path of this.arrows.get(edge.source + SEP + edge.outcomes[0]) ?? [])
       if (path.about === edge) path.count = count;
@@ -245,10 +252,10 @@ export class Diagram {
     classes.toggle("raised", !active && !!state?.error);
     classes.toggle("faded", !active && state?.left != null && now - ms(state.left) > FADE_MS);
     group.glyph.textContent = glyph(state, active, kind);
-    group.badge.textContent = active ? elapsed(state, now) : "";
+    group.badge.textContent = active ? elapsed(state, now) : group.note || "";
     if (group.bar) group.bar.style.transform = `scaleX(${active ? goal?.progress?.fraction ?? 0 : 0})`;
     const status = active ? (state.preempt ? `asked to stop${state.serviced ? ", takes it up" : ""}` : "running") : state?.outcome ?? "not visited";
-    group.setAttribute("aria-label", `${path}, ${status}`);
+    group.setAttribute("aria-label", `${path}, ${status}${group.change ? `, ${group.change}` : ""}`);
     this.minis.get(path)?.classList.toggle("active", active);
   }
 
@@ -285,7 +292,7 @@ export class Diagram {
         edge.style.strokeWidth = count ? `${Math.min(4, 1.2 + Math.log2(1 + count) * 0.6)}px` : "";
         edge.classList.toggle("never", !!weigh && !count);
         if (edge.count)
-          edge.count.textContent = !weigh || !count ? "" : `\u00d7${count}${share && share < 0.995 ? ` ${Math.round(share * 100)}%` : ""}`;
+          edge.count.textContent = !weigh || !count ? edge.count.said : `\u00d7${count}${share && share < 0.995 ? ` ${Math.round(share * 100)}%` : ""}`;
       }
     for (const [path, group] of this.nodes) {
       const value = weigh && tone ? tone(path) : null;

@@ -7,6 +7,7 @@ import { askerText, ms } from "viewer/fold";
 import { KIND_NAMES, outcomeClass } from "viewer/model";
 import { span } from "viewer/diagram";
 import { StateControls } from "viewer/controls";
+import { Differences } from "viewer/comparison";
 import { coverage } from "viewer/statistics";
 
 const html = htm.bind(h);
@@ -31,6 +32,7 @@ export function Inspector({ page }) {
   return html`<aside class="inspector" aria-label="details">
     ${store.gap.value && html`<p class="hint">This page could not follow; what happened before is not in the timeline.</p>`}
     <${Selected} page=${page} data=${data} now=${now} model=${model} />
+    <${Differences} page=${page} State=${State} />
     <${Preempts} page=${page} data=${data} now=${now} />
     <${Goals} page=${page} data=${data} now=${now} />
     <${Userdata} page=${page} data=${data} now=${now} />

@@ -42,7 +42,7 @@ class Elk {
 export const pillWidth = (outcome) => measure(outcome, 9, true) + 15;
 export function leafWidth(node) {
   const closed = node.children.length ? 20 + measure(String(node.total - 1), 9) : 0;
-  return Math.max(56, 44 + measure(node.name, 11, true) + closed);
+  return Math.max(56, 44 + measure(node.shown, 11, true) + closed);
 }
 
 export class Layout {
@@ -53,7 +53,8 @@ export class Layout {
     this.calls = 0;
   }
 
-  clear() { this.cache.clear(); this.chosen.clear(); }
+  clear() { this.forget(); this.chosen.clear(); }
+  forget() { this.cache.clear(); } // but keep the directions
 
   // Lay out everything below `root`, with the containers of `open` opened.
   async run(root, open) {
@@ -164,7 +165,7 @@ class Plan {
     const bottom = outer === "DOWN" ? 20 : 14;
     return {
       id: this.id, children: [], edges: [], ports: [],
-      labels: [{ text: node.name, width: measure(node.name, 11, true) + tag + 30, height: 17 }],
+      labels: [{ text: node.shown, width: measure(node.shown, 11, true) + tag + 30, height: 17 }],
       layoutOptions: {
         ...SPACING,
         "elk.algorithm": "layered", "elk.direction": dir, "elk.edgeRouting": "ORTHOGONAL",

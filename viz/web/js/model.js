@@ -23,6 +23,10 @@ export function shorten(text, length = 34) {
   return line.length <= length ? line : line.slice(0, length - 1) + "\u2026";
 }
 
+// What stands before the name of what has changed between two versions.
+export const SIGNS = { added: "+", removed: "\u2212", changed: "\u2260", numbers: "\u00d7" };
+export const signed = (change, name) => (change ? `${SIGNS[change]} ${name}` : name);
+
 export const CONTAINERS = new Set(["machine", "sequence", "concurrence", "iterator"]);
 export const KIND_NAMES = {
   state: "state", callback: "function", action: "action", service: "service call",
@@ -43,6 +47,7 @@ export class Model {
   #index(node, parent, depth) {
     Object.assign(node, { parent, depth, number: this.order.length });
     node.name = shorten(node.label);
+    node.shown = signed(node.change, node.name);
     this.byPath.set(node.path, node);
     this.order.push(node);
     node.total = 1;
@@ -98,10 +103,10 @@ function links(node) {
       const key = `${source}\n${outcome}\n${rule.outcome}`;
       if (have.has(key) || !node.children.some((c) => c.label === source)) continue;
       have.add(key);
-      const same = found.find((e) => e.rule && e.source === source && e.target === rule.outcome);
+      const same = found.find((e) => e.rule && e.source === source && e.target === rule.outcome && e.change === rule.change);
       if (same) same.outcomes = [...same.outcomes, outcome];
       else found.push({ source, target: rule.outcome, to_outcome: true, outcomes: [outcome],
-        implicit: false, back: false, rule: rule.text || rule.outcome });
+        implicit: false, back: false, rule: rule.text || rule.outcome, change: rule.change, note: "" });
     }
   return found;
 }

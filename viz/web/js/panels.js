@@ -6,8 +6,9 @@ import * as store from "viewer/store";
 import { choose, isFile, link } from "viewer/source";
 import { MODES } from "viewer/statistics";
 import { Controls } from "viewer/controls";
+import { CompareChip, CompareLine } from "viewer/comparison";
 import { ActionsButton } from "viewer/actions";
-import { KIND_NAMES, outcomeClass } from "viewer/model";
+import { KIND_NAMES, SIGNS, outcomeClass } from "viewer/model";
 
 export const html = htm.bind(h);
 const ROW = 24;
@@ -24,6 +25,7 @@ export function TopBar({ page }) {
     <span class=${`status ${status.kind}`} role="status" data-testid="status">${status.word}</span>
     ${store.problems.value.length > 0 && html`<span class="chip" title="problems found without running it; see the inspector">
       \u26a0 ${store.problems.value.length}</span>`}
+    <${CompareChip} page=${page} />
     <${Crumbs} page=${page} />
     <span class="spread"></span>
     <${Search} page=${page} />
@@ -105,6 +107,7 @@ function View({ page }) {
       <label class="line"><span>Numbers</span><select value=${store.heat.value} onChange=${(e) => page.setHeat(e.target.value)}>
         ${MODES.map(([key, text]) => html`<option value=${key} disabled=${["runs", "failures", "compare"].includes(key) && !store.statistics.value}>${text}</option>`)}
       </select></label>
+      <${CompareLine} page=${page} done=${() => setOpen(false)} />
       <label class="line"><span>Colours</span><select value=${store.theme.value} onChange=${(e) => page.setTheme(e.target.value)}>
         <option value="system">as the system</option><option value="light">light</option><option value="dark">dark</option></select></label>
       ${!isFile() && html`<div class="line"><span>Save picture</span><span class="group">${["svg", "png", "pdf", "dot"].map((f) =>
@@ -162,6 +165,8 @@ export function Tree({ page }) {
 }
 
 export function Legend() {
+  if (store.comparison.value)
+    return html`<div class="legend" aria-hidden="true">${["added", "removed", "changed"].map((kind) => html`<span><b class=${kind}></b>${SIGNS[kind]} ${kind}</span>`)}</div>`;
   const kinds = [["active", "running"], ["success", "succeeded"], ["failure", "failed"], ["preempted", "preempted"], ["waiting", "waiting"]];
   return html`<div class="legend" aria-hidden="true">${kinds.map(([kind, word]) => html`<span><b class=${kind}></b>${word}</span>`)}</div>`;
 }

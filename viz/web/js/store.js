@@ -31,6 +31,7 @@ export const opened = signal(new Set());
 export const statistics = signal(null);
 export const notice = signal(null);
 export const help = signal(false);
+export const comparison = signal(null); // with another machine: its name, the differences
 export const actions = signal({ actions: [], goals: [] }); // on the network; goals sent from here
 export const actionsOpen = signal(false);
 export const picked = signal(null); // name of the action whose form is shown
@@ -103,6 +104,7 @@ export function setModel(payload) {
   const next = new Model(payload, implicit.value);
   next.payload = payload;
   model.value = next;
+  if (payload !== comparison.value?.model) comparison.value = null;
   const open = saved(`open.${next.root.label}`, null);
   const known = open?.filter((path) => next.get(path)?.children.length);
   opened.value = known?.length ? new Set(known) : next.toDepth(next.readableDepth());
