@@ -104,7 +104,7 @@ def open_door(door: str) -> StateMachine:
     sm = StateMachine(ENDS)
     with sm:
         sm.add("CALL", set_door(door, is_open=True), {"succeeded": "WAIT"})
-        watch = MonitorState(f"doors/{door}/open", Bool, is_closed, timeout=OPEN_TIMEOUT)
+        watch = MonitorState(f"/doors/{door}/open", Bool, is_closed, timeout=OPEN_TIMEOUT)
         sm.add("WAIT", watch, {"invalid": "succeeded", "valid": "aborted"})
     return sm
 
@@ -112,7 +112,7 @@ def open_door(door: str) -> StateMachine:
 def set_door(door: str, *, is_open: bool) -> ServiceState:
     """Ask for a door to be opened or closed, three times at most."""
     return ServiceState(
-        f"doors/{door}/set",
+        f"/doors/{door}/set",
         SetBool,
         SetBoolRequest(is_open),
         response_cb=verdict,

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import contextlib
 from functools import partial
 from pathlib import Path
 
@@ -8,9 +9,13 @@ import pytest
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.std_msgs.msg import Bool, String
 from actionlib_core.interfaces.std_srvs.srv import SetBool
+from actionlib_core.node import Node, use_node
+from actionlib_core.topic import Publisher, Subscriber
+from actionlib_core.transport.memory import MemoryNetwork
 from missions.delivery import delivery
 from missions.exceptions import InputFileError, MissionError
-from missions.maps import OFFICE_MAP, OFFICE_ROBOT
+from missions.maps import OFFICE_DOORS, OFFICE_MAP, OFFICE_ROBOT
+from missions.move_base.simulation import simulation
 from smachpy import events as ev
 from smachpy.checks import check
 from smachpy.checks.suppression import read_settings
@@ -296,3 +301,61 @@ def test_whatever_servers_do_it_ends(mission, machine):
         machine, real_actions=True, interleavings=False, max_runs=60, max_time=40
     )
     assert found.ok, found
+
+
+# -- in the simulated office -----------------------------------------------------------------------
+
+
+@pytest.fixture
+def office_world(clock):
+    """The office with its doors; `answers` are given two seconds after each question."""
+    with contextlib.ExitStack() as stack:
+        network = MemoryNetwork(clock)
+        building = stack.enter_context(Node("building", transport=network.session(), clock=clock))
+        node = Node("mission", transport=network.session(), clock=clock, namespace="robot_0")
+        stack.enter_context(node)
+        stack.enter_context(use_node(node))
+        world = stack.enter_context(simulation(OFFICE_DOORS, node=building))
+        answer = stack.enter_context(Publisher("/robot_0/operator/answer", String, node=building))
+
+        def on_question(message):
+            if message.data:
+                world.asked.append(message.data)
+                clock.call_later(2.0, lambda: answer.publish(String(world.answers.pop(0))))
+
+        world.asked, world.answers = [], []
+        stack.enter_context(
+            Subscriber("/robot_0/operator/question", String, on_question, node=building)
+        )
+        yield world
+
+
+def test_the_simulated_robot_delivers_through_the_door_and_closes_it(office_world):
+    office_world.answers = ["yes"]
+    body, lab = office_world.robots["robot_0"].body, office_world.world.doors["lab"]
+    machine, seen = delivery(), []
+
+    def listen(event):
+        if isinstance(event, ev.Left) and event.path in {"/DELIVERY/GO", "/DELIVERY/COME_BACK"}:
+            seen.append((round(body.x, 1), round(body.y, 1), lab.is_open))
+
+    machine.subscribe(listen)
+    assert machine.execute() == "succeeded"
+    assert seen == [(*LAB, True), (*HOME, False)]
+
+
+def test_it_comes_home_when_nobody_wants_it(office_world):
+    office_world.answers = ["no"]
+    machine = delivery()
+    assert machine.execute() == "brought_back"
+    body = office_world.robots["robot_0"].body
+    assert (round(body.x, 1), round(body.y, 1)) == HOME
+    assert not office_world.world.doors["lab"].is_open
+
+
+def test_something_in_the_doorway_sends_it_home(office_world):
+    office_world.world.add_obstacle(18.0, 6.6, 0.4)
+    assert delivery().execute() == "brought_back"
+    body = office_world.robots["robot_0"].body
+    assert (round(body.x, 1), round(body.y, 1)) == HOME
+    assert office_world.asked == []
