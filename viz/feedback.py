@@ -18,9 +18,14 @@ if TYPE_CHECKING:
 DISTANCES = ("distance_remaining", "distance_left", "distance_to_goal", "distance")
 FRACTIONS = ("progress", "fraction", "completion")
 PERCENTS = ("percent", "percent_complete", "percentage")
-COUNTS = ("remaining", "left", "seconds_left", "time_left", "time_remaining")
+TIMES = ("seconds_left", "time_left", "time_remaining", "estimated_time_remaining")
+COUNTS = ("remaining", "left", *TIMES)
 TEXTS = ("text", "message", "status", "state", "phase")
 TEXT_LENGTH = 60
+LEAST_FRACTION = 0.05
+"""Of a goal that is done, before its end can be estimated."""
+LEAST_SECONDS = 1.0
+"""Since it was sent, before its end can be estimated [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +50,23 @@ def progress_of(goal: Goal) -> Progress:
         return Progress()
     distance = _distance(goal.goal, feedback)
     return Progress(_fraction(goal, distance), distance, _text(feedback))
+
+
+def seconds_left(goal: Goal, fraction: float | None, now: float) -> float | None:
+    """Return how long a running goal will still take [s]: as its server says, else estimated.
+
+    Args:
+        goal: The goal.
+        fraction: How much of it is done, None when that cannot be told.
+        now: Time of the machine's clock [s].
+    """
+    said = None if goal.feedback is None else _first(goal.feedback, TIMES)
+    if said is not None:
+        return max(said, 0.0)
+    passed = now - goal.since
+    if fraction is None or fraction < LEAST_FRACTION or passed < LEAST_SECONDS:
+        return None
+    return passed * (1.0 - fraction) / fraction
 
 
 def _distance(goal: Any, feedback: Any) -> float | None:

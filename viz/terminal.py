@@ -8,20 +8,22 @@
             unsubscribe()
     view.print_summary(outcome)
 
-In a terminal every transition becomes a line that stays, above a panel with the running states
-and the goals with their feedback, way left and a bar. Without a terminal, or with `plain=True`,
-the lines come alone. The mission never waits for the screen: events are folded in memory, a task
-of the clock draws, and a terminal that blocks (Ctrl-S, a slow link) loses lines, not time.
+In a terminal every transition becomes a line that stays, above a panel with the running states,
+the goals with their feedback, a bar, way and time left, and the userdata that was written last.
+Without a terminal, or with `plain=True`, the lines come alone. The mission never waits for the
+screen: events are folded in memory, a task of the clock draws, and a terminal that blocks (Ctrl-S,
+a slow link) loses lines, not time.
 """
 
 from __future__ import annotations
 
 import errno
 import io
+import reprlib
 import sys
 import threading
 from collections import deque
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from rich.console import Console, Group
 from rich.live import Live
@@ -31,7 +33,8 @@ from rich.table import Table
 from rich.text import Text
 
 from actionlib_core.clock import current_clock
-from viz.feedback import progress_of
+from smachpy.events import UserdataWritten
+from viz.feedback import progress_of, seconds_left
 from viz.history import History
 from viz.narration import Narrator
 from viz.words import GLYPHS, shorten
@@ -56,6 +59,9 @@ PATIENCE = 2.0
 """Longest wait for a blocked terminal when the view closes [s]."""
 NARROW = 72
 """Below this many columns the panel leaves the bars out."""
+MOST_KEYS = 5
+"""Userdata keys in the panel: those that were written last."""
+VALUE_LENGTH = 60
 MOST_ROWS = 40
 """Rows of the table at the end; deeper levels are left out first."""
 
@@ -96,6 +102,7 @@ class TerminalView:
         self._live = _live_panel(self._console) if panel else None
         self._narrator = Narrator(record, self.history, feedback=not panel)
         self._lock = threading.Lock()
+        self._written: dict[str, Any] = {}
         self._lines: deque[Text] = deque(maxlen=BACKLOG)
         self._lost = 0
         self._wake = self._drawing.event()
@@ -133,12 +140,21 @@ class TerminalView:
         """Take one event in; for `machine.subscribe`."""
         line = self._narrator.tell(event)
         self.history.on_event(event)
+        if isinstance(event, UserdataWritten) and self._live is not None:
+            self._note(event)
         if line is not None and not self._gone:
             with self._lock:
                 self._lost += len(self._lines) == BACKLOG
                 self._lines.append(line)
         if line is not None or self._live is not None:
             self._wake.set()
+
+    def _note(self, event: UserdataWritten) -> None:
+        with self._lock:
+            self._written.pop(event.key, None)  # so that the newest stands last
+            self._written[event.key] = event.value
+            if len(self._written) > MOST_KEYS:
+                del self._written[next(iter(self._written))]
 
     def print_summary(self, outcome: str | None) -> None:
         """Print the table of states and the mission's outcome; None: the mission raised.
@@ -196,8 +212,19 @@ class TerminalView:
         parts += [self._active(path, now - since) for path, since in self._running()]
         goals = self.history.goals()
         if goals:
-            parts.append(self._goals(goals))
+            parts.append(self._goals(goals, now))
+        parts += self._userdata()
         return Group(*parts)
+
+    def _userdata(self) -> list[RenderableType]:
+        """What was written last, one key a line, the newest first."""
+        with self._lock:
+            written = list(self._written.items())
+        table = Table.grid(padding=(0, 2))
+        for key, value in reversed(written):
+            text = shorten(reprlib.repr(value), VALUE_LENGTH)
+            table.add_row(Text(f"  {shorten(key, 24)}", "dim"), Text(text, no_wrap=True))
+        return [table] if written else []
 
     def _running(self) -> list[tuple[str, float]]:
         """The running states that contain no other running state."""
@@ -222,7 +249,7 @@ class TerminalView:
         line.overflow = "ellipsis"
         return line
 
-    def _goals(self, goals: list[Goal]) -> Table:
+    def _goals(self, goals: list[Goal], now: float) -> Table:
         wide = self._console.width >= NARROW
         table = Table.grid(padding=(0, 2), expand=False)
         for goal in goals:
@@ -238,6 +265,8 @@ class TerminalView:
                 cells.append(Text("" if fraction is None else f"{fraction:4.0%}"))
             left = "" if progress.distance is None else f"{progress.distance:.2f} m left"
             cells.append(Text(left, "bold", no_wrap=True))
+            seconds = seconds_left(goal, progress.fraction, now)
+            cells.append(Text("" if seconds is None else f"~{_span(seconds)}", no_wrap=True))
             cells.append(Text(progress.text, "dim", no_wrap=True, overflow="ellipsis"))
             table.add_row(*cells)
         return table

@@ -4,7 +4,7 @@ from types import SimpleNamespace as Message
 
 import pytest
 
-from viz.feedback import Progress, progress_of
+from viz.feedback import Progress, progress_of, seconds_left
 from viz.history import Goal
 
 
@@ -101,3 +101,22 @@ def test_messages_that_raise_are_left_out():
 
 def test_control_characters_never_reach_the_terminal():
     assert "\x1b" not in progress(None, 1, Message(text="\x1b[2J cleared")).text
+
+
+@pytest.mark.parametrize(
+    ("feedback", "fraction", "now", "left"),
+    [
+        (Message(seconds_left=7.0), 0.5, 10.0, 7.0),  # the server knows best
+        (Message(time_remaining=-1.0), None, 10.0, 0.0),
+        (Message(), 0.25, 10.0, 30.0),
+        (Message(), 1.0, 10.0, 0.0),
+        (Message(), 0.01, 10.0, None),  # too little is done to tell
+        (Message(), 0.5, 0.5, None),
+        (Message(), None, 10.0, None),
+        (None, None, 10.0, None),
+    ],
+)
+def test_the_time_left_is_said_by_the_server_or_estimated(feedback, fraction, now, left):
+    goal = Goal("/M/A", "a", "g", 0.0, None, feedback, feedback)
+    found = seconds_left(goal, fraction, now)
+    assert found == (None if left is None else pytest.approx(left))

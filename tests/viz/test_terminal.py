@@ -93,7 +93,32 @@ def test_the_panel_shows_every_running_state_and_goal(patrol):
     assert "DRIVE \u203a GO_THERE  1:09" in text
     assert "2.00 m left" in text
     assert "75%" in text
+    assert "~23.2 s" in text  # a quarter of the way, three quarters took 69.5 s
     assert "\u2501" in text
+
+
+def test_the_panel_shows_the_userdata_that_was_written_last(patrol):
+    screen = Screen(tty=True)
+    clock = Message(now=lambda: 1.0, event=Event)
+    view = TerminalView(patrol, console=screen.console, clock=clock)
+
+    class Broken:
+        def __repr__(self):
+            raise ValueError
+
+    for number in range(9):
+        view.on_event(ev.UserdataWritten("/PATROL", 0.0, 0, f"key_{number}", number))
+    view.on_event(
+        ev.UserdataWritten("/PATROL", 0.0, 0, "places", ["\x1b[2J"] + ["x" * 99] * 10_000)
+    )
+    view.on_event(ev.UserdataWritten("/PATROL", 0.0, 0, "key_7", Broken()))
+    screen.console.print(view._panel())
+    rows = [line.split(None, 1) for line in screen.text.splitlines()[1:]]
+    assert [row[0] for row in rows] == ["key_7", "places", "key_8", "key_6", "key_5"]
+    assert rows[0][1].startswith("<Broken instance at")
+    assert rows[2][1].strip() == "8"
+    assert "\x1b" not in screen.text
+    assert max(map(len, screen.text.splitlines())) <= 100
 
 
 def test_a_narrow_terminal_keeps_the_numbers_and_drops_the_bar(patrol):
