@@ -12,10 +12,12 @@ from actionlib_core.node import get_node
 from actionlib_core.time import to_seconds
 from smachpy import log
 from smachpy._core.goal_run import ABORTED, OUTCOMES, PREEMPTED, GoalRun
+from smachpy._runtime.frame import FRAME
 from smachpy._runtime.goal_exchange import GoalExchange
 from smachpy._runtime.interface import adopt_interface
 from smachpy._runtime.messages import Incoming, Outgoing, UserCallback, raise_problems
 from smachpy._runtime.wakeup import Wakeup
+from smachpy._runtime.watch import inherited_grace
 from smachpy.state import State
 
 if TYPE_CHECKING:
@@ -25,7 +27,7 @@ if TYPE_CHECKING:
     from actionlib_core.node import Node
     from actionlib_core.time import Duration
     from smachpy.introspection import Kind
-    from smachpy.state import RetrySpec
+    from smachpy.state import Grace, RetrySpec
 
 __all__ = ["ActionStateOptions", "SimpleActionState"]
 
@@ -33,7 +35,15 @@ SHORTEST_ACK_S = 1.0
 """A server that is there is given this long to answer, however short `server_wait_timeout` is."""
 
 MARGIN_S = 5.0
-"""The machine leaves the state's thread behind only so long after the goal was abandoned [s]."""
+INHERITED_MARGIN_S = 1.0
+"""The machine leaves the state's thread behind only so long after the goal was abandoned [s].
+
+That is for callbacks that hang; the goal is abandoned, and the state ends, without it. The second
+holds when the grace is a container's, which is to be exceeded by little.
+"""
+
+DEFAULT_PREEMPT_S = float("60")
+"""Told from a 60.0 of the caller by its identity: that one is more than a default."""
 
 
 class ActionStateOptions(TypedDict, total=False):
@@ -82,7 +92,8 @@ class SimpleActionState(State):
         exec_timeout: A goal that has not ended so long [s] after a server took it is cancelled, and
             the outcome is 'aborted'; None: no limit.
         preempt_timeout: A cancelled goal that has not ended after so long [s] is abandoned and
-            reported; it may still run on the server. None: no limit.
+            reported; it may still run on the server. None: no limit. Left out, a container's
+            `preempt_timeout` holds if it is shorter.
         server_wait_timeout: 'aborted' when no server has taken the goal after so long [s]; None: no
             limit. Under one second counts as one second.
         feedback_cb: Called as `feedback_cb(userdata, feedback)` for each XFeedback.
@@ -122,7 +133,7 @@ class SimpleActionState(State):
         output_keys: Iterable[str] = (),
         outcomes: Iterable[str] = (),
         exec_timeout: float | Duration | None = None,
-        preempt_timeout: float | Duration | None = 60.0,
+        preempt_timeout: float | Duration | None = DEFAULT_PREEMPT_S,
         server_wait_timeout: float | Duration | None = 60.0,
         *,
         feedback_cb: Callable[[Any, Any], object] | None = None,
@@ -153,7 +164,8 @@ class SimpleActionState(State):
         self._exec_s = to_seconds(exec_timeout)
         self._preempt_s = to_seconds(preempt_timeout)
         self._server_wait_s = to_seconds(server_wait_timeout)
-        self.preempt_timeout = None if self._preempt_s is None else self._preempt_s + MARGIN_S
+        if preempt_timeout is not DEFAULT_PREEMPT_S:
+            self.preempt_timeout = None if self._preempt_s is None else self._preempt_s + MARGIN_S
         self._node = node
         self._exchange: GoalExchange | None = None
         raise_problems(self, action_name, [*self._problems()])
@@ -191,7 +203,10 @@ class SimpleActionState(State):
             client = self._get_client()
             if self._is_preempted():
                 return PREEMPTED
-            run = GoalRun(exec_timeout=self._exec_s, preempt_timeout=self._preempt_s)
+            grace = self._preempt_s
+            if self.preempt_timeout == "inherit" and grace is not None:
+                grace = _shorter(grace, inherited_grace(FRAME.get()))
+            run = GoalRun(exec_timeout=self._exec_s, preempt_timeout=grace)
             wanted = self._feedback_cb is not None or self._feedback_key is not None
             exchange = GoalExchange(client, wake, self._scope(), run, wants_feedback=wanted)
             self._exchange = exchange
@@ -206,6 +221,12 @@ class SimpleActionState(State):
                 exchange.cancel()
                 raise
         return self._finish(ud, exchange)
+
+    def _grace(self, inherited: Grace) -> Grace:
+        if self.preempt_timeout != "inherit" or self._preempt_s is None:
+            return super()._grace(inherited)
+        goal = _shorter(self._preempt_s, inherited)
+        return goal + (MARGIN_S if goal == self._preempt_s else INHERITED_MARGIN_S)
 
     def _is_preempted(self) -> bool:
         if not self.preempt_requested():
@@ -278,3 +299,10 @@ class SimpleActionState(State):
             if seconds is not None:
                 own.append((f"{name}_timeout", f"{seconds:g} s"))
         return kind, (*own, *details)
+
+
+def _shorter(own: float, inherited: Grace) -> float:
+    """Return the shorter of the state's default and what its containers say."""
+    if inherited is None or isinstance(inherited, str):
+        return own
+    return min(own, inherited)

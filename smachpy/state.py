@@ -229,6 +229,11 @@ class State:
 
         return forget
 
+    def _grace(self, inherited: Grace) -> Grace:
+        """Return how long the state has after a preempt [s], given what its containers say."""
+        own: Grace = self.preempt_timeout
+        return inherited if own == "inherit" else own
+
     # -- for those who write states ------------------------------------------------------------
 
     def _clock(self) -> Clock:

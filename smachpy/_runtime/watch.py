@@ -127,14 +127,20 @@ def note_answer(frame: Frame, outcome: object) -> None:
 
 def grace_of(frame: Frame, step: Step) -> float | None:
     """Return the seconds that a child has after a preempt; None for as long as it likes."""
-    grace: Any = step.state.preempt_timeout
-    above: Frame | None = frame
-    while grace == "inherit" and above is not None:
-        grace = above.container.preempt_timeout
-        above = above.parent
+    grace: Any = step.state._grace(inherited_grace(frame))  # noqa: SLF001  one machinery
     if grace == "inherit":
         return DEFAULT_GRACE_S
     return None if grace is None else float(grace)
+
+
+def inherited_grace(frame: Frame | None) -> Any:
+    """Return the `preempt_timeout` of the nearest container that has one, else "inherit"."""
+    while frame is not None:
+        grace = frame.container.preempt_timeout
+        if grace != "inherit":
+            return grace
+        frame = frame.parent
+    return "inherit"
 
 
 def bury(frame: Frame, boundary: Any) -> None:

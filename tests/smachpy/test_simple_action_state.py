@@ -472,6 +472,41 @@ def test_a_preempt_of_a_server_that_ignores_it_is_bounded(world, caplog):
     assert "It was abandoned" in caplog.text
 
 
+@pytest.mark.parametrize(
+    ("own", "container", "took"),
+    [
+        ({}, {}, 60.0),  # the default, as in SMACH
+        ({}, {"preempt_timeout": 3.0}, 3.0),
+        ({}, {"preempt_timeout": 90.0}, 60.0),
+        ({}, {"preempt_timeout": None}, 60.0),
+        ({"preempt_timeout": 8.0}, {"preempt_timeout": 3.0}, 8.0),
+        ({"preempt_timeout": Duration(8.0)}, {"preempt_timeout": 3.0}, 8.0),
+        ({"preempt_timeout": float("60.0")}, {"preempt_timeout": 3.0}, 60.0),
+    ],
+)
+def test_a_containers_shorter_grace_holds_unless_the_state_has_its_own(
+    world, caplog, own, container, took
+):
+    world.serve_raw(lambda h: h.set_accepted())
+    inner = world.machine(world.state(**own))
+    outer = world.machine(inner, **container)
+    world.clock.call_later(1.0, outer.request_preempt)
+    assert outer.execute() == "preempted"
+    assert world.clock.now() == 1.0 + took
+    assert f"{took:g} s after the cancel. It was abandoned" in caplog.text
+    assert not [event for event in world.events if isinstance(event, events.Abandoned)]
+
+
+def test_a_callback_that_hangs_is_left_behind_soon_after_the_containers_grace(world):
+    world.serve(count)
+    hangs = world.state(feedback_cb=lambda ud, feedback: world.clock.sleep(1000.0))
+    machine = world.machine(hangs, preempt_timeout=3.0)
+    world.clock.call_later(2.0, machine.request_preempt)
+    assert machine.execute() == "preempted"
+    assert world.clock.now() == 2.0 + 3.0 + 1.0
+    assert [event.grace for event in world.events if isinstance(event, events.Abandoned)] == [4.0]
+
+
 def test_a_goal_that_succeeds_although_preempted_keeps_its_outcome(world):
     world.serve_raw(
         lambda h: h.set_accepted(), lambda h: h.set_succeeded(Result(7), "was just done")
