@@ -132,6 +132,8 @@ class Site:
         places: Where parcels come from and go to.
         low_battery: A robot below this charges before its next order, 0 to 1.
         charge_until: It leaves the dock at this charge, 0 to 1.
+        map: The file of the floor; None when the file names none.
+        robot: The file of the robots' parameters, likewise.
     """
 
     docks: tuple[Waypoint, ...]
@@ -139,6 +141,8 @@ class Site:
     places: tuple[Waypoint, ...]
     low_battery: float
     charge_until: float
+    map: Path | None = None
+    robot: Path | None = None
 
 
 def goal_at(pose: Pose2D, frame: str = "map") -> MoveBaseGoal:
@@ -223,9 +227,10 @@ def load_site(path: Path) -> Site:
     floor = _floor(top, path)
     low, until = _charges(top)
     docks, homes, places = (_named(top.rows(key), floor) for key in ("docks", "homes", "places"))
+    files = (path.parent / top.text(key, "") if key in top else None for key in ("map", "robot"))
     top.close()
     document.check()
-    return Site(docks, homes, places, low, until)
+    return Site(docks, homes, places, low, until, *files)
 
 
 def _named(rows: list[Section], floor: Floor | None) -> tuple[Waypoint, ...]:

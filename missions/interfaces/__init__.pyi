@@ -214,9 +214,11 @@ class DeliverResult(_Message):
     ) -> None: ...
 
 class DeliverFeedback(_Message):
+    doing: str  # in words
     base_position: _geometry_msgs_msg.PoseStamped  # where the robot is
     def __init__(
         self,
+        doing: str | None = None,
         base_position: _geometry_msgs_msg.PoseStamped | None = None,
     ) -> None: ...
 
@@ -352,9 +354,11 @@ class RechargeResult(_Message):
     ) -> None: ...
 
 class RechargeFeedback(_Message):
+    doing: str  # in words
     base_position: _geometry_msgs_msg.PoseStamped  # where the robot is
     def __init__(
         self,
+        doing: str | None = None,
         base_position: _geometry_msgs_msg.PoseStamped | None = None,
     ) -> None: ...
 
