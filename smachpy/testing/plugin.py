@@ -28,6 +28,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("missions", "robot missions")
     group.addoption("--mission-seed", type=int, help="interleaving of the missions under test")
     group.addoption(
+        "--mission-seeds",
+        type=int,
+        metavar="COUNT",
+        help="run every test that uses a mission with so many seeds (from 0, or --mission-seed)",
+    )
+    group.addoption(
         "--mission-rate", type=float, help="virtual seconds per real second, to watch missions"
     )
     group.addoption(
@@ -119,9 +125,29 @@ class _Measuring:
             terminalreporter.write_line(f"FAIL {line}", red=True)
 
 
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Repeat the tests that use a mission with many seeds, if it is wanted."""
+    count = metafunc.config.getoption("mission_seeds")
+    if count is not None and "mission_seed" in metafunc.fixturenames:
+        if count < 1:
+            raise pytest.UsageError(f"--mission-seeds: got {count}; expected 1 or more.")
+        first = metafunc.config.getoption("mission_seed") or 0
+        seeds = range(first, first + count)
+        metafunc.parametrize("mission_seed", seeds, ids=[f"seed{seed}" for seed in seeds])
+
+
+@pytest.fixture
+def mission_seed(request: pytest.FixtureRequest) -> int | None:
+    """The seed of `mission`; override it to choose one for some tests."""
+    seed: int | None = request.config.getoption("mission_seed")
+    return seed
+
+
 @pytest.fixture
 def mission(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+    request: pytest.FixtureRequest,
+    tmp_path_factory: pytest.TempPathFactory,
+    mission_seed: int | None,
 ) -> Iterator[MissionKit]:
     """Run machines in virtual time, on a network in memory, beside scripted servers."""
     from smachpy.testing.kit import MissionKit
@@ -129,7 +155,7 @@ def mission(
     option: Callable[[str], Any] = request.config.getoption
     measuring = request.config.pluginmanager.get_plugin("mission-coverage")
     with MissionKit(
-        seed=option("mission_seed"),
+        seed=mission_seed,
         rate=option("mission_rate"),
         folder=lambda: tmp_path_factory.mktemp("mission"),
         on_run=None if measuring is None else measuring.coverage.add,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 
@@ -162,3 +163,50 @@ def test_loading_the_plugin_loads_neither_network_nor_numbers():
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=50, check=True
     )
     assert done.stdout.strip() == "[]"
+
+
+SEEDED = """
+
+def order(mission):
+    seen = []
+    tasks = [mission.clock.spawn(lambda n=n: seen.append(n), name=n) for n in "abc"]
+    for task in tasks:
+        task.join()
+    return "".join(seen)
+
+def test_order(mission):
+    print(mission.seed, order(mission))
+
+def test_server(action_server):
+    pass
+
+def test_without():
+    pass
+"""
+
+
+def test_every_test_of_a_mission_is_repeated_with_many_seeds(pytester):
+    pytester.makepyfile(SEEDED)
+    result = pytester.runpytest_inprocess(*OPTIONS, "--mission-seeds=4", "-s")
+    result.assert_outcomes(passed=9)
+    orders = dict(re.findall(r"(\d) ([abc]{3})", result.stdout.str()))
+    assert sorted(orders) == ["0", "1", "2", "3"]
+    assert len(set(orders.values())) > 1
+    again = pytester.runpytest_inprocess(*OPTIONS, "--mission-seeds=2", "--mission-seed=2", "-s")
+    again.assert_outcomes(passed=5)
+    found = dict(re.findall(r"(\d) ([abc]{3})", again.stdout.str()))
+    assert found == {seed: orders[seed] for seed in ("2", "3")}
+
+
+def test_seeds_are_at_least_one(pytester):
+    pytester.makepyfile(SEEDED)
+    result = pytester.runpytest_inprocess(*OPTIONS, "--mission-seeds=0")
+    result.stdout.fnmatch_lines(["*--mission-seeds: got 0; expected 1 or more.*"])
+
+
+def test_a_test_may_choose_its_seed(pytester):
+    pytester.makepyfile(
+        "import pytest\n\n@pytest.fixture\ndef mission_seed():\n    return 5\n\n"
+        "def test_it(mission):\n    assert mission.seed == 5\n"
+    )
+    pytester.runpytest_inprocess(*OPTIONS).assert_outcomes(passed=1)
