@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import TextIO
 
-    from missions.stage import Pace
+    from missions.stage import Pace, RobotOptions
 
 
 def register_list(subparsers: Any) -> None:
@@ -108,6 +108,12 @@ def register_run(subparsers: Any) -> None:
         metavar=("X", "Y", "YAW"),
         help="where it starts [m, m, rad]",
     )
+    robot.add_argument(
+        "--world",
+        type=Path,
+        metavar="FILE",
+        help="a world file in place of map, parameters and pose (default: what the mission needs)",
+    )
     parser.set_defaults(run=_run, words=())
 
 
@@ -148,7 +154,6 @@ def _run(args: argparse.Namespace) -> int:
 
 def _run_mission(args: argparse.Namespace, events: TextIO | None) -> int:
     from missions.runner import RunOptions, run_mission
-    from missions.stage import RobotOptions
     from missions.watching import Watching
     from smachpy.targets import load_target
 
@@ -160,7 +165,7 @@ def _run_mission(args: argparse.Namespace, events: TextIO | None) -> int:
         inputs=_inputs(args.input),
         words=args.words,
         pace=args.time,
-        robot=RobotOptions(args.start_robot, args.map, args.config, tuple(args.pose or ())),
+        robot=_robot(args, getattr(target.thing, "world", None)),
         names=args.names,
         namespace=check_name(args.robot, "robot name") if args.robot else "",
         out=args.out,
@@ -178,6 +183,21 @@ def _run_mission(args: argparse.Namespace, events: TextIO | None) -> int:
         ),
     )
     return run_mission(target, options)
+
+
+def _robot(args: argparse.Namespace, world: Path | None) -> RobotOptions:
+    """Return what to simulate; `world` is where the mission plays unless something else is said."""
+    from missions.stage import RobotOptions
+
+    said = args.pose or args.map != OFFICE_MAP or args.config != OFFICE_ROBOT
+    if args.world is not None and said:
+        raise MissionError(
+            "--world: got it beside --map, --config or --pose; expected it alone: the file says "
+            "all of that."
+        )
+    pose = tuple(args.pose or ())
+    world = args.world or (None if said else world)
+    return RobotOptions(args.start_robot, args.map, args.config, pose, world)
 
 
 def _pace(text: str) -> Pace:

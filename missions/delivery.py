@@ -21,7 +21,7 @@ from actionlib_core.interfaces.std_msgs.msg import Bool
 from actionlib_core.interfaces.std_srvs.srv import SetBool, SetBoolRequest
 from missions.ask_operator import AskOperator
 from missions.exceptions import MissionError
-from missions.maps import OFFICE_PLACES
+from missions.maps import OFFICE_DOORS, OFFICE_PLACES
 from missions.parts import Wait, drive_to, turn
 from missions.waypoint_file import load_places
 from smachpy import CBState, MonitorState, ServiceState, StateMachine, UserData
@@ -73,6 +73,9 @@ def delivery(
             CBState(report, outcomes=["succeeded", "brought_back"], input_keys=["delivered"]),
         )
     return sm
+
+
+delivery.world = OFFICE_DOORS  # type: ignore[attr-defined]  # where --start-robot plays it
 
 
 def find(known: Places, name: str) -> Place:

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from actionlib_core.interfaces.std_srvs.srv import Empty
 from missions.ask_operator import AskOperator
+from missions.maps import OFFICE_DOORS
 from missions.move_base.geometry import Pose2D
 from missions.parts import drive_back, drive_to, locate, turn
 from smachpy import CBState, ServiceState, StateMachine, UserData
@@ -58,6 +59,9 @@ def guided_recovery(
         )
         sm.add("COME_BACK", drive_back(), {"succeeded": "returned"}, {"home": "here"})
     return sm
+
+
+guided_recovery.world = OFFICE_DOORS  # type: ignore[attr-defined]  # where --start-robot plays it
 
 
 def choose(userdata: UserData) -> str:

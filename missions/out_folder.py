@@ -89,12 +89,9 @@ class OutFolder:
         return [*files, self._events, path]
 
     def _draw_track(self, title: str) -> Path:
-        from missions.move_base.config import load_config
-        from missions.move_base.occupancy import load_map
-
         path = self._path("_track.png")
-        dock = load_config(self._robot.config).dock
-        self._track.draw(path, load_map(self._robot.map), dock=dock, title=title)
+        grid, dock = self._robot.floor()
+        self._track.draw(path, grid, dock=dock, title=title)
         return path
 
     def _path(self, ending: str) -> Path:

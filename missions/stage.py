@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
     from actionlib_core.names import NameArguments
     from actionlib_core.transport import Closable, Presence, Transport
+    from missions.move_base.geometry import Pose2D
+    from missions.move_base.occupancy import OccupancyMap
     from smachpy.container import Container
 
 ROBOT_ACTIONS: Final = frozenset({"move_base", "charge"})
@@ -77,17 +79,55 @@ class RobotOptions:
         map: Its floor.
         config: Its parameters.
         pose: Where it starts [m, m, rad]; empty: where its parameters say.
+        world: A world file in place of all that: robots, doors, what moves.
     """
 
     start: bool
     map: Path
     config: Path
     pose: tuple[float, ...] = ()
+    world: Path | None = None
 
     def arguments(self) -> tuple[str, ...]:
         """Return them as the robot's program takes them."""
+        if self.world is not None:
+            return ("--world", str(self.world))
         pose = ("--pose", *map(str, self.pose)) if self.pose else ()
         return ("--map", str(self.map), "--config", str(self.config), *pose)
+
+    def floor(self) -> tuple[OccupancyMap, Pose2D | None]:
+        """Return the map, and where the robot charges.
+
+        Raises:
+            InputFileError: a file is wrong.
+        """
+        from missions.move_base.config import load_config
+        from missions.move_base.occupancy import load_map
+
+        if self.world is None:
+            return load_map(self.map), load_config(self.config).dock
+        from missions.move_base.world_file import load_world
+
+        spec = load_world(self.world)
+        return spec.grid, spec.robots[0].config.dock if spec.robots else None
+
+    def choose_robot(self, name: str) -> str:
+        """Return the name of the robot to use in the world: `name`, or its first one.
+
+        Raises:
+            InputFileError: the world file is wrong.
+            MissionError: there is no such robot.
+        """
+        if self.world is None:
+            return name
+        from missions.move_base.world_file import load_world
+
+        names = [robot.name for robot in load_world(self.world).robots]
+        if names and not name:
+            return names[0]
+        if name not in names:
+            raise MissionError(f"--robot: got {name!r}; expected one of {names}, of {self.world}.")
+        return name
 
 
 class Stage(Protocol):
@@ -142,8 +182,11 @@ def open_stage(
     Raises:
         NameSetupError: a name is not allowed.
         TransportError: the network cannot be joined.
-        MissionError: names are to be changed, but the mission's module has made its node.
+        MissionError: names are to be changed, but the mission's module has made its node; or the
+            world is wrong, or has no such robot.
     """
+    if pace.virtual or robot.start:
+        namespace = robot.choose_robot(namespace)
     if pace.virtual:
         with _virtual_stage(pace, robot, names, namespace) as stage:
             yield stage
@@ -189,10 +232,12 @@ class _RealStage:
         self._forget = shutdown.on_shutdown(self._wait.wake)
         if not self._options.start:
             return
-        prefix = _prefix_of(needed)
-        space = get_node().namespace if needed or prefix else ""
-        name = "/".join(word for word in (space, prefix) if word)
-        arguments = (*self._options.arguments(), *(("--namespace", name) if name else ()))
+        arguments = self._options.arguments()
+        if self._options.world is None:
+            prefix = _prefix_of(needed)
+            space = get_node().namespace if needed or prefix else ""
+            name = "/".join(word for word in (space, prefix) if word)
+            arguments += ("--namespace", name) if name else ()
         self._robot = RobotProcess(arguments, on_change=self._wait.wake)
         self._robot.on_refusal(machine.request_preempt)
         self._robot.__enter__()
@@ -358,8 +403,17 @@ class _VirtualStage:
                 "--time real."
             )
         self._needed = needed
-        if needed or self._options.start:
+        if self._options.world is not None:
+            self._put_world(self._options.world)
+        elif needed or self._options.start:
             self._put_robot(_prefix_of(needed))
+
+    def _put_world(self, world: Path) -> None:
+        from missions.move_base.simulation import simulation
+
+        node = Node("simulation", transport=self._session(), clock=get_node().clock)
+        self._down.enter_context(node)
+        self._down.enter_context(simulation(world, node=node))
 
     def _put_robot(self, prefix: str) -> None:
         from missions.exceptions import NavigationError

@@ -176,3 +176,31 @@ def test_a_mission_that_waits_for_somebody_outside(tmp_path, capsys):
     error = capsys.readouterr().err
     assert "--time virtual: virtual clock: every participant waits" in error
     assert "Try --time real." in error
+
+
+def test_a_mission_that_plays_in_a_world_finds_its_doors(capsys, tmp_path):
+    out = tmp_path / "out"
+    assert main(["run", "delivery", "--time", "virtual", "--out", str(out)]) == 1
+    shown = capsys.readouterr().out
+    assert "DELIVERY: brought_back" in shown  # nobody answers in virtual time
+    assert "OPEN/WAIT invalid" in " ".join(shown.split()).replace("  ", " ")
+    assert (out / "delivery_track.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["--robot", "robot_9"], "--robot: got 'robot_9'; expected one of ['robot_0']"),
+        (["--world", "nowhere.yaml"], "nowhere.yaml: got 'No such file"),
+        (["--world", "x.yaml", "--pose", "1", "2", "0"], "--world: got it beside --map"),
+    ],
+)
+def test_a_world_or_robot_that_is_not_there(capsys, arguments, text):
+    assert main(["run", "delivery", "--time", "virtual", *arguments]) == 2
+    assert text in capsys.readouterr().err
+
+
+def test_another_floor_in_place_of_the_mission_s_world(capsys):
+    arguments = ["--time", "virtual", "--pose", "9.8", "7.1", "0", "--", "kitchen"]
+    assert main(["run", "delivery", *arguments]) == 1
+    assert "DELIVERY: brought_back" in capsys.readouterr().out
