@@ -94,6 +94,10 @@ class StatusEntry(NamedTuple):
     text: str
 
 
+def _too_short(what: str, payload: bytes) -> ValueError:
+    return ValueError(f"{what}: got {len(payload)} bytes that end too early")
+
+
 def _reads(what: str) -> Callable[[Callable[[bytes], T]], Callable[[bytes], T]]:
     """Make a reader raise ValueError, naming the message, when the bytes end too early."""
 
@@ -103,7 +107,7 @@ def _reads(what: str) -> Callable[[Callable[[bytes], T]], Callable[[bytes], T]]:
             try:
                 return read(payload)
             except (struct.error, IndexError) as error:
-                raise ValueError(f"{what}: got {len(payload)} bytes that end too early") from error
+                raise _too_short(what, payload) from error
 
         return checked
 
@@ -120,14 +124,16 @@ def pack_goal(sent_ns: int, goal_id: str, goal_stamp_ns: int, goal: bytes) -> by
     return _pack_front(sent_ns, goal_id, goal_stamp_ns) + goal
 
 
-@_reads("XActionGoal")
 def unpack_goal(payload: bytes) -> tuple[str, int, bytes]:
     """Read an XActionGoal: its goal id, its stamp [ns], the bytes of the XGoal.
 
     Raises:
         ValueError: the bytes are cut short or are not text where text belongs.
     """
-    goal_id, stamp_ns, at = _read_id(payload, 16 + int(_U32.unpack_from(payload, 12)[0]))
+    try:
+        goal_id, stamp_ns, at = _read_id(payload, 16 + int(_U32.unpack_from(payload, 12)[0]))
+    except (struct.error, IndexError) as error:
+        raise _too_short("XActionGoal", payload) from error
     return goal_id, stamp_ns, payload[at:]
 
 
@@ -173,14 +179,16 @@ def pack_report(sent_ns: int, entry: StatusEntry, body: bytes) -> bytes:
     return b"".join((front, _TAIL.pack(status, len(raw)), raw, body))
 
 
-@_reads("XActionResult or XActionFeedback")
 def unpack_report(payload: bytes) -> tuple[StatusEntry, int]:
     """Read the front of an XActionResult or XActionFeedback: status, where the rest begins.
 
     Raises:
         ValueError: the bytes are cut short or are not text where text belongs.
     """
-    return _read_status(payload, 16 + int(_U32.unpack_from(payload, 12)[0]))
+    try:
+        return _read_status(payload, 16 + int(_U32.unpack_from(payload, 12)[0]))
+    except (struct.error, IndexError) as error:
+        raise _too_short("XActionResult or XActionFeedback", payload) from error
 
 
 def pack_statuses(sent_ns: int, entries: Iterable[StatusEntry], frame: str = "") -> bytes:
@@ -231,8 +239,11 @@ def _pack_front(sent_ns: int, goal_id: str, stamp_ns: int) -> bytes:
 def _read_id(payload: bytes, at: int) -> tuple[str, int, int]:
     """Read a GoalID: the id, its stamp [ns], where the rest begins."""
     secs, nsecs, length = _ID.unpack_from(payload, at)
-    at += 12
-    return _text(payload, at, length), secs * _NS + nsecs, at + length
+    start = at + 12
+    end = start + length
+    if end > len(payload):
+        raise IndexError(start)
+    return payload[start:end].decode(), secs * _NS + nsecs, end
 
 
 def _read_status(payload: bytes, at: int) -> tuple[StatusEntry, int]:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 PERIOD_S = 1.0  # while goals are tracked
 GAP_S = 0.02  # changes that follow each other faster share a message
+SHORT = 8  # goals; a longer list is not sent before its time
 GAP_PER_GOAL_S = 100e-6  # a long list is sent less often
 
 
@@ -80,6 +81,11 @@ class StatusPublisher:
                         self._arm(due)
                 return
         self.publish()
+
+    def hurry(self) -> None:
+        """Send a change that waits for others now, unless the list is long."""
+        if self._change_waits and len(self._goals) <= SHORT:
+            self.publish()
 
     def _arm(self, due: float) -> None:
         """Let the timer run at `due`. Needs the lock."""

@@ -481,6 +481,10 @@ class ActionServer:
     def _deliver_cancel(self, handle: ServerGoalHandle) -> None:
         self.callback_queue.call(self.cancel_callback, handle)
 
+    def hurry_status(self) -> None:
+        """Send the list of all goals now if it has changed; not for users."""
+        self._status.hurry()
+
     def publish_status(self) -> None:
         """Send the list of all goals now."""
         self._status.publish()

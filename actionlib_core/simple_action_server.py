@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core._core.server_goals import RESULT_TIMEOUT_S
-from actionlib_core._core.single_goal import Policy, SingleGoal
+from actionlib_core._core.single_goal import ANNOUNCE, Policy, SingleGoal
 from actionlib_core._core.states import TERMINAL, Status
 from actionlib_core.action_server import TEXT_STOPPED, ActionServer, OnClientLost
 from actionlib_core.exceptions import ActionException
@@ -246,6 +246,8 @@ class SimpleActionServer:
 
         Blocks: until then.
         """
+        if not self._preempted.is_set():
+            self.action_server.hurry_status()  # a goal that waits is not over in a moment
         return self._preempted.wait(timeout)
 
     def is_active(self) -> bool:
@@ -352,7 +354,8 @@ class SimpleActionServer:
                 self._preempted.set()
             if decision.announce:
                 self._start_execution()
-        self._carry_out(decision, TEXT_NEWER)
+        if decision is not ANNOUNCE or self.goal_callback is not None:
+            self._carry_out(decision, TEXT_NEWER)
 
     def internal_preempt_callback(self, preempt: ServerGoalHandle) -> None:
         """Take a cancel; the `ActionServer` beneath calls it."""

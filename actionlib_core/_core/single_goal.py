@@ -34,7 +34,7 @@ class Decision(Generic[G]):
     announce: bool = False
 
 
-_ANNOUNCE: Decision[Any] = Decision(announce=True)
+ANNOUNCE: Decision[Any] = Decision(announce=True)
 
 
 class SingleGoal(Generic[G]):
@@ -97,21 +97,23 @@ class SingleGoal(Generic[G]):
         """Take a goal that arrived."""
         if self.policy == "queue":
             self._waiting.append((goal, stamp_ns))
-            return _ANNOUNCE
+            return ANNOUNCE
         if self.policy == "reject":
             if self._running or self._waiting:
                 return Decision(reject=goal)
             self._waiting.append((goal, stamp_ns))
-            return _ANNOUNCE
-        newest = self._waiting[-1][1] if self._waiting else self._current_stamp_ns
-        if stamp_ns < max(newest, self._current_stamp_ns):
+            return ANNOUNCE
+        newest = self._waiting[-1][1] if self._waiting else 0
+        if stamp_ns < newest or stamp_ns < self._current_stamp_ns:
             return Decision(recall=(goal,))
+        if not self._waiting and not self._running:
+            self._waiting.append((goal, stamp_ns))
+            self._cancelled_early = False
+            return ANNOUNCE
         older = tuple(waiting for waiting, _ in self._waiting)
         self._waiting.clear()
         self._waiting.append((goal, stamp_ns))
         self._cancelled_early = False
-        if not older and not self._running:
-            return _ANNOUNCE
         self.preempt_requested = self.preempt_requested or self._running
         return Decision(recall=older, preempt=self._running, announce=True)
 

@@ -118,22 +118,25 @@ class Inlet:
         else:
             if me not in pinned:
                 pin(me)
-            self._run(function, item, refuse)
+            self._run(me, function, item, refuse)
 
     def _run_queued(
         self, function: Callable[[T], object], item: T, refuse: Callable[[T], object] | None
     ) -> None:
         try:
-            self._run(function, item, refuse)
+            self._run(get_ident(), function, item, refuse)
         finally:
             with self._lock:
                 self._queued -= 1
 
     def _run(
-        self, function: Callable[[T], object], item: T, refuse: Callable[[T], object] | None
+        self,
+        me: int,
+        function: Callable[[T], object],
+        item: T,
+        refuse: Callable[[T], object] | None,
     ) -> None:
         gate = self._gate
-        me = get_ident()
         gate.running.append(me)
         try:
             if not (self.closed or gate.is_shut):
