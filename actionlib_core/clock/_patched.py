@@ -12,6 +12,7 @@ import queue
 import sys
 import threading
 import time
+import weakref
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.clock._current import use_clock
@@ -19,6 +20,7 @@ from actionlib_core.clock._virtual_loop import VirtualLoop
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from concurrent.futures import ThreadPoolExecutor
     from types import FrameType
 
     from actionlib_core.clock._virtual import VirtualClock
@@ -46,6 +48,7 @@ REAL_TIME = (
 SHORT_LOCKS = ("actionlib_core", "smachpy", "viz", "logging")
 
 _sleep, _allocate = time.sleep, threading.Lock
+_localtime, _asctime = time.localtime, time.asctime
 _thread_start, _thread_join = threading.Thread.start, threading.Thread.join
 _thread_is_alive = threading.Thread.is_alive
 
@@ -56,6 +59,11 @@ _places: list[tuple[dict[str, Any], str, Any, Any]] = []  # module globals that 
 _seen: dict[str, tuple[int, int]] = {}  # modules searched before: identity and size
 _found: dict[str, list[tuple[str, Any]]] = {}  # what the search gave
 _tasks: dict[threading.Thread, VirtualTask] = {}  # user threads that take part, while they run
+_SimpleQueue = queue.SimpleQueue
+_pool: list[Callable[..., Any]] = []  # submit and shutdown of pools, and their class
+_twins: weakref.WeakKeyDictionary[ThreadPoolExecutor, dict[VirtualClock, ThreadPoolExecutor]] = (
+    weakref.WeakKeyDictionary()
+)
 
 
 def install(clock: VirtualClock) -> None:
@@ -68,6 +76,7 @@ def install(clock: VirtualClock) -> None:
 
 def remove(clock: VirtualClock) -> None:
     """Undo `install`; with the last clock Python is as it was."""
+    _forget_twins(clock)
     with _guard:
         _clocks.remove(clock)
         if not _clocks:
@@ -117,6 +126,19 @@ def _reader(real: Callable[[], Any], virtual: Callable[[VirtualClock], Any]) -> 
 
 def _now_ns(clock: VirtualClock) -> int:
     return round(clock.now() * 1e9)
+
+
+def _of_now(real: Callable[..., Any], index: int) -> Callable[..., Any]:
+    """Return a function that takes the time as argument number `index`, and now without it."""
+
+    def convert(*args: Any) -> Any:
+        clock = _here()
+        if clock is None or len(args) > index or _belongs(sys._getframe(1), REAL_TIME):  # noqa: SLF001
+            return real(*args)
+        now = clock.time_ns() / 1e9
+        return real(*args, _localtime(now) if index or real is _asctime else now)
+
+    return convert
 
 
 # -- locks -----------------------------------------------------------------------------------------
@@ -270,6 +292,63 @@ def _really(function: Callable[..., None], *arguments: object) -> None:
         _bypass.discard(ident)
 
 
+# -- executors -------------------------------------------------------------------------------------
+
+
+def _submit(pool: ThreadPoolExecutor, function: Any, /, *args: Any, **kwargs: Any) -> Any:
+    """Let a participant's work run on threads that take part, also with a pool made before."""
+    clock = _here()
+    used = pool if clock is None or _takes_part(pool) else _twin(pool, clock)
+    return _pool[0](used, function, *args, **kwargs)
+
+
+def _shutdown(pool: ThreadPoolExecutor, *args: Any, **kwargs: Any) -> None:
+    for twin in _twins.pop(pool, {}).values():
+        _pool[1](twin, *args, **kwargs)
+    _pool[1](pool, *args, **kwargs)
+
+
+def _takes_part(pool: Any) -> bool:
+    """Tell whether its threads wait in virtual time; one that is shut down refuses by itself."""
+    return type(pool._work_queue) is not _SimpleQueue or pool._shutdown  # noqa: SLF001  no other way
+
+
+def _twin(pool: Any, clock: VirtualClock) -> ThreadPoolExecutor:
+    """Return the pool that stands in for one whose threads wait in real time."""
+    twins = _twins.setdefault(pool, {})
+    if clock not in twins:
+        twins[clock] = _pool[2](
+            pool._max_workers,  # noqa: SLF001  there is no other way to learn these
+            pool._thread_name_prefix,  # noqa: SLF001
+            pool._initializer,  # noqa: SLF001
+            pool._initargs,  # noqa: SLF001
+        )
+    return twins[clock]
+
+
+def _replace_pools() -> None:
+    module: Any = sys.modules.get("concurrent.futures.thread")  # else no pool was made before
+    if module is None:
+        return
+    kind = module.ThreadPoolExecutor
+    if not _pool:
+        _pool[:] = [kind.submit, kind.shutdown, kind]
+    kind.submit, kind.shutdown = _submit, _shutdown
+
+
+def _restore_pools() -> None:
+    if _pool:
+        module: Any = sys.modules["concurrent.futures.thread"]
+        module.ThreadPoolExecutor.submit, module.ThreadPoolExecutor.shutdown = _pool[:2]
+
+
+def _forget_twins(clock: VirtualClock) -> None:
+    for twins in list(_twins.values()):
+        twin = twins.pop(clock, None)
+        if twin is not None:
+            _pool[1](twin, wait=False)
+
+
 # -- asyncio ---------------------------------------------------------------------------------------
 
 
@@ -295,6 +374,11 @@ def _replacements() -> dict[int, Any]:
         (time.monotonic_ns, _reader(time.monotonic_ns, _now_ns)),
         (time.perf_counter, _reader(time.perf_counter, lambda clock: clock.now())),
         (time.perf_counter_ns, _reader(time.perf_counter_ns, _now_ns)),
+        (time.localtime, _of_now(time.localtime, 0)),
+        (time.gmtime, _of_now(time.gmtime, 0)),
+        (time.ctime, _of_now(time.ctime, 0)),
+        (time.asctime, _of_now(time.asctime, 0)),
+        (time.strftime, _of_now(time.strftime, 1)),
         (threading.Lock, _lock),
         (threading.RLock, _make_rlock(threading.RLock)),
         (queue.SimpleQueue, _make_simple_queue(queue.SimpleQueue)),
@@ -317,6 +401,7 @@ def _replace() -> None:
     threading.Thread.start = _start  # type: ignore[method-assign, assignment]
     threading.Thread.join = _join  # type: ignore[method-assign, assignment]
     threading.Thread.is_alive = _is_alive  # type: ignore[method-assign, assignment]
+    _replace_pools()
 
 
 def _search(name: str, names: dict[str, Any]) -> list[tuple[str, Any]]:
@@ -329,6 +414,7 @@ def _search(name: str, names: dict[str, Any]) -> list[tuple[str, Any]]:
 
 
 def _restore() -> None:
+    _restore_pools()
     threading.Thread.start = _thread_start  # type: ignore[method-assign]
     threading.Thread.join = _thread_join  # type: ignore[method-assign]
     threading.Thread.is_alive = _thread_is_alive  # type: ignore[method-assign]

@@ -147,16 +147,21 @@ class VirtualClock:
         """Put `time.sleep`, `threading.Event().wait` and the like of user code on this clock.
 
         Covered inside the block, for this clock's participants only (other threads keep real time):
-        `time.sleep`, `time`, `monotonic`, `perf_counter` and their `_ns` forms; in `threading`:
-        `Event`, `Condition`, `Semaphore`, `Barrier`, `Timer`, `Thread.start` (the new thread is a
-        participant), `Thread.join`, `Lock` and `RLock` made inside the block; `queue`,
-        `concurrent.futures` with threads, `asyncio.run` and `asyncio.sleep`. Names that modules
-        imported before (`from time import sleep`) are covered too.
+        `time.sleep`, `time`, `monotonic`, `perf_counter` and their `_ns` forms, `localtime`,
+        `gmtime`, `ctime`, `asctime` and `strftime` of now; in `threading`: `Event`, `Condition`,
+        `Semaphore`, `Barrier`, `Timer`, `Thread.start` (the new thread is a participant),
+        `Thread.join`, `Lock` and `RLock` made inside the block; `queue` (a `SimpleQueue` made
+        inside), thread pools of `concurrent.futures`, asyncio's loops and timers. Names that
+        modules imported before (`from time import sleep`) are covered too, and so are events,
+        conditions, semaphores, queues and pools that were made before.
 
-        Not covered, because Python offers no place to do it: `datetime.now()`, `Lock` and `RLock`
-        made before the block and held across a wait, sockets, subprocesses (they take real time,
-        and the mission stands still meanwhile), code in C, references kept elsewhere than in a
-        module's globals. `time.sleep(0)` lets a microsecond pass, so that a loop around it ends.
+        Not covered, because Python offers no place to do it: `datetime.now()`, `utcnow()` and
+        `date.today()` show real time (`datetime.fromtimestamp(time.time())` does not); a `Lock`,
+        `RLock` or `SimpleQueue` made before the block really blocks, for ever if another
+        participant is to release or fill it. Sockets, processes and code in C take real time, and
+        the mission stands still meanwhile. References kept elsewhere than in a module's globals
+        (a default argument, a class attribute) stay real. `time.sleep(0)` lets a microsecond pass,
+        so that a loop around it ends.
         """
         from actionlib_core.clock._patched import install, remove
 

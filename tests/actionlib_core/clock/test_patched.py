@@ -360,3 +360,82 @@ def test_a_chooser_decides_the_interleaving():
         clock.sleep(1)
     assert order == ["c", "b", "a"]
     assert asked == [["a", "b", "c"], ["a", "b"]]
+
+
+# -- what was made before --------------------------------------------------------------------------
+
+
+@pytest.fixture
+def pool():
+    with concurrent.futures.ThreadPoolExecutor(2, "mine") as pool:
+        yield pool
+
+
+def slow(seconds):
+    time.sleep(seconds)
+    return time.monotonic(), threading.current_thread().name
+
+
+@pytest.mark.parametrize("used_before", [False, True])
+def test_a_pool_made_before_runs_in_virtual_time(clock, pool, used_before):
+    if used_before:
+        assert pool.submit(str, 1).result() == "1"
+    with clock.patched():
+        ends = list(pool.map(slow, [30, 20, 10]))
+        with pytest.raises(concurrent.futures.TimeoutError):
+            pool.submit(time.sleep, 100).result(timeout=50)
+    assert [end for end, _ in ends] == [30, 20, 30]
+    assert all(name.startswith("mine") for _, name in ends)
+    assert pool.submit(str, 2).result() == "2"
+
+
+def test_a_pool_made_before_may_be_shut_down_inside(clock, pool):
+    with clock.patched():
+        future = pool.submit(slow, 5)
+        pool.shutdown()
+        assert future.done()
+        with pytest.raises(RuntimeError, match="after shutdown"):
+            pool.submit(slow, 5)
+    assert clock.now() == 5
+
+
+def test_queues_conditions_and_semaphores_made_before():
+    items, condition, semaphore = queue.Queue(), threading.Condition(), threading.Semaphore(0)
+    with VirtualClock() as clock, clock.patched():
+        with pytest.raises(queue.Empty):
+            items.get(timeout=60)
+        with condition:
+            assert not condition.wait(40)
+        assert not semaphore.acquire(timeout=20)
+        assert clock.now() == 120
+
+
+@pytest.mark.parametrize("utc", [time.gmtime, time.localtime])
+def test_calendar_time_of_now_is_virtual(patched, utc):
+    utc = getattr(time, utc.__name__)
+    start = time.mktime(time.localtime())
+    time.sleep(3600)
+    assert time.mktime(time.localtime()) - start == 3600
+    assert utc() == utc(time.time())
+    assert utc(0).tm_year in {1969, 1970}
+    assert time.ctime() == time.ctime(time.time())
+    assert time.asctime() == time.asctime(time.localtime())
+    assert time.strftime("%H:%M:%S") == time.strftime("%H:%M:%S", time.localtime())
+
+
+def test_every_timer_of_asyncio(patched):
+    async def main():
+        loop, fired = asyncio.get_running_loop(), []
+        loop.call_later(30, fired.append, "later")
+        loop.call_at(loop.time() + 20, fired.append, "at")
+        with pytest.raises(TimeoutError):
+            async with asyncio.timeout(40):
+                await asyncio.Future()
+        assert fired == ["at", "later"]
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(asyncio.Event().wait(), 10)
+        done, waiting = await asyncio.wait([asyncio.ensure_future(asyncio.sleep(99))], timeout=5)
+        assert (len(done), len(waiting)) == (0, 1)
+        return loop.time()
+
+    assert asyncio.run(main()) == 55 == patched.now()
