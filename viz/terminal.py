@@ -65,6 +65,9 @@ VALUE_LENGTH = 60
 MOST_ROWS = 40
 """Rows of the table at the end; deeper levels are left out first."""
 
+_REPR = reprlib.Repr()
+_REPR.maxother = _REPR.maxstring = VALUE_LENGTH
+
 
 class TerminalView:
     """Shows one machine's run; a context manager.
@@ -222,7 +225,7 @@ class TerminalView:
             written = list(self._written.items())
         table = Table.grid(padding=(0, 2))
         for key, value in reversed(written):
-            text = shorten(reprlib.repr(value), VALUE_LENGTH)
+            text = shorten(_REPR.repr(value), VALUE_LENGTH)
             table.add_row(Text(f"  {shorten(key, 24)}", "dim"), Text(text, no_wrap=True))
         return [table] if written else []
 
