@@ -78,7 +78,7 @@ class ControlConfig:
     """How the way is followed and when the goal counts as reached."""
 
     rate: float = _quantity(20.0, "Hz", "Control steps a second.", low=5, high=1000)
-    feedback_rate: float = _quantity(10.0, "Hz", "Feedback messages a second.", above=0, high=100)
+    feedback_rate: float = _quantity(5.0, "Hz", "Feedback messages a second.", above=0, high=10)
     override_time: float = _quantity(
         0.5, "s", "A message on cmd_vel counts so long.", above=0, high=60
     )

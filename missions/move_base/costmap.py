@@ -10,6 +10,8 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from missions.move_base.floor import Floor
+from missions.move_base.geometry import Pose2D
+from missions.move_base.occupancy import OccupancyMap
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -18,12 +20,13 @@ if TYPE_CHECKING:
 
     from missions.move_base.config import PlannerConfig
     from missions.move_base.floor import Thing
-    from missions.move_base.occupancy import OccupancyMap
     from missions.move_base.traffic import Sighting
 
 _WIDE_BERTH = 0.02  # [m] besides the margin, to what moves
 _SHY = 0.4  # [m] further out than needed, it is dearer to pass something that moves
 _SHY_COST = 2.0  # what a metre costs more right beside it
+_FEW = 10  # points for which an array is not worth it
+_CORNER = 1.5  # the corners of a square are so much farther away than its sides
 _DECAY = 3.0  # the extra cost falls to exp(-3), a twentieth, at `wall_distance`
 
 
@@ -48,37 +51,58 @@ class Costmap(Floor):
         clearance = _clearance(self.solid, grid.resolution)
         self.blocked: NDArray[np.bool_] = clearance < self.radius
         self.cost = _cost(clearance - self.radius, config)
+        self._touching = (clearance < body_radius - grid.resolution).tobytes()
+        self.index_cells()
+
+    def cut(self, middle: tuple[float, float], reach: float, discs: Iterable[Sighting]) -> Costmap:
+        """Return the part around a point, with things in it that move: blocked where they are now.
+
+        Args:
+            middle: (x, y) [m], on the map.
+            reach: How far it extends on each side [m].
+            discs: Each inflated by this robot's body and margin; close by, a metre costs more.
+        """
+        grid = self.map
+        row, column = grid.row_column(*middle)
+        cells = math.ceil(reach / grid.resolution)
+        r0, r1 = max(0, row - cells), min(grid.height, row + cells + 1)
+        c0, c1 = max(0, column - cells), min(grid.width, column + cells + 1)
+        part = copy.copy(self)
+        corner = Pose2D(c0 * grid.resolution, r0 * grid.resolution, 0.0)
+        part.map = OccupancyMap(grid.cells[r0:r1, c0:c1], grid.resolution, grid.origin.then(corner))
+        part.blocked = self.blocked[r0:r1, c0:c1].copy()
+        part.cost = self.cost[r0:r1, c0:c1].copy()
+        for disc in discs:
+            if math.hypot(disc.x - middle[0], disc.y - middle[1]) < _CORNER * reach + 1.0:
+                part.put(disc)
+        part.index_cells()
+        return part
+
+    def put(self, disc: Sighting) -> None:
+        """Block the cells that something round blocks; for new parts only."""
+        grid = self.map
+        inner = disc.radius + self.radius + _WIDE_BERTH
+        outer = inner + _SHY
+        row, column = grid.row_column(disc.x, disc.y)
+        reach = math.ceil(outer / grid.resolution) + 1
+        r0, r1 = max(0, row - reach), min(grid.height, row + reach + 1)
+        c0, c1 = max(0, column - reach), min(grid.width, column + reach + 1)
+        if r0 >= r1 or c0 >= c1:
+            return
+        x, y = grid.centres(*np.mgrid[r0:r1, c0:c1])
+        distance = np.hypot(x - disc.x, y - disc.y)
+        self.blocked[r0:r1, c0:c1] |= distance < inner
+        extra = _SHY_COST * np.clip((outer - distance) / _SHY, 0.0, 1.0)
+        self.cost[r0:r1, c0:c1] += extra.astype(np.float32)
+
+    def index_cells(self) -> None:
+        """Make the tables for looking cells up."""
         # Looked up one at a time by the control loop: bytes answer faster than an array.
         self._free = (~self.blocked).tobytes()
-        self._touching = (clearance < body_radius - grid.resolution).tobytes()
+        grid = self.map
         self._height, self._width = grid.height, grid.width
         origin, scale = grid.origin, 1.0 / grid.resolution
         self._ux, self._uy = math.cos(origin.yaw) * scale, math.sin(origin.yaw) * scale
-
-    def among(self, discs: Iterable[Sighting]) -> Costmap:
-        """Return this costmap with things in it that move: blocked where they are now.
-
-        Args:
-            discs: Each inflated by this robot's body and margin; close by, a metre costs more.
-        """
-        other = copy.copy(self)
-        other.blocked, other.cost = self.blocked.copy(), self.cost.copy()
-        grid = self.map
-        for disc in discs:
-            inner = disc.radius + self.radius + _WIDE_BERTH
-            outer = inner + _SHY
-            row, column = grid.row_column(disc.x, disc.y)
-            reach = math.ceil(outer / grid.resolution) + 1
-            r0, r1 = max(0, row - reach), min(grid.height, row + reach + 1)
-            c0, c1 = max(0, column - reach), min(grid.width, column + reach + 1)
-            if r0 < r1 and c0 < c1:
-                x, y = grid.centres(*np.mgrid[r0:r1, c0:c1])
-                distance = np.hypot(x - disc.x, y - disc.y)
-                other.blocked[r0:r1, c0:c1] |= distance < inner
-                extra = _SHY_COST * np.clip((outer - distance) / _SHY, 0.0, 1.0)
-                other.cost[r0:r1, c0:c1] += extra.astype(np.float32)
-        other._free = (~other.blocked).tobytes()  # noqa: SLF001  one of us
-        return other
 
     def is_free(self, x: float, y: float) -> bool:
         """Tell whether the robot's centre may be at this point of the map frame."""
@@ -110,8 +134,9 @@ class Costmap(Floor):
         """
         length = math.hypot(end[0] - start[0], end[1] - start[1])
         count = int(2.0 * length) + 2
-        rows = np.rint(np.linspace(start[0], end[0], count)).astype(np.intp)
-        columns = np.rint(np.linspace(start[1], end[1], count)).astype(np.intp)
+        share = np.arange(count) / (count - 1)
+        rows = np.rint(start[0] + (end[0] - start[0]) * share).astype(np.intp)
+        columns = np.rint(start[1] + (end[1] - start[1]) * share).astype(np.intp)
         if self.blocked[rows, columns].any():
             return math.inf
         return length * float(self.cost[rows, columns].mean())
@@ -129,7 +154,10 @@ class Costmap(Floor):
 
     def polyline_is_free(self, points: Sequence[tuple[float, float]]) -> bool:
         """Tell whether every point (x, y) of a way may be driven over."""
-        return all(self.is_free(x, y) for x, y in points)
+        if len(points) < _FEW:
+            return all(self.is_free(x, y) for x, y in points)
+        places = np.array(points)
+        return bool(self.are_free(places[:, 0], places[:, 1]).all())
 
 
 def _clearance(solid: NDArray[np.bool_], resolution: float) -> NDArray[np.float64]:

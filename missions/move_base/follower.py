@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+import bisect
 import math
 from enum import Enum, auto
 from typing import TYPE_CHECKING, Final
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from missions.move_base.body import Body
     from missions.move_base.config import ControlConfig, RobotConfig
     from missions.move_base.geometry import Pose2D
+
+    Floats = NDArray[np.float64]
 
 _CREEP: Final = 0.06  # [m/s] slowest approach, so that the goal is reached in finite time
 _CREEP_TURN: Final = 0.08  # [rad/s] the same for the last turn
@@ -65,9 +67,10 @@ class Follower:
         self.control = control
         self._at = 0  # index of the nearest point
         self._ahead = 0  # index of the point steered to
-        self._lengths = _lengths(points)
-        self._limits = _speed_limits(points, self._lengths, robot)
-        self._arrays: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+        self._xy: Floats = np.array(points, dtype=np.float64)
+        self._along = _lengths(self._xy)
+        self._lengths: list[float] = self._along.tolist()
+        self._limits: list[float] = _speed_limits(self._xy, self._along, robot).tolist()
 
     @property
     def remaining(self) -> float:
@@ -76,19 +79,14 @@ class Follower:
 
     def rest(self, distance: float = math.inf) -> Sequence[tuple[float, float]]:
         """Return the points still ahead, of the next `distance` metres."""
-        end, limit = self._at, self._lengths[self._at] + distance
-        while end < len(self.points) and self._lengths[end] <= limit:
-            end += 1
+        end = bisect.bisect_right(self._lengths, self._lengths[self._at] + distance)
         return self.points[self._at : end]
 
-    def ahead(self, distance: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def ahead(self, distance: float) -> tuple[Floats, Floats]:
         """Return the points (n, 2) of the next `distance` metres, and how far each is [m]."""
-        if self._arrays is None:
-            self._arrays = np.array(self.points), np.array(self._lengths)
-        points, lengths = self._arrays
         here = self._lengths[self._at]
-        end = int(np.searchsorted(lengths, here + distance, side="right"))
-        return points[self._at : end], lengths[self._at : end] - here
+        end = bisect.bisect_right(self._lengths, here + distance)
+        return self._xy[self._at : end], self._along[self._at : end] - here
 
     def command(self, body: Body) -> tuple[float, float]:
         """Return the speed [m/s] and turn rate [rad/s] to steer with now; moves the stage on."""
@@ -177,35 +175,36 @@ class Follower:
         return (qx - x) * (qx - px) + (qy - y) * (qy - py) <= 0.0
 
 
-def _lengths(points: Sequence[tuple[float, float]]) -> list[float]:
+def _lengths(points: Floats) -> Floats:
     """Return the distance [m] along the way from its start to each point."""
-    result, total = [0.0], 0.0
-    for (x0, y0), (x1, y1) in itertools.pairwise(points):
-        total += math.hypot(x1 - x0, y1 - y0)
-        result.append(total)
-    return result
+    steps = np.diff(points, axis=0)
+    return np.concatenate(([0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))))
 
 
-def _speed_limits(
-    points: Sequence[tuple[float, float]], lengths: Sequence[float], robot: RobotConfig
-) -> list[float]:
+def _speed_limits(points: Floats, lengths: Floats, robot: RobotConfig) -> Floats:
     """Return the fastest speed [m/s] at each point: slow in bends, braking before them."""
-    count = len(points)
-    limits = [robot.max_speed] * count
-    turn, braking = _SHARE * robot.max_turn_rate, 2.0 * _SHARE * robot.braking
-    for i in range(_BEND_REACH, count - _BEND_REACH):
-        bend = _bend(points[i - _BEND_REACH], points[i], points[i + _BEND_REACH])
-        if bend > _STRAIGHT:
-            limits[i] = min(robot.max_speed, turn / bend)
-    limits[-1] = 0.0
-    for i in range(count - 2, -1, -1):
-        reachable = math.sqrt(limits[i + 1] ** 2 + braking * (lengths[i + 1] - lengths[i]))
-        limits[i] = min(limits[i], reachable)
+    squares = np.full(len(points), robot.max_speed**2)
+    if len(points) > 2 * _BEND_REACH:
+        bends = _bends(points)
+        in_bends = _SHARE * robot.max_turn_rate / np.maximum(bends, _STRAIGHT)
+        inner = squares[_BEND_REACH:-_BEND_REACH]
+        np.minimum(inner, in_bends * in_bends, out=inner, where=bends > _STRAIGHT)
+    squares[-1] = 0.0
+    # It must be able to brake for every point ahead: v^2 <= v_ahead^2 + 2 a (distance).
+    braking = 2.0 * _SHARE * robot.braking
+    energy = np.minimum.accumulate((squares + braking * lengths)[::-1])[::-1]
+    limits: Floats = np.sqrt(np.maximum(energy - braking * lengths, 0.0))
     return limits
 
 
-def _bend(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
-    """Return the curvature [1/m] of the circle through three points."""
-    ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - b[0], c[1] - b[1]
-    product = math.hypot(ux, uy) * math.hypot(vx, vy) * math.hypot(ux + vx, uy + vy)
-    return 2.0 * abs(ux * vy - uy * vx) / product if product > 0.0 else 0.0
+def _bends(points: Floats) -> Floats:
+    """Return the curvature [1/m] at each point but the first and last few."""
+    u = points[_BEND_REACH:-_BEND_REACH] - points[: -2 * _BEND_REACH]
+    v = points[2 * _BEND_REACH :] - points[_BEND_REACH:-_BEND_REACH]
+    # Of the circle through three points.
+    w = u + v
+    product = np.sqrt((u * u).sum(axis=1) * (v * v).sum(axis=1) * (w * w).sum(axis=1))
+    area = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+    bends: Floats = np.zeros(len(area))
+    np.divide(2.0 * area, product, out=bends, where=product > 0.0)
+    return bends

@@ -10,8 +10,6 @@ import math
 from enum import Enum, auto
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
 from missions.exceptions import NavigationError
 from missions.move_base.follower import Follower, Stage
 from missions.move_base.geometry import Pose2D, wrap_angle
@@ -137,7 +135,7 @@ class _Patience:
 def _follow(robot: Robot, way: list[Point], goal: Pose2D) -> Generator[Command, None, End]:
     """Follow a way, around those who stand on it if there is room."""
     follower = Follower(way, goal, robot.config.robot, robot.config.control)
-    count, longest = 0, _longest(robot, follower.remaining)
+    count, longest, dt = 0, _longest(robot, follower.remaining), _dt(robot)
     gap, think, held = math.inf, -math.inf, 0.0
     while count < longest:
         robot.follower = follower
@@ -145,7 +143,7 @@ def _follow(robot: Robot, way: list[Point], goal: Pose2D) -> Generator[Command, 
         if follower.stage is Stage.DONE:
             return End.ARRIVED
         if robot.traffic or gap < math.inf:
-            gap = _gap(robot, follower)
+            gap = _gap(robot, follower) if count % 2 == 0 else gap - abs(robot.body.speed) * dt
             if gap < math.inf and robot.now > think:
                 around = _around(robot, follower)
                 think = robot.now + (_RETHINK if around else 2.0 * _RETHINK)
@@ -156,7 +154,7 @@ def _follow(robot: Robot, way: list[Point], goal: Pose2D) -> Generator[Command, 
                     )
                     continue
             speed = min(speed, _safe_speed(robot, gap))
-            held = held + _dt(robot) if speed == 0.0 and gap < math.inf else 0.0
+            held = held + dt if speed == 0.0 and gap < math.inf else 0.0
             if held > _HOLD or (held and robot.asker() is not None):
                 return End.HELD
         yield speed, turn_rate
@@ -175,16 +173,25 @@ def _gap(robot: Robot, follower: Follower) -> float:
 
     Who is too far off to matter now does not count: infinite. Neither does who is only left behind.
     """
-    points, lengths = follower.ahead(robot.body.braking_distance() + _HEED)
-    body, found = robot.body, math.inf
+    body, margin = robot.body, robot.config.planner.margin
+    far = body.braking_distance() + _HEED
     robot.held_by = None
-    for seen in robot.traffic.values():
-        reach = seen.radius + robot.body.radius + robot.config.planner.margin
-        now = math.hypot(seen.x - body.x, seen.y - body.y)
-        distances = np.hypot(points[:, 0] - seen.x, points[:, 1] - seen.y)
-        meets = np.flatnonzero((distances < reach) & (distances < now - _CLOSER))
-        if meets.size and lengths[meets[0]] < found:
-            found, robot.held_by = max(0.0, float(lengths[meets[0]])), seen
+    near = [
+        (seen, now, seen.radius + body.radius + margin)
+        for seen in robot.traffic.values()
+        if (now := math.hypot(seen.x - body.x, seen.y - body.y)) < far + _HEED
+    ]
+    if not near:
+        return math.inf
+    points, lengths = follower.ahead(far)
+    found = math.inf
+    for seen, now, reach in near:
+        # To come no nearer than it is now is no meeting: it only drives off.
+        dx, dy = points[:, 0] - seen.x, points[:, 1] - seen.y
+        meets = dx * dx + dy * dy < min(reach, now - _CLOSER) ** 2
+        first = int(meets.argmax())
+        if meets[first] and lengths[first] < found:
+            found, robot.held_by = float(lengths[first]), seen
     return found
 
 

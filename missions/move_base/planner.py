@@ -91,11 +91,11 @@ class Planner:
         Returns:
             The new way to the end of `rest`; None when there is none.
         """
-        window = _Window(self.costmap.among(discs), start, _AROUND)
+        window = _Window(self.costmap.cut(start, _AROUND, discs), start)
         back = window.rejoin(rest)
         if back is None or window.source is None:
             return None
-        target = self.costmap.map.row_column(*rest[back])
+        target = window.costmap.map.row_column(*rest[back])
         _, tree = window.search(target)
         if tree[window.index(window.source)] < 0 and window.source != target:
             return None
@@ -115,11 +115,12 @@ class Planner:
             clearance: How far from it [m] is far enough.
             discs: What moves, where it is now.
         """
-        window = _Window(self.costmap.among(discs), start, _AROUND)
+        window = _Window(self.costmap.cut(start, _AROUND, discs), start)
         if not avoid or window.source is None:
             return None
-        rows, columns = np.mgrid[window.r0 : window.r1, window.c0 : window.c1]
-        x, y = self.costmap.map.centres(rows, columns)
+        grid = window.costmap.map
+        rows, columns = np.mgrid[0 : grid.height, 0 : grid.width]
+        x, y = grid.centres(rows, columns)
         far = np.ones(x.shape, dtype=np.bool_)
         for ax, ay in avoid[::_EVERY]:
             far &= (x - ax) ** 2 + (y - ay) ** 2 > clearance * clearance
@@ -130,7 +131,7 @@ class Planner:
             return None
         cells = window.walk(tree, best)
         cells.reverse()
-        return window.line(cells, start, self.costmap.map.centre(*cells[-1]))
+        return window.line(cells, start, grid.centre(*cells[-1]))
 
     def _make_way(self, source: Cell, target: Cell, start: Point, goal: Point) -> list[Point]:
         cells = self._walk(source, target)
@@ -216,49 +217,40 @@ def keep_right(costmap: Costmap, way: list[Point]) -> list[Point]:
 
 
 class _Window:
-    """The cells a few metres around a point, to search in.
+    """The part of a costmap a few metres around a robot, to search in.
 
     Attributes:
-        r0, r1: First row and the row after the last.
-        c0, c1: First column and the column after the last.
-        source: The free cell at the point or close by; None when there is none.
+        costmap: That part.
+        source: The free cell at the robot or close by; None when there is none.
     """
 
-    def __init__(self, costmap: Costmap, middle: Point, reach: float) -> None:
-        self._costmap = costmap
-        grid = costmap.map
-        row, column = grid.row_column(*middle)
-        cells = math.ceil(reach / grid.resolution)
-        self.r0, self.r1 = max(0, row - cells), min(grid.height, row + cells + 1)
-        self.c0, self.c1 = max(0, column - cells), min(grid.width, column + cells + 1)
-        self._width = self.c1 - self.c0
+    def __init__(self, costmap: Costmap, middle: Point) -> None:
+        self.costmap = costmap
+        self._width = costmap.map.width
+        cell = costmap.map.cell(*middle)
         self.source: Cell | None = None
-        if self.holds((row, column)):
-            self.source = _nearest_free(costmap.blocked, (row, column), _SQUEEZE, grid.resolution)
-
-    def holds(self, cell: Cell) -> bool:
-        """Tell whether a cell is inside."""
-        return self.r0 <= cell[0] < self.r1 and self.c0 <= cell[1] < self.c1
+        if cell is not None:
+            resolution = costmap.map.resolution
+            self.source = _nearest_free(costmap.blocked, cell, _SQUEEZE, resolution)
 
     def index(self, cell: Cell) -> int:
         """Return the number of a cell, as `search` counts them."""
-        return (cell[0] - self.r0) * self._width + cell[1] - self.c0
+        return cell[0] * self._width + cell[1]
 
     def rejoin(self, rest: Sequence[Point]) -> int | None:
         """Return the index of the last point of a way that is free and still inside."""
         found = None
         for i, point in enumerate(rest):
-            cell = self._costmap.map.row_column(*point)
-            if not self.holds(cell):
+            cell = self.costmap.map.cell(*point)
+            if cell is None:
                 break
-            if not self._costmap.blocked[cell]:
+            if not self.costmap.blocked[cell]:
                 found = i
         return found
 
     def search(self, root: Cell) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
         """Return for each cell the cost to get to `root`, and the next cell on the way there."""
-        rows, columns = slice(self.r0, self.r1), slice(self.c0, self.c1)
-        graph = _graph(self._costmap.blocked[rows, columns], self._costmap.cost[rows, columns])
+        graph = _graph(self.costmap.blocked, self.costmap.cost)
         cost, tree = dijkstra(graph, indices=self.index(root), return_predecessors=True)
         return cost, tree
 
@@ -266,15 +258,15 @@ class _Window:
         """Return the cells from a node of the tree to its root."""
         cells = []
         while node >= 0:
-            cells.append((node // self._width + self.r0, node % self._width + self.c0))
+            cells.append(divmod(node, self._width))
             node = int(tree[node])
         return cells
 
     def line(self, cells: list[Cell], start: Point, end: Point) -> list[Point]:
         """Return a smooth way along the cells."""
-        corners = [self._costmap.map.centre(*cell) for cell in _straighten(self._costmap, cells)]
+        corners = [self.costmap.map.centre(*cell) for cell in _straighten(self.costmap, cells)]
         corners[0], corners[-1] = start, end
-        return _smooth(self._costmap, corners)
+        return _smooth(self.costmap, corners)
 
 
 def _straighten(costmap: Costmap, cells: list[Cell]) -> list[Cell]:

@@ -65,6 +65,13 @@ class Raycaster:
             left, gone, cos, sin = left[on], gone[on], cos[on], sin[on]
         return result
 
+    def open_around(self, x: float, y: float) -> float:
+        """Return a distance [m] that is free of walls on all sides of a point."""
+        row, column = self._grid.row_column(x, y)
+        if not (0 <= row < self._grid.height and 0 <= column < self._grid.width):
+            return 0.0
+        return max(0.0, float(self._step[row + 1, column + 1])) * self._grid.resolution
+
     def sees(self, x: float, y: float, points: Floats) -> NDArray[np.bool_]:
         """Tell which points (n, 2) no wall hides."""
         dx, dy = points[:, 0] - x, points[:, 1] - y

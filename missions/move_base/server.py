@@ -78,11 +78,9 @@ class RobotServer:
         self._pilot = Pilot(robot)
         control = robot.config.control
         self._owns_stepper = stepper is None
-        self._stepper = stepper or Stepper(
-            self._clock, rate=control.rate, reports=control.feedback_rate
-        )
-        self._report_period = 1.0 / control.feedback_rate
-        self._reported = self._battery_told = self._scanned = -math.inf
+        self._stepper = stepper or Stepper(self._clock, rate=control.rate)
+        self._feedback_period = 1.0 / control.feedback_rate
+        self._fed_back = self._battery_told = self._scanned = -math.inf
         self._scanner = Scanner(robot)
         self._moved = False
         self._closing = self._clock.event("the robot closes")
@@ -166,11 +164,11 @@ class RobotServer:
     def report(self, now: float) -> None:
         """Send feedback, odometry and battery where they are due; tell what has ended."""
         moved, self._moved = self._moved, False
-        if moved and now - self._reported > self._report_period - _JUST_PAST:
-            self._reported = now
+        if moved and now - self._fed_back > self._feedback_period - _JUST_PAST:
+            self._fed_back = now
             self._publish_feedback()
-            if self._odom.get_num_connections() or self._robot.body.standing:
-                self._publish_odometry()
+        if moved and (self._robot.body.standing or self._odom.get_num_connections()):
+            self._publish_odometry()
         self._report_scan(now)
         self._report_battery(now)
         with self._stepper.lock:

@@ -13,7 +13,7 @@ from actionlib_core.service import Service
 from actionlib_core.topic import Publisher
 from missions.exceptions import MissionError
 from missions.maps import OFFICE_MAP, OFFICE_ROBOT
-from missions.move_base.config import load_config
+from missions.move_base.config import ControlConfig, load_config
 from missions.move_base.occupancy import load_map
 from missions.move_base.server import RobotServer
 from missions.move_base.stepper import Stepper
@@ -50,8 +50,7 @@ class Simulation:
     def __init__(self, world: World, *, node: Node | None = None) -> None:
         self.world = world
         self._node = node if node is not None else get_node()
-        rate, reports = _rates(world)
-        self.stepper = Stepper(self._node.clock, rate=rate, reports=reports)
+        self.stepper = Stepper(self._node.clock, rate=_rate(world))
         self._surroundings = _Surroundings(self)
         self._nodes: list[Node] = []
         self.servers: dict[str, RobotServer] = {}
@@ -252,16 +251,20 @@ def _make(world: WorldSpec | World | Path | str | None, robots: int, now: float)
     return world.build(now) if isinstance(world, WorldSpec) else world
 
 
-def _rates(world: World) -> tuple[float, float]:
-    """Return the control rate and the fastest feedback rate [Hz] of the robots."""
-    controls = [(robot.name, robot.config.control) for robot in world.robots]
-    if not controls:
-        return 20.0, 10.0
-    first, control = controls[0]
-    for name, other in controls:
-        if other.rate != control.rate:
+def _rate(world: World) -> float:
+    """Return the control rate [Hz] of the robots.
+
+    Raises:
+        MissionError: they have different ones.
+    """
+    rates = [(robot.name, robot.config.control.rate) for robot in world.robots]
+    if not rates:
+        return ControlConfig().rate
+    first, rate = rates[0]
+    for name, other in rates:
+        if other != rate:
             raise MissionError(
-                f"{name}: control.rate: got {other.rate:g} Hz; expected {control.rate:g} Hz as "
-                f"{first} has: one clock steps all robots of a world."
+                f"{name}: control.rate: got {other:g} Hz; expected {rate:g} Hz as {first} has: one "
+                "clock steps all robots of a world."
             )
-    return control.rate, max(c.feedback_rate for _, c in controls)
+    return rate

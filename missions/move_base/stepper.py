@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from actionlib_core.clock import Clock, Task
 
 _LATE: Final = 0.5  # [s] a loop this late gives the lost time up instead of hurrying after it
+_REPORTS: Final = 10.0  # [Hz] while something is busy; an order waits so long at most
 _IDLE_PERIOD: Final = 0.5  # [s] between two reports when nothing is busy
 _STOPS_IN: Final = 1.0  # [s] `close` waits so long for the thread
 
@@ -35,7 +36,6 @@ class Stepper:
     Args:
         clock: Whose time it is.
         rate: Steps a second [Hz].
-        reports: Reports a second [Hz] while something is busy.
 
     Threads: every method may be called from any thread. `lock` keeps steps and orders apart; the
         clock is never waited for while it is held.
@@ -44,12 +44,12 @@ class Stepper:
         lock: Held during the steps.
     """
 
-    def __init__(self, clock: Clock, *, rate: float = 20.0, reports: float = 10.0) -> None:
+    def __init__(self, clock: Clock, *, rate: float = 20.0) -> None:
         self.lock = threading.RLock()
         self.rate = rate
         self._clock = clock
         self._dt = 1.0 / rate
-        self._batch = max(1, round(rate / reports))
+        self._batch = max(1, round(rate / _REPORTS))
         self._things: tuple[Stepped, ...] = ()
         self._wake = clock.event("something to step")
         self._task: Task | None = None

@@ -13,7 +13,7 @@ from PIL import Image, ImageDraw, ImageFont
 from missions.move_base.occupancy import OCCUPIED, UNKNOWN
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Iterable, Mapping, Sequence
     from pathlib import Path
 
     from missions.move_base.geometry import Pose2D
@@ -33,6 +33,19 @@ _MISSED: Final[Colour] = (176, 60, 60)
 _INK: Final[Colour] = (40, 44, 52)
 _PAPER: Final[Colour] = (255, 255, 255)
 _LEGEND_PX: Final = 56
+# Of several robots, in this order, then again; distinct also to most colour-blind eyes.
+_ROBOTS: Final[tuple[Colour, ...]] = (
+    (31, 119, 180),
+    (230, 97, 1),
+    (44, 140, 60),
+    (200, 40, 50),
+    (120, 80, 190),
+    (140, 86, 75),
+    (214, 90, 170),
+    (95, 100, 110),
+    (160, 150, 20),
+    (0, 160, 175),
+)
 _AT_DOCK: Final = 0.5  # [m] goals nearer to the charger than this need no mark of their own
 
 
@@ -86,6 +99,44 @@ def draw_track(
     canvas.finish(title, length=_length(track)).save(path)
 
 
+def draw_tracks(
+    path: Path,
+    grid: OccupancyMap,
+    tracks: Mapping[str, Sequence[tuple[float, float]]],
+    *,
+    lost: Collection[str] = (),
+    docks: Iterable[Pose2D] = (),
+    robot_radius: float = 0.25,
+    title: str = "",
+) -> None:
+    """Write a picture of the ways of several robots, each in a colour of its own.
+
+    Args:
+        path: The file to write; its folder must exist.
+        grid: The floor.
+        tracks: By the robot's name: the places driven over, (x, y) [m] in the map frame, in order.
+        lost: The robots that were lost where their track ends; they get a cross.
+        docks: Where the chargers stand.
+        robot_radius: [m], for the robots at the ends of their ways.
+        title: A line below the picture.
+
+    Raises:
+        OSError: the file cannot be written.
+        ValueError: Pillow knows no format of that name.
+    """
+    canvas = _Canvas(grid)
+    for dock in docks:
+        canvas.dock(dock, robot_radius)
+    shown = [(name, way, _ROBOTS[i % len(_ROBOTS)]) for i, (name, way) in enumerate(tracks.items())]
+    for _, way, colour in shown:
+        canvas.track(way, colour)
+    for name, way, colour in shown:
+        if way:
+            canvas.end(way[-1], colour, robot_radius, number=_number(name), lost=name in lost)
+    legend = [(name, colour, _length(way)) for name, way, colour in shown]
+    canvas.finish_several(title, legend).save(path)
+
+
 class _Canvas:
     """The picture while it is drawn, `_SMOOTH` times too large."""
 
@@ -105,11 +156,11 @@ class _Canvas:
         u, v = c * dx + s * dy, c * dy - s * dx
         return u * self._metre, self._image.height - v * self._metre
 
-    def track(self, track: Sequence[tuple[float, float]]) -> None:
-        """Draw the way, from the colour of its start to that of its end."""
+    def track(self, track: Sequence[tuple[float, float]], colour: Colour | None = None) -> None:
+        """Draw the way, from the colour of its start to that of its end, or in one colour."""
         points = [self.pixel(x, y) for x, y in track]
         width = max(2, round(0.09 * self._metre))
-        for shade, extra in ((_PAPER, 2 * _SMOOTH), (None, 0)):
+        for shade, extra in ((_PAPER, 2 * _SMOOTH), (colour, 0)):
             for i, (a, b) in enumerate(itertools.pairwise(points)):
                 colour = shade or _blend(i / max(1, len(points) - 2))
                 self._draw.line([a, b], fill=colour, width=width + extra)
@@ -155,14 +206,57 @@ class _Canvas:
         )
         self._draw.polygon([(x + half * u, y + half * v) for u, v in bolt], fill=(240, 160, 0))
 
-    def finish(self, title: str, length: float) -> Image.Image:
-        """Scale down and add the line below."""
+    def end(
+        self,
+        at: tuple[float, float],
+        colour: Colour,
+        radius: float,
+        *,
+        number: str,
+        lost: bool,
+    ) -> None:
+        """Draw one of several robots where it ended, with its number; a lost one with a cross."""
+        x, y = self.pixel(*at)
+        size = (radius + 0.15) * self._metre
+        self._dot((x, y), size, colour, outline=_PAPER)
+        if lost:
+            for way in (1, -1):
+                line = (x - size, y - way * size, x + size, y + way * size)
+                self._draw.line(line, fill=_INK, width=4 * _SMOOTH)
+        else:
+            font = _font(14 * _SMOOTH)
+            self._draw.text((x, y), number, fill=_PAPER, font=font, anchor="mm")
+
+    def finish_several(
+        self, title: str, legend: Sequence[tuple[str, Colour, float]]
+    ) -> Image.Image:
+        """Scale down and add the lines below: name, colour and metres of each robot."""
+        columns = 5
+        rows = -(-len(legend) // columns)
+        picture, draw, middle = self._with_lines(title, rows)
+        width = picture.width // columns
+        for i, (name, colour, length) in enumerate(legend):
+            x, y = 20 + (i % columns) * width, middle + _LEGEND_PX // 2 + 28 * (i // columns) + 8
+            draw.line([(x, y), (x + 36, y)], fill=colour, width=7)
+            text = f"{name}  {length:.0f} m"
+            draw.text((x + 48, y), text, fill=_INK, font=_font(16), anchor="lm")
+        return picture
+
+    def _with_lines(self, title: str, rows: int) -> tuple[Image.Image, ImageDraw.ImageDraw, int]:
+        """Scale down; return the picture, what draws on it and the middle of its first line."""
         size = (self._image.width // _SMOOTH, self._image.height // _SMOOTH)
-        picture = Image.new("RGB", (size[0], size[1] + _LEGEND_PX), _PAPER)
+        height = size[1] + _LEGEND_PX + 28 * rows
+        picture = Image.new("RGB", (size[0], height), _PAPER)
         picture.paste(self._image.reduce(_SMOOTH), (0, 0))
         draw = ImageDraw.Draw(picture)
         middle = size[1] + _LEGEND_PX // 2
         draw.text((20, middle), title, fill=_INK, font=_font(20), anchor="lm")
+        return picture, draw, middle
+
+    def finish(self, title: str, length: float) -> Image.Image:
+        """Scale down and add the line below."""
+        picture, draw, middle = self._with_lines(title, 0)
+        size = picture.size
         left = size[0] - 480
         for i in range(160):
             draw.line([(left + i, middle - 4), (left + i, middle + 4)], fill=_blend(i / 159))
@@ -234,6 +328,12 @@ def _font(size: int) -> ImageFont.FreeTypeFont:
     font = ImageFont.load_default(size)
     assert isinstance(font, ImageFont.FreeTypeFont)
     return font
+
+
+def _number(name: str) -> str:
+    """Return the number at the end of a name, else its first letter."""
+    digits = name[len(name.rstrip("0123456789")) :]
+    return digits or name[:1]
 
 
 def _length(track: Sequence[tuple[float, float]]) -> float:

@@ -449,17 +449,30 @@ class Robot:
         body, sight = self.body, self.config.robot.sight
         x, y = body.x, body.y
         close = [d for d in near if math.hypot(d.x - x, d.y - y) - d.radius <= sight]
-        places = [*((d.x, d.y) for d in close), *((s.x, s.y) for s in traffic.values())]
-        if not places:
-            return
-        visible = self.world.rays.sees(x, y, np.array(places))
-        known = list(traffic.items())
-        for (disc, seen), clear in zip(known, visible[len(close) :], strict=True):
-            if clear and math.hypot(seen.x - x, seen.y - y) <= sight:
+        remembered = [
+            (disc, seen)
+            for disc, seen in traffic.items()
+            if math.hypot(seen.x - x, seen.y - y) <= sight
+        ]
+        visible = self._which_are_visible([*close, *(seen for _, seen in remembered)])
+        for (disc, _), clear in zip(remembered, visible[len(close) :], strict=True):
+            if clear:
                 del traffic[disc]
         for disc, clear in zip(close, visible[: len(close)], strict=True):
             if clear:
                 traffic[disc] = Sighting(disc.x, disc.y, disc.radius, disc.name)
+
+    def _which_are_visible(self, places: Sequence[Disc | Sighting]) -> Sequence[bool]:
+        """Tell which places no wall hides."""
+        if not places:
+            return ()
+        x, y = self.body.x, self.body.y
+        rays = self.world.rays
+        free = rays.open_around(x, y)
+        if all(math.hypot(place.x - x, place.y - y) <= free for place in places):
+            return (True,) * len(places)
+        visible: list[bool] = rays.sees(x, y, np.array([(p.x, p.y) for p in places])).tolist()
+        return visible
 
     # -- touching ------------------------------------------------------------------------------
 

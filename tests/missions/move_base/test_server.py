@@ -37,7 +37,7 @@ def drive(client, pose, frame="map"):
     return client.get_state(), client.get_goal_status_text()
 
 
-def test_it_drives_to_a_goal_and_reports_its_pose_ten_times_a_second(clock, simulation, client):
+def test_it_drives_to_a_goal_and_reports_its_pose_five_times_a_second(clock, simulation, client):
     poses = []
     start = clock.now()
     client.send_goal(goal_at(OFFICE_1), feedback_cb=lambda f: poses.append((clock.now(), f)))
@@ -45,7 +45,7 @@ def test_it_drives_to_a_goal_and_reports_its_pose_ten_times_a_second(clock, simu
     assert client.get_state() == GoalStatus.SUCCEEDED
     assert simulation.robot.body.pose.distance(OFFICE_1) < 0.05
     times = [t - start for t, _ in poses]
-    assert times == pytest.approx([0.1 * i for i in range(1, len(times) + 1)], abs=0.06)
+    assert times == pytest.approx([0.1 + 0.2 * i for i in range(len(times))], abs=0.06)
     base = [f.base_position for _, f in poses]
     assert {b.header.frame_id for b in base} == {"map"}
     assert base[-1].pose.position.x == pytest.approx(2.0, abs=0.05)
