@@ -21,33 +21,44 @@ _SAME_PLACE = 0.05  # [m] a goal this near to a named waypoint has its name
 class TrackRecorder:
     """Listens to a mission and can draw its track; for `machine.subscribe(recorder.on_event)`.
 
-    The track is made of the poses that `move_base` reports as feedback. A goal is named after the
-    waypoint that a state wrote to userdata, else after the state that sent it.
+    The track is made of the poses that `move_base` reports as feedback, and other actions whose
+    feedback has a field `base_position`. A goal is named after the waypoint that a state wrote to
+    userdata, else after the state that sent it.
 
     Threads: `on_event` may be called from any thread.
+
+    Attributes:
+        tracks: The places, (x, y) [m] in the map frame, by robot: what is in front of the names of
+            its actions, "" for a robot without a name.
     """
 
     def __init__(self) -> None:
-        self.track: list[tuple[float, float]] = []
+        self.tracks: dict[str, list[tuple[float, float]]] = {}
+        self._lost: set[str] = set()
+        self._docks: dict[tuple[float, float], Pose2D] = {}
         self._lock = threading.Lock()
         self._names: list[Waypoint] = []
         self._goals: dict[str, tuple[Pose2D, str, bool]] = {}
 
     @property
+    def track(self) -> list[tuple[float, float]]:
+        """The track of the only robot, or of the first one."""
+        return next(iter(self.tracks.values()), [])
+
+    @property
     def has_goals(self) -> bool:
-        """Whether any goal was a place to drive to."""
-        return bool(self._goals)
+        """Whether any goal was a place to drive to, or several robots drove."""
+        return bool(self._goals) or len(self.tracks) > 1
 
     def on_event(self, event: ev.Event) -> None:
         """Take one event in."""
         with self._lock:
             if isinstance(event, ev.GoalFeedback):
-                self._on_feedback(event.feedback)
+                self._on_feedback(_robot(event.action), event.feedback)
             elif isinstance(event, ev.GoalSent):
                 self._on_goal(event)
-            elif isinstance(event, ev.GoalDone) and event.goal_id in self._goals:
-                pose, label, _ = self._goals[event.goal_id]
-                self._goals[event.goal_id] = pose, label, event.status == "SUCCEEDED"
+            elif isinstance(event, ev.GoalDone):
+                self._on_done(event)
             elif isinstance(event, ev.UserdataWritten) and isinstance(event.value, Waypoint):
                 self._names.append(event.value)
 
@@ -57,11 +68,16 @@ class TrackRecorder:
         Raises:
             OSError: the file cannot be written.
         """
-        from missions.move_base.track import draw_track
+        from missions.move_base.track import draw_track, draw_tracks
 
         with self._lock:
-            track, goals = list(self.track), self._marks()
-        draw_track(path, grid, track, goals, dock=dock, title=title)
+            tracks, goals = {name: list(way) for name, way in self.tracks.items()}, self._marks()
+            lost, docks = set(self._lost), [*self._docks.values()]
+        if len(tracks) > 1:
+            tracks = dict(sorted(tracks.items(), key=lambda item: (len(item[0]), item[0])))
+            draw_tracks(path, grid, tracks, lost=lost, docks=docks, title=title)
+        else:
+            draw_track(path, grid, next(iter(tracks.values()), []), goals, dock=dock, title=title)
 
     def _marks(self) -> list[GoalMark]:
         from missions.move_base.track import GoalMark
@@ -72,23 +88,39 @@ class TrackRecorder:
         ]
 
     def _on_goal(self, event: ev.GoalSent) -> None:
+        dock = getattr(event.goal, "dock", None)
+        if dock is not None:
+            self._docks[dock.position.x, dock.position.y] = _pose(dock)
         target = getattr(event.goal, "target_pose", None)
         if target is not None and target.header.frame_id.removeprefix("/") == "map":
             label = event.path.rpartition("/")[2].replace("_", " ").lower()
             self._goals[event.goal_id] = _pose(target.pose), label, False
 
-    def _on_feedback(self, feedback: Any) -> None:
+    def _on_done(self, event: ev.GoalDone) -> None:
+        if event.goal_id in self._goals:
+            pose, label, _ = self._goals[event.goal_id]
+            self._goals[event.goal_id] = pose, label, event.status == "SUCCEEDED"
+        if event.status == "LOST":
+            self._lost.add(_robot(event.action))
+
+    def _on_feedback(self, robot: str, feedback: Any) -> None:
         base = getattr(feedback, "base_position", None)
         if base is not None:
+            track = self.tracks.setdefault(robot, [])
             place = (base.pose.position.x, base.pose.position.y)
-            if not self.track or self.track[-1] != place:
-                self.track.append(place)
+            if not track or track[-1] != place:
+                track.append(place)
 
     def _name(self, pose: Pose2D) -> str:
         for waypoint in reversed(self._names):
             if waypoint.pose.distance(pose) < _SAME_PLACE:
                 return waypoint.name
         return ""
+
+
+def _robot(action: str) -> str:
+    """Return what stands in front of an action's name: the robot's."""
+    return action.lstrip("/").rpartition("/")[0]
 
 
 def _pose(message: Any) -> Pose2D:

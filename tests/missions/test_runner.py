@@ -152,3 +152,23 @@ def test_the_recorder_names_goals_after_waypoints_else_after_states():
     marks = [(m.label, m.reached) for m in recorder._marks()]
     assert marks == [("kitchen", True), ("drive home", False)]
     assert recorder.track == [(0.0, 0.0), (0.5, 0.0), (1.0, 0.0)]
+
+
+def test_the_recorder_keeps_several_robots_apart(office, tmp_path):
+    from actionlib_core.interfaces.geometry_msgs.msg import PoseStamped
+    from missions.interfaces import DeliverFeedback, RechargeGoal
+
+    recorder = TrackRecorder()
+    head = ("/FLEET/ROBOT/DELIVER", 0.0, 0)
+    for robot in ("robot_1", "robot_10", "robot_2"):
+        for x in (1.0, 2.0):
+            pose = PoseStamped()
+            pose.pose.position.x = x + len(robot)
+            feedback = DeliverFeedback(base_position=pose)
+            recorder.on_event(ev.GoalFeedback(*head, f"{robot}/deliver", "g", feedback))
+    recorder.on_event(ev.GoalSent(*head, "robot_1/recharge", "g2", RechargeGoal()))
+    recorder.on_event(ev.GoalDone(*head, "robot_2/deliver", "g", "LOST", "gone"))
+    assert recorder.tracks["robot_10"] == [(9.0, 0.0), (10.0, 0.0)]
+    assert recorder.has_goals
+    recorder.draw(tmp_path / "tracks.png", office, dock=None, title="fleet: succeeded")
+    assert (tmp_path / "tracks.png").read_bytes().startswith(b"\x89PNG")
