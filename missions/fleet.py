@@ -225,7 +225,7 @@ def delivering(robot: str, desk: Desk) -> SimpleActionState:
         if status == GoalStatus.SUCCEEDED:
             desk.delivered(robot, userdata.task)
             return None
-        useful = desk.failed(robot, userdata.task, result.text, aboard=result.aboard)
+        useful = desk.failed(robot, userdata.task, result.text or "no reason", aboard=result.aboard)
         return None if useful else "out"
 
     return SimpleActionState(

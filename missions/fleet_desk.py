@@ -194,8 +194,9 @@ class Desk:
         self._duties[robot].at_home = True
 
     def charged(self, robot: str, charge: float) -> None:
-        """Note how full a robot's battery is; below 0, it does not know."""
-        self._duties[robot].charge = charge if charge >= 0.0 else None
+        """Note how full a robot's battery is; 0: it does not know."""
+        if charge > 0.0:
+            self._duties[robot].charge = charge
 
     def delivered(self, robot: str, task: Delivery) -> None:
         """Note that an order is delivered."""
@@ -234,10 +235,11 @@ class Desk:
             self._leave_duty(robot)
 
     def left_dock(self, robot: str, dock: Waypoint, *, left: bool) -> bool:
-        """Note whether a robot has left its dock; tell whether it can go on."""
+        """Note whether a robot has left its dock and is home; tell whether it can go on."""
         with self._lock:
             if left:
                 self.docks.leave(dock, robot)
+                self._duties[robot].at_home = True
             else:
                 self.docks.block(dock, robot)
                 self._leave_duty(robot)

@@ -126,10 +126,10 @@ class FleetRobot:
     """
 
     def __init__(self, name: str, hands: Hands, *, node: Node) -> None:
-        self._charge = -1.0
+        self._charge = 0.0
         self._battery = Subscriber("battery", BatteryState, self._on_battery, node=node)
         self._servers = [
-            ActionServerWrapper(action, spec, machine, ["succeeded"], node=node, policy="reject")
+            ActionServerWrapper(action, spec, machine, ["succeeded"], node=node, policy="queue")
             for action, spec, machine in (
                 ("deliver", DeliverAction, deliver(name, hands, self.charge, node)),
                 ("recharge", RechargeAction, recharge(self.charge, node)),
@@ -139,7 +139,7 @@ class FleetRobot:
             server.run_server()
 
     def charge(self) -> float:
-        """Return how full the battery is, 0 to 1; below 0: it has not said so yet."""
+        """Return how full the battery is, 0 to 1; 0: it has not said so yet."""
         return self._charge
 
     def close(self) -> None:

@@ -204,7 +204,7 @@ class DeliverGoal(_Message):
 
 class DeliverResult(_Message):
     aboard: bool  # whether the parcel is on the robot now
-    charge: float  # of its battery, 0 to 1; below 0: not known
+    charge: float  # of its battery, 0 to 1; 0: not known
     text: str  # what it was doing when it ended
     def __init__(
         self,
@@ -344,7 +344,7 @@ class RechargeGoal(_Message):
 
 class RechargeResult(_Message):
     left: bool  # whether the robot has left the dock
-    charge: float  # of its battery, 0 to 1; below 0: not known
+    charge: float  # of its battery, 0 to 1; 0: not known
     text: str  # what it was doing when it ended
     def __init__(
         self,

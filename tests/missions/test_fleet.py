@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import contextlib
 import random
+import subprocess
+import sys
 from collections import Counter
 
 import pytest
@@ -25,6 +27,7 @@ from missions.fleet import coordinator, fleet, make_orders, pose_message, pose_o
 from missions.fleet_book import Order, Stage
 from missions.fleet_desk import Desk, Robot
 from missions.fleet_robot import FleetRobot, deliver, recharge
+from missions.fleet_robot import main as robot_main
 from missions.interfaces import ChargeAction
 from missions.interfaces.srv import PermitRequest
 from missions.maps import OFFICE_FLEET
@@ -446,6 +449,59 @@ def test_fifty_robots_of_which_fifteen_die(clock, floor_of, seed):
 @pytest.mark.parametrize("seed", range(3))
 def test_some_robots_of_which_some_die(clock, floor_of, seed):
     many(clock, floor_of, robots=6, orders=15, kills=3, seed=seed)
+
+
+# -- real processes --------------------------------------------------------------------------------
+
+SMALL_SITE = """\
+map: {folder}/office.yaml
+robot: {folder}/office_fleet_robot.yaml
+low_battery: 0.4
+charge_until: 0.9
+docks:
+  - {{name: dock, x: 15.6, y: 7.1, yaw: 1.5708}}
+homes:
+  - {{name: home 0, x: 9.8, y: 7.2}}
+  - {{name: home 1, x: 11.0, y: 7.2}}
+places:
+  - {{name: west, x: 8.0, y: 7.6}}
+  - {{name: east, x: 12.5, y: 7.6}}
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.zenoh
+@pytest.mark.timeout(180)
+def test_two_processes_of_which_one_is_killed_on_the_way(tmp_path):
+    site = tmp_path / "site.yaml"
+    site.write_text(SMALL_SITE.format(folder=OFFICE_FLEET.parent))
+    words = ["--robots", "2", "--orders", "2", "--lose", "1", "--site", str(site)]
+    command = [sys.executable, "-c", "import sys; from smachpy.cli import main; sys.exit(main())"]
+    done = subprocess.run(
+        [*command, "run", "fleet", "--plain", "--out", str(tmp_path / "out"), "--", *words],
+        capture_output=True,
+        text=True,
+        timeout=170,
+        stdin=subprocess.DEVNULL,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "LOST" in done.stdout
+    assert "FLEET: succeeded" in done.stdout
+    assert (tmp_path / "out" / "fleet_track.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.zenoh
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["robot 0"], "invalid namespace: ' ' is not allowed"),
+        (["robot_0", "--pose", "0", "0", "0"], "start pose: (0.00, 0.00) is in a wall"),
+        (["robot_0", "--site", "nowhere.yaml"], "nowhere.yaml: got"),
+    ],
+)
+def test_a_robot_that_cannot_be_says_why(words, text, capsys):
+    assert robot_main(words) == 2
+    assert text in capsys.readouterr().err
 
 
 # -- the parts -------------------------------------------------------------------------------------
