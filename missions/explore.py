@@ -3,10 +3,11 @@
     EXPLORE
       REMEMBER      where the robot stands now
       LOOK_AROUND   the first scan
-      SEARCH        both children at once; the first that ends calls the other off
+      SEARCH        all children at once; the first that ends calls the others off
         LOOK        one frontier after the other: where the seen ends, until there is none
           GO        there
         MAP         adds every scan to what has been seen; ends when the scanner is silent
+        BATTERY     ends when it is low
       SAVE          the map, in the form of ROS map_server
       COME_BACK     to where the robot stood
       REPORT        succeeded, or incomplete
@@ -22,9 +23,10 @@ from typing import TYPE_CHECKING
 
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
-from actionlib_core.interfaces.sensor_msgs.msg import LaserScan
+from actionlib_core.interfaces.sensor_msgs.msg import BatteryState, LaserScan
 from actionlib_core.topic import Subscriber
 from missions.exceptions import MissionError
+from missions.maps import OFFICE_EXPLORER
 from missions.parts import DRIVE_TIMEOUT, SIGNAL_TIMEOUT, drive_back, locate, pose_of
 from missions.progress import Progress
 from missions.waypoint_file import goal_at
@@ -52,7 +54,10 @@ POSES_KEPT = 50  # of which a scan takes the one with the nearest stamp
 
 
 def explore(
-    map_file: str | Path = "explored.yaml", most: int = 0, smallest: float = 1.0
+    map_file: str | Path = "explored.yaml",
+    most: int = 0,
+    smallest: float = 1.0,
+    low_battery: float = 0.2,
 ) -> StateMachine:
     """Look at all that can be reached, save a map of it, come back.
 
@@ -60,6 +65,7 @@ def explore(
         map_file: The map to write, with an image beside it.
         most: Look at so many frontiers at most; 0: at all.
         smallest: Borders between seen and unseen that are shorter are not worth a look [m].
+        low_battery: Come back below this charge, 0 to 1.
 
     Raises:
         MissionError: an argument makes no sense.
@@ -71,6 +77,8 @@ def explore(
         raise MissionError(f"most: got {most}; expected 0 (all) or more.")
     if not smallest > 0.0:
         raise MissionError(f"smallest: got {smallest:g}; expected more than 0 [m].")
+    if not 0.0 <= low_battery < 1.0:
+        raise MissionError(f"low_battery: got {low_battery:g}; expected 0 or more, less than 1.")
     search = Search(path, most, smallest)
     sm = StateMachine(["succeeded", "incomplete", "aborted", "preempted"], name="EXPLORE")
     sm.register_start_cb(lambda _userdata, _initial: search.begin())
@@ -88,7 +96,8 @@ def explore(
             ),
             {"valid": "SEARCH", "invalid": "aborted"},
         )
-        sm.add("SEARCH", look_and_map(search), {"all_seen": "SAVE", "blind": "SAVE"})
+        ends = {"all_seen": "SAVE", "blind": "SAVE", "battery_low": "SAVE"}
+        sm.add("SEARCH", look_and_map(search, low_battery), ends)
         saving = CBState(search.save, outcomes=["saved", "failed"])
         sm.add("SAVE", saving, {"saved": "COME_BACK", "failed": "COME_BACK"})
         sm.add("COME_BACK", drive_back(), {"succeeded": "REPORT"}, {"home": "here"})
@@ -96,13 +105,19 @@ def explore(
     return sm
 
 
-def look_and_map(search: Search) -> Concurrence:
-    """Drive to frontiers, and keep the map meanwhile."""
+explore.world = OFFICE_EXPLORER  # type: ignore[attr-defined]  # where --start-robot plays it
+
+
+def look_and_map(search: Search, low_battery: float) -> Concurrence:
+    """Drive to frontiers; keep the map and watch the battery meanwhile."""
     both = Concurrence(
-        outcomes=["all_seen", "blind", "preempted"],
+        outcomes=["all_seen", "blind", "battery_low", "preempted"],
         default_outcome="blind",
         output_keys=["progress"],
-        outcome_map={"all_seen": {"LOOK": "all_seen"}},
+        outcome_map={
+            "all_seen": {"LOOK": "all_seen"},
+            "battery_low": {"LOOK": "preempted", "BATTERY": "invalid"},
+        },
         child_termination_cb=lambda _outcomes: True,
     )
     look = Iterator(
@@ -124,9 +139,13 @@ def look_and_map(search: Search) -> Concurrence:
             on_exit=search.note,
         )
         Iterator.set_contained_state("GO", go, loop_outcomes=["succeeded", "aborted"])
+    battery = MonitorState(
+        "battery", BatteryState, lambda _, message: message.percentage >= low_battery
+    )
     with both:
         Concurrence.add("LOOK", look)
         Concurrence.add("MAP", Mapper(search))
+        Concurrence.add("BATTERY", battery)
     return both
 
 
@@ -158,7 +177,7 @@ class Search:
 
         self.seen = SeenMap(smallest=self.smallest)
         self.here: Pose2D | None = None
-        self.reached = self.saved = self.blind = False
+        self.reached = self.saved = self.finished = False
         self.looks = self.missed = 0
 
     def add(self, scan: LaserScan, pose: Pose2D) -> None:
@@ -175,15 +194,16 @@ class Search:
         """Yield the nearest frontier, as long as there is one; each after the last was tried."""
         in_vain = 0
         while in_vain < IN_VAIN and not 0 < self.most <= self.looks:
-            frontier = None if self.here is None else self.seen.nearest_frontier(self.here)
+            frontier = None if self.here is None else self.seen.best_frontier(self.here)
             if frontier is None:
-                return
+                break
             self.reached = False
             yield frontier
             self.seen.leave(frontier, reached=self.reached)
             self.looks += 1
             self.missed += not self.reached
             in_vain = 0 if self.reached else in_vain + 1
+        self.finished = True
 
     def note(self, userdata: UserData, outcome: str) -> None:
         """Remember whether the frontier was reached; say how much has been seen."""
@@ -205,7 +225,7 @@ class Search:
 
     def report(self, _userdata: UserData) -> str:
         """Name the end: was everything seen and saved?"""
-        all_well = self.saved and not self.missed and not self.blind
+        all_well = self.saved and self.finished and not self.missed
         return "succeeded" if all_well else "incomplete"
 
 
@@ -244,10 +264,7 @@ class Mapper(State):
                         self._search.add(scan, pose_at(poses, scan))
         finally:
             forget()
-        if self.preempt_requested():
-            return "preempted"
-        self._search.blind = True
-        return "blind"
+        return "preempted" if self.preempt_requested() else "blind"
 
 
 def pose_at(poses: deque[Odometry], scan: LaserScan) -> Pose2D:

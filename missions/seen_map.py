@@ -25,6 +25,7 @@ RESOLUTION: Final = 0.1  # [m]
 _CHUNK: Final = 64  # cells by which the map grows at least
 _HIT_WEIGHT: Final = 3  # a cell is solid when so many times its hits are as many as its misses
 _NEAR: Final = 10  # cells between a border and a place to look at it from
+_DETOUR: Final = 1.0  # [m] added to a way, so that a small gap next to the robot can wait
 _LOOKED_AT: Final = 8  # cells around the border's nearest point that are not looked at twice
 _SPARE: Final = 0.1  # [m] of room besides, where the robot is to stop and turn
 _EIGHT: Final = np.ones((3, 3), dtype=np.bool_)  # neighbours, corners included
@@ -101,31 +102,31 @@ class SeenMap:
             origin = Pose2D(self._x0 * RESOLUTION, self._y0 * RESOLUTION, 0.0)
         return OccupancyMap(cells, RESOLUTION, origin)
 
-    def nearest_frontier(self, here: Pose2D) -> Frontier | None:
-        """Return the frontier with the shortest way from `here`; None when none can be got to.
+    def best_frontier(self, here: Pose2D) -> Frontier | None:
+        """Return the frontier that shows most for its way from `here`; None: none can be got to.
 
-        Frontiers that were left are not offered again.
+        Parts of the border that were left are not offered again.
         """
         with self._lock:
             border, lengths = self._border()
             if not border.any():
                 return None
-            free, room = self._free(), self._room(self._radius)
-            places = self._room(self._radius + _SPARE)
             # Near the border, and not just on the other side of a wall.
-            places &= ndimage.binary_dilation(
-                border > 0, structure=_EIGHT, iterations=_NEAR, mask=free
+            near = ndimage.binary_dilation(
+                border > 0, structure=_EIGHT, iterations=_NEAR, mask=self._free()
             )
-            cell = self._first_reached(room, places, here)
-            if cell is None:
+            places = self._room(self._radius + _SPARE) & near
+            _, (rows, columns) = ndimage.distance_transform_edt(border == 0, return_indices=True)
+            labels = np.where(places, border[rows, columns], 0)
+            reached = self._reach(self._room(self._radius), labels, here)
+            if not reached:
                 return None
-            rows, columns = np.nonzero(border)
-            nearest = np.hypot(rows - cell[0], columns - cell[1]).argmin()
-            at = int(rows[nearest]), int(columns[nearest])
-            label = border[at]
+            label = max(reached, key=lambda n: lengths[n] * RESOLUTION / (reached[n][0] + _DETOUR))
+            _, row, column = reached[label]
+            at = int(rows[row, column]), int(columns[row, column])
             rows, columns = np.nonzero(border == label)
-            yaw = math.atan2(float(rows.mean()) - cell[0], float(columns.mean()) - cell[1])
-            goal = Pose2D(*self._centre(*cell), yaw)
+            yaw = math.atan2(float(rows.mean()) - row, float(columns.mean()) - column)
+            goal = Pose2D(*self._centre(row, column), yaw)
             return Frontier(goal, self._centre(*at), float(lengths[label]) * RESOLUTION)
 
     def leave(self, frontier: Frontier, *, reached: bool) -> None:
@@ -197,27 +198,30 @@ class SeenMap:
         labels[lengths[labels] * RESOLUTION < self._smallest] = 0
         return labels.astype(np.int32), lengths
 
-    def _first_reached(self, room: Cells, places: Cells, here: Pose2D) -> tuple[int, int] | None:
-        """Return the cell of `places` with the shortest way through `room`."""
+    def _reach(
+        self, room: Cells, labels: NDArray[np.int32], here: Pose2D
+    ) -> dict[int, tuple[float, int, int]]:
+        """Return for each label the nearest cell through `room`: distance [m], row, column."""
         column, row = math.floor(here.x / RESOLUTION), math.floor(here.y / RESOLUTION)
         row, column = row - self._y0, column - self._x0
         reach = math.ceil(2.0 * self._radius / RESOLUTION)  # it may stand where there is no room
-        width = room.shape[1] + 2
-        free = np.pad(room, 1).ravel()  # no wave goes over the edge
-        wanted = np.pad(places, 1).ravel()
-        window = np.zeros(room.shape, dtype=np.bool_)
-        window[
+        around = np.s_[
             max(0, row - reach) : row + reach + 1, max(0, column - reach) : column + reach + 1
-        ] = 1
-        wave = np.flatnonzero(np.pad(window, 1).ravel() & free)
-        around = np.array([dr * width + dc for dr in (-1, 0, 1) for dc in (-1, 0, 1)])
+        ]
+        start = np.zeros(room.shape, dtype=np.bool_)
+        start[around] = room[around]
+        width = room.shape[1] + 2
+        free, wanted = np.pad(room, 1).ravel(), np.pad(labels, 1).ravel()  # no way over the edge
+        steps = np.array([dr * width + dc for dr in (-1, 0, 1) for dc in (-1, 0, 1)])
+        found: dict[int, tuple[float, int, int]] = {}
+        wave, distance = np.flatnonzero(np.pad(start, 1)), 0.0
         while wave.size:
-            found = wave[wanted[wave]]
-            if found.size:
-                rows, columns = found // width - 1, found % width - 1
-                best = np.hypot(rows - row, columns - column).argmin()
-                return int(rows[best]), int(columns[best])
+            for label, first in zip(*np.unique(wanted[wave], return_index=True), strict=True):
+                if label and label not in found:
+                    cell = int(wave[first])
+                    found[int(label)] = distance, cell // width - 1, cell % width - 1
             free[wave] = False
-            wave = (wave[:, None] + around).ravel()
+            wave = (wave[:, None] + steps).ravel()
             wave = np.unique(wave[free[wave]])
-        return None
+            distance += RESOLUTION
+        return found

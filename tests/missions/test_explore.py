@@ -7,7 +7,7 @@ import pytest
 
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
-from actionlib_core.interfaces.sensor_msgs.msg import LaserScan
+from actionlib_core.interfaces.sensor_msgs.msg import BatteryState, LaserScan
 from actionlib_core.time import Time
 from missions.exceptions import MissionError
 from missions.explore import explore, pose_at
@@ -148,6 +148,16 @@ def test_a_scanner_that_falls_silent_ends_the_search(mission, world, path):
     assert path.exists()
 
 
+def test_a_low_battery_ends_the_search(mission, world, path):
+    battery = mission.topic("battery", BatteryState)
+    battery.publish_at(8.0, BatteryState(percentage=0.19))
+    run = mission(explore(path))
+    run.assert_outcome("incomplete")
+    assert run.outcomes("SEARCH") == ("battery_low",)
+    assert run.outcomes("COME_BACK") == ("succeeded",)
+    assert path.exists()
+
+
 def test_a_robot_that_cannot_come_home_says_so(mission, world, path):
     world.refuses = lambda x, y: x == 1.5
     run = mission(explore(path))
@@ -213,6 +223,7 @@ def test_a_scan_gets_the_pose_of_its_own_time():
         ("most", -1, "got -1; expected 0"),
         ("smallest", 0.0, "got 0; expected more than 0"),
         ("smallest", math.nan, "got nan; expected more than 0"),
+        ("low_battery", 1.0, "got 1; expected 0 or more, less than 1"),
     ],
 )
 def test_arguments_that_make_no_sense_are_refused(name, value, text):

@@ -70,7 +70,7 @@ def test_a_scan_without_a_ray_changes_nothing():
     seen = SeenMap()
     seen.add(flat(math.nan, math.nan), Pose2D(0.0, 0.0, 0.0))
     assert seen.area() == 0.0
-    assert seen.nearest_frontier(Pose2D(0.0, 0.0, 0.0)) is None
+    assert seen.best_frontier(Pose2D(0.0, 0.0, 0.0)) is None
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +89,7 @@ def look(office):
 def test_a_frontier_is_a_place_to_stand_that_looks_into_the_unseen(office, look):
     seen, here = SeenMap(), Pose2D(9.8, 7.7, 0.0)
     seen.add(look(here), here)
-    frontier = seen.nearest_frontier(here)
+    frontier = seen.best_frontier(here)
     assert frontier.size >= 1.0
     assert cell(seen.occupancy(), *frontier.goal[:2]) == FREE
     assert math.dist(frontier.goal[:2], frontier.border) <= 1.5
@@ -106,7 +106,7 @@ def test_looking_from_frontier_to_frontier_shows_the_whole_office(office, look):
     seen, here = SeenMap(), Pose2D(9.8, 7.7, 0.0)
     seen.add(look(here), here)
     goals = 0
-    while (frontier := seen.nearest_frontier(here)) is not None:
+    while (frontier := seen.best_frontier(here)) is not None:
         goals += 1
         here = frontier.goal
         assert office.cells[office.cell(here.x, here.y)] == FREE
@@ -122,7 +122,7 @@ def test_a_frontier_out_of_reach_is_not_offered_again(look):
     seen, here = SeenMap(), Pose2D(9.8, 7.7, 0.0)
     seen.add(look(here), here)
     left = []
-    while (frontier := seen.nearest_frontier(here)) is not None:
+    while (frontier := seen.best_frontier(here)) is not None:
         left.append(frontier.border)
         seen.leave(frontier, reached=False)
     assert 2 <= len(left) < 40
@@ -134,7 +134,7 @@ def test_a_frontier_behind_a_wall_has_no_place_on_this_side():
     seen, here = SeenMap(smallest=0.3), Pose2D(0.0, 0.0, 0.0)
     box = [1.5 / max(abs(math.cos(a)), abs(math.sin(a))) for a in np.arange(720) * math.tau / 720]
     seen.add(flat(*box, range_max=8.0), here)
-    assert seen.nearest_frontier(here) is None
+    assert seen.best_frontier(here) is None
 
 
 def test_the_map_can_be_written_and_read_as_any_map(tmp_path, look):
