@@ -257,7 +257,9 @@ def recharging(robot: Robot, desk: Desk, charge_until: float) -> SimpleActionSta
             return "lost"
         desk.charged(robot.name, result.charge)
         left = desk.left_dock(robot.name, userdata.task, left=result.left)
-        return None if left else "out"
+        if status != GoalStatus.SUCCEEDED:  # it cannot charge, so it can do nothing else
+            desk.out_of_duty(robot.name)
+        return None if left and status == GoalStatus.SUCCEEDED else "out"
 
     return SimpleActionState(
         f"/{robot.name}/recharge",

@@ -4,7 +4,7 @@
       TO_PICKUP     drives there                 TO_DOCK  drives there
       ASK_TO_TAKE   may it take the parcel?      CHARGE
       TAKE          takes it                     LEAVE    frees the dock again
-      ASK_TO_LEAVE  may it leave with it?
+      ASK_TO_LEAVE  may it leave with it?        LEAVE_EMPTY  the same, uncharged
       PUT_BACK      if not
       TO_DROPOFF    drives there
       ASK_TO_GIVE   may it hand it over?
@@ -297,8 +297,10 @@ def recharge(charge: Callable[[], float], node: Node | None = None) -> StateMach
             drive("dock", "to the dock", coming, RechargeFeedback, node),
             {"succeeded": "CHARGE"},
         )
-        add("CHARGE", charging(node), {"succeeded": "LEAVE", "aborted": "LEAVE"})
+        add("CHARGE", charging(node), {"succeeded": "LEAVE", "aborted": "LEAVE_EMPTY"})
         add("LEAVE", drive("outside", "home", leaving, RechargeFeedback, node, away))
+        empty = drive("outside", "home", leaving, RechargeFeedback, node, away)
+        add("LEAVE_EMPTY", empty, {"succeeded": "aborted"})
     return sm
 
 

@@ -404,6 +404,20 @@ def test_the_dock_of_a_robot_that_died_there_stays_taken(floor_of):
     assert f"dock 0: somebody has to look, {robot} had it" in floor.machine.userdata.report
 
 
+def test_a_robot_that_cannot_charge_leaves_the_dock_and_its_duty(floor_of):
+    orders = make_orders([place("a", 5.0), place("b", 9.0)], 3, 3)
+    floor = floor_of(team(2), orders, docks(1), low=0.5, charge=0.4)
+    broken, fine = floor.robots
+    broken.dock.execute_callback = lambda _goal: broken.dock.set_aborted()
+    assert floor.run() == "succeeded"
+    floor.check()
+    assert (floor.desk.docks.holders, floor.desk.docks.blocked) == ({}, {})
+    by = Counter(entry.robot for entry in floor.desk.book.entries.values())
+    assert by == {"robot_0": 1, "robot_1": 2}  # its first, before anybody knew of its battery
+    assert broken.pose == Pose2D(0.0, 0.0, 0.0)
+    assert fine.charge == pytest.approx(0.9)
+
+
 # -- many ------------------------------------------------------------------------------------------
 
 
