@@ -6,7 +6,7 @@ import argparse
 import contextlib
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from actionlib_core.names import check_name
 from missions.arguments import Text, usage, wants_help
@@ -33,14 +33,18 @@ def register_run(subparsers: Any) -> None:
     """Add `smachpy run`."""
     parser = subparsers.add_parser(
         "run",
+        add_help=False,
         help="run a mission",
         usage="smachpy run MISSION [OPTIONS] [-- ARGUMENTS]",
         description="Run a mission to its end and show it in the terminal. Exit codes: 0 it "
         "succeeded, 1 it ended otherwise, 2 bad input; the mission was preempted: 130 by Ctrl-C, "
         "143 by SIGTERM.",
         epilog="What stands after -- are the arguments of the mission's function: smachpy run "
-        "there_and_back -- 4.6 10.6. 'smachpy run MISSION -- --help' shows them. Names are "
+        "there_and_back -- 4.6 10.6. 'smachpy run MISSION --help' shows them. Names are "
         "changed by a:=b, __ns:=robot_1 or --ros-args.",
+    )
+    parser.add_argument(
+        "-h", "--help", action=_Help, nargs=0, help="show this, and the mission's arguments"
     )
     parser.add_argument(
         "target", metavar="MISSION", help="a name of `smachpy list`, module:factory, or a .py file"
@@ -76,7 +80,7 @@ def register_run(subparsers: Any) -> None:
     )
     parser.add_argument(
         "--server-timeout",
-        type=float,
+        type=_seconds,
         default=10.0,
         metavar="S",
         help="how long to wait for the mission's action servers [s] (default: %(default)g)",
@@ -198,6 +202,34 @@ def _robot(args: argparse.Namespace, world: Path | None) -> RobotOptions:
     pose = tuple(args.pose or ())
     world = args.world or (None if said else world)
     return RobotOptions(args.start_robot, args.map, args.config, pose, world)
+
+
+class _Help(argparse.Action):
+    """Shows the options, and the arguments of the mission that was named before."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: object,
+        option_string: str | None = None,
+    ) -> NoReturn:
+        """Print and exit."""
+        del values, option_string
+        parser.print_help()
+        name = getattr(namespace, "target", None)
+        if name is not None:
+            from smachpy.targets import load_target
+
+            print(f"\n{usage(load_target(name))}")
+        parser.exit()
+
+
+def _seconds(text: str) -> float:
+    seconds = finite(text)
+    if seconds <= 0:
+        raise argparse.ArgumentTypeError(f"got {text!r}; expected seconds above 0")
+    return seconds
 
 
 def _pace(text: str) -> Pace:

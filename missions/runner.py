@@ -100,6 +100,7 @@ def run_mission(target: Target, options: RunOptions) -> int:
         )
         machine = build(target, options.inputs, options.words)
         record = describe(machine)
+        _check_success(target, record, options)
         out = None
         if options.out is not None:
             out = OutFolder(options.out, target.name, machine, options.robot)
@@ -214,6 +215,15 @@ def good_outcomes(record: StateRecord, options: RunOptions) -> set[str]:
     if "succeeded" in record.outcomes:
         return {"succeeded"}
     return {outcome for outcome in record.outcomes if outcome.lower() not in _BAD_OUTCOMES}
+
+
+def _check_success(target: Target, record: StateRecord, options: RunOptions) -> None:
+    unknown = sorted(set(options.success) - set(record.outcomes))
+    if unknown:
+        raise MissionError(
+            f"--success {unknown[0]}: mission {target.name!r} has no such outcome; expected one of "
+            f"{sorted(record.outcomes)}."
+        )
 
 
 def _execute(

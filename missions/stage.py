@@ -235,7 +235,7 @@ class _RealStage:
         arguments = self._options.arguments()
         if self._options.world is None:
             prefix = _prefix_of(needed)
-            space = get_node().namespace if needed or prefix else ""
+            space = get_node().namespace
             name = "/".join(word for word in (space, prefix) if word)
             arguments += ("--namespace", name) if name else ()
         self._robot = RobotProcess(arguments, on_change=self._wait.wake)

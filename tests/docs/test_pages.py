@@ -28,6 +28,7 @@ SLOW = {
     "demo_action.md",
     "demo_service.md",
     "rp_action.md",
+    "running_missions.md",
     "there_and_back.md",
     "countdown.md",
     "patrol.md",

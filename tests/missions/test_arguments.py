@@ -254,6 +254,24 @@ def test_help_is_printed_and_nothing_runs(path, capsys):
     assert "said" not in out
 
 
+def test_the_help_of_the_command_shows_the_mission_s_arguments(path, capsys):
+    for words in (["run", path, "--help"], ["run", "-h"]):
+        with pytest.raises(SystemExit) as caught:
+            main(words)
+        assert caught.value.code == 0
+        out = capsys.readouterr().out
+        assert "--start-robot" in out
+        assert ("usage: smachpy run say [OPTIONS] -- WORD [TIMES]" in out) is (path in words)
+
+
+@pytest.mark.parametrize("seconds", ["0", "-1", "nan", "soon"])
+def test_a_server_timeout_that_is_no_use(path, seconds, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(["run", path, "--server-timeout", seconds])
+    assert caught.value.code == 2
+    assert "--server-timeout" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import signal
 import subprocess
@@ -247,6 +248,38 @@ def test_two_robots_of_one_name():
         check_one_screen(third.stderr, "action 'move_base': two servers")
         first.send_signal(signal.SIGTERM)
         assert first.wait(10) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("there_and_back", "--robot", "robot_7"),
+        ("there_and_back", "--ros-args", "-r", "__ns:=/robot_7", "--"),
+        ("rp_action.gotopose", "--", "robot_7", "10.8", "7.6"),
+    ],
+)
+def test_a_robot_is_started_under_the_name_that_the_mission_calls(arguments):
+    mission, *more = arguments
+    done = run("run", mission, "--start-robot", "--json", *more)
+    assert done.returncode == 0, done.stderr
+    events = [json.loads(line) for line in done.stdout.splitlines()[1:]]
+    assert [event["seq"] for event in events] == list(range(1, len(events) + 1))
+    assert events[-1]["outcome"] == "succeeded"
+
+
+@pytest.mark.slow
+def test_names_cannot_be_changed_after_the_mission_s_module_made_its_node(tmp_path):
+    (tmp_path / "early.py").write_text(
+        "import smachpy\n"
+        "from actionlib_core import Publisher\n"
+        "from actionlib_core.interfaces.std_msgs.msg import String\n"
+        "publisher = Publisher('chatter', String)\n"
+        "sm = smachpy.StateMachine(outcomes=['done'])\n"
+    )
+    done = run("run", "early.py", "--robot", "robot_7", cwd=tmp_path)
+    assert done.returncode == 2
+    check_one_screen(done.stderr, "names cannot be changed: the mission made its node already")
 
 
 def test_list_names_the_missions():

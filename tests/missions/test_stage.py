@@ -160,6 +160,7 @@ def test_a_signal_ends_it(nap, capsys, pace, number, code):
         (["patrol", "--robot", "robot 7"], "invalid robot name: ' ' is not allowed"),
         (["patrol", "--pose", "0", "0", "0"], "Try --pose X Y YAW"),
         (["patrol", "--map", "nowhere.yaml"], "nowhere.yaml: got"),
+        (["patrol", "--success", "done"], "--success done: mission 'patrol' has no such outcome"),
     ],
 )
 def test_what_cannot_be_had(arguments, text, capsys):
