@@ -14,7 +14,7 @@ from smachpy._runtime.frame import FRAME, Frame
 from smachpy._runtime.root import execute_root
 from smachpy._runtime.step import Step
 from smachpy._runtime.watch import arm, disarm, grace_of
-from smachpy.events import PreemptRequested
+from smachpy.events import PreemptRequested, TimedOut
 from smachpy.exceptions import (
     InconsistentMachineError,
     InvalidStateError,
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from actionlib_core.clock import Event as ClockEvent
     from smachpy._runtime.asker import Asker
+    from smachpy._runtime.guarded import Timeout
     from smachpy.control import Control
     from smachpy.state import StateOptions
     from smachpy.user_data import Remapper
@@ -343,6 +344,7 @@ class Container(Openable, Callbacks, State):
     def _tell(self, frame: Frame, step: Step) -> None:
         """Ask one child to stop and see that it does; called with the lock held."""
         frame.told = step
+        frame.timed_out = False
         if frame.run.watched:
             grace = None if step.state.is_container else grace_of(frame, step)
             fields = (*current_asker(), grace)
@@ -353,14 +355,31 @@ class Container(Openable, Callbacks, State):
     def _stop_child(self, frame: Frame, step: Step, override: Any = None) -> bool:
         """Ask the child of `step` to stop, but not this container; tell whether it ran."""
         with self._lock:
-            before, frame.told = frame.told, step  # first the mark, then the look: see `_run`
-            if frame.step is not step or frame.ended or frame.dead or self._frame is None:
-                frame.told = before
-                return False
-            frame.override = override
-            self._tell(frame, step)
+            stopped = self._stop_now(frame, step, override)
         frame.run.flush()
+        return stopped
+
+    def _stop_now(self, frame: Frame, step: Step, override: Any) -> bool:
+        """Do the work of `_stop_child`; called with the lock held."""
+        before, frame.told = frame.told, step  # first the mark, then the look: see `_run`
+        if frame.step is not step or frame.ended or frame.dead or self._frame is None:
+            frame.told = before
+            return False
+        frame.override = override
+        self._tell(frame, step)
         return True
+
+    def _time_out_child(self, frame: Frame, step: Step, timeout: Timeout) -> None:
+        """Ask the child of `step` to stop because its time is over, if it has not ended."""
+        with self._lock:
+            if timeout.ended:
+                return
+            timeout.passed = True
+            alone = frame.told is None
+            frame.note(f"{frame.path}/{step.label}", TimedOut, timeout.seconds)
+            if self._stop_now(frame, step, None if alone else frame.override):
+                frame.timed_out = alone
+        frame.run.flush()
 
     def _running_frames(self, frame: Frame) -> list[Frame]:
         """Return the frames that have a running child each: one, or the concurrence's branches."""

@@ -230,7 +230,7 @@ class Control:
             forget()
             with self._lock:
                 self._waiting.pop(path, None)
-        frame.emit(Resumed)
+            frame.emit(Resumed)
 
     def _watch(self) -> None:
         run = self._run

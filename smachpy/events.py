@@ -180,7 +180,7 @@ class Paused(NamedTuple):
 
 
 class Resumed(NamedTuple):
-    """The machine goes on with the state at `path`."""
+    """The machine goes on with the state at `path`, or without it if it was called off."""
 
     path: str
     t: float

@@ -293,7 +293,7 @@ class Iterator(Container):
         run = frame.run
         if run.control is not None:
             run.control.pass_gate(frame, step)
-            if self._preempt_requested:
+            if self._preempt_requested or frame.told is not None:  # called off while it was held
                 return "preempted"
         try:
             outcome: str = run_watched(frame, step) if run.watched else step.execute(step.userdata)
@@ -320,6 +320,8 @@ class Iterator(Container):
             override, frame.override = frame.override, None
         if not self._preempt_requested:
             if override is None:
+                if outcome == "preempted" and outcome not in plan.outcomes:
+                    return self._preempted(frame, step), True
                 return outcome, False
             if override.outcome is None:  # a pause that cancels: this item again
                 return self._once_more(frame, plan)

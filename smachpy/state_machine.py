@@ -416,6 +416,8 @@ class StateMachine(Container):
             self._forget_told(frame, step)
         if run.control is not None:
             run.control.pass_gate(frame, step)
+            if frame.told is step and not self._preempt_requested:  # called off while it was held
+                return self._follow(frame, step, "preempted")
         if run.has_shutdown_check and is_shutdown():
             with asking("shutdown", "", "the shutdown check says so"):
                 self.request_preempt()
@@ -465,9 +467,9 @@ class StateMachine(Container):
             disarm(frame)
             state.recall_preempt()
             override, frame.override = frame.override, None
+            if outcome == "preempted" and outcome not in step.next and override is None:
+                return self._preempted(frame, step)
             if self._preempt_requested:
-                if outcome == "preempted" and outcome not in step.next:
-                    return self._preempted(frame, step)
                 following = self._following(frame, step, outcome)
                 if following.final:
                     return following

@@ -119,6 +119,7 @@ class Frame:
         injected: An interruption is on its way to that thread.
         dead: The thread was left behind.
         ended: The child of a concurrence's branch has ended.
+        timed_out: The told step was asked by nothing but its own timeout.
         serviced: The told step has said that it takes the preempt up.
     """
 
@@ -137,6 +138,7 @@ class Frame:
     injected = False
     dead = False
     ended = False
+    timed_out = False
     serviced = False
     _ears: Ears | None = None
     _path: str | None = None

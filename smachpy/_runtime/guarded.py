@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from smachpy._runtime.asker import asking
 from smachpy._runtime.frame import FRAME
 from smachpy._runtime.interrupt import Interruption
-from smachpy._runtime.watch import note_answer
-from smachpy.events import Retried, TimedOut
+from smachpy._runtime.watch import disarm, note_answer
+from smachpy.events import Retried
 from smachpy.exceptions import InvalidUserCodeError
 
 if TYPE_CHECKING:
@@ -115,7 +115,8 @@ class _Guarded:
             except Exception as error:  # noqa: BLE001  raised again unless somebody wants it
                 result = error
             retry = state.retry
-            if retry is None or state.preempt_requested() or not retry.wants(attempt, result):
+            asked = state.preempt_requested() or (frame is not None and frame.told is not None)
+            if retry is None or asked or not retry.wants(attempt, result):
                 return self._conclude(result)
             if frame is not None:
                 frame.emit(Retried, attempt, _reason(result))
@@ -140,45 +141,70 @@ class _Guarded:
         timeout = self._state.timeout
         if timeout is None:
             return self._execute(userdata)
-        timeout_guard = _Timeout(self._state, frame, timeout)
+        guard = Timeout(self._state, frame, timeout)
         try:
             outcome = self._execute(userdata)
         except Interruption:
-            if timeout_guard.passed and frame is not None and not frame.dead:
+            guard.end(None)
+            if guard.passed and frame is not None and not frame.dead:
                 return self._state.timeout_outcome
             raise
-        finally:
-            timeout_guard.cancel()
-        if timeout_guard.passed and outcome == "preempted":
-            if frame is not None and frame.run.watched:
-                note_answer(frame, outcome)
-            return self._state.timeout_outcome
-        return outcome
+        except BaseException:
+            guard.end(None)
+            raise
+        guard.end(outcome)
+        return self._state.timeout_outcome if guard.passed and outcome == "preempted" else outcome
 
 
-class _Timeout:
-    """Preempts a state when its time is over."""
+class Timeout:
+    """Preempts a state when its time is over.
 
-    def __init__(self, state: State, frame: Frame | None, timeout: float) -> None:
-        self._state = state
-        self._frame = frame
-        self._timeout = timeout
-        self._step: Any = None if frame is None else frame.step
+    Attributes:
+        seconds: Its time [s].
+        passed: It was over before the state ended.
+        ended: The state has ended; both are changed with the container's lock held.
+    """
+
+    def __init__(self, state: State, frame: Frame | None, seconds: float) -> None:
+        self.seconds = seconds
         self.passed = False
-        self._timer = state._clock().call_later(timeout, self._over)  # noqa: SLF001  one machinery
+        self.ended = False
+        self._state = state
+        step = None if frame is None else frame.step
+        # A root's own frame has no step yet, or another one: nobody above watches it.
+        self._frame = frame if step is not None and step.state is state else None
+        self._step: Any = step
+        self._timer = state._clock().call_later(seconds, self._over)  # noqa: SLF001  one machinery
 
-    def cancel(self) -> None:
+    def end(self, outcome: object) -> None:
+        """The state has ended with `outcome`: the timeout, and the preempt it caused, end too.
+
+        The next attempt begins anew. A preempt that somebody else asked for stays.
+        """
         self._timer.cancel()
+        frame = self._frame
+        if frame is None:
+            self.ended = True
+            if self.passed:
+                self._state.recall_preempt()
+            return
+        if self.passed and frame.run.watched:
+            note_answer(frame, outcome)
+        with frame.container._lock:  # noqa: SLF001  one machinery
+            self.ended = True
+            if frame.timed_out and frame.told is self._step and not frame.dead:
+                disarm(frame)
+                self._state.recall_preempt()
 
     def _over(self) -> None:
-        self.passed = True
         frame = self._frame
-        if frame is None or frame.step is None or frame.step.state is not self._state:
-            self._state.request_preempt()
+        if frame is None:
+            if not self.ended:
+                self.passed = True
+                self._state.request_preempt()
             return
-        frame.emit(TimedOut, self._timeout)
-        with asking("timeout", frame.here(), f"{self._timeout:g} s"):
-            frame.container._stop_child(frame, self._step)  # noqa: SLF001  one machinery
+        with asking("timeout", frame.here(), f"{self.seconds:g} s"):
+            frame.container._time_out_child(frame, self._step, self)  # noqa: SLF001  one machinery
 
 
 def _reason(result: Any) -> str:

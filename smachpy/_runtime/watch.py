@@ -98,6 +98,7 @@ def disarm(frame: Frame) -> None:
         watch.cancel()
     close(frame)
     frame.told = None
+    frame.timed_out = False
 
 
 def has_answered(frame: Frame, outcome: object) -> bool:

@@ -245,3 +245,107 @@ def test_a_second_run_is_controlled_too(clock):
     before = clock.now()
     sm.execute()
     assert clock.now() - before == 5.0 - 0.0 + 3.0
+
+
+# -- states that a pause holds back --------------------------------------------------------------
+
+
+class Fire(smachpy.State):
+    """What must not happen once an operator has decided against it; it listens to nothing."""
+
+    def __init__(self, *outcomes):
+        super().__init__([*(outcomes or ("ok", "failed"))])
+        self.runs = 0
+
+    def execute(self, userdata):
+        self.runs += 1
+        return "ok"
+
+
+def held(kind, fire):
+    """A machine whose FIRE comes after a second, in a container of `kind`; then comes SAFE."""
+    container = {
+        "machine": lambda: smachpy.StateMachine(["ok", "failed", "preempted"]),
+        "iterator": lambda: smachpy.Iterator(
+            ["ok", "failed", "preempted"], [], [], [1, 2], "i", "ok"
+        ),
+        "concurrence": lambda: smachpy.Concurrence(
+            ["ok", "failed", "preempted"],
+            "ok",
+            outcome_map={"failed": {"FIRE": "failed"}},
+        ),
+    }[kind]()
+    if kind == "iterator":
+        container.set_contained_state("FIRE", fire, break_outcomes=["failed"])
+    else:
+        container.add("FIRE", fire)
+    sm = smachpy.StateMachine(["ok", "failed", "preempted"], name="P")
+    with sm:
+        smachpy.StateMachine.add("A", Work(), {"ok": "IN"})
+        smachpy.StateMachine.add("IN", container, {"ok": "SAFE", "preempted": "SAFE"})
+        smachpy.StateMachine.add("SAFE", Work())
+    sm.events = []
+    sm.subscribe(sm.events.append)
+    return sm
+
+
+def hold(clock, sm):
+    sm.control.add_breakpoint("/P/IN/FIRE")
+    at(clock, (5.0, lambda: sm.control.remove_breakpoint("/P/IN/FIRE")), (5.0, sm.control.resume))
+
+
+@pytest.mark.parametrize("kind", ["machine", "iterator", "concurrence"])
+def test_an_outcome_forced_on_a_held_state_comes_in_place_of_its_run(clock, kind):
+    fire = Fire()
+    sm = held(kind, fire)
+    hold(clock, sm)
+    at(clock, (2.0, lambda: sm.control.force_outcome("/P/IN/FIRE", "failed")))
+    assert sm.execute() == "failed"
+    assert fire.runs == 0
+    assert [e.path for e in sm.events if isinstance(e, OutcomeForced)] == ["/P/IN/FIRE"]
+    assert "/P/IN/FIRE" not in entered(sm)
+    assert [type(e) for e in sm.events if isinstance(e, (Paused, Resumed))] == [Paused, Resumed]
+
+
+@pytest.mark.parametrize("kind", ["machine", "iterator", "concurrence"])
+@pytest.mark.parametrize("command", ["jump", "preempt", "preempt container"])
+def test_a_held_state_that_is_called_off_does_not_run(clock, kind, command):
+    fire = Fire()
+    sm = held(kind, fire)
+    hold(clock, sm)
+    commands = {
+        "jump": lambda: sm.control.jump("/P/SAFE"),
+        "preempt": lambda: sm.control.preempt("/P/IN/FIRE"),
+        "preempt container": lambda: sm.control.preempt("/P/IN"),
+    }
+    at(clock, (2.0, commands[command]))
+    assert sm.execute() == "ok"
+    assert fire.runs == 0
+    assert entered(sm)[-1] == "/P/SAFE"
+
+
+def test_a_held_state_of_the_machine_itself_is_jumped_over(clock):
+    fire = Fire()
+    sm = smachpy.StateMachine(["ok", "failed"], name="P")
+    with sm:
+        smachpy.StateMachine.add("FIRE", fire, {"ok": "SAFE"})
+        smachpy.StateMachine.add("SAFE", Work(), {"preempted": "failed"})
+    sm.control.add_breakpoint("/P/FIRE")
+    at(clock, (2.0, lambda: sm.control.jump("/P/SAFE")), (3.0, sm.control.resume))
+    assert sm.execute() == "ok"
+    assert fire.runs == 0
+
+
+@pytest.mark.parametrize("kind", ["machine", "iterator", "concurrence"])
+def test_a_preempted_state_without_that_outcome_ends_its_container_preempted(clock, kind):
+    class Deaf(Fire):
+        def execute(self, userdata):
+            self._clock().sleep(1000.0)
+            return "ok"
+
+    deaf = Deaf()
+    deaf.preempt_timeout = 1.0
+    sm = held(kind, deaf)
+    at(clock, (2.0, lambda: sm.control.preempt("/P/IN/FIRE")))
+    assert sm.execute() == "ok"
+    assert entered(sm)[-1] == "/P/SAFE"

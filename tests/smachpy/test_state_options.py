@@ -9,7 +9,7 @@ import pytest
 
 import smachpy
 from actionlib_core.clock import current_clock
-from smachpy.events import Retried, TimedOut
+from smachpy.events import Abandoned, Retried, TimedOut
 
 
 class Waits(smachpy.State):
@@ -247,3 +247,101 @@ def test_cb_interface_on_callbacks():
     sm.add("A", state)
     sm.execute()
     assert sm.userdata.y == 9
+
+
+# -- a timeout belongs to one attempt ------------------------------------------------------------
+
+
+class Listens(smachpy.State):
+    """Stops when it is asked to; `says` whether it says so."""
+
+    def __init__(self, seconds, *, says, **options):
+        super().__init__(["ok", "preempted"], **options)
+        self.seconds = list(seconds)
+        self.says = says
+        self.runs = 0
+
+    def execute(self, userdata):
+        self.runs += 1
+        if self.sleep(self.seconds.pop(0)):
+            if self.says:
+                self.service_preempt()
+            return "preempted"
+        return "ok"
+
+
+@pytest.mark.parametrize("says", [True, False])
+def test_an_attempt_that_ran_into_its_timeout_is_made_again(clock, says):
+    state = Listens([9.0, 9.0, 1.5], says=says, timeout=2.0, retry=smachpy.Retry(4, 0, ["aborted"]))
+    outcome, events = run(state)
+    assert outcome == "ok"
+    assert (state.runs, clock.now()) == (3, 5.5)
+    assert [e.reason for e in events if isinstance(e, Retried)] == ["aborted", "aborted"]
+
+
+def test_the_grace_of_an_earlier_attempt_does_not_end_a_later_one(clock):
+    state = Listens(
+        [9.0, 1.5],
+        says=True,
+        timeout=2.0,
+        preempt_timeout=1.0,
+        retry=smachpy.Retry(4, 0, ["aborted"]),
+    )
+    outcome, events = run(state)
+    assert outcome == "ok"
+    assert clock.now() == 3.5
+    assert not [e for e in events if isinstance(e, Abandoned)]
+
+
+def test_an_interrupted_attempt_is_made_again(clock):
+    class Deaf(smachpy.State):
+        runs = 0
+
+        def execute(self, userdata):
+            self.runs += 1
+            current_clock().sleep(100.0 if self.runs == 1 else 1.5)
+            return "ok"
+
+    state = Deaf(["ok"], timeout=2.0, preempt_timeout=1.0, retry=smachpy.Retry(2, 0, ["aborted"]))
+    outcome, events = run(state)
+    assert (outcome, clock.now(), state.runs) == ("ok", 4.5, 2)
+    assert len([e for e in events if isinstance(e, Abandoned)]) == 1
+
+
+@pytest.mark.parametrize("says", [True, False])
+@pytest.mark.parametrize("asked_at", [1.0, 2.0, 2.5, 3.0])
+def test_a_preempt_from_above_is_not_taken_back_with_a_timeout(clock, says, asked_at):
+    """It comes before, at, or while the state cleans up after its timeout at 2 s."""
+
+    class Tidies(Listens):
+        def execute(self, userdata):
+            outcome = super().execute(userdata)
+            current_clock().sleep(1.5)
+            return outcome
+
+    state = Tidies([9.0] * 5, says=says, timeout=2.0, retry=smachpy.Retry(5, 0, ["aborted"]))
+    sm = smachpy.StateMachine(["ok", "preempted", "aborted"])
+    sm.add("A", state)
+    clock.call_later(asked_at, sm.request_preempt)
+    outcome = sm.execute()
+    assert state.runs == 1
+    assert outcome in {"preempted", "aborted"}
+    assert not state.preempt_requested()
+    assert not sm.preempt_requested()
+
+
+@pytest.mark.parametrize("asked_at", [1.0, 2.0, 2.5])
+def test_a_concurrence_that_calls_a_child_off_is_obeyed_beside_its_timeout(clock, asked_at):
+    class Tidies(Listens):
+        def execute(self, userdata):
+            outcome = super().execute(userdata)
+            current_clock().sleep(1.0)
+            return outcome
+
+    state = Tidies([9.0] * 5, says=True, timeout=2.0, retry=smachpy.Retry(5, 0, ["aborted"]))
+    both = smachpy.Concurrence(["ok"], "ok", child_termination_cb=lambda outcomes: True)
+    with both:
+        both.add("A", state)
+        both.add("B", Waits(asked_at))
+    both.execute()
+    assert state.runs == 1
