@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from actionlib_core.clock import current_clock
 from actionlib_core.service import Service
-from missions.fleet_book import DockBook, OrderBook
+from missions.fleet_book import DockBook, OrderBook, Stage
 from missions.interfaces.srv import Permit, PermitResponse
 from smachpy import loginfo, logwarn
 
@@ -121,7 +121,8 @@ class Desk:
             blocked = sorted(self.docks.blocked.items())
             docks = [f"  {dock}: somebody has to look, {robot} had it" for dock, robot in blocked]
             report = "\n".join([self.book.report(), *docks])
-        loginfo(report)
+            done = all(e.stage is Stage.DELIVERED for e in self.book.entries.values())
+        (loginfo if done else logwarn)(report)
         return report
 
     # -- what a robot does next ----------------------------------------------------------------
