@@ -91,6 +91,7 @@ def fleet(
 fleet.serves = tuple(  # type: ignore[attr-defined]  # so that nobody waits for them beforehand
     f"/robot_{n}/{action}" for n in range(MOST) for action in ("deliver", "recharge", "move_base")
 )
+fleet.real_time = "its robots are processes of their own"  # type: ignore[attr-defined]
 
 
 def check_numbers(robots: int, orders: int, lose: int, site: Site) -> None:

@@ -88,6 +88,12 @@ def run_mission(target: Target, options: RunOptions) -> int:
 
     Blocks: until the mission has ended.
     """
+    only_real: str = getattr(target.thing, "real_time", "")
+    if options.pace.virtual and only_real:
+        raise MissionError(
+            f"--time {options.pace}: mission {target.name!r} needs real time: {only_real}. "
+            "Try --time real."
+        )
     if options.pace.virtual and options.watching.view:
         raise MissionError(
             f"--view: got it beside --time {options.pace}, where nobody else can look in; expected "
