@@ -59,6 +59,8 @@ class RealEvent:
             # Set between the first look and the append: nobody may wake us.
             if self.is_set():
                 return True
+            if threading.get_ident() == threading.main_thread().ident:
+                return _acquire_in_main(waiter, timeout) or self.is_set()
             longest = -1 if timeout is None else min(timeout, _LONGEST_S)
             return waiter.acquire(timeout=longest) or self.is_set()
         finally:
@@ -72,6 +74,23 @@ class RealEvent:
 
 
 _LONGEST_S = threading.TIMEOUT_MAX
+_UNHEARD_S = 0.5
+
+
+def _acquire_in_main(waiter: _thread.LockType, timeout: float | None) -> bool:
+    """Wait in the main thread, where signals are handled.
+
+    A signal that comes between Python's last look and the system call does not end that call, so
+    that its handler would run when the wait is over, maybe never. Looking up now and then bounds
+    the delay to `_UNHEARD_S`; a signal that comes later ends the call at once.
+    """
+    deadline = None if timeout is None else time.monotonic() + timeout
+    while True:
+        left = _UNHEARD_S if deadline is None else deadline - time.monotonic()
+        if waiter.acquire(timeout=max(0.0, min(left, _UNHEARD_S))):
+            return True
+        if deadline is not None and left <= _UNHEARD_S:
+            return False
 
 
 class RealTask:

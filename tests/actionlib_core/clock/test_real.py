@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 import threading
+import time
+
+import pytest
 
 from actionlib_core.clock import RealClock
 
@@ -21,6 +25,33 @@ def test_event_may_be_set_by_a_signal_handler_that_interrupts_its_wait():
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, previous)
+
+
+def test_a_signal_that_does_not_end_the_system_call_is_handled_soon():
+    """As one that comes just before the call: here another thread takes it from the kernel."""
+    event, ready = RealClock().event(), threading.Event()
+    previous = signal.signal(signal.SIGUSR1, lambda *_: event.set())
+    sender = threading.Thread(
+        target=lambda: (ready.wait(20.0), os.kill(os.getpid(), signal.SIGUSR1))
+    )
+    sender.start()
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGUSR1})
+    try:
+        ready.set()
+        start = time.monotonic()
+        assert event.wait(20.0)
+        assert time.monotonic() - start < 10.0
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGUSR1})
+        signal.signal(signal.SIGUSR1, previous)
+        sender.join()
+
+
+@pytest.mark.parametrize("timeout", [0.01, 0.7])
+def test_a_wait_in_the_main_thread_keeps_to_its_timeout(timeout):
+    start = time.monotonic()
+    assert not RealClock().event().wait(timeout)
+    assert time.monotonic() - start >= timeout
 
 
 def test_a_raising_signal_handler_leaves_no_waiter_behind():
