@@ -38,6 +38,7 @@ from actionlib_core.transport._inlet import Gate, inside
 from actionlib_core.transport._keys import check_key, compile_pattern
 from actionlib_core.transport._refusal import check_interface, explain_refusal
 from actionlib_core.transport._zenoh_config import zenoh_settings
+from actionlib_core.transport.zenoh._callbacks import direct, held
 from actionlib_core.transport.zenoh._declared import (
     Asking,
     Declared,
@@ -47,7 +48,6 @@ from actionlib_core.transport.zenoh._declared import (
     Subscriber,
     Token,
     Watcher,
-    direct,
 )
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ __all__ = ["ZenohTransport"]
 D = TypeVar("D", bound=Declared)
 
 CLOSE_S = 0.5  # zenoh may take so long to leave the network; it is left behind after that
-SETTLE_S = 0.05  # the interpreter's end waits so long for callbacks that had begun
+LET_GO_S = 0.5  # the interpreter's end waits so long for callbacks that had begun
 IDLE_S = 0.3  # `close` waits so long for callbacks that are running
 ACCESS_S = 1.0  # longest wait for the other side's access rules
 ASK_S = 5.0  # longest wait for a latched publisher's answer
@@ -128,7 +128,7 @@ class ZenohTransport:
         on_done: Callable[[], None],
     ) -> Asking:
         asking = self._declare(lambda: Asking(self, on_reply, on_done), check_key(key))
-        callback = handlers.Callback(asking.take_reply, asking.take_done, indirect=False)
+        callback = direct(asking.take_reply, asking.take_done)
         try:
             self._get(key, callback, payload, encoding, timeout, asking.token)
         except TransportError:
@@ -140,7 +140,7 @@ class ZenohTransport:
         self, key: str, on_reply: Callable[[zenoh.Reply], None], on_done: Callable[[], None]
     ) -> None:
         """Ask without giving the question to anybody to hold; for the declarations here."""
-        callback = handlers.Callback(on_reply, on_done, indirect=False)
+        callback = direct(on_reply, on_done)
         try:
             self._get(key, callback, b"", "", ASK_S, None)
         except TransportError:
@@ -200,7 +200,7 @@ class ZenohTransport:
             with inside:
                 liveliness = self.session.liveliness()
                 history = liveliness.declare_subscriber(pattern, direct(on_token), history=True)
-                callback = handlers.Callback(on_reply, done.set, indirect=False)
+                callback = direct(on_reply, done.set)
                 liveliness.get(pattern, callback, timeout=timeout)
             done.wait(timeout)
             with inside:
@@ -319,11 +319,11 @@ def _close_all() -> None:
 
     CPython ends a foreign thread that asks for the interpreter after its end, which aborts the
     process ("exception not rethrown") when zenoh's Rust is on the thread's stack. A callback that
-    had begun before the session closed can be at that point, and nothing tells.
+    had begun before the session closed can be at that point; zenoh tells when it has let go of it.
     """
     for transport in list(_open_transports):
         transport.close()
-    RealClock().sleep(SETTLE_S)
+    held.wait(LET_GO_S)
 
 
 atexit.register(_close_all)

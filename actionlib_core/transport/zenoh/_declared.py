@@ -12,12 +12,12 @@ from threading import get_ident
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import zenoh
-from zenoh import handlers
 
 from actionlib_core.exceptions import TransportError
 from actionlib_core.transport import Presence, Quality, Reply, Sample
 from actionlib_core.transport._inlet import Inlet, inside
 from actionlib_core.transport._latch import LatchFilter, pack_numbers
+from actionlib_core.transport.zenoh._callbacks import direct
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -363,11 +363,6 @@ class Token(Declared):
     def __init__(self, transport: ZenohTransport, key: str) -> None:
         super().__init__(transport)
         self._keep(transport.session.liveliness().declare_token(key))
-
-
-def direct(callback: Callable[[T], None]) -> handlers.Callback[T]:
-    """Run a callback on zenoh's thread; zenoh's default starts a Python thread for each."""
-    return handlers.Callback(callback, indirect=False)
 
 
 def _convert_encoding(raw: zenoh.Encoding) -> str:

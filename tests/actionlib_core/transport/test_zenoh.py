@@ -415,3 +415,37 @@ def test_router_command_serves_until_it_is_told_to_end():
     finally:
         process.kill()
         process.communicate()
+
+
+LETS_GO = """
+import threading
+from actionlib_core.transport.zenoh import ZenohTransport
+from actionlib_core.transport.zenoh._callbacks import held
+
+transport = ZenohTransport()
+began, go_on = threading.Event(), threading.Event()
+
+def slow(sample):
+    began.set()
+    go_on.wait(20)
+
+transport.subscribe("test/slow", slow, history=False)
+sender = ZenohTransport()
+publisher = sender.publisher("test/slow")
+while not publisher.matching():
+    began.wait(0.01)
+publisher.put(b"x")
+assert began.wait(20)
+transport.close()
+sender.close()
+assert not held.wait(0.0)
+go_on.set()
+assert held.wait(20)
+print("let go")
+"""
+
+
+def test_zenoh_lets_go_of_a_callback_when_it_has_returned_and_not_before():
+    with child(LETS_GO) as process:
+        out, errors = process.communicate(timeout=WAIT_S * 2)
+    assert (out, errors) == ("let go\n", "")
