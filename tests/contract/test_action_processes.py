@@ -60,9 +60,11 @@ from actionlib_core.transport.zenoh import ZenohTransport
 
 config = Config(discovery="off", connect=("tcp/127.0.0.1:{port}",), lease={lease})
 node = Node("doomed", transport=ZenohTransport(config))
-client = ActionClient("demo", TestAction, node=node)
+client = ActionClient("demo", TestAction, node=node, server_lost_timeout={patience})
 assert client.wait_for_server(20)
-client.send_goal(TestGoal(600)).wait()
+handle = client.send_goal(TestGoal(600))
+handle.wait()
+print(handle.get_terminal_state().name, flush=True)
 """
 
 
@@ -70,7 +72,7 @@ class Process:
     """A Python program of a test, ended with it."""
 
     def __init__(self, script: str, **values: object) -> None:
-        values = {"lease": LEASE_S, "on_lost": "continue", **values}
+        values = {"lease": LEASE_S, "on_lost": "continue", "patience": 0.0, **values}
         self.process = subprocess.Popen(
             [sys.executable, "-c", textwrap.dedent(script).format(**values)],
             stdin=subprocess.PIPE,
@@ -253,6 +255,21 @@ def test_server_stopped_without_patience_is_lost_within_the_lease(stage):
     assert handle.wait(4 * LEASE_S)
     assert handle.get_terminal_state().name == "LOST"
     server.signal(signal.SIGCONT)
+
+
+@pytest.mark.parametrize("on_lost", ["continue", "cancel"])
+def test_client_stopped_for_longer_than_the_lease(stage, on_lost):
+    """To the server it is dead meanwhile; it has not noticed, and asks for what it missed."""
+    server = stage.server(on_lost=on_lost)
+    client = stage.process(CLIENT.replace("600", "30"), patience=LONG_S)
+    server.expect("run 30")
+    client.signal(signal.SIGSTOP)
+    if on_lost == "cancel":
+        server.expect("preempted")
+    else:
+        time.sleep(2.5 * LEASE_S)
+    client.signal(signal.SIGCONT)
+    client.expect("PREEMPTED" if on_lost == "cancel" else "SUCCEEDED")
 
 
 def test_restarted_server_takes_the_next_goal_and_not_the_old_one(stage):

@@ -352,6 +352,19 @@ def test_second_server_on_a_name_is_refused_and_names_both(world):
     assert client.send_goal_and_wait(msg.TestGoal(2), LONG_S) == S.SUCCEEDED
 
 
+def test_second_server_that_knows_of_the_first_too_late_stops_and_the_first_goes_on(world):
+    """A session that has just been opened may not have heard of anybody yet."""
+    doubler = Doubler(world)
+    client = simple_client(world)
+    with pytest.raises(ServerConflictError):
+        SimpleActionServer(
+            "demo", msg.TestAction, lambda _: None, node=world.node("intruder")
+        ).wait(LONG_S)
+    assert client.wait_for_server(LONG_S)
+    assert client.send_goal_and_wait(msg.TestGoal(2), LONG_S) == S.SUCCEEDED
+    assert doubler.runs == [2]
+
+
 def test_wrong_type_is_an_error_on_both_sides(world, caplog):
     Doubler(world)
     with caplog.at_level(logging.CRITICAL):
