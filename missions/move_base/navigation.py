@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from missions.move_base.costmap import Costmap
     from missions.move_base.planner import Point
-    from missions.move_base.world import Robot
+    from missions.move_base.world import Request, Robot
 
 Command = tuple[float, float]  # speed [m/s], turn rate [rad/s]
 STOP: Final[Command] = (0.0, 0.0)
@@ -155,7 +155,7 @@ def _follow(robot: Robot, way: list[Point], goal: Pose2D) -> Generator[Command, 
                     continue
             speed = min(speed, _safe_speed(robot, gap))
             held = held + dt if speed == 0.0 and gap < math.inf else 0.0
-            if held > _HOLD or (held and robot.asker() is not None):
+            if held > _HOLD or (held and robot.request() is not None):
                 return End.HELD
         yield speed, turn_rate
         if robot.bumped:
@@ -212,26 +212,27 @@ def _safe_speed(robot: Robot, gap: float) -> float:
 def _give_way(robot: Robot) -> Generator[Command]:
     """Make room for who asked for it, or ask who stands in the way; wait a moment."""
     yield from brake(robot)
-    asker = robot.asker()
-    if asker is not None:
-        yield from _make_room(robot, asker)
+    request = robot.request()
+    if request is not None:
+        yield from _make_room(robot, request)
         return
     robot.ask_for_room()
     for _ in range(round(_RETHINK * robot.config.control.rate)):
         yield STOP
-        if robot.asker() is not None:
+        if robot.request() is not None:
             return
     robot.look()
 
 
-def _make_room(robot: Robot, other: Robot) -> Generator[Command]:
+def _make_room(robot: Robot, request: Request) -> Generator[Command]:
     """Drive off another robot's way and wait there until it has passed."""
-    here = (robot.body.x, robot.body.y)
+    here, other = (robot.body.x, robot.body.y), request.robot
     clearance = other.body.radius + robot.planner.costmap.radius + _KEPT_AWAY
+    farther = request.depth * 2.0 * (robot.body.radius + _KEPT_AWAY)
     robot.look()
-    way = robot.planner.refuge(here, other.ahead(), clearance, robot.traffic.values())
+    way = robot.planner.refuge(here, other.ahead(), clearance + farther, robot.traffic.values())
     if way is None:
-        robot.ask_all_for_room()
+        robot.pass_on(request)
         yield from _stand(robot, _RETHINK)
         return
     yield from _follow(robot, way, Pose2D(*way[-1], robot.body.yaw))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -38,6 +38,7 @@ _NEAR_SPARE: Final = 1.5  # [m] what is near may come closer by so much until th
 _PLACES_AGE: Final = 0.2  # [s] that the array of places may be old
 _TOLD: Final = 4.0  # [m] of its way that a robot tells others
 _ASKED: Final = 3.0  # [s] that a request for room counts
+_DEEPEST: Final = 4  # a request is passed on so often
 _CLOSE: Final = 1.5  # [m] between two robots that are in each other's way, at most
 _MANY: Final = 16  # discs from which an array is worth it
 
@@ -53,6 +54,23 @@ class Dock:
 
     name: str
     pose: Pose2D
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """A robot asks for room.
+
+    Attributes:
+        robot: The one that wants to go on; its way is to be left.
+        rank: Its right of way when it asked.
+        until: How long the request counts [s].
+        depth: How often it was passed on: so much farther off its way must be made room.
+    """
+
+    robot: Robot
+    rank: tuple[float, int]
+    until: float
+    depth: int
 
 
 class World:
@@ -275,7 +293,7 @@ class Robot:
         self.follower: Follower | None = None
         self.held_by: Sighting | None = None
         self._own_rank = (math.inf, 0)
-        self._asked: tuple[Robot, tuple[float, int], float] | None = None
+        self._request: Request | None = None
         self.now = now
         self._share = 0.0
         self._near: list[Disc] = []
@@ -369,45 +387,49 @@ class Robot:
 
     def rank(self) -> tuple[float, int]:
         """Return its right of way, the lowest goes first: who set out first, or asked for it."""
-        if self._asked is None or self.asker() is None:
-            return self._own_rank
-        return min(self._own_rank, self._asked[1])
+        request = self.request()
+        return self._own_rank if request is None else min(self._own_rank, request.rank)
 
     def set_out(self) -> None:
         """A drive begins now."""
         self._own_rank = (self.now, self.world.robots.index(self))
-        self._asked = None
+        self._request = None
 
-    def asker(self) -> Robot | None:
-        """Return the robot that has asked for room lately."""
-        if self._asked is None:
+    def request(self) -> Request | None:
+        """Return the request for room that it has heard lately."""
+        request = self._request
+        if request is None or self.now > request.until or request.robot.follower is None:
             return None
-        asker, _, until = self._asked
-        return asker if self.now < until and asker.follower is not None else None
+        return request
 
     def ask_for_room(self) -> None:
-        """Ask the robot that stands in the way to make room."""
+        """Ask the robot that stands in the way to make room for this one."""
         seen = self.held_by
         for other in self.world.robots:
             if seen is not None and other.name == seen.name:
-                other.be_asked(self)
+                other.hear(Request(self, self.rank(), self.now + _ASKED, 0))
 
-    def ask_all_for_room(self) -> None:
-        """Ask all robots close by to make room."""
+    def pass_on(self, request: Request) -> None:
+        """Ask all robots close by to make room, farther off, so that this one can."""
+        onward = replace(request, until=self.now + _ASKED, depth=request.depth + 1)
+        if onward.depth > _DEEPEST:
+            return
         for other in self.world.robots:
             gap = math.hypot(other.body.x - self.body.x, other.body.y - self.body.y)
-            if other is not self and gap < _CLOSE:
-                other.be_asked(self)
+            if other is not self and other is not request.robot and gap < _CLOSE:
+                other.hear(onward)
 
-    def be_asked(self, other: Robot) -> None:
-        """Hear another robot ask for room; one that has the right of way does not listen."""
-        rank = other.rank()
-        if rank < self._own_rank and (self.asker() is None or rank <= self.rank()):
-            self._asked = (other, rank, self.now + _ASKED)
+    def hear(self, request: Request) -> None:
+        """Be asked for room; one that has the right of way, or a more urgent request, does not."""
+        present = self.request()
+        if request.rank >= self._own_rank:
+            return
+        if present is None or (request.rank, request.depth) <= (present.rank, present.depth):
+            self._request = request
 
     def thank(self) -> None:
         """Nobody asks for room any more."""
-        self._asked = None
+        self._request = None
 
     def check_place(self, x: float, y: float) -> None:
         """Check a place against the map alone: obstacles may go, walls do not.
