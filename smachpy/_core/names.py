@@ -14,14 +14,17 @@ def unique_names(names: Iterable[str], what: str = "names") -> tuple[str, ...]:
     """Return `names` without repeats, in their order.
 
     Raises:
-        InvalidStateError: `names` is one string, or holds something that is no string.
+        InvalidStateError: `names` is one string or no list, or holds something that is no string.
     """
     if isinstance(names, str):
         raise InvalidStateError(
             f"{what}: got the string {names!r}; expected a list of strings. Try [{names!r}]."
         )
-    found = tuple(dict.fromkeys(names))
+    try:
+        found = list(names)
+    except TypeError as error:
+        raise InvalidStateError(f"{what}: got {names!r}; expected strings, in a list.") from error
     bad = [name for name in found if not isinstance(name, str)]
     if bad:
         raise InvalidStateError(f"{what}: got {bad}; expected strings.")
-    return found
+    return tuple(dict.fromkeys(found))

@@ -64,9 +64,12 @@ class _Async:
         forget = self._state._on_preempt(cancel)  # noqa: SLF001  one machinery
         try:
             return await task
-        except asyncio.CancelledError:
+        except asyncio.CancelledError as error:
             if not self._state.preempt_requested():
-                raise
+                own = asyncio.current_task()
+                if own is not None and own.cancelling():
+                    raise  # somebody ends the loop: Ctrl-C in a program that handles it itself
+                raise RuntimeError("the coroutine was cancelled, by no preempt") from error
             self._state.service_preempt()
             return "preempted"
         finally:

@@ -345,3 +345,28 @@ def test_a_concurrence_that_calls_a_child_off_is_obeyed_beside_its_timeout(clock
         both.add("B", Waits(asked_at))
     both.execute()
     assert state.runs == 1
+
+
+def test_a_coroutine_that_is_cancelled_by_no_preempt_has_failed(clock):
+    async def cancels_itself(_userdata):
+        asyncio.current_task().cancel()
+        await asyncio.sleep(1.0)
+
+    async def awaits_what_is_cancelled(_userdata):
+        task = asyncio.ensure_future(asyncio.sleep(1.0))
+        task.cancel()
+        await task
+
+    for function in (cancels_itself, awaits_what_is_cancelled):
+        state = smachpy.CBState(function, outcomes=["ok"])
+        with pytest.raises(smachpy.InvalidUserCodeError, match="cancelled") as caught:
+            run(state)
+        assert caught.value.path == "/SM_ROOT/A"
+        mapped = smachpy.CBState(function, outcomes=["ok"], on_exception={RuntimeError: "failed"})
+        assert run(mapped)[0] == "failed"
+
+
+@pytest.mark.parametrize("names", [None, 5, True, [["a"]]])
+def test_what_is_no_list_of_names_is_told(names):
+    with pytest.raises(smachpy.InvalidStateError, match=r"outcomes: got .*; expected strings"):
+        smachpy.State(outcomes=names)
