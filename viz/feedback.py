@@ -69,6 +69,32 @@ def seconds_left(goal: Goal, fraction: float | None, now: float) -> float | None
     return passed * (1.0 - fraction) / fraction
 
 
+@dataclass(frozen=True, slots=True)
+class Written:
+    """A mission's own word about how far it is: a value that a state wrote to userdata.
+
+    Attributes:
+        fraction: 0 to 1, None when there is no end.
+        seconds_left: Until the end [s], None when it is not known.
+        text: Where it is.
+    """
+
+    fraction: float | None
+    seconds_left: float | None
+    text: str
+
+
+def written_progress(value: Any) -> Written | None:
+    """Read a value that has the attributes `fraction`, `seconds_left` and `text`; else None."""
+    text = _read(value, "text")
+    if not (isinstance(text, str) and {"fraction", "seconds_left"} <= {*_names(value)}):
+        return None
+    fraction, seconds = _number(_read(value, "fraction")), _number(_read(value, "seconds_left"))
+    if fraction is not None:
+        fraction = min(max(fraction, 0.0), 1.0)
+    return Written(fraction, seconds, shorten(text, TEXT_LENGTH))
+
+
 def _distance(goal: Any, feedback: Any) -> float | None:
     said = _first(feedback, DISTANCES)
     if said is not None:

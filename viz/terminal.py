@@ -34,7 +34,7 @@ from rich.text import Text
 
 from actionlib_core.clock import current_clock
 from smachpy.events import UserdataWritten
-from viz.feedback import progress_of, seconds_left
+from viz.feedback import progress_of, seconds_left, written_progress
 from viz.history import History
 from viz.narration import Narrator
 from viz.words import GLYPHS, shorten
@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from actionlib_core.clock import Clock, Task
     from smachpy import events as ev
     from smachpy.introspection import StateRecord
+    from viz.feedback import Written
     from viz.history import Goal
 
 FRAME = 0.1
@@ -224,10 +225,26 @@ class TerminalView:
         with self._lock:
             written = list(self._written.items())
         table = Table.grid(padding=(0, 2))
+        bars = Table.grid(padding=(0, 2), expand=False)
         for key, value in reversed(written):
+            progress = written_progress(value)
+            if progress is not None:
+                bars.add_row(*self._bar(key, progress))
+                continue
             text = shorten(_REPR.repr(value), VALUE_LENGTH)
             table.add_row(Text(f"  {shorten(key, 24)}", "dim"), Text(text, no_wrap=True))
-        return [table] if written else []
+        return [part for part in (bars, table) if part.row_count]
+
+    def _bar(self, key: str, progress: Written) -> list[RenderableType]:
+        """How far the mission is by its own word: name, bar, share, time left, text."""
+        share, seconds = progress.fraction, progress.seconds_left
+        cells: list[RenderableType] = [Text(f"  {shorten(key, 24)}", no_wrap=True)]
+        if self._console.width >= NARROW and share is not None:
+            cells.append(ProgressBar(total=1.0, completed=share, width=20, complete_style="green"))
+        cells.append(Text("" if share is None else f"{share:4.0%}"))
+        cells.append(Text("" if seconds is None else f"~{_span(seconds)}", no_wrap=True))
+        cells.append(Text(progress.text, no_wrap=True, overflow="ellipsis"))
+        return cells
 
     def _running(self) -> list[tuple[str, float]]:
         """The running states that contain no other running state."""

@@ -4,7 +4,7 @@ from types import SimpleNamespace as Message
 
 import pytest
 
-from viz.feedback import Progress, progress_of, seconds_left
+from viz.feedback import Progress, Written, progress_of, seconds_left, written_progress
 from viz.history import Goal
 
 
@@ -120,3 +120,17 @@ def test_the_time_left_is_said_by_the_server_or_estimated(feedback, fraction, no
     goal = Goal("/M/A", "a", "g", 0.0, None, feedback, feedback)
     found = seconds_left(goal, fraction, now)
     assert found == (None if left is None else pytest.approx(left))
+
+
+def test_a_mission_s_own_word_about_its_progress():
+    told = Message(fraction=1.5, seconds_left=41.0, text="2/4 kitchen")
+    assert written_progress(told) == Written(1.0, 41.0, "2/4 kitchen")
+    endless = Message(fraction=None, seconds_left=None, text="7 kitchen")
+    assert written_progress(endless) == Written(None, None, "7 kitchen")
+
+
+@pytest.mark.parametrize(
+    "value", [None, 3, "text", Message(text="a"), Message(fraction=1, seconds_left=1, text=3)]
+)
+def test_other_values_are_no_progress(value):
+    assert written_progress(value) is None

@@ -121,6 +121,22 @@ def test_the_panel_shows_the_userdata_that_was_written_last(patrol):
     assert max(map(len, screen.text.splitlines())) <= 100
 
 
+def test_a_value_that_says_how_far_it_is_gets_a_bar(patrol):
+    for width, bar in ((100, True), (60, False)):
+        screen = Screen(tty=True)
+        screen.console.width = width
+        clock = Message(now=lambda: 1.0, event=Event)
+        view = TerminalView(patrol, console=screen.console, clock=clock)
+        value = Message(fraction=0.45, seconds_left=83.0, text="2/4 kitchen")
+        view.on_event(ev.UserdataWritten("/PATROL", 0.0, 0, "progress", value))
+        view.on_event(ev.UserdataWritten("/PATROL", 0.0, 0, "index", 1))
+        screen.console.print(view._panel())
+        row = next(line for line in screen.text.splitlines() if "progress" in line)
+        assert ("\u2501" in row) == bar
+        assert " ".join(row.replace("\u2501", "").split()).endswith("45% ~1:23 2/4 kitchen")
+        assert any(line.split() == ["index", "1"] for line in screen.text.splitlines())
+
+
 def test_a_narrow_terminal_keeps_the_numbers_and_drops_the_bar(patrol):
     text = panel(patrol, 50)
     assert "2.00 m left" in text
