@@ -184,7 +184,7 @@ def _yaml(text: Text) -> object:
 
     try:
         return YAML(typ="safe", pure=True).load(text)
-    except (YAMLError, ValueError):  # `2026-13-01` looks like a date and is none
+    except (YAMLError, ValueError, RecursionError):  # `2026-13-01` looks like a date and is none
         return str(text)
 
 

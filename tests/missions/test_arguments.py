@@ -149,6 +149,7 @@ def test_a_finished_machine_takes_no_words():
         (Text("{a: 1}"), dict[str, int], {"a": 1}),
         (Text("{a: 1}"), Any, {"a": 1}),
         (Text("2026-13-01"), Any, "2026-13-01"),
+        (Text("{a: " * 500), Any, "{a: " * 500),
         (3, float, 3.0),
         (3, str, "3"),
         ("REL", Mode, Mode.REL),
