@@ -56,6 +56,7 @@ def fleet(
     lose: int = 0,
     seed: int = 1,
     site: Path = OFFICE_FLEET,
+    together: bool = False,
     start: bool = True,
 ) -> Concurrence:
     """Deliver parcels with several robots that share docks.
@@ -66,6 +67,7 @@ def fleet(
         lose: So many robots are killed while they have a parcel aboard.
         seed: Picks the places.
         site: The YAML file that lists docks, homes and places.
+        together: The bodies of all robots are on one floor, and see each other.
         start: Start the robots, simulated, as processes; else they must run already.
 
     Raises:
@@ -74,8 +76,15 @@ def fleet(
     """
     place = load_site(Path(site))
     check_numbers(robots, orders, lose, place)
+    if together and lose:
+        raise MissionError(
+            f"lose: got {lose} with together; expected 0: the body of a robot whose mission is "
+            "killed stays on their floor, where it drives on to its last goal."
+        )
+    if together and place.map is None:
+        raise MissionError(f"{site}: map: got none; expected one for the floor they share.")
     team = [Robot(f"robot_{n}", place.homes[n].pose) for n in range(robots)]
-    crew = Crew(team if start else [], Path(site), lose)
+    crew = Crew(team if start else [], place, Path(site), lose=lose, together=together)
     desk = Desk(
         team,
         make_orders(place.places, orders, seed),
@@ -202,7 +211,8 @@ class Next(State):
             if task is not None:
                 what, userdata.task = task
                 return what
-            self._desk.wait(self._robot)
+            if not self.preempt_requested():  # asked before `next_task`, its wake may be over
+                self._desk.wait(self._robot)
         return "preempted"
 
 

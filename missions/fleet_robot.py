@@ -362,7 +362,7 @@ def drive(
         result_cb=arrived,
         input_keys=["action_goal"],
         output_keys=["action_feedback", "action_result"],
-        server_wait_timeout=10.0,
+        server_wait_timeout=30.0,
         node=node,
     )
     return ignore(state, "no-timeout", "ways have any length; a robot that cannot go on aborts")

@@ -25,6 +25,7 @@ from actionlib_core.transport.memory import MemoryNetwork
 from missions.exceptions import InputFileError, MissionError
 from missions.fleet import coordinator, fleet, make_orders, pose_message, pose_of
 from missions.fleet_book import Order, Stage
+from missions.fleet_crew import world_text
 from missions.fleet_desk import Desk, Robot
 from missions.fleet_robot import FleetRobot, deliver, recharge
 from missions.fleet_robot import main as robot_main
@@ -32,6 +33,7 @@ from missions.interfaces import ChargeAction
 from missions.interfaces.srv import PermitRequest
 from missions.maps import OFFICE_FLEET
 from missions.move_base.geometry import Pose2D
+from missions.move_base.world_file import load_world
 from missions.serving import serve_during
 from missions.waypoint_file import Waypoint, load_site
 from smachpy.checks import check
@@ -504,6 +506,17 @@ def test_two_processes_of_which_one_is_killed_on_the_way(tmp_path):
     assert (tmp_path / "out" / "fleet_track.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_the_floor_that_robots_share_is_a_world_file(tmp_path):
+    site = load_site(OFFICE_FLEET)
+    team = [Robot(f"robot_{n}", home.pose) for n, home in enumerate(site.homes)]
+    path = tmp_path / "world.yaml"
+    path.write_text(world_text(site, team))
+    world = load_world(path).build(0.0)
+    assert [robot.name for robot in world.robots] == [robot.name for robot in team]
+    assert len(world.docks) == len(site.docks)
+    assert world.robots[3].body.pose.distance(site.homes[3].pose) < 1e-3
+
+
 @pytest.mark.zenoh
 @pytest.mark.parametrize(
     ("words", "text"),
@@ -542,6 +555,7 @@ def test_a_check_finds_nothing(machine):
         ({"orders": -1}, "orders: got -1; expected 0 or more"),
         ({"robots": 2, "lose": 3}, "lose: got 3; expected 0 to 2, of 2 robots"),
         ({"lose": -1}, "lose: got -1"),
+        ({"lose": 1, "together": True}, "lose: got 1 with together; expected 0"),
     ],
 )
 def test_bad_arguments_are_refused_before_anything_starts(arguments, text):
