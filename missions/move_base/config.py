@@ -167,8 +167,7 @@ def load_config(path: Path) -> SimConfig:
         start=read_pose(top.section("start")) if "start" in top else ORIGIN,
         dock=read_pose(top.section("dock")) if "dock" in top else None,
     )
-    top.section("start")
-    top.section("dock")
+    top.allow("start", "dock")
     top.close()
     document.check()
     return config

@@ -238,14 +238,13 @@ class _Window:
         return cell[0] * self._width + cell[1]
 
     def rejoin(self, rest: Sequence[Point]) -> int | None:
-        """Return the index of the last point of a way that is free and still inside."""
+        """Return the index of the last point of a way that is inside; None if that is not free."""
         found = None
         for i, point in enumerate(rest):
             cell = self.costmap.map.cell(*point)
             if cell is None:
                 break
-            if not self.costmap.blocked[cell]:
-                found = i
+            found = None if self.costmap.blocked[cell] else i
         return found
 
     def search(self, root: Cell) -> tuple[NDArray[np.float64], NDArray[np.int32]]:

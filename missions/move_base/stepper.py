@@ -86,11 +86,11 @@ class Stepper:
         clock = self._clock
         reached = clock.now()  # the steps have come so far
         while not self._closing:
+            if clock.now() - reached > _LATE:
+                reached = clock.now()
             if self._step(reached):
                 reached += self._batch * self._dt
                 self._catch_up(reached)
-                late = clock.now() - reached
-                reached += late if late > _LATE else 0.0
             else:
                 self._wake.wait(_IDLE_PERIOD)
                 self._wake.clear()

@@ -141,8 +141,7 @@ def load_world(path: Path) -> WorldSpec:
     docks = tuple(
         _dock(row, f"dock_{i}", config, grid, names) for i, row in enumerate(_rows(top, "docks"))
     )
-    top.text("robot", "-")
-    top.text("map", "-")
+    top.allow("map", "robot", "robots", "moving", "doors", "docks")
     top.close()
     document.check()
     return WorldSpec(path.name, grid, robots, movers, doors, docks)
@@ -236,8 +235,7 @@ def _robot(
         charge = row.number("charge", REQUIRED, _CHARGE)
         config = replace(config, battery=replace(config.battery, charge=charge))
     pose = _standing(row, config, grid)
-    row.text("config", "-")
-    row.number("charge", 1.0)
+    row.allow("config", "charge")
     row.close()
     return RobotSpec(name, pose, replace(config, start=pose))
 
