@@ -1,0 +1,66 @@
+"""What the commands wait for before they say what is there."""
+
+from __future__ import annotations
+
+import pytest
+
+from actionlib_core.cli import _network
+from actionlib_core.interfaces.std_msgs.msg import String
+from actionlib_core.node import Node
+from actionlib_core.presence import Kind
+from actionlib_core.topic import Publisher
+from actionlib_core.transport.memory import MemoryNetwork
+
+
+@pytest.fixture
+def nodes(clock):
+    network = MemoryNetwork(clock)
+    made = [Node(name, transport=network.session(), clock=clock) for name in ("cli", "robot")]
+    yield made
+    for node in made:
+        node.close()
+        node.transport.close()
+
+
+def test_an_empty_network_is_known_after_a_quiet_moment(nodes, clock):
+    start = clock.now()
+    _network._settle(nodes[0], 0.4)
+    assert clock.now() - start == pytest.approx(0.4)
+
+
+def test_who_shows_up_late_makes_it_wait_again(nodes, clock):
+    start = clock.now()
+    for number, delay in enumerate((0.3, 0.6)):
+        clock.call_later(delay, lambda n=number: Publisher(f"a_{n}", String, node=nodes[1]))
+    _network._settle(nodes[0], 0.4)
+    assert clock.now() - start == pytest.approx(1.0)
+
+
+def test_a_network_that_never_rests_is_taken_as_it_is(nodes, clock):
+    start = clock.now()
+    for number in range(100):
+        clock.call_later(number * 0.1, lambda n=number: Publisher(f"a_{n}", String, node=nodes[1]))
+    _network._settle(nodes[0], 0.4)
+    assert clock.now() - start == pytest.approx(_network.SETTLE_MOST_S)
+
+
+def test_a_name_is_waited_for_and_ends_of_other_kinds_are_not_it(nodes, clock):
+    cli, robot = nodes
+    start = clock.now()
+    clock.call_later(0.5, lambda: Publisher("chatter", String, node=robot))
+    assert _network.find_by_name(cli, "chatter", (Kind.SERVICE,)) == []
+    assert clock.now() - start == pytest.approx(_network.FIND_S)
+    (end,) = _network.find_by_name(cli, "chatter", (Kind.PUBLISHER,))
+    assert end.node == "robot"
+
+
+@pytest.mark.parametrize(
+    ("names", "text"),
+    [
+        ([], "expected one, but there is none at all."),
+        (["charge"], "expected one of ['/charge']."),
+        (["charge", "move_base"], "Did you mean '/move_base'?"),
+    ],
+)
+def test_what_there_is_instead(names, text):
+    assert _network.which_there_are("move_bse", names).endswith(text)
