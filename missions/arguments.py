@@ -406,6 +406,7 @@ class _Reader:
         return f"expected {f'one of {names}' if names else 'none'}.{hint}"
 
     def _take_places(self, places: list[str]) -> None:
+        named = [p.name for p in self._parameters.values() if p.name in self.values and not p.named]
         free = [p for p in self._parameters.values() if p.name not in self.values and not p.named]
         for parameter in free:
             if not places:
@@ -415,9 +416,10 @@ class _Reader:
                 return
             self._take(parameter, Text(places.pop(0)), parameter.name)
         if places:
+            why = f", as {', '.join(named)} came by name" if named else ""
             self.problems.append(
                 f"got {len(places)} more than it takes: {' '.join(places)!r}; expected "
-                f"{len(free)}. A text with spaces needs quotes."
+                f"{len(free)}{why}. A text with spaces needs quotes."
             )
 
     def _take(self, parameter: Parameter, value: object, where: str) -> None:

@@ -85,6 +85,8 @@ def test_words_fill_the_parameters_in_order_or_by_name(words, values):
 def test_what_is_given_by_name_is_not_asked_for_again():
     assert call(gotopose, "1", "2", robot=Text("007")) == ("007", 1.0, 2.0, 0.0, False)
     assert "robot" in problem(gotopose, "--robot", "a", "1", "2", robot="b")
+    text = problem(gotopose, "1", "2", "3", "4", robot="a")
+    assert "got 1 more than it takes: '4'; expected 3, as robot came by name." in text
 
 
 def test_a_list_at_the_end_takes_the_rest():
