@@ -22,7 +22,7 @@ class GoalIDGenerator:
         name: What an id begins with; the name of the default node when None.
         clock: Gives the stamp; the current clock when None.
 
-    Threads: any; ids never repeat within a process.
+    Threads: any; ids never repeat within a process, those of a virtual clock never on that clock.
     """
 
     def __init__(self, name: str | None = None, *, clock: Clock | None = None) -> None:
@@ -47,7 +47,8 @@ class GoalIDGenerator:
         clock = self._clock if self._clock is not None else current_clock()
         stamp_ns = clock.time_ns()
         secs, nsecs = divmod(stamp_ns, 1_000_000_000)
-        return f"{self.name}-{next(_count)}-{secs}.{nsecs}", stamp_ns
+        count = getattr(clock, "numbers", _count)  # a virtual clock's own: each run has the same
+        return f"{self.name}-{next(count)}-{secs}.{nsecs}", stamp_ns
 
     def generate_ID(self) -> GoalID:  # noqa: N802  actionlib's name
         """Return a new id, stamped with the present time."""

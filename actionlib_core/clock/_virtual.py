@@ -66,6 +66,7 @@ class VirtualClock:
     Attributes:
         limit: When time would pass this [s], the wait of the thread that made the clock raises
             `TimeLimit` instead; None, the default: never.
+        numbers: Counts for ids that are to be the same in every run.
 
     Threads: only participants may wait; `Event.set` and `call_later` may come from any thread.
 
@@ -86,6 +87,7 @@ class VirtualClock:
         self.rate = rate
         self._pick = _picker(seed, choose)
         self.limit: float | None = None
+        self.numbers = itertools.count(1)
         self._now = 0.0
         self._stepped = time.monotonic()
         self._poke = RealEvent()

@@ -163,7 +163,10 @@ def _result(problem: Problem) -> dict[str, Any]:
 
 
 def _plain(problem: Problem) -> dict[str, Any]:
-    return {**asdict(problem), "steps": problem.steps}
+    plain = {**asdict(problem), "steps": problem.steps}
+    if problem.place is not None and not problem.place.file:
+        plain["place"] = None
+    return plain
 
 
 def _relative(file: str) -> str:

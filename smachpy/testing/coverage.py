@@ -7,8 +7,9 @@ import json
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from smachpy.events import Entered, Finished, Left, Preempted, PreemptRequested, TimedOut
+from smachpy.events import Entered, Finished, Left, Preempted, PreemptRequested
 from smachpy.introspection import StateRecord
+from smachpy.testing.runs import own_timeouts
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -80,6 +81,8 @@ class Coverage:
         measured.runs += 1
         active: dict[str, None] = {}
         leaves = {state.path for state in run.record.walk() if not state.is_container}
+        for path in run.timeouts():
+            measured.count("timeouts", path)
         for event in run.events:
             if isinstance(event, Entered):
                 active[event.path] = None
@@ -91,8 +94,6 @@ class Coverage:
             elif isinstance(event, Finished):
                 measured.count("states", event.path)
                 measured.count("outcomes", f"{event.path} -{event.outcome}->")
-            elif isinstance(event, TimedOut):
-                measured.count("timeouts", event.path)
             elif isinstance(event, PreemptRequested):
                 if event.path in leaves and event.path in active:
                     measured.count("preempts", event.path)
@@ -219,7 +220,12 @@ def _preempts(record: StateRecord) -> list[str]:
 
 
 def _timeouts(record: StateRecord) -> list[str]:
-    return [state.path for state in record.walk() if "timeout" in dict(state.details)]
+    own = own_timeouts(record)
+    return [
+        state.path
+        for state in record.walk()
+        if "timeout" in dict(state.details) or state.path in own
+    ]
 
 
 _ITEMS = {

@@ -112,8 +112,28 @@ class Run:
 
     def timed_out(self, state: str) -> bool:
         """Tell whether a state ran into its timeout."""
-        path = find_path(self.record, state)
-        return any(isinstance(e, TimedOut) and e.path == path for e in self.events)
+        return find_path(self.record, state) in self.timeouts()
+
+    def timeouts(self) -> tuple[str, ...]:
+        """Return the paths of the states that ran into their timeouts, in order.
+
+        That of a goal, call or wait is its state's own, which ends with the timeout's outcome when
+        it has lasted that long.
+        """
+        own = own_timeouts(self.record)
+        begun: dict[str, float] = {}
+        found: list[str] = []
+        for event in self.events:
+            if isinstance(event, TimedOut):
+                found.append(event.path)
+            elif isinstance(event, Entered):
+                begun[event.path] = event.t
+            elif isinstance(event, Left) and event.path in own:
+                seconds, outcome = own[event.path]
+                lasted = event.t - begun.get(event.path, event.t)
+                if lasted >= seconds * (1 - _ROUNDED) and outcome == event.outcome:
+                    found.append(event.path)
+        return tuple(found)
 
     def abandoned(self) -> tuple[str, ...]:
         """Return the paths of the states that ignored a preempt and were left behind."""
@@ -231,6 +251,26 @@ def _summary(events: Iterable[Event]) -> list[str]:
 _WORTH_TELLING = frozenset(
     {"Failed", "PreemptRequested", "Preempted", "Abandoned", "TimedOut", "Retried", "GoalDone"}
 )
+
+
+def own_timeouts(record: StateRecord) -> dict[str, tuple[float, str]]:
+    """Return, for leaves with a limit of their own, the seconds and the outcome then."""
+    found: dict[str, tuple[float, str]] = {}
+    for state in record.walk():
+        text = dict(state.details).get(_OWN_TIMEOUTS.get(state.kind, ""), "")
+        seconds, _, outcome = text.partition(" s")
+        if seconds:
+            found[state.path] = (float(seconds), outcome.removeprefix(" -> ") or "aborted")
+    return found
+
+
+_OWN_TIMEOUTS = {
+    "service": "timeout",
+    "monitor": "timeout",
+    "condition": "timeout",
+    "action": "exec_timeout",
+}
+_ROUNDED = 1e-5  # the records round seconds to six digits
 
 
 def _matches(path: Sequence[str], wanted: Sequence[Pattern]) -> bool:

@@ -8,7 +8,17 @@ import time
 import pytest
 
 import smachpy
-from smachpy import CBState, Concurrence, Iterator, State, StateMachine, any_of, cb_interface
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
+from smachpy import (
+    CBState,
+    Concurrence,
+    Iterator,
+    SimpleActionState,
+    State,
+    StateMachine,
+    any_of,
+    cb_interface,
+)
 from smachpy.checks import (
     RULES,
     Ignore,
@@ -323,8 +333,6 @@ def test_a_wait_without_a_timeout():
 
 
 def test_an_action_state_without_a_timeout():
-    from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
-    from smachpy.simple_action_state import SimpleActionState
 
     ends = {"succeeded": "done", "aborted": "done", "preempted": "preempted"}
     outcomes = ["done", "preempted"]
@@ -545,6 +553,18 @@ def test_formats():
     assert (result["ruleId"], result["level"]) == ("property", "error")
     assert len(result["codeFlows"][0]["threadFlows"][0]["locations"]) == 2
     assert sarif["version"] == "2.1.0"
+
+
+def test_a_problem_without_a_place_of_its_own_has_none_in_any_format():
+    sm = StateMachine(["succeeded", "aborted", "preempted"], name="M")
+    with sm:
+        sm.add("DRIVE", SimpleActionState("move_base", MoveBaseAction))
+    report = check(sm)
+    assert [problem.rule for problem in report.problems] == ["no-timeout"]
+    assert json.loads(FORMATS["json"]([report]))[0]["problems"][0]["place"] is None
+    assert FORMATS["github"]([report]).startswith("::warning title=no-timeout::")
+    (result,) = json.loads(FORMATS["sarif"]([report]))["runs"][0]["results"]
+    assert "physicalLocation" not in result["locations"][0]
 
 
 def test_the_run_that_shows_a_problem_is_drawn(tmp_path):

@@ -10,7 +10,19 @@ import pytest
 
 from actionlib_core import shutdown
 from actionlib_core.clock import Deadlock, RealClock, current_clock
-from smachpy import CBState, Concurrence, InvalidUserCodeError, State, StateMachine
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
+from actionlib_core.interfaces.std_msgs.msg import Bool
+from actionlib_core.interfaces.std_srvs.srv import SetBool
+from smachpy import (
+    CBState,
+    Concurrence,
+    InvalidUserCodeError,
+    MonitorState,
+    ServiceState,
+    SimpleActionState,
+    State,
+    StateMachine,
+)
 from smachpy.testing import (
     DoubleError,
     MissionTestCase,
@@ -18,6 +30,7 @@ from smachpy.testing import (
     UnknownStateError,
     mission_kit,
 )
+from smachpy.testing.coverage import Coverage
 
 
 class Wait(State):
@@ -332,3 +345,49 @@ def test_ten_thousand_transitions_cost_little_more_than_in_real_time():
     unsubscribe()
     with mission_kit() as mission:
         assert cost(lambda: mission(sm)) < 5 * real
+
+
+def timed():
+    sm = StateMachine(["succeeded", "aborted", "preempted"], name="TIMED")
+    with sm:
+        sm.add(
+            "ASK",
+            ServiceState("ask", SetBool, timeout=5.0),
+            {"succeeded": "aborted", "aborted": "WATCH"},
+        )
+        sm.add(
+            "WATCH",
+            MonitorState("smoke", Bool, lambda _ud, m: not m.data, timeout=7.0),
+            {"valid": "DRIVE", "invalid": "DRIVE", "aborted": "DRIVE"},
+        )
+        sm.add("DRIVE", SimpleActionState("move_base", MoveBaseAction, exec_timeout=60.0))
+    return sm
+
+
+def test_the_timeouts_of_calls_waits_and_goals_are_told_and_covered(mission):
+    coverage = Coverage()
+    mission.on_run = coverage.add
+    service = mission.service_server("ask", SetBool)
+    robot = mission.action_server("move_base", MoveBaseAction)
+    service.fail()
+    mission.topic("smoke", Bool).publish_at(1.0, {"data": True})
+    robot.reply(status="aborted", duration=3)
+    assert mission(timed()).timeouts() == ()
+    assert coverage.machines[0].counts("timeouts") == (0, 3)
+    service.never_answer()
+    robot.never_finish()
+    run = mission(timed())
+    assert run.timeouts() == ("/TIMED/ASK", "/TIMED/WATCH", "/TIMED/DRIVE")
+    assert run.timed_out("DRIVE")
+    assert coverage.machines[0].counts("timeouts") == (3, 3)
+
+
+def test_the_same_seed_gives_the_same_run_to_the_last_event():
+    def events(seed):
+        with mission_kit(seed=seed) as mission:
+            mission.service_server("ask", SetBool).fail()
+            mission.action_server("move_base", MoveBaseAction).reply(duration=3, feedback=[{}, {}])
+            return [repr(event) for event in mission(timed()).events]
+
+    assert events(5) == events(5)
+    assert any("GoalSent" in event for event in events(5))
