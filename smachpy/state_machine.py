@@ -380,7 +380,7 @@ class StateMachine(Container):
                 try:
                     window = step.watched_userdata(frame) if step.writes else step.userdata
                     outcome = step.execute(window)
-                except (Exception, Interruption) as error:
+                except BaseException as error:
                     publish_raised(frame, error)
                     raise
                 if (

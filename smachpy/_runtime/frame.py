@@ -188,6 +188,9 @@ class Frame:
     def find_ears(self) -> Ears:
         """Return who hears the events of this frame now."""
         at = HEARING.now
+        if self.dead:
+            self._ears = Ears(at, (), ())
+            return self._ears
         container, parent = self.container, self.parent
         above = None
         if parent is not None:

@@ -154,7 +154,7 @@ def run_watched(frame: Frame, step: Step) -> Any:
     try:
         window = step.watched_userdata(frame) if step.writes else step.userdata
         outcome = step.execute(window)
-    except (Exception, Interruption) as error:
+    except BaseException as error:
         publish_raised(frame, error)
         raise
     if frame.told is not None or run.pending or run.control is not None:

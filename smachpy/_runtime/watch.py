@@ -11,8 +11,9 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from smachpy import log
+from smachpy._runtime.frame import RootFrame
 from smachpy._runtime.interrupt import close, interrupt
-from smachpy.events import Abandoned, PreemptServiced
+from smachpy.events import Abandoned, Finished, Left, PreemptServiced
 
 if TYPE_CHECKING:
     from actionlib_core.clock import Timer
@@ -76,6 +77,8 @@ class Watch:
                 self._again()
                 interrupt(frame)
                 return
+            if frame.run.watched:
+                frame.find_ears()  # `bury` has some last words for them
             frame.dead = True
         log.logerr(f"{frame.here()}: did not react; its thread is left behind.")
         bury(frame, boundary)
@@ -148,13 +151,16 @@ def bury(frame: Frame, boundary: Any) -> None:
     """Cut everything from `frame` up to `boundary` off from later runs.
 
     The thread that is left behind keeps a dead frame: it can neither go on to another state, nor
-    write userdata, nor end a later run.
+    write userdata, nor end a later run, nor publish events: what was active in it has left now.
     """
     above: Frame | None = frame
     while above is not None:
-        above.dead = True
         container = above.container
         step = above.step
+        if above.run.watched:
+            _publish_end(above)
+        above.dead = True
+        above._ears = None  # noqa: SLF001  a dead frame finds none
         if step is not None:
             step.cut_off()
             step.state.recall_preempt()
@@ -166,6 +172,16 @@ def bury(frame: Frame, boundary: Any) -> None:
         if above is boundary:
             return
         above = above.parent
+
+
+def _publish_end(frame: Frame) -> None:
+    """Publish the end of the child that is left behind in `frame`, and of a root with it."""
+    clock = frame.run.clock
+    now = clock.now(), clock.time_ns()
+    if frame.step is not None:
+        frame.publish(Left(frame.here(), *now, "preempted"))
+    if isinstance(frame, RootFrame):
+        frame.publish(Finished(frame.path, *now, "preempted"))
 
 
 def stack_of(ident: int) -> str:

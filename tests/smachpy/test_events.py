@@ -117,6 +117,26 @@ def test_failures_are_events():
     assert isinstance(heard[-1], Finished)
 
 
+@pytest.mark.parametrize("taped", [True, False])
+@pytest.mark.parametrize("kind", [KeyboardInterrupt, SystemExit])
+def test_what_is_never_wrapped_ends_the_states_in_the_events_too(clock, kind, taped):
+    def leave(ud):
+        raise kind
+
+    inner = smachpy.StateMachine(["ok"])
+    inner.add("X", smachpy.CBState(leave, outcomes=["ok"]))
+    sm = smachpy.StateMachine(["ok"], name="P")
+    sm.add("IN", inner)
+    heard = []
+    tape = sm.tape()
+    if not taped:
+        sm.subscribe(heard.append)
+    with pytest.raises(kind):
+        sm.execute()
+    told = [(record["kind"], record["path"]) for record in tape.read()]
+    assert told[-3:] == [("Failed", "/P/IN/X"), ("Failed", "/P/IN"), ("Finished", "/P")]
+
+
 def test_scopes_publish_from_any_thread(clock):
     heard = []
 

@@ -596,6 +596,7 @@ def test_thread_blocked_in_c_is_left_behind_and_cannot_come_back(place, quiet):
     release = threading.Lock()
     release.acquire()
     late = []
+    started = threading.Event()
 
     class Blocks(smachpy.State):
         def __init__(self):
@@ -604,6 +605,7 @@ def test_thread_blocked_in_c_is_left_behind_and_cannot_come_back(place, quiet):
         def execute(self, userdata):
             if not late:
                 late.append("started")
+                started.set()
                 try:
                     release.acquire()
                 finally:
@@ -619,9 +621,7 @@ def test_thread_blocked_in_c_is_left_behind_and_cannot_come_back(place, quiet):
     else:
         top = smachpy.Concurrence(["done", "preempted"], "done", preempt_timeout=0.02)
         top.add("M", machine if place == "branch machine" else Blocks())
-    current_clock().spawn(
-        lambda: (threading.Event().wait(0.03), top.request_preempt()), name="asks"
-    )
+    current_clock().spawn(lambda: (started.wait(10.0), top.request_preempt()), name="asks")
     if place == "root":
         runner = threading.Thread(target=lambda: outcomes.append(top.execute()))
         runner.start()
@@ -800,3 +800,51 @@ def test_requests_are_events(clock):
     sm.execute()
     paths = [e.path for e in events if isinstance(e, PreemptRequested)]
     assert paths == ["/SM_ROOT", "/SM_ROOT/S0", "/SM_ROOT/S0/S0"]
+
+
+class Stone(smachpy.State):
+    """Cannot be broken into, in virtual time either; ends some day."""
+
+    def __init__(self):
+        super().__init__(["ok"], output_keys=["k"], preempt_timeout=1.0)
+
+    def execute(self, userdata):
+        clock = self._clock()
+        end = clock.now() + 500.0
+        while clock.now() < end:
+            with contextlib.suppress(BaseException):
+                clock.sleep(end - clock.now())
+        return "ok"
+
+
+@pytest.mark.parametrize("how", ["listener", "tape"])
+@pytest.mark.parametrize("where", ["concurrence", "task"])
+def test_what_is_left_behind_has_left_in_the_events_and_says_nothing_more(clock, where, how):
+    inner = chain(Stone())
+    if where == "concurrence":
+        both = smachpy.Concurrence(["done", "preempted"], "done")
+        both.add("IN", inner)
+        inner = both
+    sm = chain(inner, name="P")
+    heard = []
+    tape = sm.tape()
+    if how == "listener":
+        sm.subscribe(lambda event: heard.append(type(event).__name__))
+    clock.call_later(1.0, sm.request_preempt)
+    if where == "task":
+        task = clock.spawn(sm.execute, name="mission")
+        task.join()
+    else:
+        sm.execute()
+    told = tape.read()
+    assert clock.now() < 10.0
+    entered = [record["path"] for record in told if record["kind"] == "Entered"]
+    left = [record["path"] for record in told if record["kind"] == "Left"]
+    assert sorted(left) == sorted(entered)
+    assert (told[-1]["kind"], told[-1]["outcome"]) == ("Finished", "preempted")
+    deepest = max(entered, key=len)
+    assert deepest not in [r["path"] for r in told if r["kind"] == "PreemptServiced"]
+    count = len(heard)
+    clock.sleep(1000.0)
+    assert tape.read() == []
+    assert len(heard) == count
