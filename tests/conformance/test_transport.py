@@ -242,6 +242,7 @@ def test_closed_latched_publisher_is_forgotten(network):
 
 def test_without_history_the_latched_message_does_not_come(network):
     a, b = network.session(), network.session()
+    network.meet(a, b)  # zenoh sends what is put before that to everybody
     publisher = a.publisher(GOAL, "", LATCH)
     publisher.put(b"1")
     inbox = network.inbox()
