@@ -52,14 +52,23 @@ class Body:
 
     def steer(self, speed: float, turn_rate: float, dt: float) -> None:
         """Move speed and turn rate towards a command, as far as `dt` seconds allow."""
-        limits = self._limits
-        speed = max(-limits.max_reverse_speed, min(limits.max_speed, speed))
-        turn_rate = max(-limits.max_turn_rate, min(limits.max_turn_rate, turn_rate))
-        speeding = self.speed * speed >= 0.0 and abs(speed) > abs(self.speed)
-        step = (limits.acceleration if speeding else limits.braking) * dt
-        self.speed = max(self.speed - step, min(self.speed + step, speed))
-        step = limits.turn_acceleration * dt
-        self.turn_rate = max(self.turn_rate - step, min(self.turn_rate + step, turn_rate))
+        # Written out, for this runs at every step: min and max cost twice as much.
+        limits, present = self._limits, self.speed
+        if speed > limits.max_speed:
+            speed = limits.max_speed
+        elif speed < -limits.max_reverse_speed:
+            speed = -limits.max_reverse_speed
+        if speed != present:
+            speeding = present * speed >= 0.0 and abs(speed) > abs(present)
+            step = (limits.acceleration if speeding else limits.braking) * dt
+            self.speed = _approach(present, speed, step)
+        if turn_rate > limits.max_turn_rate:
+            turn_rate = limits.max_turn_rate
+        elif turn_rate < -limits.max_turn_rate:
+            turn_rate = -limits.max_turn_rate
+        if turn_rate != self.turn_rate:
+            step = limits.turn_acceleration * dt
+            self.turn_rate = _approach(self.turn_rate, turn_rate, step)
 
     def advance(self, dt: float) -> None:
         """Move along the present arc for `dt` seconds."""
@@ -75,3 +84,12 @@ class Body:
     def braking_distance(self) -> float:
         """Return how far [m] it rolls when it brakes now."""
         return self.speed * self.speed / (2.0 * self._limits.braking)
+
+
+def _approach(present: float, wanted: float, step: float) -> float:
+    """Return `wanted`, or as near to it as one step allows."""
+    if wanted > present + step:
+        return present + step
+    if wanted < present - step:
+        return present - step
+    return wanted

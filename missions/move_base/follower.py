@@ -26,6 +26,7 @@ _CREEP: Final = 0.06  # [m/s] slowest approach, so that the goal is reached in f
 _CREEP_TURN: Final = 0.08  # [rad/s] the same for the last turn
 _FACING: Final = 0.15  # [rad] a turn on the spot ends this near to the way's heading
 _SHARE: Final = 0.8  # of the braking and turning power that the plan counts on
+_TINY: Final = 1e-3  # [m] the point steered to counts as no nearer
 _STRAIGHT: Final = 1e-4  # [1/m] less curvature than this needs no slowing down
 _BEND_REACH: Final = 4  # points on each side over which a bend is measured
 
@@ -70,6 +71,8 @@ class Follower:
         self._xy: Floats = np.array(points, dtype=np.float64)
         self._along = _lengths(self._xy)
         self._lengths: list[float] = self._along.tolist()
+        self._stopping = 2.0 * _SHARE * robot.braking
+        self._fastest_turn = _SHARE * robot.max_turn_rate
         self._limits: list[float] = _speed_limits(self._xy, self._along, robot).tolist()
 
     @property
@@ -90,9 +93,10 @@ class Follower:
 
     def command(self, body: Body) -> tuple[float, float]:
         """Return the speed [m/s] and turn rate [rad/s] to steer with now; moves the stage on."""
-        if self.stage in {Stage.TURN, Stage.DRIVE}:
+        stage = self.stage
+        if stage is Stage.DRIVE or stage is Stage.TURN:  # not in a set: this runs at every step
             return self._go(body)
-        if self.stage is Stage.BRAKE:
+        if stage is Stage.BRAKE:
             if not body.standing:
                 return 0.0, 0.0
             self.stage = Stage.FACE
@@ -116,12 +120,11 @@ class Follower:
         error = wrap_angle(math.atan2(target_y - y, target_x - x) - body.yaw)
         if self._must_turn(error):
             return 0.0, self._turn(error)
-        speed = max(_CREEP, self._limits[self._at])
-        speed = max(_CREEP, min(speed, math.sqrt(2.0 * _SHARE * self.robot.braking * left)))
-        curvature = 2.0 * math.sin(error) / max(distance, 1e-3)
-        turn_rate = speed * curvature
-        most = _SHARE * self.robot.max_turn_rate
-        if abs(turn_rate) > most:
+        speed = min(self._limits[self._at], math.sqrt(self._stopping * left))
+        speed = max(speed, _CREEP)
+        turn_rate = speed * 2.0 * math.sin(error) / max(_TINY, distance)
+        most = self._fastest_turn
+        if turn_rate > most or turn_rate < -most:
             speed *= most / abs(turn_rate)
             turn_rate = math.copysign(most, turn_rate)
         return speed, turn_rate

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from missions.move_base.world import Robot
 
 _KEPT_AWAY: Final = 0.05  # [m] driven by hand, it stops so far before an obstacle
+_BATTERY_EVERY: Final = 4  # steps between two looks at the battery
 _SHARE: Final = 0.8  # of the braking power that is counted on
 
 
@@ -115,8 +116,9 @@ class Pilot:
     def _journey(self, goal: Pose2D) -> Generator[Command, None, str]:
         """Drive to `goal`; returns what went wrong, at rest."""
         try:
-            for command in drive_to(self.robot, goal):
-                self._check_battery()
+            for count, command in enumerate(drive_to(self.robot, goal)):
+                if count % _BATTERY_EVERY == 0:
+                    self._check_battery()
                 yield command
         except NavigationError as error:
             yield from brake(self.robot)

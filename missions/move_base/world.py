@@ -316,8 +316,9 @@ class Robot:
         if (body.x != x or body.y != y) and self._hits(x, y, body.x, body.y):
             body.x, body.y, body.yaw, body.speed = x, y, yaw, 0.0
             self.bumped = True
-        self.odometer += abs(body.speed) * dt
-        share = abs(body.speed) / self.config.robot.max_speed
+        speed = abs(body.speed)
+        self.odometer += speed * dt
+        share = speed / self.config.robot.max_speed
         if share != self._share:
             self._share = share
             self.battery.drive(now, share)
