@@ -27,6 +27,7 @@ _CREEP_TURN: Final = 0.08  # [rad/s] the same for the last turn
 _FACING: Final = 0.15  # [rad] a turn on the spot ends this near to the way's heading
 _SHARE: Final = 0.8  # of the braking and turning power that the plan counts on
 _TINY: Final = 1e-3  # [m] the point steered to counts as no nearer
+_REACHED: Final = 0.02  # [m] a point steered to that is nearer has no direction
 _STRAIGHT: Final = 1e-4  # [1/m] less curvature than this needs no slowing down
 _BEND_REACH: Final = 4  # points on each side over which a bend is measured
 
@@ -117,6 +118,10 @@ class Follower:
             return 0.0, 0.0
         target_x, target_y = self.points[self._look(body.speed)]
         distance = math.hypot(target_x - x, target_y - y)
+        if distance < _REACHED and self._ahead < len(self.points) - 1:
+            # The way comes back to where it was: it stands on both ends of the bend.
+            self._at = self._ahead
+            return self._go(body)
         error = wrap_angle(math.atan2(target_y - y, target_x - x) - body.yaw)
         if self._must_turn(error):
             return 0.0, self._turn(error)

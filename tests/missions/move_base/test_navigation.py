@@ -168,3 +168,11 @@ def test_the_battery_drains_with_the_distance(robot, config):
     full = config.battery.drive_power / config.robot.max_speed
     expected = config.battery.idle_power * seconds + full * robot.odometer
     assert used == pytest.approx(expected, rel=0.02)
+
+
+def test_a_way_that_comes_back_to_where_it_was_does_not_keep_it_turning(world, config):
+    """It begins nearer to a chair than a way may be, so the way first leads out and back."""
+    robot = Robot(world, config, Pose2D(14.0, 15.9, 0.0), 0.0)
+    robot.body.x, robot.body.y, robot.body.yaw = 13.952, 15.848, 0.277
+    run(robot, drive_to(robot, Pose2D(9.75, 14.65, -2.877)), longest=round(30 / DT))
+    assert math.hypot(robot.body.x - 9.75, robot.body.y - 14.65) < config.control.xy_tolerance
