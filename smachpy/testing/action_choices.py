@@ -26,17 +26,29 @@ REPLIES: dict[str, Reply] = {
     "delivers twice": Reply(duration=DURATION_S, twice=True),
     "is slow and ignores a cancel": Reply(duration=3 * DURATION_S, ignore_cancel=True),
 }
+# The same with a preempt of the mission while the goal is active.
+PREEMPTED: dict[str, Reply] = {
+    "works as a preempt comes": Reply(duration=3 * DURATION_S),
+    "works as a preempt comes, and ignores the cancel": Reply(
+        duration=3 * DURATION_S, ignore_cancel=True
+    ),
+}
 
 
-def serve_actions(kit: MissionKit, machine: Container, explorer: Explorer) -> None:
-    """Offer every action that the machine's states use."""
+def serve_actions(
+    kit: MissionKit, machine: Container, explorer: Explorer
+) -> list[ScriptedActionServer]:
+    """Offer every action that the machine's states use; return the servers."""
     names: set[str] = set()
+    servers: list[ScriptedActionServer] = []
     for state in _action_states(machine):
         name = state._action_name  # noqa: SLF001  one house
         if name not in names:
             names.add(name)
             server = kit.action_server(name, state._types.action)  # noqa: SLF001
             _let_choose(server, explorer)
+            servers.append(server)
+    return servers
 
 
 def _action_states(container: Container) -> Iterator[Any]:
@@ -48,9 +60,13 @@ def _action_states(container: Container) -> Iterator[Any]:
 
 
 def _let_choose(server: ScriptedActionServer, explorer: Explorer) -> None:
-    options = list(REPLIES)
-
     def choose() -> Reply:
-        return REPLIES[options[explorer.choose(f"server {server.name}", options)]]
+        options = [*REPLIES, *(PREEMPTED if explorer.may_preempt else ())]
+        picked = options[explorer.choose(f"server {server.name}", options)]
+        if picked in PREEMPTED:
+            explorer.count_preempt()
+            server.node.clock.call_later(DURATION_S, explorer.preempt)
+            return PREEMPTED[picked]
+        return REPLIES[picked]
 
     server.choose_by(choose)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from actionlib_core.action_server import ActionServer
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from smachpy.testing.ends import TWICE, ScriptedEnd, as_message
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 Status: TypeAlias = Literal["succeeded", "aborted", "preempted", "rejected"]
 STATUSES = ("succeeded", "aborted", "preempted", "rejected")
+_UNASKED = (GoalStatus.PENDING, GoalStatus.ACTIVE)
 
 
 @dataclass(slots=True)
@@ -76,6 +78,7 @@ class ScriptedActionServer(ScriptedEnd):
         self._default: Reply | None = Reply()
         self._arrived = kit.clock.event(f"a goal for {name}")
         self._cancels: dict[str, Any] = {}
+        self._handles: dict[str, ServerGoalHandle] = {}
         super().__init__(kit, name)
         self._start()
 
@@ -198,6 +201,15 @@ class ScriptedActionServer(ScriptedEnd):
         made.ignore_cancel = True
         return made
 
+    @property
+    def left(self) -> tuple[str, ...]:
+        """Ids of the goals that it works on and nobody has asked to stop."""
+        return tuple(
+            goal_id
+            for goal_id, handle in self._handles.items()
+            if handle.get_goal_status().status in _UNASKED
+        )
+
     # -- the test's side -----------------------------------------------------------------------
 
     def await_goal(self, timeout: float | None = None) -> Any:
@@ -252,6 +264,7 @@ class ScriptedActionServer(ScriptedEnd):
         self.goals.append(goal)
         self._arrived.set()
         goal_id = handle.get_goal_id().id
+        self._handles[goal_id] = handle
         self._cancels[goal_id] = self._clock.event(f"a cancel of {goal_id}")
         reply = self._choose(goal)
         if isinstance(reply, Reply):
@@ -346,6 +359,11 @@ class ScriptedActionServer(ScriptedEnd):
         if reply.back_after is not None:
             self._clock.sleep(reply.back_after)
             self.come_back()
+
+    def kill(self) -> None:
+        """Die as a process does that gets SIGKILL, and its goals with it."""
+        self._handles.clear()
+        super().kill()
 
     def come_back(self) -> None:
         """Start again after death, as a new process that knows nothing of the goals before."""

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import Self
 
+    from smachpy.testing.action_servers import ScriptedActionServer
     from smachpy.testing.runs import Run
 
 LIMIT_S = 3600.0
@@ -139,7 +140,7 @@ def explore(
         writes: Leaf (path) -> userdata that its double writes.
         real_actions: Only services, monitors and conditions are stood in for. Scripted servers do
             to each goal all that servers do: succeed, abort, reject, accept late, die, come back,
-            lose the result, deliver twice, ignore a cancel.
+            lose the result, deliver twice, ignore a cancel; preempts come while one works.
         userdata: Put into the machine's userdata before each run.
         folder: Gives the folder for the picture.
         on_run: Called with each run, for coverage.
@@ -240,6 +241,7 @@ class _Runner:
         self.real_actions = real_actions
         self._places = Places()
         self._machine: Container | None = None
+        self.goals_left: list[str] = []
         self._snapshot: list[tuple[Container, Snapshot]] = []
         self._around = contextlib.ExitStack()
 
@@ -296,14 +298,16 @@ class _Runner:
         with MissionKit(choose=self.explorer.turn, on_run=runs.append) as kit:
             kit.draws = False
             self.explorer.now = kit.clock.now
+            servers: list[ScriptedActionServer] = []
             if self.real_actions:
-                serve_actions(kit, machine, self.explorer)
+                servers = serve_actions(kit, machine, self.explorer)
             try:
                 kit(machine, copy.deepcopy(self.userdata), limit=LIMIT_S)
             except Exception as caught:  # noqa: BLE001  judged by the caller
                 error = caught
             finally:
                 unsubscribe()
+            self.goals_left = [goal for server in servers for goal in server.left]
         if self.explorer.mismatch:
             raise ReplayError(self.explorer.mismatch) from error
         return runs[0], error
@@ -352,8 +356,9 @@ class _Judge:
             took = ended[-1] - first[0]
             who = f", {', '.join(left)} ignored it" if left else ""
             return f"a preempt takes {took:g} s{who}; expected at most {self.grace:g} s"
-        if run.goals_left:
-            return f"goals are left running: {', '.join(run.goals_left)}"
+        running = dict.fromkeys([*run.goals_left, *self.runner.goals_left])
+        if running:
+            return f"goals are left running: {', '.join(running)}"
         return self._own_reason(run)
 
     def _own_reason(self, run: Run) -> str | None:

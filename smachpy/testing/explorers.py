@@ -163,6 +163,20 @@ class Explorer:
             _userdata(self._root, self._values),
         )
 
+    @property
+    def may_preempt(self) -> bool:
+        """Whether the run may be preempted once more."""
+        return self._preempts > 0
+
+    def count_preempt(self) -> None:
+        """Note a preempt that is to come."""
+        self._preempts -= 1
+
+    def preempt(self) -> None:
+        """Preempt the mission."""
+        with asking("test"):
+            self._root.request_preempt()
+
     # -- doubles -------------------------------------------------------------------------------
 
     def stand_in(
@@ -247,9 +261,8 @@ class Explorer:
         return picked
 
     def _ask(self) -> None:
-        self._preempts -= 1
-        with asking("test"):
-            self._root.request_preempt()
+        self.count_preempt()
+        self.preempt()
 
 
 def _userdata(container: Container, values: Values) -> Hashable:

@@ -6,7 +6,8 @@ import time
 
 import pytest
 
-from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
+from actionlib_core.simple_action_client import SimpleActionClient
 from smachpy import CBState, Concurrence, Iterator, SimpleActionState, State, StateMachine
 from smachpy.testing import explore, mission_kit, replay
 
@@ -324,3 +325,56 @@ def test_equal_situations_are_entered_once_and_nothing_is_missed():
     everything, all_states = seen(invariants=[lambda run: True], max_runs=400)
     assert everything.runs > 2 * merged.runs
     assert states == all_states
+
+
+# -- what is found with real actions ---------------------------------------------------------------
+
+
+def forgets_a_goal():
+    """START sends a goal of its own and does not look after it."""
+
+    def start(_userdata):
+        client = SimpleActionClient("move_base", MoveBaseAction)
+        assert client.wait_for_server(5.0)
+        client.send_goal(MoveBaseGoal())
+        return "started"
+
+    sm = drive()
+    with sm:
+        sm.add("START", CBState(start, outcomes=["started"]), {"started": "DRIVE"})
+    sm.set_initial_state(["START"])
+    return sm
+
+
+def test_a_goal_that_is_left_running():
+    found = explore(forgets_a_goal, real_actions=True, preempts=0, interleavings=False)
+    assert "goals are left running: /mission-" in reason(found)
+    assert replay(
+        forgets_a_goal,
+        found.counterexample.choices,
+        real_actions=True,
+        preempts=0,
+        interleavings=False,
+    ).outcome
+
+
+def test_preempts_come_while_a_server_works():
+    outcomes = set()
+    found = explore(
+        drive,
+        real_actions=True,
+        interleavings=False,
+        on_run=lambda run: outcomes.update(run.outcomes("DRIVE")),
+    )
+    assert found.ok, found
+    assert found.exhaustive
+    assert found.runs == 11
+    assert "preempted" in outcomes
+
+
+def test_a_server_that_ignores_the_cancel_of_a_preempt_for_too_long():
+    found = explore(drive, real_actions=True, interleavings=False, grace=1.5)
+    assert "a preempt takes 2 s" in reason(found)
+    assert found.counterexample.choices == (
+        "server move_base: works as a preempt comes, and ignores the cancel",
+    )
