@@ -62,7 +62,8 @@ class SeenMap:
         self._lock = threading.Lock()
         self._hits = np.zeros((0, 0), dtype=np.int32)
         self._misses = np.zeros((0, 0), dtype=np.int32)
-        self._left = np.zeros((0, 0), dtype=np.bool_)
+        self._left = np.zeros((0, 0), dtype=np.bool_)  # borders that were looked at
+        self._refused = np.zeros((0, 0), dtype=np.bool_)  # places that could not be got to
         self._x0 = self._y0 = 0  # cell numbers of the lower left cell
 
     def add(self, scan: LaserScan, pose: Pose2D) -> None:
@@ -105,7 +106,7 @@ class SeenMap:
     def best_frontier(self, here: Pose2D) -> Frontier | None:
         """Return the frontier that shows most for its way from `here`; None: none can be got to.
 
-        Parts of the border that were left are not offered again.
+        What was left is not offered again.
         """
         with self._lock:
             border, lengths = self._border()
@@ -115,7 +116,7 @@ class SeenMap:
             near = ndimage.binary_dilation(
                 border > 0, structure=_EIGHT, iterations=_NEAR, mask=self._free()
             )
-            places = self._room(self._radius + _SPARE) & near
+            places = self._room(self._radius + _SPARE) & near & ~self._refused
             _, (rows, columns) = ndimage.distance_transform_edt(border == 0, return_indices=True)
             labels = np.where(places, border[rows, columns], 0)
             reached = self._reach(self._room(self._radius), labels, here)
@@ -130,15 +131,17 @@ class SeenMap:
             return Frontier(goal, self._centre(*at), float(lengths[label]) * RESOLUTION)
 
     def leave(self, frontier: Frontier, *, reached: bool) -> None:
-        """Do not offer this part of the border again: it was looked at, or could not be got to."""
-        reach = _LOOKED_AT if reached else _NEAR
+        """Do not offer this again: a border that was looked at, or a place out of reach."""
+        (x, y), reach = frontier.border, _LOOKED_AT
+        if not reached:
+            x, y, _ = frontier.goal
+            reach = math.ceil(2.0 * self._radius / RESOLUTION)
         offsets = np.arange(-reach, reach + 1) * RESOLUTION
         dx, dy = np.meshgrid(offsets, offsets)
         disc = np.hypot(dx, dy) <= reach * RESOLUTION
-        x, y = frontier.border
         with self._lock:
             cells = self._cells(x + dx[disc], y + dy[disc])  # the grid may grow
-            self._left[cells] = True
+            (self._left if reached else self._refused)[cells] = True
 
     # -- the grid: called with the lock --------------------------------------------------------
 
@@ -168,7 +171,7 @@ class SeenMap:
         if below or above or left or right:
             frame = ((below, above), (left, right))
             self._hits, self._misses = np.pad(self._hits, frame), np.pad(self._misses, frame)
-            self._left = np.pad(self._left, frame)
+            self._left, self._refused = np.pad(self._left, frame), np.pad(self._refused, frame)
             self._y0, self._x0 = self._y0 - below, self._x0 - left
 
     def _centre(self, row: int, column: int) -> tuple[float, float]:

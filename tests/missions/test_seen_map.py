@@ -118,15 +118,16 @@ def test_looking_from_frontier_to_frontier_shows_the_whole_office(office, look):
     assert cell(seen.occupancy(), 0.2, 0.2) == UNKNOWN  # outside the walls
 
 
-def test_a_frontier_out_of_reach_is_not_offered_again(look):
-    seen, here = SeenMap(), Pose2D(9.8, 7.7, 0.0)
-    seen.add(look(here), here)
-    left = []
+def test_a_place_out_of_reach_is_not_offered_again_but_another_for_the_same_border():
+    seen, here = SeenMap(), Pose2D(0.0, 0.0, 0.0)
+    seen.add(flat(*[math.inf] * 90, range_max=1.5), here)
+    tried = []
     while (frontier := seen.best_frontier(here)) is not None:
-        left.append(frontier.border)
+        tried.append(frontier)
         seen.leave(frontier, reached=False)
-    assert 2 <= len(left) < 40
-    assert len(set(left)) == len(left)
+    places = [frontier.goal[:2] for frontier in tried]
+    assert 4 < len(places) < 30
+    assert min(math.dist(a, b) for i, a in enumerate(places) for b in places[:i]) > 0.5
 
 
 def test_a_frontier_behind_a_wall_has_no_place_on_this_side():
