@@ -32,6 +32,9 @@ SLOW = {
     "there_and_back.md",
     "countdown.md",
     "patrol.md",
+    "delivery.md",
+    "explore.md",
+    "guided_recovery.md",
 }
 MARKED = [
     pytest.param(page, marks=pytest.mark.slow) if page.name in SLOW else page for page in PAGES
