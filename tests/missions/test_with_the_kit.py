@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
+import random
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -17,7 +20,10 @@ from missions.there_and_back import there_and_back
 from smachpy.checks import check
 from smachpy.checks.suppression import read_settings
 from smachpy.testing import mission_kit
+from smachpy.testing._core.search import Choice
 from smachpy.testing.coverage import Coverage
+from smachpy.testing.exploration import _Runner
+from smachpy.testing.explorers import Explorer, Options
 
 MISSIONS = {"PATROL": patrol, "COUNTDOWN": countdown, "THERE_AND_BACK": there_and_back}
 PATROL = patrol()  # reading the waypoints takes longer than a run
@@ -82,6 +88,50 @@ def test_a_hundred_seeds_give_the_same_verdict_twice(name):
     first = [verdict(seed) for seed in range(100)]
     assert first == [verdict(seed) for seed in range(100)]
     assert {outcome for outcome, _, _ in first} == {"succeeded"}
+
+
+def listed():
+    """Return name -> place of the missions that `smachpy list` shows, as the project has them."""
+    with (Path(__file__).parents[2] / "pyproject.toml").open("rb") as file:
+        points = tomllib.load(file)["project"]["entry-points"]["smachpy.missions"]
+    return dict(points)
+
+
+# What the missions that need arguments are made with.
+ARGUMENTS = {
+    "rp_action.gotopose": {"robot": "robot_0", "x": 1.0, "y": 2.0},
+    "rp_action.stopmove": {"robot": "robot_0"},
+    "rp_action.turn": {"client": "robot_0", "angle": 90.0},
+}
+PROCESSES = {"fleet"}  # its robots are processes of their own, in real time
+
+
+def dice(seed):
+    """Return what chooses outcomes, faults, preempts and turns in an explored run."""
+    pick = random.Random(seed).randrange
+
+    def choose(self, where, options, _situation=None):
+        self.choices.append(Choice(where, tuple(options), picked := pick(len(options)), None))
+        return picked
+
+    return choose
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(listed().keys() - PROCESSES))
+def test_a_hundred_dice_give_the_same_run_of_every_mission_twice(name, monkeypatch):
+    module, _, function = listed()[name].partition(":")
+    machine = getattr(importlib.import_module(module), function)(**ARGUMENTS.get(name, {}))
+
+    def verdict(seed):
+        monkeypatch.setattr(Explorer, "choose", dice(seed))
+        run, error = runner.run(())
+        return run.outcome, repr(error), [repr(event) for event in run.events]
+
+    with _Runner(machine, Options(), (), None, real_actions=False) as runner:
+        first = [verdict(seed) for seed in range(100)]
+        assert [verdict(seed) for seed in range(100)] == first
+    assert len({str(events) for _, _, events in first}) > 1
 
 
 @pytest.mark.parametrize("name", MISSIONS)
