@@ -44,7 +44,7 @@ class AskOperator(State):
         question: What to ask.
         answers: What may be answered.
         patience: 'no_answer' after so long [s].
-        channel: Where questions and answers go; one question at a time may use it.
+        channel: Where questions and answers go; an answer is for all questions asked there now.
         **options: See `smachpy.state.StateOptions`.
     """
 
@@ -65,9 +65,6 @@ class AskOperator(State):
 
     def execute(self, userdata: UserData) -> str:
         """Ask.
-
-        Raises:
-            ServerConflictError: another question is asked on this channel.
 
         Blocks: until the answer, `patience` [s] or a preempt.
         """

@@ -98,3 +98,22 @@ def test_the_next_question_does_not_take_the_last_ones_answer(mission, answer):
 def test_the_machines_picture_shows_the_question():
     (child,) = smachpy.describe(asking()).children
     assert ("question", "Go on?") in child.details
+
+
+def test_an_operator_at_the_page_ends_it_with_any_outcome(mission):
+    machine = asking("retry", "skip")
+    mission.clock.call_later(6.0, lambda: machine.control.force_outcome("/ASK/ASK", "skip"))
+    run = mission(machine)
+    assert (run.outcome, run.duration) == ("skip", 6.0)
+
+
+def test_two_questions_at_once_have_channels_of_their_own(mission, answer):
+    answer(2.0, "yes")
+    mission.topic("door/answer", String).publish_at(3.0, String("no"))
+    seen = []
+    both = smachpy.Concurrence(["done"], "done", outcome_cb=seen.append)
+    with both:
+        both.add("ONE", AskOperator("One?", patience=5))
+        both.add("TWO", AskOperator("Two?", patience=5, channel="door"))
+    assert mission(both).duration == 3.0
+    assert {"ONE": "yes", "TWO": "no"} in seen
