@@ -25,7 +25,6 @@ from smachpy.testing.coverage import Coverage
 from smachpy.testing.exploration import _Runner
 from smachpy.testing.explorers import Explorer, Options
 
-MISSIONS = {"PATROL": patrol, "COUNTDOWN": countdown, "THERE_AND_BACK": there_and_back}
 PATROL = patrol()  # reading the waypoints takes longer than a run
 FULL, EMPTY = {"percentage": 1.0}, {"percentage": 0.05}
 
@@ -106,6 +105,12 @@ ARGUMENTS = {
 PROCESSES = {"fleet"}  # its robots are processes of their own, in real time
 
 
+def make(name):
+    """Make the machine of a listed mission."""
+    module, _, function = listed()[name].partition(":")
+    return getattr(importlib.import_module(module), function)(**ARGUMENTS.get(name, {}))
+
+
 def dice(seed):
     """Return what chooses outcomes, faults, preempts and turns in an explored run."""
     pick = random.Random(seed).randrange
@@ -120,8 +125,7 @@ def dice(seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(listed().keys() - PROCESSES))
 def test_a_hundred_dice_give_the_same_run_of_every_mission_twice(name, monkeypatch):
-    module, _, function = listed()[name].partition(":")
-    machine = getattr(importlib.import_module(module), function)(**ARGUMENTS.get(name, {}))
+    machine = make(name)
 
     def verdict(seed):
         monkeypatch.setattr(Explorer, "choose", dice(seed))
@@ -134,10 +138,10 @@ def test_a_hundred_dice_give_the_same_run_of_every_mission_twice(name, monkeypat
     assert len({str(events) for _, _, events in first}) > 1
 
 
-@pytest.mark.parametrize("name", MISSIONS)
+@pytest.mark.parametrize("name", listed())
 def test_no_mission_has_problems_that_a_check_finds(name):
     settings = read_settings(Path(__file__).parents[2])
-    report = check(MISSIONS[name](), ignores=settings.ignores, name=name)
+    report = check(make(name), ignores=settings.ignores)
     assert report.ok, report
 
 
