@@ -3,8 +3,10 @@
     <server>/smach/description   `smachpy.introspection.StateRecord`, latched      std_msgs/String
     <server>/smach/events        `smachpy.events` with sequence numbers `seq`      std_msgs/String
     <server>/smach/history       what a viewer that comes late needs              std_srvs/Trigger
+    <server>/smach/value         a value of userdata, whole (`smachpy.value_server`)
 
-The history is JSON: `epoch` (which machine this is: another one after a restart), `description`,
+The history is JSON: `epoch` (which machine this is: another one after a restart), `session` (id of
+the network session: another one of the same name has another), `description`,
 `problems` (what a check found), `base` (a `smachpy.run_state.RunState` of what is too long ago),
 `events` (the newest, as they were sent), `control` (paused and breakpoints, null where
 no commands are obeyed).
@@ -26,6 +28,7 @@ from actionlib_core.topic import Publisher
 from smachpy.events import Started
 from smachpy.introspection import describe
 from smachpy.run_state import RunState
+from smachpy.value_server import ValueServer
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -88,6 +91,8 @@ class Feed:
             server_name + DESCRIPTION_TOPIC, String, latch=True, node=node
         )
         self._describe()
+        self._session = node.transport.session_id
+        self._values = ValueServer(server_name, machine, path, node)
         self._history = Service(server_name + HISTORY_SERVICE, Trigger, self._tell, node=node)
         self._events = Publisher(server_name + EVENTS_TOPIC, String, node=node)  # what viewers seek
         self._tape = machine.tape(self._on_news, limit=QUEUED_EVENTS, name=path)
@@ -102,6 +107,7 @@ class Feed:
         self._executor.join(STOP_S)
         self._descriptions.unregister()
         self._history.close()
+        self._values.close()
         self._events.unregister()
 
     def _on_news(self) -> None:
@@ -140,6 +146,7 @@ class Feed:
             self._on_news()
         head = {
             "epoch": self._epoch,
+            "session": self._session,
             "description": json.loads(self._description),
             "problems": self._problems,
             "control": None if self._control is None else self._control.state(),

@@ -8,6 +8,7 @@
     GET  /api/export          the run as .html or .jsonl
     GET  /api/statistics      of recorded runs
     GET  /api/compare         a machine and another one in one drawing
+    GET  /api/value           a value of userdata as it is now, whole
     GET  /api/action          what a form for a goal of an action needs
     POST /api/control         a command
     POST /api/action          check or send a goal, or cancel one
@@ -78,6 +79,7 @@ class Viewer:
         statistics: Of recorded runs, by machine label.
         hosts: Names that the server goes by, besides addresses.
         actions: On the network, for the page that sends goals; None shows none.
+        value: Asks a machine for a value of its userdata, by name, container and key; blocks.
     """
 
     def __init__(
@@ -90,8 +92,10 @@ class Viewer:
         statistics: Callable[[str], dict[str, Any] | None] = lambda _label: None,
         hosts: tuple[str, ...] = (),
         actions: Actions | None = None,
+        value: Callable[[str, str, str], str] | None = None,
     ) -> None:
         self._machines = machines
+        self._value = value
         self._actions = actions
         self._token = token
         self._send = send
@@ -115,6 +119,7 @@ class Viewer:
                 Route("/api/export", self._export),
                 Route("/api/statistics", self._runs),
                 Route("/api/compare", self._compare),
+                Route("/api/value", self._whole_value),
                 Route("/api/control", self._control, methods=["POST"]),
                 Route("/api/action", self._action, methods=["GET"]),
                 Route("/api/action", self._command_action, methods=["POST"]),
@@ -201,6 +206,22 @@ class Viewer:
             machine.name, machine.record, machine.events(),
         )  # fmt: skip
         return JSONResponse(await run_in_threadpool(_compared, *sides))
+
+    async def _whole_value(self, request: Request) -> Response:
+        machine = self._asked(request)
+        if machine is None or self._value is None:
+            return _unknown(request)
+        if machine.recorded or machine.stale is not None:
+            text = "The mission is gone; only what it told of the value is left."
+            return JSONResponse({"ok": False, "text": text}, status_code=409)
+        query = request.query_params
+        try:
+            text = await run_in_threadpool(
+                self._value, machine.name, query.get("container", ""), query.get("key", "")
+            )
+        except SmachError as error:
+            return JSONResponse({"ok": False, "text": str(error)}, status_code=409)
+        return JSONResponse({"ok": True, "text": text})
 
     async def _picture(self, request: Request) -> Response:
         machine = self._asked(request)

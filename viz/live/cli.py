@@ -92,6 +92,7 @@ def _serve(args: argparse.Namespace, machines: Machines, network: Any, node: Nod
         statistics=StatisticsOfFiles(args.runs).of,
         hosts=(args.host,),
         actions=actions,
+        value=network.value,
     )
     server = PageServer(viewer, args.host, args.port)
     print(server.address + (f"#token={token}" if token else ""), flush=True)

@@ -32,6 +32,7 @@ class Machine:
         revision: Counts the structures.
         stale: Since when nobody speaks for it [ns since the epoch]; None while somebody does.
         control: Pause and breakpoints; None when it obeys no commands.
+        node: Name of the node that it runs in.
 
     Threads: every method may be called from any thread.
     """
@@ -44,6 +45,7 @@ class Machine:
         self.control: dict[str, Any] | None = None
         self.stale: int | None = None
         self.recorded = False
+        self.node = ""
         self.epoch = uuid.uuid4().hex
         self._on_change = on_change
         self._lock = threading.Lock()
@@ -171,6 +173,7 @@ class Machine:
             "stale": self.stale,
             "control": self.control,
             "recorded": self.recorded,
+            "node": self.node,
         }
 
     def _set_record(self, record: StateRecord) -> None:

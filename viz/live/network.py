@@ -1,7 +1,12 @@
-"""Finds running machines on the network and follows them, across restarts of either side."""
+"""Finds running machines on the network and follows them, across restarts of either side.
+
+Two machines of one name are two machines: what they send is told apart by their network sessions.
+The first is shown under its name, the others as "name (2)" and so on.
+"""
 
 from __future__ import annotations
 
+import itertools
 import json
 import logging
 import threading
@@ -12,16 +17,20 @@ from actionlib_core.clock import SerialExecutor
 from actionlib_core.exceptions import ActionlibError
 from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import Trigger
-from actionlib_core.presence import Kind, parse_token, token_pattern
+from actionlib_core.presence import Kind, parse_token, token_key, token_pattern
 from actionlib_core.service import ServiceProxy
-from actionlib_core.topic import Subscriber
+from actionlib_core.wire import encoding_of
 from smachpy.feed import DESCRIPTION_TOPIC, EVENTS_TOPIC, HISTORY_SERVICE
 from smachpy.introspection import StateRecord
 from smachpy.remote_control import CommandError, ControlClient
+from smachpy.value_server import VALUE_SERVICE, ReadValue
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from actionlib_core.node import Node
-    from actionlib_core.transport import Presence
+    from actionlib_core.presence import Endpoint
+    from actionlib_core.transport import Closable, Presence, Reply, Sample
     from viz.live.machines import Machine, Machines
 
 logger = logging.getLogger("viz.live")
@@ -52,6 +61,7 @@ class Network:
         self._control = control
         self._lock = threading.Lock()
         self._links: dict[str, Link] = {}
+        self._ears: dict[str, _Ear] = {}
         pattern = token_pattern(Kind.PUBLISHER, f"**{EVENTS_TOPIC}")
         self._watch = node.transport.watch_alive(pattern, self._on_presence)
 
@@ -59,69 +69,140 @@ class Network:
         """Follow nothing any more; a second call does nothing."""
         self._watch.close()
         with self._lock:
-            links = list(self._links.values())
+            parts: list[Link | _Ear] = [*self._ears.values(), *self._links.values()]
             self._links.clear()
-        for link in links:
-            link.close()
+            self._ears.clear()
+        for part in parts:
+            part.close()
 
     def send(self, name: str, command: dict[str, Any]) -> dict[str, Any]:
         """Send a command to a machine and return the answer.
 
         Raises:
-            CommandError: no such machine, a wrong command, or no answer.
+            CommandError: no such machine, two of one name, a wrong command, or no answer.
 
         Blocks: until the answer, some seconds at most.
         """
+        link = self._link(name)
+        twins = [one for one in self._links.values() if one.server == link.server and one.alive]
+        if len(twins) > 1:
+            raise CommandError(
+                f"{name}: {len(twins)} machines are called {link.server!r}, and a command would "
+                "reach all; expected one. Give each a name or a namespace of its own."
+            )
+        return link.send(command)
+
+    def value(self, name: str, container: str, key: str) -> str:
+        """Return a value of a machine's userdata as it is now, whole.
+
+        Raises:
+            CommandError: no such machine or value, or no answer.
+
+        Blocks: until the answer, some seconds at most.
+        """
+        return self._link(name).value(container, key)
+
+    def _link(self, name: str) -> Link:
         link = self._links.get(name)
         if link is None:
             raise CommandError(f"{name}: no such machine; expected one of {sorted(self._links)}.")
-        return link.send(command)
+        return link
 
     def _on_presence(self, presence: Presence) -> None:
         endpoint = parse_token(presence.key)
         if endpoint is None or not endpoint.name.endswith(EVENTS_TOPIC):
             return
-        name = endpoint.name.removesuffix(EVENTS_TOPIC)
+        server = endpoint.name.removesuffix(EVENTS_TOPIC)
         with self._lock:
-            link = self._links.get(name)
+            if presence.alive and server not in self._ears:
+                self._ears[server] = _Ear(server, self._node, self._on_sample)
+            link = self._of(server, endpoint.session)
             if link is None and presence.alive:
-                machine = self._machines.obtain(name)
-                link = self._links[name] = Link(name, machine, self._node, control=self._control)
+                link = self._take_in(server, endpoint)
         if link is not None:
             link.on_presence(presence.key, alive=presence.alive)
 
+    def _of(self, server: str, session: str) -> Link | None:
+        """The link to the server of that name in that session."""
+        links = self._links.values()
+        return next((o for o in links if (o.server, o.session) == (server, session)), None)
+
+    def _take_in(self, server: str, endpoint: Endpoint) -> Link:
+        """The link for a server that is new: that of one that has gone, else another one."""
+        for number in itertools.count(1):
+            name = server if number == 1 else f"{server} ({number})"
+            link = self._links.get(name)
+            if link is None:
+                machine = self._machines.obtain(name)
+                link = Link(server, machine, self._node, control=self._control)
+                self._links[name] = link
+            if not link.alive:
+                link.adopt(endpoint)
+                return link
+        raise AssertionError  # numbers do not end
+
+    def _on_sample(self, server: str, sample: Sample) -> None:
+        with self._lock:
+            link = self._of(server, sample.source)
+        if link is not None:
+            link.hear(sample)
+
+
+class _Ear:
+    """Hears all servers of one name, and knows which of them speaks; a `Subscriber` does not."""
+
+    def __init__(self, server: str, node: Node, on_sample: Callable[[str, Sample], None]) -> None:
+        transport = node.transport
+        self._parts: list[Closable] = []
+        for topic in (EVENTS_TOPIC, DESCRIPTION_TOPIC):
+            name = server + topic
+            end = node.endpoint(Kind.SUBSCRIBER, name, String._type, String._md5sum)
+            self._parts += [
+                transport.subscribe(name, lambda sample: on_sample(server, sample)),
+                transport.declare_alive(token_key(end)),
+            ]
+
+    def close(self) -> None:
+        """Hear nothing any more."""
+        for part in self._parts:
+            part.close()
+
 
 class Link:
-    """Follows one server.
+    """Follows one server at a time: when it has gone, the next one of its name.
 
     What it hears is worked off in order, one at a time, so that nothing is between the history and
     the events after it.
     """
 
-    def __init__(self, name: str, machine: Machine, node: Node, *, control: bool) -> None:
-        self._name = name
+    def __init__(self, server: str, machine: Machine, node: Node, *, control: bool) -> None:
+        self.server = server
+        self.session = ""
         self._machine = machine
         self._node = node
-        self._executor = SerialExecutor(node.clock, f"link to {name}")
+        self._executor = SerialExecutor(node.clock, f"link to {server}")
         self._alive: set[str] = set()
         self._closed = False
         self._heard: deque[str] = deque()
-        server = f"/{name}"
-        self._client = ControlClient(server, node) if control else None
-        self._history = ServiceProxy(
-            server + HISTORY_SERVICE, Trigger, timeout=HISTORY_S, node=node
+        self._client = ControlClient(f"/{server}", node) if control else None
+        self._values = ServiceProxy(
+            f"/{server}{VALUE_SERVICE}", ReadValue, timeout=HISTORY_S, node=node
         )
-        self._topics = (
-            Subscriber(server + EVENTS_TOPIC, String, self._take, node=node),
-            Subscriber(server + DESCRIPTION_TOPIC, String, self._take_description, node=node),
-        )
+
+    @property
+    def alive(self) -> bool:
+        """Whether its server is there."""
+        return bool(self._alive)
+
+    def adopt(self, endpoint: Endpoint) -> None:
+        """Follow another server from now on."""
+        self.session = endpoint.session
+        self._machine.node = endpoint.node
 
     def close(self) -> None:
         """Stop following; a second call does nothing."""
         self._closed = True
-        for topic in self._topics:
-            topic.unregister()
-        self._history.close()
+        self._values.close()
         if self._client is not None:
             self._client.close()
         self._executor.join(HISTORY_S)
@@ -129,30 +210,48 @@ class Link:
     def send(self, command: dict[str, Any]) -> dict[str, Any]:
         """Send a command and return the answer."""
         if self._client is None:
-            raise CommandError(f"{self._name}: this viewer only looks. Try --control.")
+            raise CommandError(f"{self.server}: this viewer only looks. Try --control.")
         answer = self._client.send(command)
         self._machine.set_control(answer)
         return answer
 
+    def value(self, container: str, key: str) -> str:
+        """Return a value of the machine's userdata, whole."""
+        try:
+            answer = self._values(container, key)
+        except ActionlibError as error:
+            raise CommandError(str(error)) from error
+        if not answer.success:
+            raise CommandError(answer.text)
+        text: str = answer.text
+        return text
+
     def on_presence(self, key: str, *, alive: bool) -> None:
         """A server of this name has come or gone."""
-        self._executor.submit(lambda: self._come(key) if alive else self._go(key))
+        if alive:
+            self._alive.add(key)
+            self._executor.submit(self._come)
+        else:
+            self._alive.discard(key)
+            self._executor.submit(self._go)
 
-    def _come(self, key: str) -> None:
-        self._alive.add(key)
+    def hear(self, sample: Sample) -> None:
+        """Take what the server has sent."""
+        if sample.key.endswith(DESCRIPTION_TOPIC):
+            self._executor.submit(lambda: self._describe(_text(sample)))
+            return
+        self._heard.append(_text(sample))
+        if len(self._heard) == 1:  # the others go with the first
+            self._executor.submit(self._add)
+
+    def _come(self) -> None:
         self._read_history()
         self._node.clock.sleep(SETTLE_S)
         self._read_history()
 
-    def _go(self, key: str) -> None:
-        self._alive.discard(key)
+    def _go(self) -> None:
         if not self._alive:
             self._machine.set_stale(self._node.clock.time_ns())
-
-    def _take(self, message: Any) -> None:
-        self._heard.append(message.data)
-        if len(self._heard) == 1:  # the others go with the first
-            self._executor.submit(self._add)
 
     def _add(self) -> None:
         self._node.clock.sleep(GATHER_S)
@@ -164,19 +263,17 @@ class Link:
         if self._heard:
             self._executor.submit(self._add)
 
-    def _take_description(self, message: Any) -> None:
-        self._executor.submit(lambda: self._machine.describe(StateRecord.from_json(message.data)))
+    def _describe(self, text: str) -> None:
+        self._machine.describe(StateRecord.from_json(text))
 
     def _read_history(self) -> None:
         if self._closed or not self._alive:
             return
-        try:
-            answer = self._history.call()
-        except ActionlibError as error:
-            logger.info("%s: no history yet: %s", self._name, error)
+        history = self._ask_history()
+        if history is None:
+            logger.info("%s: no history yet", self.server)
             self._node.clock.call_later(RETRY_S, lambda: self._executor.submit(self._read_history))
             return
-        history = json.loads(answer.message)
         machine = self._machine
         known = machine.record is not None and machine.problems == history["problems"]
         if known and machine.epoch == history["epoch"]:
@@ -184,3 +281,29 @@ class Link:
             if machine.add(history["events"]):
                 return
         machine.reset(history)
+
+    def _ask_history(self) -> dict[str, Any] | None:
+        """The answer of this link's own server, should there be several of the name."""
+        replies: list[Reply] = []
+        done = self._node.clock.event(f"history of {self.server}")
+        query = self._node.transport.query(
+            self.server + HISTORY_SERVICE,
+            Trigger._request_class().to_bytes(),
+            encoding=encoding_of(Trigger),
+            timeout=HISTORY_S,
+            on_reply=replies.append,
+            on_done=done.set,
+        )
+        done.wait(HISTORY_S + 1.0)
+        query.close()
+        answers = [Trigger._response_class.from_bytes(r.payload) for r in replies if not r.error]
+        for answer in answers:
+            history: dict[str, Any] = json.loads(answer.message)
+            if history.get("session", self.session) == self.session:
+                return history
+        return None
+
+
+def _text(sample: Sample) -> str:
+    text: str = String.from_bytes(sample.payload).data
+    return text

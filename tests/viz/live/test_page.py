@@ -385,3 +385,167 @@ def test_a_viewer_that_hangs_or_dies_slows_no_mission(start):
     held = (count(views[0]) - before) / (time.monotonic() - begun)
     os.kill(views[1].pid, signal.SIGCONT)
     assert held > 0.5 * free > 0
+
+
+def test_two_machines_of_one_name_are_two_machines(start, look):
+    first = start.robot("--name", "twin", "--rate", 4, "--control")
+    view = start.view("--control")
+    page = look(view.address.replace("/#", "/?machine=twin#"))
+    start.robot("--name", "twin", "--rate", 4, "--states", 12, "--control")
+    wait_for(page, "smachpy.store.machines.value.some((m) => m.name === 'twin (2)')")
+    twins = "smachpy.store.machines.value.filter((m) => m.name.startsWith('twin'))"
+    labels = page.evaluate(f"() => {twins}.map((m) => [m.name, m.label])")
+    assert labels == [["twin", "DELIVER"], ["twin (2)", "FACTORY_12"]]
+    page.wait_for_timeout(1500)
+    # Nothing of the one is in the other.
+    paths = "[...new Set(smachpy.store.run.events.map((e) => e.path.split('/')[1]))]"
+    assert page.evaluate(f"() => {paths}") == ["DELIVER"]
+    other = look(view.base + "?machine=twin%20(2)")
+    wait_for(other, "smachpy.store.run.events.length > 5")
+    assert other.evaluate(f"() => {paths}") == ["FACTORY_12"]
+    # A command would reach both, so it reaches none.
+    page.click("#pause")
+    page.wait_for_selector(".notice.error")
+    assert "2 machines are called 'twin'" in page.text_content(".notice")
+    # The one goes, the other stays; a new one takes the place of the one that has gone.
+    first.kill()
+    wait_for(page, "smachpy.store.runStatus.value.word === 'stale'")
+    assert other.evaluate("() => smachpy.store.runStatus.value.word") == "running"
+    start.robot("--name", "twin", "--rate", 4)
+    wait_for(page, "smachpy.store.runStatus.value.word === 'running'")
+    assert page.evaluate(f"() => {twins}.length") == 2
+
+
+def test_a_value_that_was_shortened_is_fetched_whole_from_the_mission(start, look):
+    start.robot("--name", "hoarder", "--rate", 5, "--hostile")
+    view = start.view()
+    page = look(view.base + "?machine=hoarder")
+    wait_for(page, "Object.values(smachpy.store.run.now.userdata).some((u) => u.key === 'big')")
+    page.click(".userdata tr:has(th:text-is('big'))")
+    page.click(".whole")
+    page.wait_for_selector(".whole-value textarea")
+    text = page.input_value(".whole-value textarea")
+    assert text.startswith("[0,")
+    assert text.endswith("99999]")
+    page.click(".userdata tr:has(th:text-is('markup'))")  # nothing is missing here
+    assert page.query_selector(".whole") is None
+    status, _, body = view.get("/api/value?machine=hoarder&container=/HOSTILE&key=markup")
+    assert (status, json.loads(body)["text"]) == (200, "<script>document.title='broken'</script>")
+    for query, why in [
+        ("container=/HOSTILE&key=nothing", "'nothing' is not there any more"),
+        ("container=/HOSTILE/nowhere&key=big", "no such container"),
+        ("container=/HOSTILE&key=secret", "its repr raised RuntimeError"),
+    ]:
+        with pytest.raises(urllib.error.HTTPError) as caught:
+            view.get(f"/api/value?machine=hoarder&{query}")
+        assert caught.value.code == 409
+        assert why in json.loads(caught.value.read())["text"]
+
+
+def test_follow_shows_all_regions_that_are_active(start, look):
+    start.robot("--name", "regions", "--rate", 0.5)
+    view = start.view()
+    page = look(view.base + "?machine=regions")
+    page.keyboard.press("1")
+    page.keyboard.press("o")
+    wait_for(
+        page,
+        "['NAVIGATE', 'WATCH'].every((l) => document.querySelector("
+        '`g.active[data-path="/DELIVER/TRANSPORT/${l}"]`))',
+        timeout=20.0,
+    )
+    wait_for(page, "smachpy.store.activeLeaves.value.length === 2")
+    assert "+1 active" in page.text_content(".crumbs")
+    inside = """(label) => { const box = document.querySelector(`g[data-path="/DELIVER/TRANSPORT/${label}"]`)
+        .getBoundingClientRect(), stage = document.querySelector('.diagram').getBoundingClientRect();
+        return box.left >= stage.left && box.right <= stage.right && box.top >= stage.top
+            && box.bottom <= stage.bottom; }"""
+    page.wait_for_timeout(600)
+    assert page.evaluate(inside, "NAVIGATE")
+    assert page.evaluate(inside, "WATCH")
+    # What does not run any more is folded again.
+    wait_for(page, "!document.querySelector('g[data-path=\"/DELIVER/PICK/GRASP\"]')")
+
+
+def test_every_key_does_what_the_help_says(delivery, look):
+    page = look(delivery.base + "?machine=delivery")
+    view = "() => { const { x, y, k } = smachpy.page.view; return [x, y, k]; }"
+    page.keyboard.press("Escape")
+    x, y, k = page.evaluate(view)
+    for key, moves in [
+        ("ArrowLeft", (80, 0)), ("ArrowRight", (-80, 0)), ("ArrowUp", (0, 80)), ("ArrowDown", (0, -80)),
+    ]:  # fmt: skip
+        page.keyboard.press(key)
+        x, y = x + moves[0], y + moves[1]
+        assert page.evaluate(view) == pytest.approx([x, y, k])
+    page.keyboard.press("+")
+    assert page.evaluate(view)[2] == pytest.approx(k * 1.25)
+    page.keyboard.press("-")
+    page.keyboard.press("-")
+    assert page.evaluate(view)[2] == pytest.approx(k * 0.8)
+    page.keyboard.press("f")
+    wait_for(page, f"Math.abs(smachpy.page.view.k - {k}) < 0.01")
+    page.keyboard.press("/")
+    assert page.evaluate("() => document.activeElement.id") == "search"
+    page.keyboard.type("f+1,")  # only text here
+    assert page.input_value("#search") == "f+1,"
+    page.keyboard.press("Escape")
+    assert page.evaluate("() => document.activeElement.tagName") == "BODY"
+    # Neighbours, and the same state again.
+    page.evaluate("() => smachpy.page.select('/DELIVER/PICK')")
+    page.keyboard.press("Enter")
+    wait_for(page, "!document.querySelector('g[data-path=\"/DELIVER/PICK/GRASP\"]')")
+    page.keyboard.press("Enter")
+    wait_for(page, "document.querySelector('g[data-path=\"/DELIVER/PICK/GRASP\"]')")
+    page.keyboard.press("Shift+ArrowLeft")  # moves the view though something is selected
+    assert page.evaluate("() => smachpy.store.selected.value") == "/DELIVER/PICK"
+    page.keyboard.press("Escape")
+    assert page.evaluate("() => smachpy.store.selected.value") is None
+    before = page.evaluate("() => smachpy.store.implicit.value")
+    page.keyboard.press("i")
+    assert page.evaluate("() => smachpy.store.implicit.value") != before
+    page.keyboard.press("i")
+    wait_for(page, "smachpy.store.run.events.length > 5")
+    page.keyboard.press(",")
+    assert page.evaluate("() => smachpy.store.cursor.value") is not None
+    page.keyboard.press("l")
+    assert page.evaluate("() => smachpy.store.cursor.value") is None
+    page.keyboard.press("o")
+    assert page.evaluate("() => smachpy.store.follow.value") is True
+    page.keyboard.press("o")
+    page.keyboard.press("?")
+    listed = page.text_content("[role=dialog]")
+    for word in ("search", "fit everything", "follow what runs", "zoom", "actions"):
+        assert word in listed
+    page.keyboard.press("Escape")
+    assert page.query_selector("[role=dialog]") is None
+
+
+def test_who_cannot_see_is_told(delivery, look):
+    page = look(delivery.base + "?machine=delivery")
+    page.wait_for_timeout(500)
+    unnamed = page.evaluate("""() => [...document.querySelectorAll('button, input, select, [role=button], [role=slider], svg[role]')]
+        .filter((e) => e.getClientRects().length)
+        .filter((e) => !(e.getAttribute('aria-label') || e.labels?.length || e.textContent.trim() || e.title))
+        .map((e) => e.outerHTML.slice(0, 200))""")
+    assert unnamed == []
+    # Every state says its path and what it does.
+    wrong = page.evaluate("""() => [...document.querySelectorAll('.diagram g[data-path]')]
+        .filter((g) => !g.getAttribute('aria-label').startsWith(`${g.dataset.path}, `)).length""")
+    assert wrong == 0
+    wait_for(
+        page,
+        "document.querySelector('g.leaf.active')?.getAttribute('aria-label').endsWith(', running')",
+    )
+    # What happens is spoken, at most once a second.
+    wait_for(page, "document.getElementById('spoken').textContent.startsWith('running: ')")
+    changes = page.evaluate("""() => new Promise((done) => { let count = 0;
+        new MutationObserver(() => { count += 1; }).observe(document.getElementById('spoken'), {childList: true, characterData: true, subtree: true});
+        setTimeout(() => done(count), 2100); })""")
+    assert changes <= 3
+    tree = page.evaluate("""() => [...document.querySelectorAll('[role=treeitem]')].map((e) =>
+        [e.getAttribute('aria-level'), e.getAttribute('aria-selected')])""")
+    assert tree
+    assert all(level and selected in {"true", "false"} for level, selected in tree)
+    for label in ("states", "details", "state machine"):
+        assert page.query_selector(f'[aria-label="{label}"]') is not None

@@ -16,6 +16,7 @@ import { Empty, Help, Legend, Notice, TopBar, Tree } from "viewer/panels";
 import { ActionsPage } from "viewer/actions";
 import { weights } from "viewer/statistics";
 import { askerText, ms } from "viewer/fold";
+import { shorten } from "viewer/model";
 
 const html = htm.bind(h);
 const PANELS_MS = 160; // the panels are drawn again at most so often
@@ -137,7 +138,7 @@ class Page {
 
   #announce(moment) {
     if (moment - this.announcedAt < ANNOUNCE_MS) return;
-    const words = `${store.runStatus.value.word}: ${store.activeLeaves.value.map((p) => p.split("/").at(-1)).join(", ")}`;
+    const words = `${store.runStatus.value.word}: ${store.activeLeaves.value.slice(0, 6).map((p) => store.model.value?.get(p)?.name ?? shorten(p.split("/").at(-1))).join(", ")}`;
     const region = document.getElementById("spoken");
     if (region && region.textContent !== words) { region.textContent = words; this.announcedAt = moment; }
   }

@@ -3,7 +3,7 @@ import { h } from "preact";
 import { useState } from "preact/hooks";
 import htm from "htm";
 import * as store from "viewer/store";
-import { SIGNS } from "viewer/model";
+import { SIGNS, shorten } from "viewer/model";
 import { ask, isFile, link } from "viewer/source";
 
 const html = htm.bind(h);
@@ -58,6 +58,6 @@ export function Differences({ page, State }) {
     <p class="hint">from ${found.with}${found.runs.every(Boolean) ? ` (${found.runs[0]} runs) to this (${found.runs[1]}); \u00d7: visits per run` : ""}</p>
     ${!found.listed.length && html`<p class="hint">no notable difference</p>`}
     <ul class="differences">${shown.map((one) => html`<li class=${one.change}><b aria-hidden="true">${SIGNS[one.change]}</b><span><${State} path=${one.path} page=${page} />
-      <span class="hidden"> ${one.change}</span>${one.text !== one.change ? ` ${one.text}` : ""}</span></li>`)}</ul>
+      <span class="hidden"> ${one.change}</span>${one.text !== one.change ? ` ${shorten(one.text, 300)}` : ""}</span></li>`)}</ul>
     ${shown.length < found.listed.length && html`<button onClick=${() => setAll(true)}>and ${found.listed.length - shown.length} more</button>`}</section>`;
 }

@@ -1,11 +1,13 @@
 // What is behind the picture: the selected state, who is asked to stop, goals, userdata, the log.
 import { h } from "preact";
 import { useState } from "preact/hooks";
+import { signal } from "@preact/signals";
 import htm from "htm";
 import * as store from "viewer/store";
 import { askerText, ms } from "viewer/fold";
-import { KIND_NAMES, outcomeClass } from "viewer/model";
+import { KIND_NAMES, outcomeClass, shorten } from "viewer/model";
 import { span } from "viewer/diagram";
+import { ask, isFile, link } from "viewer/source";
 import { StateControls } from "viewer/controls";
 import { Differences } from "viewer/comparison";
 import { coverage } from "viewer/statistics";
@@ -13,15 +15,15 @@ import { coverage } from "viewer/statistics";
 const html = htm.bind(h);
 const FLASH_MS = 900;
 const LOG_LINES = 70;
-const SHORT = 160;
+const SHORT = 160, LINE = 200; // characters; the browser takes minutes to break lines of thousands
 const RECENT_MS = 30_000; // a preempt that is over is shown so long while the mission goes on
 const MOST_ROWS = 24;
 
 const Section = ({ title, count, children }) =>
   html`<section><h2>${title}${count != null && html` <span class="number">${count}</span>`}</h2>${children}</section>`;
 const State = ({ path, page }) => {
-  const name = store.model.value?.get(path)?.name ?? path.split("/").at(-1);
-  return html`<button class="link" title=${path} onClick=${() => page.goTo(path)}>${name}</button>`;
+  const name = store.model.value?.get(path)?.name ?? shorten(path.split("/").at(-1));
+  return html`<button class="link" title=${shorten(path, 400)} onClick=${() => page.goTo(path)}>${name}</button>`;
 };
 
 export function Inspector({ page }) {
@@ -66,10 +68,10 @@ function Selected({ page, data, now, model }) {
       ${keys?.inputs.length > 0 && html`<dt>reads</dt><dd>${keys.inputs.map(key)}</dd>`}
       ${keys?.outputs.length > 0 && html`<dt>writes</dt><dd>${keys.outputs.map(key)}</dd>`}
     </dl>
-    ${state?.error && html`<p class="error">${state.error}</p>`}
+    ${state?.error && html`<p class="error">${shorten(state.error, 2000)}</p>`}
     <ul class="outcomes">${node.outcomes.map((o) => {
       const edge = node.parent?.links.find((l) => l.source === node.label && l.outcomes.includes(o));
-      return html`<li><span class=${`pill-text ${outcomeClass(o)}`}>${o}</span><span>${edge ? ` \u2192 ${edge.target}` : ""}</span>
+      return html`<li><span class=${`pill-text ${outcomeClass(o)}`}>${shorten(o, 60)}</span><span>${edge ? ` \u2192 ${shorten(edge.target)}` : ""}</span>
         <span class="times">${state?.outcomes?.[o] ? `\u00d7${state.outcomes[o]}` : ""}</span></li>`;
     })}</ul>
     <${StateControls} node=${node} state=${state} />
@@ -172,11 +174,32 @@ function Userdata({ page, data, now }) {
       const fresh = now - ms(entry.at) < FLASH_MS;
       const first = several && entry.container !== container;
       container = entry.container;
-      return html`${first && html`<tr class="group"><th colspan="2" title=${container}>${container.split("/").filter(Boolean).slice(-2).join(" \u203a ")}</th></tr>`}<tr key=${id} class=${fresh ? "fresh" : ""} onClick=${() => setOpen(open === id ? null : id)}>
-        <th scope="row" title=${entry.container}>${entry.key}</th>
+      return html`${first && html`<tr class="group"><th colspan="2" title=${container}>${container.split("/").filter(Boolean).slice(-2).map((part) => shorten(part)).join(" \u203a ")}</th></tr>`}<tr key=${id} class=${fresh ? "fresh" : ""} onClick=${() => setOpen(open === id ? null : id)}>
+        <th scope="row" title=${shorten(entry.container, 400)}>${shorten(entry.key, 80)}</th>
         <td><code>${open === id ? html`<pre>${pretty(entry.value)}</pre>` : text.slice(0, SHORT)}${open !== id && text.length > SHORT ? "\u2026" : ""}</code>
+          ${open === id && wasShortened(text) && html`<${Whole} entry=${entry} />`}
           <small>by <${State} path=${entry.writer} page=${page} /> ${clock(entry.at, data)}</small></td></tr>`;
     })}</tbody></table><//>`;
+}
+
+// Events tell only the beginning of long values; the mission has the rest.
+const wasShortened = (text) => /\u2026$|\u2026"|<\S+ of \d+ elements>/.test(text);
+const wholes = signal({}); // what has been fetched, by container and key; rows come and go
+function Whole({ entry }) {
+  // Labels may hold slashes, so the path alone does not tell what is inside what.
+  const container = store.model.value?.get(entry.writer)?.parent?.path ?? entry.container;
+  const id = `${store.facts.value?.epoch} ${container} ${entry.key}`;
+  const found = wholes.value[id];
+  if (isFile() || store.facts.value?.recorded) return html`<small>shortened when it was recorded</small>`;
+  const put = (answer) => { wholes.value = { ...wholes.value, [id]: answer }; };
+  const fetchIt = async (e) => {
+    e.stopPropagation();
+    put({ text: "Asking the mission\u2026" });
+    put(await ask(link("value", `&container=${encodeURIComponent(container)}&key=${encodeURIComponent(entry.key)}`)));
+  };
+  if (!found) return html`<button class="small whole" onClick=${fetchIt}>Fetch the whole value</button>`;
+  return html`<div class="whole-value" onClick=${(e) => e.stopPropagation()}>${found.ok ? html`<small>as it was when it was asked for, ${found.text.length.toLocaleString("en")} characters
+    <button class="small" onClick=${fetchIt}>again</button></small><textarea readonly rows="14" wrap="off" aria-label=${`the whole value of ${entry.key}`} value=${found.text}></textarea>` : html`<p class="error">${found.text}</p>`}</div>`;
 }
 
 const clock = (ns, data) => {
@@ -220,7 +243,7 @@ function Problems({ page }) {
   if (!found.length) return null;
   const words = (p) => (p.text.startsWith(`${p.path}: `) ? p.text.slice(p.path.length + 2) : p.text);
   return html`<section><details class="fold-up"><summary><h2>Problems of the machine <span class="number">${found.length}</span></h2></summary>
-    <ul class="problems">${found.slice(0, 30).map((p) => html`<li class=${p.severity}><${State} path=${p.path} page=${page} /> ${words(p)}</li>`)}</ul></details></section>`;
+    <ul class="problems">${found.slice(0, 30).map((p) => html`<li class=${p.severity}><${State} path=${p.path} page=${page} /> ${shorten(words(p), 600)}</li>`)}</ul></details></section>`;
 }
 
 const LINES = {
@@ -253,7 +276,7 @@ function Log({ page }) {
     if (wanted && !`${e.path} ${words}`.toLowerCase().includes(wanted)) continue;
     const edge = e.kind === "Left" ? target(e) : "";
     lines.push(html`<li key=${e.seq} onClick=${() => { if (store.cursor.value !== null) store.seek(ms(e.stamp_ns)); }}>
-      <time>${((ms(e.stamp_ns) - begun) / 1000).toFixed(2)}</time><${State} path=${e.path} page=${page} /> <span class=${`word ${kind}`}>${words}</span>${edge}</li>`);
+      <time>${((ms(e.stamp_ns) - begun) / 1000).toFixed(2)}</time><${State} path=${e.path} page=${page} /> <span class=${`word ${kind}`}>${shorten(words, LINE)}</span>${edge}</li>`);
   }
   return html`<${Section} title="Log"><div class="filter">
     <select aria-label="kinds" value=${store.logFilter.value} onChange=${(e) => { store.logFilter.value = e.target.value; }}>${Object.keys(GROUPS).map((g) => html`<option value=${g}>${g}</option>`)}</select>
@@ -264,5 +287,5 @@ function Log({ page }) {
 function target(e) {
   const node = store.model.value?.get(e.path);
   const link = node?.parent?.links.find((l) => l.source === node.label && l.outcomes.includes(e.outcome));
-  return link && link.target !== e.outcome ? ` \u2192 ${link.target}` : "";
+  return link && link.target !== e.outcome ? ` \u2192 ${shorten(link.target)}` : "";
 }

@@ -8,7 +8,7 @@ import { MODES } from "viewer/statistics";
 import { Controls } from "viewer/controls";
 import { CompareChip, CompareLine } from "viewer/comparison";
 import { ActionsButton } from "viewer/actions";
-import { KIND_NAMES, SIGNS, outcomeClass } from "viewer/model";
+import { KIND_NAMES, SIGNS, outcomeClass, shorten } from "viewer/model";
 
 export const html = htm.bind(h);
 const ROW = 24;
@@ -38,12 +38,12 @@ export function TopBar({ page }) {
 
 function Chooser() {
   const list = store.machines.value, facts = store.facts.value;
-  const name = facts?.label ?? "no machine yet";
+  const name = facts ? shorten(facts.label, 60) : "no machine yet";
   if (isFile() || list.length < 2) return html`<h1 title=${facts?.name}>${name}</h1>`;
   const word = (m) => m.recorded ? "recording" : m.stale != null && m.ended == null ? "stale" : m.ended != null ? `ended: ${m.outcome}` : "running";
   return html`<label class="chooser"><span class="hidden">machine</span>
     <select value=${facts?.name} onChange=${(e) => choose(e.target.value)}>
-      ${list.map((m) => html`<option value=${m.name}>${m.name} \u2013 ${word(m)}</option>`)}
+      ${list.map((m) => html`<option value=${m.name} title=${m.node ? `in node ${m.node}` : ""}>${m.name} \u2013 ${word(m)}</option>`)}
     </select></label>`;
 }
 
