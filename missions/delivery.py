@@ -22,9 +22,9 @@ from actionlib_core.interfaces.std_srvs.srv import SetBool, SetBoolRequest
 from missions.ask_operator import AskOperator
 from missions.exceptions import MissionError
 from missions.maps import OFFICE_DOORS, OFFICE_PLACES
-from missions.parts import Wait, drive_to, turn
+from missions.parts import AwaitMessage, Wait, drive_to, turn
 from missions.waypoint_file import load_places
-from smachpy import CBState, MonitorState, ServiceState, StateMachine, UserData
+from smachpy import CBState, ServiceState, StateMachine, UserData
 
 if TYPE_CHECKING:
     from actionlib_core.interfaces.std_srvs.srv import SetBoolResponse
@@ -107,8 +107,10 @@ def open_door(door: str) -> StateMachine:
     sm = StateMachine(ENDS)
     with sm:
         sm.add("CALL", set_door(door, is_open=True), {"succeeded": "WAIT"})
-        watch = MonitorState(f"/doors/{door}/open", Bool, is_closed, timeout=OPEN_TIMEOUT)
-        sm.add("WAIT", watch, {"invalid": "succeeded", "valid": "aborted"})
+        is_open = AwaitMessage(
+            f"/doors/{door}/open", Bool, lambda message: message.data, timeout=OPEN_TIMEOUT
+        )
+        sm.add("WAIT", is_open, {"came": "succeeded", "timeout": "aborted"})
     return sm
 
 
@@ -127,11 +129,6 @@ def set_door(door: str, *, is_open: bool) -> ServiceState:
 def verdict(_userdata: UserData, response: SetBoolResponse) -> str:
     """Name the outcome of a call: did the door do what it was told?"""
     return "succeeded" if response.success else "aborted"
-
-
-def is_closed(_userdata: UserData, message: Bool) -> bool:
-    """Tell whether the door is not open yet; the first 'no' ends the wait."""
-    return not message.data
 
 
 def hand_over() -> StateMachine:

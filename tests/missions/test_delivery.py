@@ -123,7 +123,7 @@ def test_a_door_that_says_yes_and_stays_shut_sends_it_home(mission, machine, rob
     run = mission(machine)
     run.assert_outcome("brought_back")
     run.assert_not_visited("ENTER")
-    assert run.outcomes("GO/OPEN/WAIT") == ("aborted",)
+    assert run.outcomes("GO/OPEN/WAIT") == ("timeout",)
 
 
 def test_a_door_that_hesitates_is_asked_again(mission, machine, robot, answer):
