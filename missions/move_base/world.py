@@ -36,6 +36,7 @@ _KEPT_PLANNERS: Final = 8  # of the last sets of obstacles
 _NEAR_STEPS: Final = 4  # steps between two looks at who is near
 _NEAR_SPARE: Final = 1.5  # [m] what is near may come closer by so much until the next look
 _PLACES_AGE: Final = 0.2  # [s] that the array of places may be old
+_REMEMBERED: Final = 2.0  # times its sight: what moves farther off is forgotten
 _TOLD: Final = 4.0  # [m] of its way that a robot tells others
 _ASKED: Final = 3.0  # [s] that a request for room counts
 _DEEPEST: Final = 4  # a request is passed on so often
@@ -472,11 +473,13 @@ class Robot:
         body, sight = self.body, self.config.robot.sight
         x, y = body.x, body.y
         close = [d for d in near if math.hypot(d.x - x, d.y - y) - d.radius <= sight]
-        remembered = [
-            (disc, seen)
-            for disc, seen in traffic.items()
-            if math.hypot(seen.x - x, seen.y - y) <= sight
-        ]
+        remembered = []
+        for disc, seen in list(traffic.items()):
+            distance = math.hypot(seen.x - x, seen.y - y)
+            if distance > _REMEMBERED * sight:
+                del traffic[disc]
+            elif distance <= sight:
+                remembered.append((disc, seen))
         visible = self._which_are_visible([*close, *(seen for _, seen in remembered)])
         for (disc, _), clear in zip(remembered, visible[len(close) :], strict=True):
             if clear:

@@ -11,7 +11,7 @@ from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.interfaces.std_msgs.msg import Bool
-from actionlib_core.interfaces.std_srvs.srv import SetBool
+from actionlib_core.interfaces.std_srvs.srv import Empty, SetBool
 from actionlib_core.node import Node, use_node
 from actionlib_core.service import ServiceProxy
 from actionlib_core.simple_action_client import SimpleActionClient
@@ -159,6 +159,40 @@ def test_a_moving_obstacle_goes_back_and_forth(clock, node, world):
         assert walker.x == pytest.approx(5.5, abs=0.3)
         clock.sleep(2.5)
         assert walker.velocity()[0] < 0.0
+
+
+def test_what_moved_is_remembered_where_it_was_seen_until_the_costmap_is_cleared(
+    clock, node, add, world
+):
+    robot = add("robot_0", 9.0, 7.7)
+    walker = world.add_mover("visitor", [(9.0, 10.2)])
+    with simulation(world) as made:
+        clear = ServiceProxy("robot_0/move_base/clear_costmaps", Empty)
+        clear()
+        assert [seen.name for seen in robot.traffic.values()] == ["visitor"]
+        with made.stepper.lock:
+            robot.body.x, walker.x = 11.0, 20.0  # behind the wall of the corridor
+            robot.look()
+        assert [(seen.x, seen.y) for seen in robot.traffic.values()] == [(9.0, 10.2)]
+        clear()
+        assert robot.traffic == {}
+
+
+def test_what_moved_on_is_forgotten_when_its_place_is_seen_empty(node, add, world):
+    robot = add("robot_0", 9.0, 7.7)
+    walker = world.add_mover("visitor", [(11.0, 7.7)])
+    robot.forget()
+    assert [seen.x for seen in robot.traffic.values()] == [11.0]
+    walker.x = 20.0
+    robot.look()
+    assert robot.traffic == {}
+
+
+def test_walls_hide_what_moves(node, add, world):
+    robot = add("robot_0", 9.0, 7.7)
+    world.add_mover("visitor", [(7.4, 9.8)])
+    robot.forget()
+    assert robot.traffic == {}
 
 
 # -- doors -----------------------------------------------------------------------------------------
