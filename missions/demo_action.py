@@ -266,7 +266,7 @@ def server() -> StateMachine:
 
 
 def client(count: int = 10, preempt_after: float = 0.0) -> StateMachine:
-    """Count to n at a server that runs, or preempt that on the way.
+    """Count to n at a server that runs.
 
     Args:
         count: Where to stop.

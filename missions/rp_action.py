@@ -102,7 +102,7 @@ def gotopose(robot: str, x: float, y: float, theta: float = 0.0) -> StateMachine
 
 
 def stopmove(robot: str) -> StateMachine:
-    """Stop a robot: every goal that drives or turns it is cancelled.
+    """Stop a robot: cancel all that drives or turns it.
 
     Args:
         robot: Its name.
@@ -121,7 +121,7 @@ def turn(
     client: str = "",
     server: str = "",
 ) -> StateMachine:
-    """Turn a robot (-client ROBOT), or offer that (-server ROBOT).
+    """Turn a robot (-client NAME), or offer it (-server NAME).
 
     Args:
         angle: How far, or to which heading [deg], anticlockwise.
