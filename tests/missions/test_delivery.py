@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from actionlib_core.clock import VirtualClock, use_clock
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.std_msgs.msg import Bool, String
 from actionlib_core.interfaces.std_srvs.srv import SetBool
@@ -306,8 +307,8 @@ def test_whatever_servers_do_it_ends(mission, machine):
 # -- in the simulated office -----------------------------------------------------------------------
 
 
-@pytest.fixture
-def office_world(clock):
+@contextlib.contextmanager
+def in_the_office(clock):
     """The office with its doors; `answers` are given two seconds after each question."""
     with contextlib.ExitStack() as stack:
         network = MemoryNetwork(clock)
@@ -327,6 +328,12 @@ def office_world(clock):
         stack.enter_context(
             Subscriber("/robot_0/operator/question", String, on_question, node=building)
         )
+        yield world
+
+
+@pytest.fixture
+def office_world(clock):
+    with in_the_office(clock) as world:
         yield world
 
 
@@ -359,3 +366,11 @@ def test_something_in_the_doorway_sends_it_home(office_world):
     body = office_world.robots["robot_0"].body
     assert (round(body.x, 1), round(body.y, 1)) == HOME
     assert office_world.asked == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10))
+def test_it_delivers_whoever_goes_first(seed):
+    with VirtualClock(seed) as clock, use_clock(clock), in_the_office(clock) as office_world:
+        office_world.answers = ["yes"]
+        assert delivery().execute() == "succeeded"

@@ -16,6 +16,7 @@ from missions.move_base.occupancy import FREE, load_map
 from smachpy import events as ev
 from smachpy.checks import check
 from smachpy.checks.suppression import read_settings
+from smachpy.testing import mission_kit
 
 RAYS = 180
 
@@ -264,3 +265,22 @@ def test_the_simulated_robot_sees_the_rooms_around_it(simulation, path):
         wrong += real.cells[real.cell(x, y)] != FREE
     assert (seen.cells == FREE).sum() > 3000
     assert wrong < 0.02 * (seen.cells == FREE).sum()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_same_seed_gives_the_same_search(seed, path):
+    def search():
+        with mission_kit(seed=seed) as mission:
+            world = Hall(mission)
+            run = mission(explore(path, most=3))
+            world.timer.cancel()
+            return (
+                run.outcome,
+                run.path,
+                run.duration,
+                [g.target_pose.pose for g in world.robot.goals],
+            )
+
+    first = search()
+    assert first[0] == "succeeded"
+    assert search() == first
