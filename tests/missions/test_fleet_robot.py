@@ -15,6 +15,7 @@ from missions.interfaces import (
     RechargeGoal,
 )
 from missions.interfaces.srv import Permit, PermitRequest
+from smachpy.testing import mission_kit
 
 YES, NO = {"granted": True}, {"granted": False, "reason": "it is no longer yours"}
 
@@ -282,3 +283,29 @@ def test_robots_that_never_come_are_lost(mission):
     run.assert_outcome("undelivered")
     run.assert_duration(at_most=200)
     assert "robot_1 was lost while it was handed out" in run.userdata["report"]
+
+
+def test_a_robot_that_comes_back_gets_no_more_orders_in_this_run(mission, scripted):
+    scripted["robot_0"][0].die(after=5, back_after=2)
+    run = mission(fleet(2, 4, start=False))
+    run.assert_outcome("succeeded")
+    assert len(scripted["robot_0"][0].goals) == 1
+
+
+@pytest.mark.slow
+def test_the_same_seed_gives_the_same_run_twice():
+    def verdict(seed):
+        with mission_kit(seed=seed) as kit:
+            for robot in ("robot_0", "robot_1", "robot_2"):
+                server = kit.action_server(f"/{robot}/deliver", DeliverAction)
+                if robot == "robot_1":
+                    server.die(after=5)
+                server.default_result({"charge": 0.9, "text": "handed over"}, duration=30)
+                kit.action_server(f"/{robot}/move_base", MoveBaseAction).default_result(duration=10)
+                kit.action_server(f"/{robot}/recharge", RechargeAction)
+            run = kit(fleet(3, 9, start=False))
+            return run.outcome, run.path, run.duration, run.userdata["report"]
+
+    first = [verdict(seed) for seed in range(20)]
+    assert first == [verdict(seed) for seed in range(20)]
+    assert {outcome for outcome, *_ in first} == {"succeeded"}
