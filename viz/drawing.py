@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import secrets
+import os
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -19,7 +19,6 @@ from viz.page import INCH
 from viz.theme import THEMES, Theme
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Callable, Iterable
 
     from smachpy.events import Event
@@ -291,7 +290,7 @@ _FORMS: dict[str, Callable[[StateRecord, Look, Marks], bytes]] = {
 
 def _write(file: Path, content: bytes) -> None:
     """Write whole or not at all: a viewer never sees half a picture."""
-    draft = file.with_name(f".{file.name}.{secrets.token_hex(4)}")
+    draft = file.with_name(f".{file.name}.{os.urandom(4).hex()}")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         try:

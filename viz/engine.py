@@ -7,6 +7,7 @@ in the C library reaches the robot's process.
 from __future__ import annotations
 
 import contextlib
+import html
 import importlib.util
 import json
 import os
@@ -17,7 +18,6 @@ import sys
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar
-from xml.sax.saxutils import escape
 
 from graphviz import ExecutableNotFound
 from graphviz.backend.execute import run_check
@@ -294,8 +294,8 @@ def _font_configuration() -> str:
     return f"""<?xml version="1.0"?>
 <!DOCTYPE fontconfig SYSTEM "fonts.dtd">
 <fontconfig>
-  <dir>{escape(str(FONTS))}</dir>
-  <include ignore_missing="yes">{escape(system)}</include>
+  <dir>{html.escape(str(FONTS))}</dir>
+  <include ignore_missing="yes">{html.escape(system)}</include>
   <cachedir prefix="xdg">fontconfig</cachedir>
 </fontconfig>
 """

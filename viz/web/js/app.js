@@ -119,6 +119,7 @@ class Page {
       this.diagram.svg.classList.toggle("busy", left > 3 * BUSY * (WORDS_MS / 1000));
     }
     this.timeline.draw();
+    this.diagram.paintMinis();
     this.#announce(moment);
     this.#follow();
   }

@@ -6,6 +6,7 @@ import { ms } from "viewer/fold";
 const NS = "http://www.w3.org/2000/svg";
 const SEP = "\u0001";
 const FLASH_MS = 380, FADE_MS = 5000;
+const BRIEF_MS = 400; // a state that has run for less has no clock
 const ICONS = { // in a box of 10 x 10
   action: "M2 1.2 8.6 5 2 8.8Z", service: "M1 3.4h7M6 1.2 8.4 3.4 6 5.6M9 6.8H2M4 4.6 1.6 6.8 4 9",
   monitor: "M5 1a4 4 0 1 0 0 8a4 4 0 1 0 0-8M5 3.4a1.6 1.6 0 1 0 0 3.2a1.6 1.6 0 1 0 0-3.2",
@@ -58,6 +59,7 @@ export class Diagram {
     this.arrows = new Map();
     this.boxes = new Map();
     this.minis = new Map();
+    this.minisDue = new Map();
   }
 
   draw(layout, machine, problems) {
@@ -251,17 +253,25 @@ export class Diagram {
       classes.toggle(`was-${name}`, !active && kind === name);
     classes.toggle("raised", !active && !!state?.error);
     classes.toggle("faded", !active && state?.left != null && now - ms(state.left) > FADE_MS);
-    group.glyph.textContent = glyph(state, active, kind);
-    group.badge.textContent = active ? elapsed(state, now) : group.note || "";
-    if (group.bar) group.bar.style.transform = `scaleX(${active ? goal?.progress?.fraction ?? 0 : 0})`;
+    write(group.glyph, glyph(state, active, kind));
+    write(group.badge, active ? elapsed(state, now) : group.note || "");
+    const part = active ? goal?.progress?.fraction ?? 0 : 0;
+    if (group.bar && group.bar.part !== part) group.bar.style.transform = `scaleX(${group.bar.part = part})`;
     const status = active ? (state.preempt ? `asked to stop${state.serviced ? ", takes it up" : ""}` : "running") : state?.outcome ?? "not visited";
-    group.setAttribute("aria-label", `${path}, ${status}${group.change ? `, ${group.change}` : ""}`);
-    this.minis.get(path)?.classList.toggle("active", active);
+    const label = `${path}, ${status}${group.change ? `, ${group.change}` : ""}`;
+    if (group.label !== label) group.setAttribute("aria-label", group.label = label);
+    this.minisDue.set(path, active);
+  }
+
+  // The small map follows a few times a second: drawing it at every event costs as much as the rest.
+  paintMinis() {
+    for (const [path, active] of this.minisDue) this.minis.get(path)?.classList.toggle("active", active);
+    this.minisDue.clear();
   }
 
   tickBadge(path, state, now) {
     const group = this.nodes.get(path);
-    if (group && state.since != null) group.badge.textContent = elapsed(state, now);
+    if (group && state.since != null) write(group.badge, elapsed(state, now));
   }
 
   flash(path, outcome, now) {
@@ -321,6 +331,13 @@ function glyph(state, active, kind) {
   return { success: "\u2713", failure: "\u2715", preempted: "\u25a0", other: "" }[kind];
 }
 
+// Text is laid out anew whenever it is set, so it is set only when it is another one.
+function write(element, text) {
+  if (element.shown === text) return;
+  element.shown = text;
+  element.textContent = text;
+}
+
 export function span(seconds) {
   if (seconds < 10) return `${seconds.toFixed(1)} s`;
   if (seconds < 120) return `${Math.floor(seconds)} s`;
@@ -329,14 +346,15 @@ export function span(seconds) {
 }
 
 function elapsed(state, now) {
-  const parts = [];
+  const parts = [], lasted = now - ms(state.since);
+  if (lasted < BRIEF_MS && !state.preempt && !(state.attempt > 1)) return "";
   if (state.item != null) parts.push(`#${state.item + 1}`);
   if (state.attempt > 1) parts.push(`attempt ${state.attempt}`);
   if (state.preempt) {
     const grace = state.asked?.grace, asked = span(Math.max(0, now - ms(state.preempt)) / 1000);
     parts.push(state.serviced ? `cleans up ${span(Math.max(0, now - ms(state.serviced)) / 1000)}` : `asked to stop ${asked}${grace != null ? ` of ${span(grace)}` : ""}`);
   }
-  else parts.push(span(Math.max(0, now - ms(state.since)) / 1000));
+  else parts.push(span(Math.max(0, lasted) / 1000));
   return parts.join(" \u00b7 ");
 }
 
