@@ -145,7 +145,7 @@ class Guide:
         """Set out, or go on."""
         self.watch = TripWatch()
         saved = None if self.kept is None else self.kept.load()
-        userdata.update(saved or BEGINNING)
+        userdata.update({**(saved or BEGINNING), "in_vain": 0})
         return "again" if saved else "anew"
 
     def begin_at_nearest(self, userdata: UserData) -> str:
@@ -156,11 +156,11 @@ class Guide:
     def take_next(self, userdata: UserData) -> str:
         """Take the next waypoint, if there is one."""
         total = self.trip.total
+        if userdata.done == total and self.kept is not None:
+            self.kept.forget()
         if userdata.in_vain >= len(self.trip.waypoints):
             return "none_reached"
         if userdata.done == total:
-            if self.kept is not None:
-                self.kept.forget()
             userdata.progress = Progress(1.0, 0.0, f"{total}/{total}")
             return "some_skipped" if userdata.skipped else "all_visited"
         trip = self.trip.begun_at(userdata.first)

@@ -158,6 +158,19 @@ def test_it_resumes_a_round_that_began_at_the_nearest(mission, robot, file, tmp_
     assert places(robot) == [3, 1]
 
 
+@pytest.mark.parametrize("loop", [1, 0])
+def test_after_a_round_in_vain_it_tries_again(mission, robot, file, tmp_path, loop):
+    kept = tmp_path / "state.json"
+    bad = robot.reply_conditionally(lambda goal: True, status="aborted", duration=1)
+    mission(waypoints(file(), tries=1, loop=loop, resume=kept)).assert_outcome("aborted")
+    assert kept.exists() == (loop == 0)
+    bad.status = "succeeded"
+    robot.goals.clear()
+    mission.preempt(at=2.5)
+    mission(waypoints(file(), tries=1, loop=loop, resume=kept))
+    assert places(robot) == [1, 2, 3]
+
+
 @pytest.mark.parametrize(
     ("text", "got"),
     [
