@@ -132,8 +132,17 @@ class _Patience:
         return f"{who.name} stands in the way at ({who.x:.2f}, {who.y:.2f})"
 
 
-def _follow(robot: Robot, way: list[Point], goal: Pose2D) -> Generator[Command, None, End]:
-    """Follow a way, around those who stand on it if there is room."""
+def _follow(
+    robot: Robot, way: list[Point], goal: Pose2D, *, asked: bool = False
+) -> Generator[Command, None, End]:
+    """Follow a way, around those who stand on it if there is room.
+
+    Args:
+        robot: It drives.
+        way: Where.
+        goal: Its end, and the heading there.
+        asked: It makes room for somebody, and does not stop for more requests.
+    """
     follower = Follower(way, goal, robot.config.robot, robot.config.control)
     count, longest, dt = 0, _longest(robot, follower.remaining), _dt(robot)
     gap, think, held = math.inf, -math.inf, 0.0
@@ -155,7 +164,7 @@ def _follow(robot: Robot, way: list[Point], goal: Pose2D) -> Generator[Command, 
                     continue
             speed = min(speed, _safe_speed(robot, gap))
             held = held + dt if speed == 0.0 and gap < math.inf else 0.0
-            if held > _HOLD or (held and robot.request() is not None):
+            if held > _HOLD or (held and not asked and robot.request() is not None):
                 return End.HELD
         yield speed, turn_rate
         if robot.bumped:
@@ -231,13 +240,15 @@ def _make_room(robot: Robot, request: Request) -> Generator[Command]:
     farther = request.depth * 2.0 * (robot.body.radius + _KEPT_AWAY)
     robot.look()
     way = robot.planner.refuge(here, other.ahead(), clearance + farther, robot.traffic.values())
-    if way is None:
+    end = End.HELD
+    if way is not None:
+        end = yield from _follow(robot, way, Pose2D(*way[-1], robot.body.yaw), asked=True)
+        yield from brake(robot)
+    robot.follower = None
+    if end is not End.ARRIVED:
         robot.pass_on(request)
         yield from _stand(robot, _RETHINK)
         return
-    yield from _follow(robot, way, Pose2D(*way[-1], robot.body.yaw))
-    yield from brake(robot)
-    robot.follower = None
     until = robot.now + _YIELD_WAIT
     while robot.now < until and _comes_near(other, here, clearance):
         yield from _stand(robot, _RETHINK)
