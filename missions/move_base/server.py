@@ -39,6 +39,7 @@ from missions.move_base.world import AT_DOCK
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from actionlib_core.exceptions import ServerConflictError
     from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseGoal
     from actionlib_core.node import Node
     from missions.interfaces import ChargeGoal
@@ -132,6 +133,11 @@ class RobotServer:
         Blocks: until then.
         """
         self._move.wait()
+
+    @property
+    def conflict(self) -> ServerConflictError | None:
+        """Why it left its names by itself: an older robot of this name was found; else None."""
+        return self._move.action_server.error or self._charge.action_server.error
 
     def close(self) -> None:
         """Stop taking goals; a running one is aborted. A second call does nothing.

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import Any
 
+    from actionlib_core.exceptions import ServerConflictError
     from missions.move_base.doors import Door
     from missions.move_base.world import Robot, World
 
@@ -56,6 +57,7 @@ class Simulation:
         self.servers: dict[str, RobotServer] = {}
         self._closing = self._node.clock.event("the simulation closes")
         self._closed = False
+        self._conflict: ServerConflictError | None = None
 
     @property
     def node(self) -> Node:
@@ -115,10 +117,16 @@ class Simulation:
 
         Blocks: until then.
         """
-        if self.servers:
-            next(iter(self.servers.values())).wait()
-        else:
-            self._closing.wait()
+        self._closing.wait()
+        if self._conflict is not None:
+            raise self._conflict
+
+    def check_names(self) -> None:
+        """End the wait when a robot had to leave its name to an older one."""
+        for server in tuple(self.servers.values()):
+            if server.conflict is not None and self._conflict is None:
+                self._conflict = server.conflict
+                self._closing.set()
 
     def close(self) -> None:
         """Take everything off the network; running goals are aborted. A second call does nothing.
@@ -164,6 +172,7 @@ class _Surroundings:
         del now
         for door in self._doors:
             door.report()
+        self._simulation.check_names()
 
 
 class _DoorServer:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from actionlib_core.clock import VirtualClock, use_clock
 from actionlib_core.exceptions import ServerConflictError
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
@@ -322,6 +323,35 @@ def test_two_robots_of_one_name_are_refused(clock, network, node, add, office, s
             with pytest.raises(ServerConflictError):
                 with simulation(other, node=second):
                     pass
+
+
+def test_a_robot_that_finds_an_older_one_later_ends_the_whole(node, add, world):
+    add("robot_0", 3.0, 7.7)
+    add("robot_1", 6.0, 7.7)
+    with simulation(world) as made:
+        error = ServerConflictError("robot_1/move_base", ("a", "1"), ("b", "2"))
+        made.servers["robot_1"]._move.action_server.on_conflict(error)
+        with pytest.raises(ServerConflictError, match="'robot_1/move_base': two servers"):
+            made.wait()
+
+
+def test_the_same_world_twice_is_the_same(office, strong):
+    def run():
+        with VirtualClock(seed=3) as clock, use_clock(clock):
+            session = MemoryNetwork(clock).session()
+            with Node("test", transport=session, clock=clock) as node, use_node(node):
+                with simulation(robots=4) as made:
+                    clients = []
+                    for i, name in enumerate(made.robots):
+                        client = SimpleActionClient(f"{name}/move_base", MoveBaseAction)
+                        client.wait_for_server(1.0)
+                        client.send_goal(goal_at(Pose2D(3.0 + 2.0 * i, 7.7, 0.0)))
+                        clients.append(client)
+                    for client in clients:
+                        client.wait_for_result(60.0)
+                    return clock.now(), [robot.body.pose for robot in made.world.robots]
+
+    assert run() == run()
 
 
 def test_robots_of_different_rates_are_refused(clock, node, add, world, strong):
