@@ -170,10 +170,12 @@ class RobotServer:
     def report(self, now: float) -> None:
         """Send feedback, odometry and battery where they are due; tell what has ended."""
         moved, self._moved = self._moved, False
-        if moved and now - self._fed_back > self._feedback_period - _JUST_PAST:
+        due = moved and now - self._fed_back > self._feedback_period - _JUST_PAST
+        if due:
             self._fed_back = now
             self._publish_feedback()
-        if moved and (self._robot.body.standing or self._odom.get_num_connections()):
+        # Who comes later gets the last one, so it is never old, even when nobody listens.
+        if due or (moved and (self._robot.body.standing or self._odom.get_num_connections())):
             self._publish_odometry()
         self._report_scan(now)
         self._report_battery(now)

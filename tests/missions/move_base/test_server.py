@@ -170,6 +170,15 @@ def test_odometry_and_battery_can_be_watched_at_rest_and_on_the_way(clock, simul
     assert seen[-1].twist.twist.linear.x == pytest.approx(0.0, abs=1e-6)
 
 
+def test_the_first_odometry_of_who_comes_later_is_not_old(clock, simulation, client):
+    client.send_goal(goal_at(OFFICE_1))
+    for _ in range(7):
+        clock.sleep(0.53)
+        pose = wait_for_message("odom", Odometry, 1.0).pose.pose.position
+        body = simulation.robot.body
+        assert math.hypot(pose.x - body.x, pose.y - body.y) <= 0.3 * abs(body.speed) + 0.05
+
+
 # -- charging --------------------------------------------------------------------------------------
 
 
