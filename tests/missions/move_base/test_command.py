@@ -57,6 +57,7 @@ def test_all_parameters_are_listed(capsys):
         assert name in text
 
 
+@pytest.mark.slow
 @pytest.mark.zenoh
 def test_a_world_as_a_process():
     command = [sys.executable, "-m", "missions.move_base", "--world", FOLDER / "office_world.yaml"]
