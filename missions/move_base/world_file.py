@@ -12,7 +12,7 @@ from missions.checked_yaml import REQUIRED, Document, Limits
 from missions.exceptions import NavigationError
 from missions.maps import OFFICE_MAP, OFFICE_ROBOT
 from missions.move_base.config import SimConfig, load_config
-from missions.move_base.floor import Floor
+from missions.move_base.floor import Floor, Obstacle
 from missions.move_base.geometry import Pose2D
 from missions.move_base.occupancy import load_map
 from missions.move_base.world import Robot, World
@@ -100,7 +100,7 @@ class WorldSpec:
         """Make the world as it begins at time `now` [s].
 
         Raises:
-            NavigationError: a robot cannot stand where it begins.
+            NavigationError: a robot or a moving obstacle cannot stand where it begins.
         """
         world = World(self.grid)
         for robot in self.robots:
@@ -109,6 +109,11 @@ class WorldSpec:
             except NavigationError as error:
                 raise NavigationError(f"{self.name}: {robot.name}: {error}") from error
         for mover in self.movers:
+            x, y = mover.places[0]
+            someone = world.who_is_at(Obstacle(x, y, mover.radius))
+            if someone:
+                where = f"({x:.2f}, {y:.2f}) is taken by {someone}"
+                raise NavigationError(f"{self.name}: {mover.name}: first place: {where}")
             world.add_mover(
                 mover.name, mover.places, radius=mover.radius, speed=mover.speed, loop=mover.loop
             )

@@ -98,6 +98,15 @@ def test_two_robots_on_one_place_are_refused(write):
         load_world(path).build(0.0)
 
 
+def test_what_moves_cannot_begin_where_a_robot_stands(write):
+    path = write(
+        "robots: [{x: 4, y: 7.7}]\nmoving: [{name: visitor, places: [{x: 4.3, y: 7.7}]}]\n"
+    )
+    expected = r"visitor: first place: \(4\.30, 7\.70\) is taken by robot_0"
+    with pytest.raises(NavigationError, match=expected):
+        load_world(path).build(0.0)
+
+
 def test_robots_by_number_stand_apart_and_near_the_first(office, office_robot):
     specs = place_robots(office, office_robot, 50)
     assert [spec.name for spec in specs] == [f"robot_{i}" for i in range(50)]
