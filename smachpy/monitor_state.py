@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections import deque
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from actionlib_core.time import to_seconds
 from actionlib_core.topic import NotingSubscriber
 from smachpy import log
+from smachpy._core.plain import only_compares
 from smachpy._runtime.interface import adopt_interface, name_of
 from smachpy._runtime.wakeup import Wakeup
 from smachpy.events import CallbackFailed
@@ -28,7 +30,9 @@ __all__ = ["MonitorState"]
 class MonitorState(State):
     """Checks the messages of a topic. Outcomes: 'valid', 'invalid', 'preempted'.
 
-    The condition runs in the thread that runs the state, once per message, in order.
+    The condition runs in the thread that runs the state, once per message, in order. One that only
+    reads and compares (`message.percentage > 0.2`: no call, no loop, nothing written) runs where
+    the message arrives: while the messages are good, the state's thread sleeps.
 
     Args:
         topic: Name of the topic.
@@ -41,7 +45,8 @@ class MonitorState(State):
         output_keys: Userdata keys that it writes.
         timeout: `timeout_outcome` after so long [s]; None: no limit.
         timeout_outcome: Outcome then; registered if there is a timeout.
-        latest: Of several messages that wait, check only the newest.
+        latest: Of several messages that wait, check only the newest. For a condition that only
+            reads and compares none ever waits.
         node: Where to listen; the current node when None.
         **options: See `smachpy.state.StateOptions`.
     """
@@ -81,20 +86,15 @@ class MonitorState(State):
 
         Blocks: see above.
         """
-        inbox: deque[Any] = deque(maxlen=1 if self._latest else None)
         with Wakeup(self) as wake:
+            condition = partial(self._cond_cb, ud) if only_compares(self._cond_cb) else None
+            checks = _Checks(condition, wake, most=self._max_checks, latest=self._latest)
+            with NotingSubscriber(self._topic, self._msg_type, checks.note, node=self._node):
+                return self._watch(ud, wake, checks)
 
-            def note(message: Any) -> None:
-                inbox.append(message)
-                wake.set()
-
-            with NotingSubscriber(self._topic, self._msg_type, note, node=self._node):
-                return self._watch(ud, wake, inbox)
-
-    def _watch(self, ud: Any, wake: Wakeup, inbox: deque[Any]) -> str:
+    def _watch(self, ud: Any, wake: Wakeup, checks: _Checks) -> str:
         clock = wake.clock
         until = None if self._timeout_s is None else clock.now() + self._timeout_s
-        checks = 0
         while True:
             wake.clear()
             if self.preempt_requested():
@@ -102,12 +102,10 @@ class MonitorState(State):
                 return "preempted"
             if until is not None and clock.now() >= until:
                 return self.timeout_outcome
-            if inbox:
-                if not self._check(ud, inbox.popleft()):
-                    return "invalid"
-                checks += 1
-                if 0 < self._max_checks <= checks:
-                    return "valid"
+            if checks.outcome is not None:
+                return checks.outcome
+            if checks.waiting:
+                checks.count(good=self._check(ud, checks.waiting.popleft()))
                 continue
             wake.wait_until(until)
 
@@ -136,3 +134,60 @@ class MonitorState(State):
         if self._timeout_s is not None:
             own.append(("timeout", f"{self._timeout_s:g} s -> {self.timeout_outcome}"))
         return kind, (*own, *details)
+
+
+class _Checks:
+    """The messages of one run: what they have come to, and those that are still to be checked.
+
+    Args:
+        condition: Called with each message where it arrives; None: the state's thread checks them.
+        wake: What the state's thread waits on.
+        most: So many good messages are enough; -1: no limit.
+        latest: Keep only the newest of those that wait.
+
+    Attributes:
+        waiting: Those that the state's thread is to check.
+        outcome: What the state ends with; None: nothing yet.
+
+    Threads: `note` on the network's; the rest belongs to the state's.
+    """
+
+    def __init__(
+        self,
+        condition: Callable[[Any], object] | None,
+        wake: Wakeup,
+        *,
+        most: int,
+        latest: bool,
+    ) -> None:
+        self.waiting: deque[Any] = deque(maxlen=1 if latest else None)
+        self.outcome: str | None = None
+        self._condition = condition
+        self._most = most
+        self._wake = wake
+        self._good = 0
+
+    def note(self, message: Any) -> None:
+        """Take a message; wake the state's thread if it has to do something about it."""
+        if self._condition is not None:
+            if self.outcome is not None:
+                return
+            try:
+                good = bool(self._condition(message))
+            except Exception:  # noqa: BLE001  the state's thread calls it again, and reports it
+                self._condition = None
+            else:
+                if self.count(good=good):
+                    self._wake.set()
+                return
+        self.waiting.append(message)
+        self._wake.set()
+
+    def count(self, *, good: bool) -> bool:
+        """Count an answer, in one of the two threads; tell whether it ends the state."""
+        self._good += good
+        if not good:
+            self.outcome = "invalid"
+        elif 0 < self._most <= self._good:
+            self.outcome = "valid"
+        return self.outcome is not None
