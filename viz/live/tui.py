@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from rich.text import Text
 from textual import work
 from textual.app import App, ComposeResult
+from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
 from textual.widgets import DataTable, Footer, Input, RichLog, Static, Tree
 
@@ -55,7 +56,7 @@ class MissionApp(App[None]):
         ("n", "next", "Next machine"),
         ("o", "follow", "Follow"),
         ("slash", "search", "Search"),
-        ("space", "pause", "Pause"),
+        Binding("space", "pause", "Pause", priority=True),  # else the tree takes it
         ("s", "step", "Step"),
         ("escape", "leave", "Back"),
     ]
@@ -86,7 +87,7 @@ class MissionApp(App[None]):
             with Vertical():
                 yield Static(id="goals")
                 yield DataTable(id="userdata", cursor_type="row")
-                yield RichLog(id="log", max_lines=500, wrap=True)
+                yield RichLog(id="log", max_lines=500, wrap=True, min_width=20)
         yield Footer()
 
     def on_mount(self) -> None:
@@ -213,9 +214,16 @@ class MissionApp(App[None]):
             lines.append("\u2501" * (BAR - filled), "dim")
             words = goal["text"] or progress.get("text") or ""
             lines.append(f" {part:4.0%} {goal['status'].lower()} {shorten(words, 40)}\n")
-        self.query_one("#goals", Static).update(lines)
+        goals = self.query_one("#goals", Static)
+        goals.display = bool(lines)
+        goals.update(lines)
 
     # -- keys ----------------------------------------------------------------------------------
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Leave the space bar to the search while somebody types there."""
+        del parameters
+        return not (action == "pause" and self.query_one("#search", Input).has_focus)
 
     def action_next(self) -> None:
         """Show the next machine."""

@@ -50,6 +50,11 @@ def test_tree_log_status_search_and_refused_commands(tmp_path, clock):
             found["cursor"] = str(app.query_one(Tree).cursor_node.label)
             await pilot.press("s")
             await pilot.pause(0.1)
+            await pilot.press("space")  # though the tree has the focus
+            await pilot.pause(0.1)
+            found["told"] = [note.message for note in app._notifications]
+            await pilot.press("slash", "a", "space", "b")
+            found["typed"] = app.query_one("#search").value
             app.save_screenshot(str(tmp_path / "tui.svg"))
 
     asyncio.run(look())
@@ -58,4 +63,44 @@ def test_tree_log_status_search_and_refused_commands(tmp_path, clock):
         "tree"
     ][0]
     assert found["log"] > 3
+    assert found["told"] == ["this viewer only looks; try --control"] * 2
+    assert found["typed"] == "a b"
     assert "DEEP" in found["cursor"]
+
+
+def test_a_preempt_says_who_asked_and_who_holds_it_up(tmp_path, clock):
+    recording = recorded(tmp_path)
+    deep = next(e for e in recording.events if e["path"] == "/JOB/IN/DEEP")
+    at = recording.events.index(deep) + 1
+    events = recording.events[:at]
+    asked = {"source": "operator", "by": "ann", "why": "preempt /JOB"}
+    for path, grace in (("/JOB", None), ("/JOB/IN", None), ("/JOB/IN/DEEP", 5.0)):
+        number = len(events) + 1
+        stamp = deep["stamp_ns"] + number
+        events.append(
+            {
+                "kind": "PreemptRequested", "path": path, "seq": number, "t": 0.0,
+                "stamp_ns": stamp, "grace": grace, **asked,
+            }
+        )  # fmt: skip
+    machines = Machines()
+    machine = machines.obtain("job")
+    machine.recorded = True
+    machine.reset({**recording.history(), "events": events})
+    found = {}
+
+    async def look():
+        app = MissionApp(machines, None)
+        async with app.run_test(size=(120, 40)) as pilot:
+            app.refresh_view()
+            await pilot.pause()
+            found["status"] = str(app.query_one("#status", Static).render())
+            found["preempt"] = str(app.query_one("#preempt", Static).render())
+            found["log"] = "\n".join(line.text for line in app.query_one(RichLog).lines)
+
+    asyncio.run(look())
+    assert "preempting" in found["status"]
+    assert "preempt by operator ann: preempt /JOB" in found["preempt"]
+    assert "DEEP holds it up for" in found["preempt"]
+    assert "of 5 s" in found["preempt"]
+    assert "asked to stop by operator ann" in found["log"]

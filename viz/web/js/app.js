@@ -23,6 +23,7 @@ const PANELS_MS = 160; // the panels are drawn again at most so often
 const WORDS_MS = 400; // and the inspector
 const BUSY = 15; // transitions in a second from which they do not fade one by one
 const ANNOUNCE_MS = 1000;
+const READABLE = 0.55; // the scale below which fewer levels are opened at first
 
 class Page {
   constructor() {
@@ -49,7 +50,11 @@ class Page {
     svg.addEventListener("click", (e) => this.#click(e));
     svg.addEventListener("dblclick", (e) => this.#open(e));
     minimap.addEventListener("pointerdown", (e) => this.#jump(e));
-    new ResizeObserver(() => { this.diagram.showWindow(this.view); this.timeline.draw(); }).observe(svg);
+    new ResizeObserver(() => {
+      if (this.fitted && this.view.is(this.fitted)) this.fit({ fly: false }); // who saw all sees all again
+      this.diagram.showWindow(this.view);
+      this.timeline.draw();
+    }).observe(svg);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.timeline.restyle());
     listen(this);
     setInterval(() => this.#beat(), 200);
@@ -194,6 +199,7 @@ class Page {
         this.diagram.draw(result, model, store.problems.value);
         this.#hold(anchor);
         this.paintAll();
+        if (this.wish?.frame === true && this.view.scaleFor(this.diagram.size) < READABLE && store.shallower()) this.again = true;
       } while (this.again);
       const wish = this.wish ?? {};
       this.wish = null;
@@ -232,7 +238,9 @@ class Page {
     if (open) { store.opened.value = open; this.relayout({ frame: "follow" }); }
   }
 
-  fit({ fly = true } = {}) { if (this.diagram.size) this.view.frame(this.diagram.size, { fly, most: 1.5 }); }
+  fit({ fly = true } = {}) {
+    if (this.diagram.size) this.fitted = this.view.frame(this.diagram.size, { fly, most: 1.5 });
+  }
 
   // -- what the user does -------------------------------------------------------------------------
 

@@ -28,7 +28,7 @@ export async function compare(page, name) {
 function show(page, payload) {
   const opened = store.opened.value;
   store.setModel(payload);
-  store.opened.value = new Set([...opened].filter((path) => store.model.value.get(path)?.children.length));
+  store.keepOpened(new Set([...opened].filter((path) => store.model.value.get(path)?.children.length)));
   page.select(null);
   page.layout.forget();
   page.relayout({ frame: true });

@@ -143,16 +143,17 @@ export class Diagram {
       group.append(el("circle", { class: `dot ${kind}`, cx: x + dot.x, cy: y + dot.y, r: 3.2 }));
       group.append(el("text", { class: `outcome ${kind}`, x: x + dot.x - 7, y: y + dot.y + 3.1, "text-anchor": "end" }, dot.outcome));
     }
-    this.#extras(group, node, { x, y, w: place.w, h: place.h });
+    const room = place.dots.length ? place.nameWidth : place.w; // its outcomes are right of that
+    this.#extras(group, node, { x, y, w: place.w, h: place.h }, room);
     into.append(group);
   }
 
   // Badges that appear when there is something to say.
-  #extras(group, node, box) {
+  #extras(group, node, box, room = box.w) {
     const badge = el("text", { class: "badge", x: box.x + box.w - 5, y: box.y - 3, "text-anchor": "end" });
     group.append(badge);
     group.badge = badge;
-    const glyph = el("text", { class: "glyph", x: box.x + box.w - 8, y: box.y + 10, "text-anchor": "middle" });
+    const glyph = el("text", { class: "glyph", x: box.x + room - 8, y: box.y + 10, "text-anchor": "middle" });
     group.append(glyph);
     group.glyph = glyph;
     const found = this.problems.get(node.path);
@@ -190,7 +191,9 @@ export class Diagram {
     const { change, note } = edge.link;
     const said = [!edge.labels.length && change ? SIGNS[change] : "", note].filter(Boolean).join(" ");
     const middle = longest(edge.points);
-    const count = el("text", { class: "count", x: x + middle.x + 4, y: y + middle.y - 3 }, said);
+    const right = !edge.labels.some((label) => label.x > middle.x); // not where the names are
+    const count = el("text", { class: "count", x: x + middle.x + (right ? 4 : -4), y: y + middle.y - 3,
+      "text-anchor": right ? "start" : "end" }, said);
     count.said = said;
     into.append(count);
     for (const path of this.arrows.get(edge.source + SEP + edge.outcomes[0]) ?? [])

@@ -169,7 +169,7 @@ function Userdata({ page, data, now }) {
   let container = null;
   return html`<${Section} title="Userdata" count=${all.length || null}>
     ${!all.length && html`<p class="hint">nothing written yet</p>`}
-    <table class="userdata"><tbody>${all.slice(0, 60).map(([id, entry]) => {
+    <div class="scroller"><table class="userdata"><tbody>${all.slice(0, 60).map(([id, entry]) => {
       const text = brief(entry.value);
       const fresh = now - ms(entry.at) < FLASH_MS;
       const first = several && entry.container !== container;
@@ -179,7 +179,7 @@ function Userdata({ page, data, now }) {
         <td><code>${open === id ? html`<pre>${pretty(entry.value)}</pre>` : text.slice(0, SHORT)}${open !== id && text.length > SHORT ? "\u2026" : ""}</code>
           ${open === id && wasShortened(text) && html`<${Whole} entry=${entry} />`}
           <small>by <${State} path=${entry.writer} page=${page} /> ${clock(entry.at, data)}</small></td></tr>`;
-    })}</tbody></table><//>`;
+    })}</tbody></table></div><//>`;
 }
 
 // Events tell only the beginning of long values; the mission has the rest.

@@ -39,6 +39,7 @@ export const logFilter = signal("all");
 
 export let run = new Run(emptyState(), []);
 let past = null; // the state at the cursor
+let autoDepth = 0; // levels opened by themselves; 0: somebody has chosen what is open
 
 export function begin(base, events) {
   run = new Run(base, events);
@@ -107,7 +108,8 @@ export function setModel(payload) {
   if (payload !== comparison.value?.model) comparison.value = null;
   const open = saved(`open.${next.root.label}`, null);
   const known = open?.filter((path) => next.get(path)?.children.length);
-  opened.value = known?.length ? new Set(known) : next.toDepth(next.readableDepth());
+  autoDepth = known?.length ? 0 : next.readableDepth();
+  opened.value = autoDepth ? next.toDepth(autoDepth) : new Set(known);
 }
 
 export function setImplicit(on) {
@@ -120,8 +122,21 @@ export function setImplicit(on) {
   model.value = next;
 }
 
-export function setOpened(paths) {
+// One level less, if nobody has chosen what is open; false when there is no less.
+export function shallower() {
+  if (autoDepth < 2) return false;
+  autoDepth -= 1;
+  opened.value = model.value.toDepth(autoDepth);
+  return true;
+}
+
+export function keepOpened(paths) {
   opened.value = paths;
+  autoDepth = 0;
+}
+
+export function setOpened(paths) {
+  keepOpened(paths);
   if (model.value) save(`open.${model.value.root.label}`, [...paths]);
 }
 

@@ -3,7 +3,7 @@ import * as store from "viewer/store";
 import { outcomeClass } from "viewer/model";
 import { askerText, ms } from "viewer/fold";
 
-const NAMES = 168, RIGHT = 14, FOOT = 18, LANE = 19, LEAST_SPAN = 0.5, LIVE_SPAN = 30_000;
+const NAMES = 168, NARROW = 84, RIGHT = 14, FOOT = 18, LANE = 19, LEAST_SPAN = 0.5, LIVE_SPAN = 30_000;
 
 export class Timeline {
   constructor(canvas, { onPick }) {
@@ -12,6 +12,7 @@ export class Timeline {
     this.width = LIVE_SPAN; // [ms] shown
     this.end = null; // [ms]; null: with now
     this.top = 0;
+    this.names = NAMES; // [px] for the names of the lanes
     this.onPick = onPick;
     this.colours = null;
     this.lanes = [];
@@ -43,12 +44,14 @@ export class Timeline {
     const now = store.nowMs();
     let end = this.end ?? now + this.width * 0.01;
     if (store.cursor.value !== null && this.end === null) end = Math.max(now + this.width / 2, now);
+    const first = store.run.first(); // a young run begins at the left and grows
+    if (store.cursor.value === null && this.end === null && first != null) end = Math.max(end, first + this.width * 0.98);
     return [end - this.width, end];
   }
 
   #time(px) {
     const [from, to] = this.#range();
-    return from + ((px - NAMES) / (this.canvas.clientWidth - NAMES - RIGHT)) * (to - from);
+    return from + ((px - this.names) / (this.canvas.clientWidth - this.names - RIGHT)) * (to - from);
   }
 
   // Lanes in tree order; made again when a container shows up for the first time.
@@ -77,6 +80,7 @@ export class Timeline {
     const model = store.model.value;
     const width = canvas.clientWidth, height = canvas.clientHeight, ratio = devicePixelRatio || 1;
     if (!width || !model) return;
+    this.names = width < 640 ? NARROW : NAMES;
     if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
       canvas.width = Math.round(width * ratio);
       canvas.height = Math.round(height * ratio);
@@ -87,7 +91,7 @@ export class Timeline {
     g.textBaseline = "middle";
     this.#makeLanes(model, store.run.spans);
     const [from, to] = this.#range();
-    const x = (t) => NAMES + ((t - from) / (to - from)) * (width - NAMES - RIGHT);
+    const x = (t) => this.names + ((t - from) / (to - from)) * (width - this.names - RIGHT);
     this.#grid(g, x, from, to, width, height);
     const room = height - FOOT;
     const lanes = this.#lanesToShow(from, to, room);
@@ -123,7 +127,7 @@ export class Timeline {
   #grid(g, x, from, to, width, height) {
     const begun = ms(store.shown().started) ?? store.run.first() ?? from;
     const steps = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600, 7200].map((s) => s * 1000);
-    const step = steps.find((s) => (s / (to - from)) * (width - NAMES) > 74) ?? 14_400_000;
+    const step = steps.find((s) => (s / (to - from)) * (width - this.names) > 74) ?? 14_400_000;
     g.fillStyle = this.#colour("muted");
     g.strokeStyle = this.#colour("hair");
     g.textAlign = "left";
@@ -139,7 +143,7 @@ export class Timeline {
     g.fillStyle = this.#colour("muted");
     g.textAlign = "left";
     const indent = 10 + Math.min(lane.depth, 6) * 9;
-    g.save(); g.beginPath(); g.rect(0, y, NAMES - 8, h); g.clip();
+    g.save(); g.beginPath(); g.rect(0, y, this.names - 8, h); g.clip();
     g.fillText(lane.name, indent, y + h / 2);
     g.restore();
     const regions = lane.kind === "concurrence" ? lane.children.length : 1;
@@ -153,7 +157,7 @@ export class Timeline {
       const ended = span.to !== null && (later || span.to <= now);
       const until = span.to !== null ? span.to : Math.max(now, store.run.last() ?? now);
       if (until < from) continue;
-      const a = Math.max(NAMES, x(span.from)), b = Math.min(width - RIGHT + 2, x(until));
+      const a = Math.max(this.names, x(span.from)), b = Math.min(width - RIGHT + 2, x(until));
       if (regions === 1 && b - lastPx < LEAST_SPAN && ended) continue; // too thin to see
       lastPx = b;
       const node = this.model.get(span.path);
@@ -225,7 +229,7 @@ export class Timeline {
   #down(e) {
     const box = this.canvas.getBoundingClientRect();
     const px = e.clientX - box.left;
-    if (px < NAMES) return;
+    if (px < this.names) return;
     const span = this.#at(e);
     const from = px;
     let dragged = false;
@@ -249,7 +253,7 @@ export class Timeline {
 
   #wheel(e) {
     e.preventDefault();
-    if (e.shiftKey || (!e.ctrlKey && e.deltaX === 0 && e.offsetX < NAMES)) { this.top += e.deltaY; return; }
+    if (e.shiftKey || (!e.ctrlKey && e.deltaX === 0 && e.offsetX < this.names)) { this.top += e.deltaY; return; }
     const [from, to] = this.#range();
     const at = this.#time(e.offsetX);
     if (Math.abs(e.deltaX) > Math.abs(e.deltaY)) {

@@ -23,7 +23,9 @@ export class Viewport {
     const x = (this.width - box.w * k) / 2 - box.x * k;
     const y = (room - box.h * k) / 2 - box.y * k;
     if (fly) this.fly(x, y, k); else this.set(x, y, k);
+    return { x, y, k };
   }
+  is({ x, y, k }) { return Math.abs(x - this.x) + Math.abs(y - this.y) < 1 && Math.abs(k - this.k) < 1e-3; }
   scaleFor(box, margin = 28) {
     return Math.min((this.width - 2 * margin) / box.w, (this.height - 2 * margin) / box.h);
   }
