@@ -12,12 +12,21 @@ thread if you like. Recordings and the feed of viewers are made of it.
 
 from __future__ import annotations
 
+import sys
 import threading
 from itertools import repeat
 from typing import TYPE_CHECKING, Any
 
 from smachpy import log
-from smachpy.events import GoalDone, GoalFeedback, GoalSent, UserdataWritten, to_record
+from smachpy.events import (
+    Entered,
+    GoalDone,
+    GoalFeedback,
+    GoalSent,
+    Left,
+    UserdataWritten,
+    to_record,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -35,6 +44,7 @@ _CHANGING: tuple[type, ...] = (UserdataWritten, GoalSent, GoalFeedback, GoalDone
 """Events with values that may change later: they become records at once."""
 
 _NOTHING = (None, None, None)
+_new = tuple.__new__  # an event without its class's own `__new__`, which costs more than the rest
 _ROUNDS = 256  # so many transitions between two looks at the limit
 _SAME_NS = 1_000_000  # a wall clock that goes back by less than this was only read inexactly
 
@@ -217,3 +227,45 @@ class Tape:
         if self._name:
             record["path"] = self._name + record["path"].removeprefix(self._read_path)
         return record
+
+
+class EventTape(Tape):
+    """A tape that gives the events themselves, for a reader in the same process.
+
+    It never drops any; the values in them are the machine's own, as a listener gets them.
+
+    Args:
+        machine: The container.
+    """
+
+    def __init__(self, machine: Callbacks) -> None:
+        super().__init__(machine, limit=sys.maxsize)
+        machine._add_tape(self)  # noqa: SLF001  one machinery
+
+    def take(self, event: Event) -> None:
+        """Take an event down."""
+        self._entries.extend((None, event, *_NOTHING))
+
+    def events(self) -> list[Event]:
+        """Return the events since the last call, in order."""
+        with self._lock:
+            self._set_clock()
+            found = iter(self._take_all())
+            events: list[Event] = []
+            last, stamp = None, 0
+            base = step = path = None  # what began last is mostly what ends next
+            for t, what, left, outcome, entered in zip(*[found] * _SLOTS, strict=True):
+                if t is None:
+                    if type(what) is not _Begin:
+                        events.append(what)
+                    continue
+                if t != last:
+                    last, stamp = t, self._stamp_of(t)
+                if left is not None:
+                    if left is not step or what is not base:
+                        path = f"{what}/{left.label}"
+                    events.append(_new(Left, (path, t, stamp, outcome)))
+                if entered is not None:
+                    base, step, path = what, entered, f"{what}/{entered.label}"
+                    events.append(_new(Entered, (path, t, stamp)))
+            return events

@@ -110,9 +110,12 @@ class Callbacks:
         Threads: any.
         """
         made = Tape(self, on_news, limit=limit, name=name)
-        self._tapes = (*self._tapes, made)
-        self._hearing_changed()
+        self._add_tape(made)
         return made
+
+    def _add_tape(self, tape: Tape) -> None:
+        self._tapes = (*self._tapes, tape)
+        self._hearing_changed()
 
     def _remove_tape(self, tape: Tape) -> None:
         self._tapes = tuple(item for item in self._tapes if item is not tape)

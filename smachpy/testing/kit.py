@@ -18,6 +18,7 @@ from smachpy._runtime.asker import asking
 from smachpy.events import Entered, Event
 from smachpy.exceptions import SmachError
 from smachpy.introspection import describe
+from smachpy.tape import EventTape
 from smachpy.testing.doubles import Double, Places
 from smachpy.testing.runs import Run, find_path
 
@@ -342,7 +343,7 @@ class MissionKit:
 
 
 class _Watch:
-    """Sees one run: keeps its events and pulls the triggers."""
+    """Sees one run: takes its events down and pulls the triggers."""
 
     def __init__(
         self,
@@ -353,34 +354,46 @@ class _Watch:
     ) -> None:
         self._clock = kit.clock
         self._machine = machine
-        self._waiting = [(t, None if t.on is None else find_path(record, t.on)) for t in triggers]
+        self._timed = [trigger for trigger in triggers if trigger.on is None]
+        self._waiting = [(t, find_path(record, t.on)) for t in triggers if t.on is not None]
         self._visits: dict[str, int] = {}
+        self._unsubscribe: Callable[[], object] = _nothing
         self.events: list[Event] = []
         self.started = self._clock.now()
 
     @contextlib.contextmanager
     def installed(self) -> Iterator[None]:
         timers = [
-            self._clock.call_later(trigger.at, partial(trigger.act, self._machine))
-            for trigger, _ in self._waiting
-            if trigger.at is not None
+            self._clock.call_later(trigger.at or 0.0, partial(trigger.act, self._machine))
+            for trigger in self._timed
         ]
-        unsubscribe = self._machine.subscribe(self._on_event)
+        tape = EventTape(self._machine)
+        if self._waiting:
+            self._unsubscribe = self._machine.subscribe(self._on_event)
         try:
             yield
         finally:
-            unsubscribe()
+            self._unsubscribe()
+            tape.close()
+            self.events = tape.events()
             for timer in timers:
                 timer.cancel()
 
     def _on_event(self, event: Event) -> None:
-        self.events.append(event)
-        if not self._waiting or not isinstance(event, Entered):
+        """Pull triggers; a listener slows the machine down, so it goes with the last of them."""
+        if not isinstance(event, Entered):
             return
         count = self._visits[event.path] = self._visits.get(event.path, 0) + 1
-        for trigger, path in self._waiting:
+        for trigger, path in list(self._waiting):
             if path == event.path and trigger.visit == count:
                 self._clock.call_later(trigger.after, partial(trigger.act, self._machine))
+                self._waiting.remove((trigger, path))
+        if not self._waiting:
+            self._unsubscribe()
+
+
+def _nothing() -> None:
+    pass
 
 
 def _reraise(error: BaseException, run: Run, limit: float, *, draws: bool) -> NoReturn:

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 import smachpy
 from actionlib_core.clock import RealClock, VirtualClock, use_clock
 from smachpy import Concurrence, Iterator, State, StateMachine
-from smachpy.events import to_record
+from smachpy.events import Entered, Left, Started, UserdataWritten, to_record
+from smachpy.tape import EventTape
 
 
 class Work(State):
@@ -63,23 +64,28 @@ def without_seq(records):
     return [{key: value for key, value in one.items() if key != "seq"} for one in records]
 
 
-def story(listen, act, *, seed=None, make=mission):
+def story(way, act, *, seed=None, make=mission):
     """Run a machine while `act(clock, machine)` happens; return what was heard or taken down."""
     with VirtualClock(seed) as clock, use_clock(clock):
         sm = make()
         heard = []
-        if listen:
+        if way == "listener":
             sm.subscribe(lambda event: heard.append(json.loads(json.dumps(to_record(event)))))
         else:
-            tape = sm.tape()
+            tape = sm.tape() if way == "tape" else EventTape(sm)
         act(clock, sm)
         sm.execute()
-        return heard if listen else json.loads(json.dumps(without_seq(tape.read())))
+        if way == "tape":
+            heard = without_seq(tape.read())
+        elif way == "events":
+            heard = [to_record(event) for event in tape.events()]
+        return json.loads(json.dumps(heard))
 
 
 def both_ways(act, **how):
-    taken, heard = story(False, act, **how), story(True, act, **how)
+    taken, heard = story("tape", act, **how), story("listener", act, **how)
     assert taken == heard
+    assert story("events", act, **how) == heard
     return taken
 
 
@@ -317,3 +323,43 @@ def test_two_tapes_hear_the_same(clock):
     one, two = sm.tape(), sm.tape()
     sm.execute()
     assert one.read() == two.read()
+
+
+def test_a_tape_of_events_gives_what_a_listener_gets():
+    with VirtualClock() as clock, use_clock(clock):
+        sm, heard = mission(), []
+        tape = EventTape(sm)
+        clock.call_later(0.5, lambda: sm.subscribe(heard.append))  # the tape was alone till then
+        sm.execute()
+        events = tape.events()
+    assert [type(event) for event in events[:3]] == [Started, Entered, UserdataWritten]
+    assert events[-len(heard) :] == heard
+    assert {type(event) for event in heard} >= {Entered, Left, UserdataWritten}
+    assert tape.events() == []
+    tape.close()
+
+
+def test_a_tape_of_events_keeps_all_of_them_with_the_values_themselves():
+    value = object()
+
+    class Writes(State):
+        def __init__(self):
+            super().__init__(["ok"], output_keys=["what"])
+
+        def execute(self, userdata):
+            userdata.what = value
+            return "ok"
+
+    with use_clock(RealClock()):
+        sm = ring(60_000)  # more transitions than a tape of records keeps
+        tape = EventTape(sm)
+        sm.execute()
+        assert len(tape.events()) == 240_000 + 2
+        assert tape.dropped == 0
+        sm = StateMachine(["ok"])
+        with sm:
+            StateMachine.add("W", Writes())
+        tape = EventTape(sm)
+        sm.execute()
+    (written,) = [event for event in tape.events() if isinstance(event, UserdataWritten)]
+    assert written.value is value

@@ -211,6 +211,42 @@ def test_preempt_on_a_later_visit(mission):
     assert mission(sm).duration == 31
 
 
+def test_a_trigger_changes_nothing_before_it_acts(mission):
+    """A run without triggers is only taken down; one with them has a listener until the last."""
+    hearing = []
+
+    class Look(Wait):
+        def execute(self, ud):
+            hearing.append(len(sm._listeners))
+            return super().execute(ud)
+
+    def machine():
+        sm = StateMachine(["done", "preempted"], name="M")
+        with sm:
+            sm.add("A", Look(), {"done": "B"})
+            sm.add("B", Look(), {"done": "C"})
+            sm.add("C", Look())
+        return sm
+
+    sm = machine()
+    plain = mission(sm)
+    assert hearing == [0, 0, 0]
+    mission.preempt(on="A", after=100)
+    mission.preempt(on="B", after=15)
+    sm = machine()
+    preempted = mission(sm)
+    assert hearing[3:] == [1, 0, 0]
+    assert preempted.path == plain.path
+    assert preempted.duration == 25
+
+    def until_c(run):
+        begun = run.events[0]
+        events = [event._replace(t=event.t - begun.t, stamp_ns=0) for event in run.events]
+        return events[: next(i for i, e in enumerate(events) if e.path == "/M/C") + 1]
+
+    assert until_c(preempted) == until_c(plain)
+
+
 def test_interrupt_is_a_shutdown_and_a_preempt(mission):
     mission.interrupt(on="A", after=2)
     run = mission(two_waits())
