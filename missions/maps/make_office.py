@@ -84,7 +84,7 @@ def shell(floor: Floor) -> None:
         floor.wall_y(x, SOUTH, NORTH)
     floor.wall_x(CORRIDOR_SOUTH, WEST, EAST, doors=(2.2, 7.6, 11.8, 18.0, 24.6))
     floor.wall_x(CORRIDOR_NORTH, WEST, EAST, doors=(4.4, 9.0, 15.2, 19.6, 24.4))
-    for x in (5.4, 9.8, 14.2, 21.2):
+    for x in (5.4, 9.2, 14.2, 21.2):
         floor.wall_y(x, SOUTH, CORRIDOR_SOUTH)
     floor.wall_y(6.4, CORRIDOR_NORTH, NORTH)
     floor.wall_y(11.6, CORRIDOR_NORTH, NORTH, doors=(15.2,))
@@ -94,9 +94,9 @@ def shell(floor: Floor) -> None:
 
 def south_rooms(floor: Floor) -> None:
     """Three offices, the lab and the store room."""
-    for x in (2.9, 7.6, 12.0):
+    for x, shelf in ((2.9, 4.0), (7.3, 8.2), (12.0, 13.1)):
         floor.desk(x, 1.0, chair=0.72)
-        floor.box(x + 1.1, 5.9, x + 2.1, 6.5)  # a shelf beside the door
+        floor.box(shelf, 5.9, shelf + 1.0, 6.5)  # a shelf beside the door
     floor.desk(2.9, 4.2, chair=-0.72)
     floor.box(5.6, 2.6, 6.0, 4.6)  # shelves along the walls
     floor.box(13.7, 2.4, 14.1, 4.8)
