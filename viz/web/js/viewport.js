@@ -1,6 +1,6 @@
 // Pan and zoom: at the cursor, by keys, by flights; events never move it.
 const LEAST = 0.04, MOST = 4;
-const FOOT = 22; // what the legend covers
+const FOOT = 22, HEAD = 18; // what the legend and a banner cover
 
 export class Viewport {
   constructor(svg, world, onChange) {
@@ -18,10 +18,10 @@ export class Viewport {
     this.onChange();
   }
   frame(box, { margin = 28, most = 1.6, fly = true } = {}) {
-    const room = this.height - FOOT;
+    const room = this.height - FOOT - HEAD;
     const k = Math.min(most, (this.width - 2 * margin) / box.w, (room - 2 * margin) / box.h);
     const x = (this.width - box.w * k) / 2 - box.x * k;
-    const y = (room - box.h * k) / 2 - box.y * k;
+    const y = HEAD + (room - box.h * k) / 2 - box.y * k;
     if (fly) this.fly(x, y, k); else this.set(x, y, k);
     return { x, y, k };
   }
