@@ -549,3 +549,23 @@ def test_who_cannot_see_is_told(delivery, look):
     assert all(level and selected in {"true", "false"} for level, selected in tree)
     for label in ("states", "details", "state machine"):
         assert page.query_selector(f'[aria-label="{label}"]') is not None
+
+
+def test_at_first_no_more_is_open_than_can_be_read_and_a_new_size_shows_all_again(start, look):
+    start.robot("--name", "wide", "--rate", 2, "--states", 60)
+    view = start.view()
+    page = look(view.base + "?machine=wide")
+    wait_for(page, "smachpy.page.drawing === null")
+    assert page.evaluate("() => smachpy.page.view.k") >= 0.55
+    assert page.evaluate("() => smachpy.store.opened.value.size") < 5
+    whole = """() => { const { view, diagram } = smachpy.page, s = diagram.size;
+        return view.x >= 0 && view.y >= 0 && view.x + s.w * view.k <= view.width
+            && view.y + s.h * view.k <= view.height; }"""
+    page.set_viewport_size({"width": 800, "height": 600})
+    wait_for(page, f"({whole})()")
+    page.mouse.move(300, 200)
+    page.mouse.wheel(0, -300)  # who has looked closer keeps what they look at
+    k = page.evaluate("() => smachpy.page.view.k")
+    page.set_viewport_size({"width": 1200, "height": 800})
+    page.wait_for_timeout(200)
+    assert page.evaluate("() => smachpy.page.view.k") == k
