@@ -6,6 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from actionlib_core._action_wire import ActionTypes
+from actionlib_core._arguments import check_function
 from actionlib_core._core.states import CommState, TerminalState
 from actionlib_core.comm_state_machine import CommStateMachine
 from actionlib_core.exceptions import ActionException
@@ -332,6 +333,7 @@ class ActionClient(Generic[A_co]):
     ) -> Callable[[CommStateMachine, CommState], None] | None:
         if callback is None:
             return None
+        check_function(f"action '{self.ns}'", "transition_cb", callback)
         call = self.manager.callbacks.call
 
         def note(machine: CommStateMachine, state: CommState) -> None:
@@ -346,6 +348,7 @@ class ActionClient(Generic[A_co]):
     ) -> Callable[[CommStateMachine, Any], None] | None:
         if callback is None:
             return None
+        check_function(f"action '{self.ns}'", "feedback_cb", callback)
         call = self.manager.callbacks.call
 
         def note(machine: CommStateMachine, feedback: Any) -> None:

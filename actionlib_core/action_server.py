@@ -15,6 +15,7 @@ from actionlib_core._action_wire import (
     pack_status,
     pack_statuses,
 )
+from actionlib_core._arguments import check_function
 from actionlib_core._callbacks import CallbackQueue
 from actionlib_core._core.server_goals import RESULT_TIMEOUT_S, Arrival, ServerGoal, ServerGoals
 from actionlib_core._core.states import TERMINAL, Status
@@ -106,6 +107,8 @@ class ActionServer:
                 f"action {ns!r}: on_client_lost: got {on_client_lost!r}; "
                 "expected 'continue' or 'cancel'."
             )
+        check_function(f"action {ns!r}", "goal_cb", goal_cb)
+        check_function(f"action {ns!r}", "cancel_cb", cancel_cb)
         self.node = node if node is not None else get_node()
         self.types = ActionTypes.of(ActionSpec)
         self.ns = self.node.resolve(ns, "action name")
@@ -270,12 +273,14 @@ class ActionServer:
 
     def register_goal_callback(self, cb: Callable[[ServerGoalHandle], object] | None) -> None:
         """Replace the goal callback; None takes it away."""
+        check_function(f"action '{self.ns}'", "cb", cb)
         self.goal_callback = cb if cb is not None else nop_cb
 
     def register_cancel_callback(
         self, cancel_cb: Callable[[ServerGoalHandle], object] | None
     ) -> None:
         """Replace the cancel callback; None takes it away."""
+        check_function(f"action '{self.ns}'", "cancel_cb", cancel_cb)
         self.cancel_callback = cancel_cb if cancel_cb is not None else nop_cb
 
     def accept(self, tracker: StatusTracker, text: str = "") -> None:

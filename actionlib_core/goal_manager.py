@@ -111,11 +111,11 @@ class GoalManager:
         changed = self._clock.event()
         while True:
             with self._lock:
+                if self._closed:
+                    return False
                 if self._current is not None:
                     return True
                 self._check_types()
-                if self._closed:
-                    return False
                 changed.clear()
                 self._waiters.append(changed)
             left = None if deadline is None else deadline - self._clock.now()
@@ -247,6 +247,11 @@ class GoalManager:
         created: Callable[[CommStateMachine], None] | None = None,
     ) -> CommStateMachine:
         """Follow a goal that was sent in an earlier life; arguments as `send`."""
+        if not isinstance(goal_id, str) or not goal_id:
+            raise ActionlibError(
+                f"action '{self.name}': goal id: got {goal_id!r}; expected the id of a goal that "
+                "was sent, SentGoal.id for example."
+            )
         with self._lock:
             known = self._machines.get(goal_id)
         if known is not None:
@@ -492,6 +497,8 @@ class GoalManager:
         if not self._port.is_heard():
             return
         with self._lock:
+            if goal.over:  # cancelled or stopped while it had not been sent
+                return
             server = self._current
             goal.on_offered(server.session if server is not None else "")
         self._port.send_goal(machine.payload)

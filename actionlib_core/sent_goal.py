@@ -170,8 +170,10 @@ class SentGoal(Generic[R, F]):
         while True:
             self._changed.clear()
             over = self.over
-            while self._feedback:
-                yield self._feedback.popleft()
+            if over:
+                self._changed.set()  # for those who wait in another thread
+            while (feedback := self._take()) is not None:
+                yield feedback
             yield None
             if over:
                 return
@@ -188,7 +190,16 @@ class SentGoal(Generic[R, F]):
 
         Blocks: until then.
         """
-        return next((item for item in self.news() if item is not None), None)
+        taken = next((item for item in self.news() if item is not None), None)
+        if self._feedback:
+            self._changed.set()  # the rest is for another thread, should this one not come again
+        return taken
+
+    def _take(self) -> F | None:
+        """Take feedback, None when there is none; another thread may take it first."""
+        with contextlib.suppress(IndexError):
+            return self._feedback.popleft()
+        return None
 
     def _wait(self, timeout: float | None) -> bool:
         return self._goal.settled.wait(self._left(timeout)) or self.over
@@ -257,7 +268,7 @@ class SentGoal(Generic[R, F]):
         if not await self._wait_async(lambda: self._feedback or self.over, self._left(None)):
             self.cancel()
             raise self._late(None)
-        return self._feedback.popleft() if self._feedback else None
+        return self._take()
 
     async def _wait_async(self, condition: Callable[[], object], limit: float | None) -> bool:
         import asyncio  # programs without it start faster

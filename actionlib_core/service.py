@@ -15,6 +15,7 @@ import logging
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core._arguments import check_class, check_function
 from actionlib_core._callbacks import CallbackQueue
 from actionlib_core._name_watch import NameWatch
 from actionlib_core.exceptions import (
@@ -56,6 +57,8 @@ class _ServiceEnd:
     """What server and proxy share."""
 
     def __init__(self, name: str, service_class: type[ServiceType], node: Node | None) -> None:
+        kind = "service class, such as SetBool"
+        check_class(f"service {name!r}", service_class, "_request_class", kind)
         self.node = get_node() if node is None else node
         self.resolved_name = self.node.resolve(name, NAME_KIND)
         self.service_class = service_class
@@ -114,6 +117,7 @@ class Service(_ServiceEnd):
         *,
         node: Node | None = None,
     ) -> None:
+        check_function(f"service {name!r}", "handler", handler)
         super().__init__(name, service_class, node)
         self.handler = handler
         self._servers = self._watch()
@@ -171,9 +175,11 @@ class Service(_ServiceEnd):
         try:
             response = self._respond(self.handler(self.request_class.from_bytes(query.payload)))
             query.reply(response.to_bytes(), encoding_of(self.service_class))
-        except Exception as error:
+        except BaseException as error:  # sys.exit() too: the caller waits for an answer
             logger.exception("service /%s: the handler raised", self.resolved_name)
             _fail(query, error)
+            if not isinstance(error, Exception):
+                raise
         finally:
             query.finish()
 
@@ -198,7 +204,7 @@ def _show(seconds: float | None) -> str:
     return "all the time" if seconds is None else f"{seconds:g} s"
 
 
-def _fail(query: Query, error: Exception) -> None:
+def _fail(query: Query, error: BaseException) -> None:
     text = json.dumps({"type": type(error).__name__, "text": str(error)})
     query.reply_error(text)
     query.finish()

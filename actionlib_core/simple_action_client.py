@@ -6,6 +6,7 @@ import threading
 from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from actionlib_core._arguments import check_function
 from actionlib_core._core.states import CommState, SimpleGoalState, Status
 from actionlib_core.action_client import ActionClient, ClientGoalHandle, to_timeout
 from actionlib_core.time import to_seconds
@@ -44,6 +45,10 @@ class _Goal:
         active_cb: Callable[[], object] | None,
         feedback_cb: Callable[[Any], object] | None,
     ) -> None:
+        where = f"action '{owner.action_client.ns}'"
+        check_function(where, "done_cb", done_cb)
+        check_function(where, "active_cb", active_cb)
+        check_function(where, "feedback_cb", feedback_cb)
         self.owner = owner
         self.done_cb = done_cb
         self.active_cb = active_cb

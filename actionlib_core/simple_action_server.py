@@ -6,6 +6,7 @@ import logging
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core._arguments import check_function
 from actionlib_core._core.server_goals import RESULT_TIMEOUT_S
 from actionlib_core._core.single_goal import ANNOUNCE, Policy, SingleGoal
 from actionlib_core._core.states import TERMINAL, Status
@@ -100,6 +101,7 @@ class SimpleActionServer:
         on_client_lost: OnClientLost = "continue",
         result_timeout: float | Duration = RESULT_TIMEOUT_S,
     ) -> None:
+        check_function(f"action {name!r}", "execute_cb", execute_cb)
         self.execute_callback = execute_cb
         self.goal_callback: Callable[[], object] | None = None
         self.preempt_callback: Callable[[], object] | None = None
@@ -334,10 +336,12 @@ class SimpleActionServer:
                 f"action '{self._name}': register_goal_callback(): got a callback beside "
                 "execute_cb; expected one of the two."
             )
+        check_function(f"action '{self._name}'", "cb", cb)
         self.goal_callback = cb
 
     def register_preempt_callback(self, cb: Callable[[], object] | None) -> None:
         """Call `cb` when the current goal is asked to stop."""
+        check_function(f"action '{self._name}'", "cb", cb)
         self.preempt_callback = cb
 
     # -- what arrives (on the network's thread) ------------------------------------------------

@@ -14,6 +14,7 @@ import threading
 from collections import deque
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from actionlib_core._arguments import check_class, check_function, check_queue_size
 from actionlib_core._callbacks import CallbackQueue
 from actionlib_core._name_watch import TOPIC_KINDS, NameWatch
 from actionlib_core.exceptions import NodeError, TypeMismatchError, WaitTimeoutError
@@ -46,6 +47,7 @@ class _TopicEnd:
     _counterpart: Kind
 
     def __init__(self, name: str, data_class: type[Message], node: Node | None) -> None:
+        check_class(f"topic {name!r}", data_class, "from_bytes", "message class, such as String")
         self.node = get_node() if node is None else node
         self.resolved_name = self.node.resolve(name, NAME_KIND)
         self.data_class = data_class
@@ -148,6 +150,7 @@ class Publisher(_TopicEnd):
         *,
         node: Node | None = None,
     ) -> None:
+        check_queue_size(f"topic {name!r}", queue_size)
         super().__init__(name, data_class, node)
         self.queue_size = queue_size
         self.latch = latch
@@ -218,6 +221,8 @@ class Subscriber(_TopicEnd, Generic[M]):
         *,
         node: Node | None = None,
     ) -> None:
+        check_function(f"topic {name!r}", "callback", callback)
+        check_queue_size(f"topic {name!r}", queue_size)
         super().__init__(name, data_class, node)
         self.callback = callback
         self.callback_args = callback_args

@@ -1,0 +1,52 @@
+"""Arguments that would fail later, in another thread: refused where they are given."""
+
+from __future__ import annotations
+
+from actionlib_core.exceptions import ActionlibError
+
+
+def check_function(where: str, argument: str, value: object) -> None:
+    """Refuse a callback that cannot be called; None is one that is not wanted.
+
+    Args:
+        where: Whose callback, "action 'dock'" for example.
+        argument: Its name.
+        value: What was given.
+
+    Raises:
+        ActionlibError: it is no function.
+    """
+    if value is not None and not callable(value):
+        raise ActionlibError(
+            f"{where}: {argument}: got {value!r}; expected a function. Try giving the function "
+            "itself, without calling it."
+        )
+
+
+def check_class(where: str, value: object, attribute: str, kind: str) -> None:
+    """Refuse what is not an interface class of the right kind.
+
+    Args:
+        where: For what, "service 'open'" for example.
+        value: What was given.
+        attribute: What classes of this kind have.
+        kind: What they are called, for the error.
+
+    Raises:
+        ActionlibError: it is none.
+    """
+    if not isinstance(value, type) or not hasattr(value, attribute):
+        raise ActionlibError(f"{where}: got {value!r}; expected a {kind}.")
+
+
+def check_queue_size(where: str, value: object) -> None:
+    """Refuse a queue size that is no number; None and, as in rospy, 0 set no limit.
+
+    Raises:
+        ActionlibError: it is none, or negative.
+    """
+    if value is not None and (not isinstance(value, int) or value < 0):
+        raise ActionlibError(
+            f"{where}: queue_size: got {value!r}; expected a number of messages, or None for no "
+            "limit."
+        )

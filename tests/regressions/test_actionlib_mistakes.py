@@ -1,0 +1,217 @@
+"""Programs that make mistakes, and calls that meet at a bad moment: each told at once, none lost."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+from actionlib_core.action_client import ActionClient
+from actionlib_core.action_server import ActionServer
+from actionlib_core.clock import RealClock
+from actionlib_core.exceptions import ActionlibError
+from actionlib_core.interfaces.actionlib import msg
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
+from actionlib_core.interfaces.std_msgs.msg import String
+from actionlib_core.interfaces.std_srvs.srv import Trigger
+from actionlib_core.node import Node
+from actionlib_core.sent_goal import SentGoal
+from actionlib_core.service import Service, ServiceProxy
+from actionlib_core.simple_action_client import SimpleActionClient
+from actionlib_core.simple_action_server import SimpleActionServer
+from actionlib_core.topic import Publisher, Subscriber
+from actionlib_core.transport.memory import MemoryNetwork
+
+LONG_S = 20.0
+
+
+@pytest.fixture
+def network(clock):
+    return MemoryNetwork(clock)
+
+
+@pytest.fixture
+def nodes(clock, network):
+    made = [Node(name, transport=network.session(), clock=clock) for name in ("server", "client")]
+    yield made
+    for node in reversed(made):
+        node.close()
+
+
+@pytest.fixture
+def node():
+    """A node on the real clock, in a network of its own."""
+    clock = RealClock()
+    with Node("both", transport=MemoryNetwork(clock).session(), clock=clock) as node:
+        yield node
+
+
+# -- moments -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("end", ["cancel", "stop"])
+def test_goal_that_ends_as_its_server_appears_is_not_sent(nodes, clock, monkeypatch, end):
+    """The client said RECALLED, or was stopped, and the server ran the goal all the same."""
+    server_node, client_node = nodes
+    client = ActionClient("demo", msg.TestAction, node=client_node)
+    handle = client.send_goal(msg.TestGoal(1))
+    port = client.manager._port
+
+    def heard():
+        """Somebody listens now; meanwhile another thread ends the goal."""
+        monkeypatch.undo()
+        handle.cancel() if end == "cancel" else client.stop()
+        return True
+
+    monkeypatch.setattr(port, "is_heard", heard)
+    ran = []
+    server = ActionServer("demo", msg.TestAction, ran.append, node=server_node)
+    clock.sleep(LONG_S)
+    server.stop()
+    assert ran == []
+    expected = GoalStatus.RECALLED if end == "cancel" else GoalStatus.LOST
+    assert handle.get_goal_status() == expected
+
+
+class _Moments:
+    """An event of a clock that calls something just after it was cleared, or as a wait begins."""
+
+    def __init__(self, event, waiting):
+        self._event = event
+        self._waiting = waiting
+        self.set = event.set
+        self.clear = event.clear
+
+    def wait(self, timeout=None):
+        self._waiting()
+        return self._event.wait(timeout)
+
+
+def test_loops_over_the_feedback_of_one_goal_all_end(node):
+    """Two loops: one cleared the news that the goal is over, and the other waited for ever."""
+    release = threading.Event()
+
+    def execute(goal):
+        assert release.wait(LONG_S)
+        server.set_succeeded()
+
+    server = SimpleActionServer("demo", msg.TestAction, execute, node=node)
+    client = ActionClient("demo", msg.TestAction, node=node)
+    sent = client.send(msg.TestGoal(1))
+    looped = []
+
+    def loop_in_between():
+        """As this loop is about to wait, the goal ends, and another loop hears of it first."""
+        sent._changed = event
+        release.set()
+        assert sent.wait(LONG_S)
+        looped.append(list(sent.feedback()))
+
+    event = sent._changed
+    sent._changed = _Moments(event, loop_in_between)
+    waiting = threading.Thread(target=lambda: looped.append(list(sent.feedback())), daemon=True)
+    waiting.start()
+    waiting.join(LONG_S)
+    assert looped == [[], []]
+
+
+def test_feedback_taken_by_another_loop_is_no_error(node):
+    """Two loops: one saw the last feedback, the other took it, and the first one raised."""
+
+    class Shared(list):
+        """Feedback of which another loop takes the last just before we do."""
+
+        def popleft(self):
+            raise IndexError("pop from an empty deque")
+
+    sent = SentGoal(node, "demo", timeout=None)
+    client = ActionClient("demo", msg.TestAction, node=node)
+    client.manager.send(
+        "g", 1, b"", on_transition=sent.on_transition, on_feedback=None, created=sent.on_created
+    )
+    taken = Shared([msg.TestFeedback(1)])
+    sent._feedback = taken
+    client.stop()
+    assert sent.over
+    assert list(sent.feedback()) == []
+
+
+def test_stopped_client_waits_for_no_server(nodes):
+    server_node, client_node = nodes
+    server = ActionServer("demo", msg.TestAction, node=server_node)
+    client = SimpleActionClient("demo", msg.TestAction, node=client_node)
+    assert client.wait_for_server(LONG_S)
+    client.stop()
+    assert not client.wait_for_server()
+    server.stop()
+
+
+# -- mistakes ----------------------------------------------------------------------------------
+
+
+def test_goal_to_follow_has_an_id(nodes):
+    client = ActionClient("demo", msg.TestAction, node=nodes[1])
+    for wrong in ("", 3, None):
+        with pytest.raises(ActionlibError, match=r"demo.*goal id: got .*; expected"):
+            client.attach(wrong)
+        with pytest.raises(ActionlibError, match=r"demo.*goal id: got .*; expected"):
+            client.follow(wrong)
+
+
+def test_callbacks_are_functions(nodes):
+    """A callback that is none was reported when it was due, from a thread without a place."""
+    node = nodes[0]
+    simple = SimpleActionClient("demo", msg.TestAction, node=node)
+    client = ActionClient("demo", msg.TestAction, node=node)
+    server = ActionServer("demo", msg.TestAction, auto_start=False, node=node)
+    runner = SimpleActionServer("demo", msg.TestAction, auto_start=False, node=node)
+    goal = msg.TestGoal(1)
+    calls = {
+        "done_cb": lambda: simple.send_goal(goal, "done"),
+        "active_cb": lambda: simple.send_goal(goal, active_cb=1),
+        "feedback_cb": lambda: simple.send_goal(goal, feedback_cb=1),
+        "transition_cb": lambda: client.send_goal(goal, 1),
+        "goal_cb": lambda: ActionServer("demo", msg.TestAction, 1, auto_start=False, node=node),
+        "cancel_cb": lambda: server.register_cancel_callback(1),
+        "execute_cb": lambda: SimpleActionServer("demo", msg.TestAction, 1, node=node),
+        "cb": lambda: runner.register_preempt_callback(1),
+        "handler": lambda: Service("demo", Trigger, 1, node=node),
+        "callback": lambda: Subscriber("demo", String, 1, node=node),
+    }
+    for what, call in calls.items():
+        with pytest.raises(ActionlibError, match=rf"demo.*: {what}: got .*; expected a function"):
+            call()
+    assert simple.get_state() == GoalStatus.LOST  # no goal was sent
+
+
+def test_service_class_is_one(nodes):
+    for make in (ServiceProxy, lambda *args, **kw: Service(*args, print, **kw)):
+        with pytest.raises(ActionlibError, match=r"demo.*got .*String.*; expected a service class"):
+            make("demo", String, node=nodes[0])
+
+
+def test_topic_class_is_one(nodes):
+    for make in (Publisher, Subscriber):
+        with pytest.raises(ActionlibError, match=r"demo.*got .*; expected a message class"):
+            make("demo", Trigger, node=nodes[0])
+        with pytest.raises(ActionlibError, match=r"demo.*queue_size: got .*; expected"):
+            make("demo", String, queue_size="many", node=nodes[0])
+
+
+def test_handler_that_ends_its_thread_answers(nodes, caplog):
+    """The caller was told that the server had died."""
+
+    def handler(request):
+        raise SystemExit("enough")
+
+    Service("demo", Trigger, handler, node=nodes[0])
+    with pytest.raises(ActionlibError, match="the handler raised SystemExit: enough"):
+        ServiceProxy("demo", Trigger, node=nodes[1])()
+    assert "the handler raised" in caplog.text
+
+
+def test_wrong_policy_and_callback_leave_nothing_behind(nodes):
+    with pytest.raises(ActionlibError):
+        SimpleActionServer("demo", msg.TestAction, 1, node=nodes[0])
+    server = SimpleActionServer("demo", msg.TestAction, print, node=nodes[0])
+    server.stop()
