@@ -6,6 +6,7 @@ from functools import partial
 
 import pytest
 
+from actionlib_core.clock import VirtualClock, use_clock
 from actionlib_core.node import Node, use_node
 from actionlib_core.transport.memory import MemoryNetwork
 from missions.maps import OFFICE_MAP, OFFICE_ROBOT
@@ -13,6 +14,13 @@ from missions.move_base.config import load_config
 from missions.move_base.occupancy import load_map
 from missions.move_base.server import RobotServer
 from missions.move_base.world import Robot, World
+
+
+@pytest.fixture
+def clock(mission_seed):
+    """A virtual clock, in force for the test, with the interleaving of `--mission-seeds`."""
+    with VirtualClock(mission_seed) as clock, use_clock(clock):
+        yield clock
 
 
 @pytest.fixture(scope="session")
