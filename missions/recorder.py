@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from missions.move_base.geometry import Pose2D, yaw_of
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from missions.move_base.occupancy import OccupancyMap
     from missions.move_base.track import GoalMark
 
+_SAME_STATE = 3  # goals of one state that have its name
 _SAME_PLACE = 0.05  # [m] a goal this near to a named waypoint has its name
 
 
@@ -82,8 +84,14 @@ class TrackRecorder:
     def _marks(self) -> list[GoalMark]:
         from missions.move_base.track import GoalMark
 
+        # A state that drives to many places is no name for any of them.
+        times = Counter(label for _, label, _ in self._goals.values())
         return [
-            GoalMark(pose, self._name(pose) or label, reached=reached)
+            GoalMark(
+                pose,
+                self._name(pose) or (label if times[label] <= _SAME_STATE else ""),
+                reached=reached,
+            )
             for pose, label, reached in self._goals.values()
         ]
 

@@ -152,6 +152,10 @@ def test_the_recorder_names_goals_after_waypoints_else_after_states():
     marks = [(m.label, m.reached) for m in recorder._marks()]
     assert marks == [("kitchen", True), ("drive home", False)]
     assert recorder.track == [(0.0, 0.0), (0.5, 0.0), (1.0, 0.0)]
+    for i in range(5, 9):  # a state that drives to many places is no name for any of them
+        goal = goal_at(Pose2D(i, 1, 0))
+        recorder.on_event(ev.GoalSent("/M/GO", 0.0, 0, "move_base", f"g{i}", goal))
+    assert [m.label for m in recorder._marks()] == ["kitchen", "drive home", "", "", "", ""]
 
 
 def test_the_recorder_keeps_several_robots_apart(office, tmp_path):
