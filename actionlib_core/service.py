@@ -50,6 +50,7 @@ NAME_KIND = "service name"
 CALL_TIMEOUT_S = 60.0  # default limit of a call
 APPEAR_S = 2.0  # how much of it a call gives a server to appear
 FOREVER_S = 1e8  # for the network, which wants a number: three years
+STALE_S = 0.2  # a server that vanishes so soon after a call may have been gone before it
 MARGIN_S = 1.0  # the network gives up after the call itself has
 
 
@@ -358,18 +359,39 @@ class ServiceProxy(_ServiceEnd):
             on_reply=on_reply,
             on_done=on_done,
         )
-        asked = set(self._servers.ends())
 
-        def over() -> bool:
-            return bool(replies or done or self._closed) or asked.isdisjoint(self._servers.ends())
+        def settled() -> bool:
+            return bool(replies or done or self._closed)
 
         try:
-            in_time = self._servers.wait(over, timeout)
+            in_time = self._wait_for_answer(settled, timeout)
         finally:
             query.close()
         if replies:
             return replies[0]
         raise self._explain_silence(timeout, in_time=in_time)
+
+    def _wait_for_answer(self, settled: Callable[[], bool], timeout: float | None) -> bool:
+        """Wait until a call is settled, or whoever may have got it is gone; return whether.
+
+        When the servers that were known at the call go right after it, a new one that has just
+        taken the name has got it: its token may be later here than the answer.
+        """
+        now, servers = self.node.clock.now, self._servers
+        start = now()
+        asked = set(servers.ends())
+
+        def over() -> bool:
+            return settled() or asked.isdisjoint(servers.ends())
+
+        in_time = servers.wait(over, timeout)
+        stale = start + STALE_S - now()
+        if in_time and stale > 0:
+            servers.wait(lambda: settled() or bool(servers.ends()), stale)
+            asked = set(servers.ends())
+            left = None if timeout is None else start + timeout - now()
+            in_time = servers.wait(over, left)
+        return in_time
 
     def _explain_silence(self, timeout: float | None, *, in_time: bool) -> ActionlibError:
         if self._closed:

@@ -132,6 +132,22 @@ def test_server_that_leaves_ends_the_call_at_once(nodes, clock):
     assert clock.now() == pytest.approx(5.0)
 
 
+def test_call_to_a_successor_that_is_not_yet_known_is_answered(nodes, clock):
+    """The caller saw the former server go, and took the call for lost, which the new one had."""
+    server, caller = nodes
+    former = Service("grip", SetBool, lambda _: (True, "former"), node=server)
+    proxy = ServiceProxy("grip", SetBool, timeout=3, node=caller)
+    assert proxy(True).message == "former"
+
+    def successor(request):
+        clock.sleep(1.0)
+        return True, "successor"
+
+    former.shutdown()
+    Service("grip", SetBool, successor, node=server)
+    assert proxy(True).message == "successor"
+
+
 def test_without_limit_a_call_ends_with_the_server(nodes, clock):
     server, caller = nodes
     Service("grip", SetBool, lambda _: clock.sleep(1e6), node=server)
