@@ -123,10 +123,15 @@ class Page {
       this.counted = store.run.events.length;
       this.diagram.svg.classList.toggle("busy", left > 3 * BUSY * (WORDS_MS / 1000));
     }
-    this.timeline.draw();
-    this.diagram.paintMinis();
+    this.mapsDue ||= setTimeout(() => this.#maps(), PANELS_MS / 2); // not all in one long task
     this.#announce(moment);
     this.#follow();
+  }
+
+  #maps() {
+    this.mapsDue = 0;
+    this.timeline.draw();
+    this.diagram.paintMinis();
   }
 
   // What changes without events: clocks, the stale badge, folded containers.
