@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import difflib
+import math
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.interfaces.std_msgs.msg import String
@@ -19,6 +20,7 @@ from actionlib_core.interfaces.std_srvs.srv import SetBool
 from actionlib_core.node import get_node
 from actionlib_core.service import Service
 from actionlib_core.topic import Publisher, Subscriber
+from missions.exceptions import MissionError
 from smachpy import State, UserData
 from smachpy.log import logwarn
 
@@ -46,6 +48,9 @@ class AskOperator(State):
         patience: 'no_answer' after so long [s].
         channel: Where questions and answers go; an answer is for all questions asked there now.
         **options: See `smachpy.state.StateOptions`.
+
+    Raises:
+        MissionError: `patience` is no time.
     """
 
     def __init__(
@@ -57,6 +62,8 @@ class AskOperator(State):
         channel: str = "operator",
         **options: Any,
     ) -> None:
+        if not 0.0 < patience < math.inf:
+            raise MissionError(f"patience: got {patience:g}; expected more than 0 [s].")
         super().__init__((*answers, "no_answer", "preempted"), **options)
         self.question = question
         self.answers = tuple(answers)

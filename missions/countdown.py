@@ -26,13 +26,16 @@ from actionlib_core.exceptions import ActionlibError
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.simple_action_client import SimpleActionClient
 from actionlib_core.simple_action_server import SimpleActionServer
+from missions.exceptions import MissionError
 from missions.interfaces import (
     CountdownAction,
     CountdownFeedback,
     CountdownGoal,
     CountdownResult,
 )
-from smachpy import Concurrence, SimpleActionState, State, StateMachine, UserData
+from missions.parts import Wait
+from smachpy import Concurrence, SimpleActionState, StateMachine, UserData
+from smachpy.checks import ignore
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -90,7 +93,11 @@ def countdown(seconds: int = 3) -> StateMachine:
 
     Args:
         seconds: Where the first countdown begins.
+
+    Raises:
+        MissionError: nobody can count down from there.
     """
+    check_seconds(seconds)
     sm = StateMachine(outcomes=["succeeded", "aborted", "preempted"], name="COUNTDOWN")
     server: list[CountdownServer] = []
     sm.register_start_cb(lambda _ud, _initial: server.append(CountdownServer()))
@@ -117,7 +124,18 @@ countdown.serves = (NAME,)  # type: ignore[attr-defined]  # so that nobody waits
 
 def count_from(seconds: int) -> SimpleActionState:
     """Start the countdown and wait for zero."""
-    return SimpleActionState(NAME, CountdownAction, goal=CountdownGoal(seconds=seconds))
+    start = SimpleActionState(NAME, CountdownAction, goal=CountdownGoal(seconds=seconds))
+    return ignore(start, "no-timeout", "it ends by itself; a dead server is seen")
+
+
+def check_seconds(seconds: int) -> None:
+    """Refuse a number that does not fit the goal's field.
+
+    Raises:
+        MissionError: it is negative, or larger than a uint32.
+    """
+    if not 0 <= seconds < 2**32:
+        raise MissionError(f"seconds: got {seconds}; expected 0 to 4294967295.")
 
 
 def start_twice() -> Concurrence:
@@ -131,17 +149,15 @@ def start_twice() -> Concurrence:
     with second:
         StateMachine.add("WAIT", Wait(2.0), transitions={"done": "COUNT"})
         StateMachine.add("COUNT", count_from(3))
+    first = SimpleActionState(
+        NAME,
+        CountdownAction,
+        goal=CountdownGoal(seconds=5),
+        outcomes=["taken_over"],
+        result_cb=taken_over,
+    )
     with both:
-        Concurrence.add(
-            "FIRST",
-            SimpleActionState(
-                NAME,
-                CountdownAction,
-                goal=CountdownGoal(seconds=5),
-                outcomes=["taken_over"],
-                result_cb=taken_over,
-            ),
-        )
+        Concurrence.add("FIRST", ignore(first, "no-timeout", "it is taken over, or ends by itself"))
         Concurrence.add("SECOND", second)
     return both
 
@@ -149,20 +165,6 @@ def start_twice() -> Concurrence:
 def taken_over(_userdata: UserData, status: int, _result: CountdownResult) -> str | None:
     """Name the end of a goal that somebody else's goal preempted."""
     return "taken_over" if status == GoalStatus.PREEMPTED else None
-
-
-class Wait(State):
-    """Let some seconds pass."""
-
-    def __init__(self, seconds: float) -> None:
-        super().__init__(outcomes=["done", "preempted"])
-        self.seconds = seconds
-
-    def execute(self, userdata: UserData) -> str:
-        """Wait, unless called off."""
-        del userdata
-        self.sleep(self.seconds)
-        return "preempted" if self.preempt_requested() else "done"
 
 
 # -- the three programs ----------------------------------------------------------------------------
@@ -180,6 +182,7 @@ def serve() -> int:
 
 def start(seconds: int) -> int:
     """Start a countdown and show each second; Ctrl-C leaves it running."""
+    check_seconds(seconds)
     client = connect()
     client.send_goal(
         CountdownGoal(seconds=seconds), feedback_cb=lambda feedback: print(feedback.seconds_left)
@@ -216,7 +219,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if args.program == "server":
             return serve()
         return start(args.seconds) if args.program == "start" else stop()
-    except ActionlibError as error:
+    except (ActionlibError, MissionError) as error:
         print(f"countdown: {error}", file=sys.stderr)
         return 2
 

@@ -40,6 +40,7 @@ from smachpy import (
     StateMachine,
     UserData,
 )
+from smachpy.checks import ignore
 from smachpy.log import logwarn
 
 if TYPE_CHECKING:
@@ -145,7 +146,9 @@ def look_and_map(search: Search, low_battery: float) -> Concurrence:
     with both:
         Concurrence.add("LOOK", look)
         Concurrence.add("MAP", Mapper(search))
-        Concurrence.add("BATTERY", battery)
+        Concurrence.add(
+            "BATTERY", ignore(battery, "no-timeout", "it watches for as long as the search takes")
+        )
     return both
 
 

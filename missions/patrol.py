@@ -16,14 +16,18 @@ from typing import TYPE_CHECKING
 
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.sensor_msgs.msg import BatteryState
+from missions.exceptions import MissionError
 from missions.interfaces import ChargeAction, ChargeGoal
 from missions.maps import OFFICE_WAYPOINTS
 from missions.waypoint_file import load_route
 from smachpy import CBState, Concurrence, MonitorState, SimpleActionState, StateMachine, UserData
+from smachpy.checks import ignore
 
 if TYPE_CHECKING:
     from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseGoal
     from missions.waypoint_file import Route
+
+DRIVES = "ways have any length; a robot that cannot go on aborts, a dead one is seen"
 
 
 def patrol(waypoints: str | Path = OFFICE_WAYPOINTS, rounds: int = 1) -> StateMachine:
@@ -35,7 +39,10 @@ def patrol(waypoints: str | Path = OFFICE_WAYPOINTS, rounds: int = 1) -> StateMa
 
     Raises:
         InputFileError: the file is wrong; with the line and field of every problem.
+        MissionError: there is no round to drive.
     """
+    if rounds < 1:
+        raise MissionError(f"rounds: got {rounds}; expected 1 or more.")
     route = load_route(Path(waypoints))
     sm = StateMachine(outcomes=["succeeded", "aborted", "preempted"], name="PATROL")
     sm.userdata.waypoints = list(route.waypoints) * rounds
@@ -63,13 +70,14 @@ def watched_round(route: Route) -> Concurrence:
         },
         child_termination_cb=lambda _outcomes: True,
     )
+    battery = MonitorState(
+        "battery", BatteryState, lambda _, msg: msg.percentage >= route.low_battery
+    )
     with round_:
         Concurrence.add("VISIT", visit())
         Concurrence.add(
             "WATCH_BATTERY",
-            MonitorState(
-                "battery", BatteryState, lambda _, msg: msg.percentage >= route.low_battery
-            ),
+            ignore(battery, "no-timeout", "it watches for as long as the round takes"),
         )
     return round_
 
@@ -80,6 +88,9 @@ def visit() -> StateMachine:
         outcomes=["all_visited", "aborted", "preempted"],
         input_keys=["waypoints", "index"],
         output_keys=["index"],
+    )
+    drive = SimpleActionState(
+        "move_base", MoveBaseAction, goal_cb=drive_goal, input_keys=["waypoint"]
     )
     with sm:
         StateMachine.add(
@@ -94,9 +105,7 @@ def visit() -> StateMachine:
         )
         StateMachine.add(
             "DRIVE",
-            SimpleActionState(
-                "move_base", MoveBaseAction, goal_cb=drive_goal, input_keys=["waypoint"]
-            ),
+            ignore(drive, "no-timeout", DRIVES),
             transitions={"succeeded": "TICK_OFF"},
         )
         StateMachine.add(
@@ -110,15 +119,17 @@ def visit() -> StateMachine:
 def recharge(route: Route) -> StateMachine:
     """Drive to the dock and charge."""
     sm = StateMachine(outcomes=["succeeded", "aborted", "preempted"])
+    drive = SimpleActionState("move_base", MoveBaseAction, goal=route.dock.goal())
+    charge = SimpleActionState("charge", ChargeAction, goal=ChargeGoal(until=route.charge_until))
     with sm:
         StateMachine.add(
             "DRIVE_TO_DOCK",
-            SimpleActionState("move_base", MoveBaseAction, goal=route.dock.goal()),
+            ignore(drive, "no-timeout", DRIVES),
             transitions={"succeeded": "CHARGE"},
         )
         StateMachine.add(
             "CHARGE",
-            SimpleActionState("charge", ChargeAction, goal=ChargeGoal(until=route.charge_until)),
+            ignore(charge, "no-timeout", "batteries charge for any time; a dead dock is seen"),
         )
     return sm
 

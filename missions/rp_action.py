@@ -27,16 +27,15 @@ from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.names import check_name
 from actionlib_core.simple_action_client import SimpleActionClient
-from missions.countdown import Wait
 from missions.exceptions import MissionError
 from missions.interfaces import TurnAction, TurnGoal
 from missions.move_base.geometry import Pose2D
+from missions.parts import AwaitMessage, Wait
 from missions.serving import serve_during, serving_machine
 from missions.turn_server import TurnServer, goal_trouble
 from missions.waypoint_file import goal_at
 from smachpy import (
     Concurrence,
-    MonitorState,
     SimpleActionState,
     State,
     StateMachine,
@@ -207,13 +206,8 @@ def stop(prefix: str, name: str | None = None) -> StateMachine:
         StateMachine.add("CANCEL", CancelAll(prefix), transitions={"asked": "STAND"})
         StateMachine.add(
             "STAND",
-            MonitorState(
-                f"{prefix}odom",
-                Odometry,
-                lambda _userdata, message: not stands(message),
-                timeout=BRAKING,
-            ),
-            transitions={"invalid": "succeeded", "valid": "aborted"},
+            AwaitMessage(f"{prefix}odom", Odometry, stands, timeout=BRAKING),
+            transitions={"came": "succeeded", "timeout": "aborted"},
         )
     return sm
 

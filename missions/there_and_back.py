@@ -10,13 +10,16 @@ Run it: `smachpy run there_and_back --start-robot`
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
+from missions.exceptions import MissionError
 from missions.move_base.geometry import Pose2D
 from missions.waypoint_file import goal_at
 from smachpy import MonitorState, SimpleActionState, StateMachine, UserData
+from smachpy.checks import ignore
 
 if TYPE_CHECKING:
     from actionlib_core.interfaces.geometry_msgs.msg import PoseStamped
@@ -32,12 +35,19 @@ def there_and_back(
         y: Of the goal [m], map frame.
         yaw: Of the goal [rad].
         seconds: How long it may drive.
+
+    Raises:
+        MissionError: that is no time.
     """
+    if not 0.0 < seconds < math.inf:
+        raise MissionError(f"seconds: got {seconds:g}; expected more than 0.")
+    here = MonitorState("odom", Odometry, remember, max_checks=1, output_keys=["home"])
+    back = SimpleActionState("move_base", MoveBaseAction, goal_cb=home_goal, input_keys=["home"])
     sm = StateMachine(outcomes=["succeeded", "aborted", "preempted"], name="THERE_AND_BACK")
     with sm:
         StateMachine.add(
             "REMEMBER",
-            MonitorState("odom", Odometry, remember, max_checks=1, output_keys=["home"]),
+            ignore(here, "no-timeout", "the robot may be switched on after the mission"),
             transitions={"valid": "GO", "invalid": "aborted"},
         )
         StateMachine.add(
@@ -53,7 +63,7 @@ def there_and_back(
         )
         StateMachine.add(
             "COME_BACK",
-            SimpleActionState("move_base", MoveBaseAction, goal_cb=home_goal, input_keys=["home"]),
+            ignore(back, "no-timeout", "a robot that cannot go on aborts, a dead one is seen"),
         )
     return sm
 

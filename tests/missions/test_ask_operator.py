@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import logging
+import math
 
 import pytest
 
@@ -10,6 +11,7 @@ from actionlib_core.interfaces.std_srvs.srv import SetBool
 from actionlib_core.node import Node
 from actionlib_core.service import ServiceProxy
 from missions.ask_operator import AskOperator
+from missions.exceptions import MissionError
 
 
 def asking(*answers, patience=30.0):
@@ -117,3 +119,9 @@ def test_two_questions_at_once_have_channels_of_their_own(mission, answer):
         both.add("TWO", AskOperator("Two?", patience=5, channel="door"))
     assert mission(both).duration == 3.0
     assert {"ONE": "yes", "TWO": "no"} in seen
+
+
+@pytest.mark.parametrize("patience", [0.0, -1.0, math.inf, math.nan])
+def test_a_patience_that_is_no_time_is_refused(patience):
+    with pytest.raises(MissionError, match=f"patience: got {patience:g}; expected more than 0"):
+        AskOperator("Shall I?", patience=patience)

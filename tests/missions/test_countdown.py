@@ -7,7 +7,8 @@ from actionlib_core.node import Node, use_node
 from actionlib_core.presence import Kind, list_endpoints
 from actionlib_core.simple_action_client import SimpleActionClient
 from actionlib_core.transport.memory import MemoryNetwork
-from missions.countdown import CountdownServer, countdown
+from missions.countdown import CountdownServer, countdown, main
+from missions.exceptions import MissionError
 from missions.interfaces import CountdownAction, CountdownGoal
 from smachpy import events as ev
 
@@ -92,3 +93,11 @@ def test_the_mission_can_run_twice_and_be_preempted(clock, node):
     machine.request_preempt()
     task.join()
     assert outcomes == ["preempted"]
+
+
+@pytest.mark.parametrize("seconds", [-3, 2**32])
+def test_seconds_that_do_not_fit_the_goal_are_refused_before_anything_counts(seconds, capsys):
+    with pytest.raises(MissionError, match=f"seconds: got {seconds}; expected 0 to 4294967295"):
+        countdown(seconds)
+    assert main(["start", str(seconds)]) == 2
+    assert f"countdown: seconds: got {seconds}; expected" in capsys.readouterr().err

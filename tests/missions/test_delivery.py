@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import contextlib
 from functools import partial
-from pathlib import Path
 
 import pytest
 
@@ -19,7 +18,6 @@ from missions.maps import OFFICE_DOORS, OFFICE_MAP, OFFICE_ROBOT
 from missions.move_base.simulation import simulation
 from smachpy import events as ev
 from smachpy.checks import check
-from smachpy.checks.suppression import read_settings
 
 LAB, WAIT, HOME = (17.9, 5.4), (18.0, 7.7), (9.8, 7.1)
 
@@ -264,8 +262,7 @@ def test_every_problem_of_the_places_is_named(tmp_path):
 
 
 def test_a_check_finds_no_problems(machine):
-    settings = read_settings(Path(__file__).parents[2])
-    report = check(machine, ignores=settings.ignores, name="DELIVERY")
+    report = check(machine, name="DELIVERY")
     assert report.ok, report
 
 

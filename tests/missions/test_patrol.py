@@ -5,7 +5,7 @@ import itertools
 import pytest
 
 from actionlib_core.clock import VirtualClock, use_clock
-from missions.exceptions import InputFileError
+from missions.exceptions import InputFileError, MissionError
 from missions.maps import OFFICE_WAYPOINTS
 from missions.patrol import patrol
 from missions.waypoint_file import load_route
@@ -112,3 +112,9 @@ def test_it_succeeds_whoever_goes_first(seed, simulate_on, office_robot):
         events = record(machine)
         assert machine.execute() == "succeeded"
     assert [e.status for e in goals(events)].count("PREEMPTED") == 1
+
+
+@pytest.mark.parametrize("rounds", [0, -2])
+def test_no_rounds_are_refused(rounds):
+    with pytest.raises(MissionError, match=rf"rounds: got {rounds}; expected 1 or more"):
+        patrol(rounds=rounds)

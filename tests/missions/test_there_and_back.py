@@ -1,7 +1,10 @@
 from __future__ import annotations
 
+import math
+
 import pytest
 
+from missions.exceptions import MissionError
 from missions.there_and_back import there_and_back
 from smachpy import events as ev
 
@@ -37,3 +40,9 @@ def test_a_near_goal_is_reached_before_the_time_is_up(simulation):
 
 def test_a_goal_in_a_wall_ends_it(simulation):
     assert there_and_back(x=0.5, y=5.0).execute() == "aborted"
+
+
+@pytest.mark.parametrize("seconds", [0.0, -1.0, math.inf, math.nan])
+def test_a_time_that_is_none_is_refused(seconds):
+    with pytest.raises(MissionError, match=f"seconds: got {seconds:g}; expected more than 0"):
+        there_and_back(seconds=seconds)
