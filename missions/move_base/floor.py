@@ -132,7 +132,10 @@ class Floor:
         cell = self.map.cell(x, y)
         where = f"goal ({x:.2f}, {y:.2f})"
         if cell is None:
-            raise NavigationError(f"{where} is outside the map")
+            width, height = (
+                cells * self.map.resolution for cells in (self.map.width, self.map.height)
+            )
+            raise NavigationError(f"{where} is outside the map of {width:.4g} x {height:.4g} m")
         if self.solid[cell]:
             raise NavigationError(f"{where} is in a wall or another solid thing")
         if self.clearance(*cell) < self.radius:

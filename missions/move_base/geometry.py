@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import math
 from typing import Final, NamedTuple
 
@@ -57,9 +58,12 @@ def finite(text: str) -> float:
     """Read a number of the command line that is neither infinite nor none at all.
 
     Raises:
-        ValueError: it is not.
+        argparse.ArgumentTypeError: it is not.
     """
-    value = float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
     if not math.isfinite(value):
-        raise ValueError(text)
+        raise argparse.ArgumentTypeError(f"got {text!r}; expected a finite number")
     return value

@@ -181,7 +181,11 @@ def test_a_robot_that_is_killed_ends_the_mission(far):
         (["run", "patrol", "-i", "speed=3"], "no such input; expected one of"),
         (["run", "patrol", "-i", "rounds=many"], "expected a whole number"),
         (["run", "patrol", "-i", "speed"], "expected KEY=VALUE"),
-        (["run", "patrol", "--start-robot", "--pose", "nan", "0", "0"], "invalid finite value"),
+        (
+            ["run", "patrol", "--start-robot", "--pose", "nan", "0", "0"],
+            "got 'nan'; expected a finite",
+        ),
+        (["run", "patrol", "--start-robot", "--pose", "a", "0", "0"], "got 'a'; expected a finite"),
     ],
 )
 def test_bad_input_is_one_screen_without_traceback(arguments, text, capsys):

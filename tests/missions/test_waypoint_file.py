@@ -92,7 +92,7 @@ def test_a_csv_row_is_named_with_its_line_and_column(tmp_path):
     found = problems(path, map_file=OFFICE_MAP)
     assert found == [
         "2: waypoints[0].x: got 0.5; expected a place where the robot can stand. wall: (0.50, 5.00) is in a wall or another solid thing.",
-        "4: waypoints[1].x: got 99; expected a place where the robot can stand. off: (99.00, 5.00) is outside the map.",
+        "4: waypoints[1].x: got 99; expected a place where the robot can stand. off: (99.00, 5.00) is outside the map of 27 x 17 m.",
         "5: waypoints[2].task: got 'turrn'; expected one of photo, turn, wait_for_service. Did you mean 'turn'?",
         "5: waypoints[2].y: got nan; expected a number [m].",
         "6: waypoints[3].dwell: got -1; expected a number [s] at least 0.",

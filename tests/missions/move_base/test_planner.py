@@ -108,7 +108,7 @@ def test_the_way_bends_around_an_obstacle_by_more_than_the_radii():
 @pytest.mark.parametrize(
     ("goal", "text"),
     [
-        ((99.0, 0.0), r"goal \(99.00, 0.00\) is outside the map"),
+        ((99.0, 0.0), r"goal \(99.00, 0.00\) is outside the map of 27 x 17 m"),
         ((0.5, 5.0), "in a wall"),
         ((0.75, 5.0), "too near to a wall: the robot needs 0.28 m"),
     ],
