@@ -120,6 +120,8 @@ class ClientGoalHandle:
     def wait(self, timeout: float | None = None) -> bool:
         """Wait until the goal is over and its last callback has returned.
 
+        Called from a callback of this client, it does not wait for callbacks.
+
         Args:
             timeout: Longest wait [s]; None waits for ever (a server that dies ends the wait).
 
@@ -128,7 +130,10 @@ class ClientGoalHandle:
 
         Blocks: until then.
         """
-        return self.comm_state_machine.settled.wait(timeout)
+        machine = self.comm_state_machine
+        if machine.manager.callbacks.is_inside():
+            return machine.manager.wait_until_over(machine, timeout)
+        return machine.settled.wait(timeout)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, ClientGoalHandle):

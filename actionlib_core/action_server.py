@@ -484,7 +484,12 @@ class ActionServer:
                 self.finish(tracker, event, "the end of its callback", None, text)
 
     def _deliver_cancel(self, handle: ServerGoalHandle) -> None:
-        self.callback_queue.call(self.cancel_callback, handle)
+        self.callback_queue.call(self._run_cancel_callback, handle)
+
+    def _run_cancel_callback(self, handle: ServerGoalHandle) -> None:
+        """Tell the user's code of a cancel, unless the goal has ended since."""
+        if handle.status_tracker.record.status not in TERMINAL:
+            self.cancel_callback(handle)
 
     def hurry_status(self) -> None:
         """Send the list of all goals now if it has changed; not for users."""

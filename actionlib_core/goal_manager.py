@@ -435,7 +435,9 @@ class GoalManager:
             if len(self._ended) > REMEMBERED:
                 del self._ended[next(iter(self._ended))]
         if machine.on_transition is None:
-            if machine.goal.over:
+            if machine.goal.over and machine.on_feedback is not None:
+                self.callbacks.call(machine.settled.set)  # behind the last feedback
+            elif machine.goal.over:
                 machine.settled.set()
             return
         for state in path:

@@ -378,9 +378,22 @@ class SimpleActionServer:
         if decision.reject is not None:
             decision.reject.set_rejected(None, TEXT_BUSY)
         if decision.preempt and self.preempt_callback is not None:
-            self._queue.call(self.preempt_callback)
+            self._queue.call(self._call_preempt_callback)
         if decision.announce and self.goal_callback is not None:
-            self._queue.call(self.goal_callback)
+            self._queue.call(self._call_goal_callback)
+
+    # In ROS these run as the message comes. Here others may run before, so look again.
+
+    def _call_preempt_callback(self) -> None:
+        callback, goal = self.preempt_callback, self._policy.current
+        over = goal is None or goal.status_tracker.record.status in TERMINAL
+        if callback is not None and self._policy.preempt_requested and not over:
+            callback()
+
+    def _call_goal_callback(self) -> None:
+        callback = self.goal_callback
+        if callback is not None and self._policy.waiting:
+            callback()
 
     # -- execution -----------------------------------------------------------------------------
 

@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from actionlib_core.action_client import ActionClient
+from actionlib_core.action_client import ActionClient, CommState
 from actionlib_core.action_server import ActionServer
 from actionlib_core.clock import RealClock
 from actionlib_core.exceptions import ActionlibError
@@ -134,6 +134,124 @@ def test_feedback_taken_by_another_loop_is_no_error(node):
     client.stop()
     assert sent.over
     assert list(sent.feedback()) == []
+
+
+def test_goal_callback_finds_a_goal_that_waits(nodes, clock):
+    """Goals in a row: one callback accepted the newest, the next one got None to work with."""
+    server_node, client_node = nodes
+    server = SimpleActionServer("demo", msg.TestAction, auto_start=False, node=server_node)
+    accepted = []
+
+    def on_goal():
+        clock.sleep(1.0)
+        accepted.append(server.accept_new_goal().goal)
+
+    server.register_goal_callback(on_goal)
+    server.start()
+    client = ActionClient("demo", msg.TestAction, node=client_node)
+    assert client.wait_for_server(LONG_S)
+    handles = [client.send_goal(msg.TestGoal(number)) for number in range(3)]
+    clock.sleep(LONG_S)
+    assert accepted == [2]
+    server.set_succeeded()
+    assert handles[2].wait(LONG_S)
+    ends = [handle.get_goal_status() for handle in handles]
+    assert ends == [GoalStatus.RECALLED, GoalStatus.RECALLED, GoalStatus.SUCCEEDED]
+
+
+def test_preempt_callback_is_not_called_for_a_goal_that_has_ended(nodes, clock):
+    """It ended the next goal, or raised: the goal it was for had just ended."""
+    server_node, client_node = nodes
+    server = SimpleActionServer("demo", msg.TestAction, auto_start=False, node=server_node)
+    preempted = []
+    server.register_goal_callback(server.accept_new_goal)
+    server.register_preempt_callback(lambda: preempted.append(server.set_preempted()))
+    server.start()
+    client = SimpleActionClient("demo", msg.TestAction, node=client_node)
+    assert client.wait_for_server(LONG_S)
+    for late in (True, False):
+        client.send_goal(msg.TestGoal(1))
+        clock.sleep(1.0)
+        if late:
+            server.action_server.callback_queue.call(clock.sleep, 1.0)
+        client.cancel_goal()
+        if late:
+            clock.sleep(0.5)
+            server.set_succeeded()
+        assert client.wait_for_result(LONG_S)
+        expected = GoalStatus.SUCCEEDED if late else GoalStatus.PREEMPTED
+        assert client.get_state() == expected
+    assert preempted == [None]
+
+
+def test_cancel_callback_is_not_called_for_a_goal_that_has_ended(nodes, clock):
+    server_node, client_node = nodes
+    taken, cancelled = [], []
+
+    def on_goal(handle):
+        handle.set_accepted()
+        taken.append(handle)
+        clock.sleep(2.0)
+
+    server = ActionServer("demo", msg.TestAction, on_goal, cancelled.append, node=server_node)
+    client = ActionClient("demo", msg.TestAction, node=client_node)
+    assert client.wait_for_server(LONG_S)
+    handle = client.send_goal(msg.TestGoal(1))
+    clock.sleep(0.5)
+    handle.cancel()
+    clock.sleep(0.5)
+    taken[0].set_succeeded()
+    assert handle.wait(LONG_S)
+    clock.sleep(2.0)
+    assert cancelled == []
+    server.stop()
+
+
+def test_wait_of_a_handle_covers_its_feedback_callbacks(nodes, clock):
+    server_node, client_node = nodes
+
+    def on_goal(handle):
+        handle.set_accepted()
+        handle.publish_feedback(msg.TestFeedback(1))
+        handle.set_succeeded()
+
+    server = ActionServer("demo", msg.TestAction, on_goal, node=server_node)
+    client = ActionClient("demo", msg.TestAction, node=client_node)
+    assert client.wait_for_server(LONG_S)
+    heard = []
+
+    def on_feedback(handle, feedback):
+        clock.sleep(1.0)
+        heard.append(feedback.feedback)
+
+    handle = client.send_goal(msg.TestGoal(1), feedback_cb=on_feedback)
+    assert handle.wait(LONG_S)
+    assert heard == [1]
+    server.stop()
+
+
+def test_callback_may_wait_for_another_goal_of_its_client(nodes, clock):
+    """The wait was for a callback behind the one that waited."""
+    server_node, client_node = nodes
+
+    def on_goal(handle):
+        handle.set_accepted()
+        handle.set_succeeded()
+
+    server = ActionServer("demo", msg.TestAction, on_goal, node=server_node)
+    client = ActionClient("demo", msg.TestAction, node=client_node)
+    assert client.wait_for_server(LONG_S)
+    waited = []
+
+    def on_transition(handle):
+        if handle.get_comm_state() == CommState.DONE:
+            other = client.send_goal(msg.TestGoal(2), lambda _: None)
+            waited.append((other.wait(LONG_S), other.get_goal_status()))
+
+    assert client.send_goal(msg.TestGoal(1), on_transition).wait(LONG_S)
+    assert waited == [(True, GoalStatus.SUCCEEDED)]
+    assert clock.now() < LONG_S
+    server.stop()
 
 
 def test_stopped_client_waits_for_no_server(nodes):
