@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import viz
 from missions.exceptions import MissionError
 from missions.recorder import TrackRecorder
+from smachpy.extras import advice
+from smachpy.log import logwarn
 from viz.runs.recording import Recorder, RecordingError
 
 if TYPE_CHECKING:
@@ -47,7 +49,7 @@ class OutFolder:
             viz.render(machine, self._path(".svg"))
             for old in (self._events, self._path("_summary.json"), self._path("_track.png")):
                 old.unlink(missing_ok=True)
-        importlib.import_module("missions.move_base.track")
+        self._no_track = _why_no_track()
 
     @contextlib.contextmanager
     def collecting(self) -> Iterator[None]:
@@ -82,7 +84,9 @@ class OutFolder:
         """
         with self._writing():
             files = [viz.render(self._machine, self._path(".svg"), run=history)]
-            if self._track.has_goals:
+            if self._track.has_goals and self._no_track is not None:
+                logwarn(f"{self._path('_track.png')}: not drawn: {self._no_track}")
+            elif self._track.has_goals:
                 files.append(self._draw_track(f"{self._name}: {facts['outcome']}"))
             path = self._path("_summary.json")
             path.write_text(json.dumps({**facts, **summary(history)}, indent=2) + "\n", "utf-8")
@@ -106,6 +110,18 @@ class OutFolder:
                 f"--out {self._folder}: got {error.strerror or str(error)!r}; expected a folder to "
                 "write to."
             ) from error
+
+
+def _why_no_track() -> str | None:
+    """Import what draws tracks, which takes a moment; return what is missing for it."""
+    try:
+        importlib.import_module("missions.move_base.track")
+    except ModuleNotFoundError as error:
+        text = advice(error)
+        if text is None:
+            raise
+        return text
+    return None
 
 
 def summary(history: viz.History) -> dict[str, Any]:

@@ -15,8 +15,8 @@ from missions.exceptions import MissionError, NavigationError
 from missions.maps import OFFICE_MAP, OFFICE_ROBOT
 from missions.move_base.config import SimConfig, load_config
 from missions.move_base.geometry import Pose2D, finite, wrap_angle
-from missions.move_base.server import RobotServer
 from missions.robot_process import end_with_stdin
+from smachpy.extras import advice
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,6 +46,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         if args.debug:
             raise
         print(f"move_base: {error}", file=sys.stderr)
+        return EXIT_BAD_INPUT
+    except ModuleNotFoundError as error:
+        text = advice(error)
+        if args.debug or text is None:
+            raise
+        print(f"move_base: {text}", file=sys.stderr)
         return EXIT_BAD_INPUT
 
 

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from actionlib_core.exceptions import ActionlibError
 from actionlib_core.names import parse_arguments
 from smachpy.exceptions import SmachError
+from smachpy.extras import advice
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -63,14 +64,19 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stderr.close()
         return 0
     except (SmachError, ActionlibError) as error:
-        return _report(error, debug="--debug" in arguments)
+        return _report(error, str(error), debug="--debug" in arguments)
+    except ModuleNotFoundError as error:
+        text = advice(error)
+        if text is None:
+            raise
+        return _report(error, text, debug="--debug" in arguments)
 
 
-def _report(error: Exception, *, debug: bool) -> int:
+def _report(error: Exception, text: str, *, debug: bool) -> int:
     if debug:
         traceback.print_exception(error)
     else:
-        print(f"smachpy: {error}", file=sys.stderr)
+        print(f"smachpy: {text}", file=sys.stderr)
     return EXIT_ERROR
 
 

@@ -42,6 +42,21 @@ def commands(monkeypatch):
     monkeypatch.setattr(smachpy.cli, "_load", lambda p: loaders.get(p.name) or load(p))
 
 
+@pytest.fixture
+def add_late(monkeypatch):
+    """Return what makes the command `late` do something."""
+
+    def add(run):
+        def register(subparsers):
+            subparsers.add_parser("late").set_defaults(run=run)
+
+        points = [EntryPoint("late", "here:late", smachpy.cli.GROUP)]
+        monkeypatch.setattr(smachpy.cli, "entry_points", lambda **_: points)
+        monkeypatch.setattr(smachpy.cli, "_load", lambda _: register)
+
+    return add
+
+
 def test_main_returns_what_the_command_returns():
     assert smachpy.cli.main(["ok", "7"]) == 7
 
@@ -67,6 +82,31 @@ def test_a_missing_package_is_named_with_the_way_to_install_it(capsys):
     captured = capsys.readouterr().err
     assert "'a_package_nobody_has' is missing" in captured
     assert "pip install" in captured
+
+
+@pytest.mark.parametrize(
+    ("module", "extra"), [("scipy.ndimage", "sim"), ("PIL", "sim"), ("textual.app", "tui")]
+)
+def test_a_package_of_an_extra_that_is_missing_later_is_named_with_it(
+    module, extra, add_late, capsys
+):
+    def run(_args):
+        raise ModuleNotFoundError(f"No module named {module!r}", name=module)
+
+    add_late(run)
+    assert smachpy.cli.main(["late"]) == 2
+    package = module.partition(".")[0]
+    expected = f"smachpy: package {package!r} is missing. Try: pip install 'smachpy[{extra}]'\n"
+    assert capsys.readouterr().err == expected
+
+
+def test_a_module_of_no_extra_that_is_missing_is_a_mistake_and_shows_where(add_late):
+    def run(_args):
+        raise ModuleNotFoundError("No module named 'my_robot'", name="my_robot")
+
+    add_late(run)
+    with pytest.raises(ModuleNotFoundError, match="my_robot"):
+        smachpy.cli.main(["late"])
 
 
 def test_an_unknown_command_is_exit_code_2_and_names_the_commands(capsys, monkeypatch):

@@ -80,3 +80,10 @@ def test_a_world_as_a_process():
         world.kill()
         world.wait()
         world.stdout.close()
+
+
+def test_a_missing_package_is_named_with_its_extra(capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "PIL", None)
+    assert main([]) == 2
+    expected = "move_base: package 'PIL' is missing. Try: pip install 'smachpy[sim]'\n"
+    assert capsys.readouterr().err == expected
