@@ -259,12 +259,17 @@ class _Default:
             clock=RealClock(),
         )
         self._node = node
-        atexit.register(_leave, node)
+        atexit.register(_leave, node, os.getpid())
         return node
 
 
-def _leave(node: Node) -> None:
-    """Let those finish who asked for it (`Shutdown.at_exit`), then leave the network."""
+def _leave(node: Node, pid: int) -> None:
+    """Let those finish who asked for it (`Shutdown.at_exit`), then leave the network.
+
+    Only in the process that made the node: what a forked one ends with is not its own.
+    """
+    if os.getpid() != pid:
+        return
     current_shutdown().leave()
     node.close()
 

@@ -49,6 +49,7 @@ from actionlib_core.transport.zenoh._declared import (
     Token,
     Watcher,
 )
+from actionlib_core.transport.zenoh._process import process
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -272,6 +273,7 @@ class ZenohTransport:
         return entry
 
     def _check_open(self, key: str) -> None:
+        process.check(key)
         if self._closed:
             raise TransportError(
                 f"{key}: the session is closed. Try using a node that is still open."
@@ -279,7 +281,9 @@ class ZenohTransport:
 
 
 def _open(config: Config) -> zenoh.Session:
+    process.check("joining the network")
     check_interface(config)
+    process.opened = True
     raw = zenoh.Config()
     try:
         for path, value in zenoh_settings(config).items():
@@ -321,6 +325,8 @@ def _close_all() -> None:
     process ("exception not rethrown") when zenoh's Rust is on the thread's stack. A callback that
     had begun before the session closed can be at that point; zenoh tells when it has let go of it.
     """
+    if process.forked:  # they are the other process's, and nothing here would answer
+        return
     for transport in list(_open_transports):
         transport.close()
     held.wait(LET_GO_S)

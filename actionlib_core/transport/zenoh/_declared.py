@@ -18,6 +18,7 @@ from actionlib_core.transport import Presence, Quality, Reply, Sample
 from actionlib_core.transport._inlet import Inlet, inside
 from actionlib_core.transport._latch import LatchFilter, pack_numbers
 from actionlib_core.transport.zenoh._callbacks import direct
+from actionlib_core.transport.zenoh._process import process
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -88,6 +89,8 @@ class Publisher(Declared):
         depths, me = inside.depths, get_ident()
         depths[me] = depths.get(me, 0) + 1  # as `with inside`, in half the time
         try:
+            if process.forked:
+                process.check(self._key)
             if self._inlet.closed:
                 raise TransportError(
                     f"{self._key}: the publisher is closed. Try sending before the node is closed."
@@ -106,6 +109,7 @@ class Publisher(Declared):
     def matching(self) -> bool:
         self._users.append(None)
         try:
+            process.check(self._key)
             if self._inlet.closed:
                 return False
             status: Any = self._port.matching_status  # zenoh's stub says bool

@@ -449,3 +449,38 @@ def test_zenoh_lets_go_of_a_callback_when_it_has_returned_and_not_before():
     with child(LETS_GO) as process:
         out, errors = process.communicate(timeout=WAIT_S * 2)
     assert (out, errors) == ("let go\n", "")
+
+
+_FORK = """
+import os, sys, time
+from actionlib_core import SimpleActionClient, SimpleActionServer, get_node
+from actionlib_core.interfaces.actionlib.msg import TestAction, TestGoal
+from actionlib_core.transport.zenoh import ZenohTransport
+
+server = SimpleActionServer("demo", TestAction, lambda goal: server.set_succeeded())
+client = SimpleActionClient("demo", TestAction)
+client.wait_for_server()
+pid = os.fork()
+if pid == 0:
+    for attempt in (
+        lambda: client.send_goal_and_wait(TestGoal(1)),
+        lambda: SimpleActionClient("demo", TestAction),
+        ZenohTransport,
+    ):
+        try:
+            attempt()
+        except ConnectionError as error:
+            print(str(error).partition(": ")[2][:23], flush=True)
+    sys.exit(0)
+print("exit code", os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]), flush=True)
+print("status", client.send_goal_and_wait(TestGoal(2)), flush=True)
+"""
+
+
+def test_forked_process_is_told_that_it_has_no_network():
+    """It waited for ever, for threads that a fork does not copy; its parent goes on."""
+    with child(_FORK) as process:
+        output, errors = process.communicate(timeout=60)
+    told = ["this process was forked"] * 3
+    assert output.splitlines() == [*told, "exit code 0", "status 3"], errors
+    assert "Traceback" not in errors
