@@ -91,7 +91,13 @@ class Parameter:
 
     def shown(self) -> str:
         """Return it as it stands in a usage line."""
-        word = f"--{self.name.replace('_', '-')} VALUE" if self.named else self.name.upper()
+        if self.named:
+            name = self.name.replace("_", "-")
+            flags = {False: f"--{name}", True: f"--no-{name}"}  # what there is to say
+            known = isinstance(self.default, bool)
+            word = flags[bool(self.default)] if known else f"--{name} VALUE"
+        else:
+            word = self.name.upper()
         word += "..." if self.rest else ""
         return word if self.required else f"[{word}]"
 

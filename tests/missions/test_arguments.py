@@ -109,7 +109,7 @@ def test_every_problem_is_named_at_once_with_the_usage():
         "--wait: got 'maybe'; expected true or false.",
         "x: got 'ten'; expected a number.",
         "y: got 'nan'; expected a number.",
-        "usage: smachpy run mine [OPTIONS] -- ROBOT X Y [THETA] [--wait VALUE]",
+        "usage: smachpy run mine [OPTIONS] -- ROBOT X Y [THETA] [--wait]",
     ]
 
 
@@ -208,15 +208,15 @@ def test_an_annotation_that_only_type_checkers_see_takes_anything():
 
 def test_the_help_says_what_each_is():
     assert usage(target(gotopose)).splitlines() == [
-        "usage: smachpy run mine [OPTIONS] -- ROBOT X Y [THETA] [--wait VALUE]",
+        "usage: smachpy run mine [OPTIONS] -- ROBOT X Y [THETA] [--wait]",
         "",
         "Drive somewhere.",
         "",
-        "  ROBOT           Its name (text)",
-        "  X               Of the goal [m], map frame (a number)",
-        "  Y               a number",
-        "  [THETA]         Heading [rad] (a number, 0.0 when not given)",
-        "  [--wait VALUE]  true or false, False when not given",
+        "  ROBOT     Its name (text)",
+        "  X         Of the goal [m], map frame (a number)",
+        "  Y         a number",
+        "  [THETA]   Heading [rad] (a number, 0.0 when not given)",
+        "  [--wait]  true or false, False when not given",
         "",
         "Each may be given by name too: --NAME VALUE, or --input NAME=VALUE.",
     ]
@@ -288,3 +288,11 @@ def test_a_server_timeout_that_is_no_use(path, seconds, capsys):
 def test_bad_words_end_with_2(path, arguments, text, capsys):
     assert main(["run", path, *arguments]) == 2
     assert text in capsys.readouterr().err
+
+
+def test_the_usage_shows_the_word_that_changes_a_truth_value():
+    def mission(*, start: bool = True, together: bool = False, must: bool):
+        """Do it."""
+
+    first = usage(target(mission)).splitlines()[0]
+    assert first.endswith("-- [--no-start] [--together] --must VALUE")
