@@ -60,9 +60,9 @@ def test_words_that_are_no_answer_are_refused_and_it_goes_on_waiting(mission, an
     assert "got 'rety'; expected one of ['retry', 'skip']. Did you mean 'retry'?" in caplog.text
 
 
-def test_the_first_answer_counts(mission, answer):
-    answer(3.0, "no")
-    answer(3.0, "yes")
+def test_the_first_answer_counts(mission):
+    topic = mission.topic("operator/answer", String)
+    mission.clock.call_later(3.0, lambda: [topic.publish(String(text)) for text in ("no", "yes")])
     mission(asking()).assert_outcome("no")
 
 
