@@ -136,10 +136,14 @@ def _text(feedback: Any) -> str:
         value = _read(feedback, name)
         if isinstance(value, str) and value:
             return shorten(value, TEXT_LENGTH)
+    values = {name: _read(feedback, name) for name in _names(feedback)}
+    texts = [value for value in values.values() if isinstance(value, str)]
+    if len(texts) == 1 and " " in texts[0]:  # a phrase, which needs no name and says it all
+        return shorten(texts[0], TEXT_LENGTH)
     words = [
         f"{name} {value:g}" if isinstance(value, float) else f"{name} {value}"
-        for name in _names(feedback)
-        if isinstance(value := _read(feedback, name), (int, float, str))
+        for name, value in values.items()
+        if isinstance(value, (int, float, str))
     ]
     return shorten(", ".join(words), TEXT_LENGTH)
 

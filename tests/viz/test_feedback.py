@@ -72,6 +72,14 @@ def test_texts_and_small_values_are_shown():
     )
 
 
+def test_the_only_text_is_shown_alone_when_it_is_a_phrase():
+    turning = Message(feedback="turned 10 deg, 80 deg left", left=80.0)
+    assert progress(None, 1, turning).text == "turned 10 deg, 80 deg left"
+    assert progress(None, 1, Message(doing="to the pickup", pose=object())).text == "to the pickup"
+    assert progress(None, 1, Message(room="lab", left=2)).text == "room lab, left 2"
+    assert progress(None, 1, Message(a="to the", b="lab 2")).text == "a to the, b lab 2"
+
+
 def test_slots_are_read_too():
     class Slotted:
         __slots__ = ("_hidden", "count")
