@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import argparse
 import math
 
 import pytest
@@ -54,5 +55,5 @@ def test_a_step_is_as_long_in_every_frame(frame, step):
 
 @pytest.mark.parametrize("text", ["nan", "inf", "-inf", "one"])
 def test_the_command_line_takes_finite_numbers_only(text):
-    with pytest.raises(ValueError, match=r"nan|inf|one"):
+    with pytest.raises(argparse.ArgumentTypeError, match=r"nan|inf|one"):
         finite(text)
