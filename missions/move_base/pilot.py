@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from missions.move_base.navigation import Command
     from missions.move_base.world import Robot
 
-_KEPT_AWAY: Final = 0.05  # [m] driven by hand, it stops so far before an obstacle
+_LOOKED_AHEAD: Final = 0.15  # [m] besides the braking distance, when it is driven by hand
 _BATTERY_EVERY: Final = 4  # steps between two looks at the battery
 _SHARE: Final = 0.8  # of the braking power that is counted on
 
@@ -134,7 +134,11 @@ class Pilot:
         return ""
 
     def _by_hand(self, now: float) -> Command:
-        """Return the override, slowed down so that it ends before what stands in the way."""
+        """Return the override, slowed down so that it ends before what stands in the way.
+
+        It ends where it could be sent to as well: the margin of goals away, and two cells more,
+        as bodies and goals are measured in cells.
+        """
         speed, turn_rate = self._override
         robot = self.robot
         if not robot.battery.charge(now):
@@ -142,6 +146,7 @@ class Pilot:
         if speed == 0.0:
             return self._override
         braking = _SHARE * robot.config.robot.braking
-        room = max(0.0, robot.room(self._override) - _KEPT_AWAY)
+        kept_away = robot.config.planner.margin + 2.0 * robot.world.map.resolution
+        room = max(0.0, robot.room(self._override, kept_away + _LOOKED_AHEAD) - kept_away)
         most = math.sqrt(2.0 * braking * room)
         return math.copysign(min(abs(speed), most), speed), turn_rate

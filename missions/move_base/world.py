@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from missions.move_base.traffic import Disc
 
 AT_DOCK: Final = 0.2  # [m] the charger reaches this far
-_ROOM_BESIDE: Final = 0.2  # [m] looked for ahead besides the braking distance
 _KEPT_PLANNERS: Final = 8  # of the last sets of obstacles
 _NEAR_STEPS: Final = 4  # steps between two looks at who is near
 _NEAR_SPARE: Final = 1.5  # [m] what is near may come closer by so much until the next look
@@ -324,15 +323,15 @@ class Robot:
             self._share = share
             self.battery.drive(now, share)
 
-    def room(self, command: tuple[float, float]) -> float:
+    def room(self, command: tuple[float, float], beside: float) -> float:
         """Return the free distance [m] ahead on the arc of a command (speed, turn rate).
 
-        Looked for no farther than it takes to brake.
+        Looked for no farther than it takes to brake, and `beside` [m] more.
         """
         speed, turn_rate = command
         body = self.body
         fastest = max(abs(speed), abs(body.speed))
-        braking = fastest * fastest / self.config.robot.braking + _ROOM_BESIDE
+        braking = fastest * fastest / self.config.robot.braking + beside
         step = math.copysign(self.world.map.resolution / 2.0, speed)
         turn = turn_rate * step / speed if speed else 0.0
         x, y, yaw = body.pose

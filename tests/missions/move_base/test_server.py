@@ -3,6 +3,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from actionlib_core.exceptions import ServerConflictError
@@ -16,8 +17,13 @@ from actionlib_core.service import ServiceProxy
 from actionlib_core.simple_action_client import SimpleActionClient
 from actionlib_core.topic import Publisher, Subscriber, wait_for_message
 from missions.interfaces import ChargeAction, ChargeGoal
+from missions.maps import OFFICE_ROBOT
+from missions.move_base.config import load_config
 from missions.move_base.geometry import Pose2D, wrap_angle
+from missions.move_base.occupancy import OCCUPIED, OccupancyMap
+from missions.move_base.pilot import Pilot
 from missions.move_base.server import RobotServer
+from missions.move_base.world import Robot, World
 from missions.waypoint_file import goal_at
 
 OFFICE_1 = Pose2D(2.0, 3.0, 0.0)
@@ -321,6 +327,33 @@ def test_driven_by_hand_it_stops_before_a_wall_without_a_bump(simulation, teleop
     nose = body.pose.then(Pose2D(0.25 + 0.12, 0, 0))
     row, column = simulation.world.map.cell(nose.x, nose.y)
     assert (simulation.world.map.cells[row - 2 : row + 3, column - 2 : column + 3] == 100).any()
+
+
+@pytest.mark.parametrize("speed", [0.05, 0.5])
+def test_it_is_driven_by_hand_on_a_coarse_map_too(speed):
+    hall = OccupancyMap(np.zeros((20, 20), np.int8), 0.5, Pose2D(0, 0, 0))
+    robot = Robot(World(hall), load_config(OFFICE_ROBOT), Pose2D(5, 5, 0), 0.0)
+    pilot = Pilot(robot)
+    for i in range(40):
+        pilot.override(0.05 * i, (speed, 0.0))
+        pilot.step(0.05 * i, 0.05)
+    assert robot.body.speed == pytest.approx(speed)
+
+
+@pytest.mark.parametrize("cell", [0.05, 0.1])
+@pytest.mark.parametrize("ahead", [i / 90 for i in range(10)])
+def test_where_it_was_driven_by_hand_it_can_be_sent_again(cell, ahead):
+    config = load_config(OFFICE_ROBOT)
+    hall = OccupancyMap(np.zeros((100, 100), np.int8), cell, Pose2D(0, 0, 0))
+    hall.cells[:, 60:] = OCCUPIED
+    robot = Robot(World(hall), config, Pose2D(60 * cell - 1.0 - ahead, 50 * cell, 0.0), 0.0)
+    pilot = Pilot(robot)
+    for i in range(100):
+        pilot.override(0.05 * i, (0.5, 0.0))
+        pilot.step(0.05 * i, 0.05)
+    assert robot.body.standing
+    robot.check_place(robot.body.x, robot.body.y)
+    assert robot.body.x > 60 * cell - 0.25 - 4 * cell
 
 
 def test_a_goal_waits_while_somebody_drives_by_hand_and_goes_on_afterwards(
