@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+POLL_S = 1e-3  # calls are many and their end is asked for once: looking is cheaper than telling
+
 
 class Inside:
     """Which threads are in calls into the library; a callback on one of them is inline.
@@ -45,6 +47,15 @@ class Inside:
         self.depths[me] -= 1
         if not self.depths[me]:
             del self.depths[me]
+
+    def wait_idle(self, timeout: float) -> None:
+        """Wait until no other thread is in a call.
+
+        Blocks: `timeout` [s] at most.
+        """
+        me, deadline = get_ident(), RealClock.now() + timeout
+        while self.depths.keys() - {me} and RealClock.now() < deadline:
+            RealClock().sleep(POLL_S)
 
 
 inside = Inside()

@@ -18,6 +18,7 @@ import contextlib
 import itertools
 import json
 import threading
+import weakref
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
@@ -94,6 +95,7 @@ class ZenohTransport:
         self.session = _open(self.config)
         self._session_id = str(self.session.zid())
         self.loopback = SerialExecutor(self.clock, f"transport-{self._session_id[:8]}")
+        _loopbacks.add(self.loopback)
         _open_transports[self] = None
         if self.config.access:
             self.queryable(ACCESS_KEY, self._tell_permissions)
@@ -264,7 +266,8 @@ class ZenohTransport:
         self._check_open(key)
         self._check_access(key)
         try:
-            with inside:
+            with inside:  # whom the interpreter's end waits for: so look again
+                self._check_open(key)
                 entry = make()
         except zenoh.ZError as error:
             raise TransportError(f"{key}: cannot be declared: {error}") from error
@@ -305,7 +308,7 @@ def _leave(clock: RealClock, session: zenoh.Session) -> None:
 
     def close() -> None:
         # A time-out says that the network could not be told; the session is unusable all the same.
-        with contextlib.suppress(zenoh.ZError):
+        with inside, contextlib.suppress(zenoh.ZError):
             session.close()  # type: ignore[no-untyped-call]  # zenoh's stub
 
     try:
@@ -316,6 +319,7 @@ def _leave(clock: RealClock, session: zenoh.Session) -> None:
 
 # Sessions stay alive until they are closed, so that no finalizer ever does it.
 _open_transports: dict[ZenohTransport, None] = {}
+_loopbacks: weakref.WeakSet[SerialExecutor] = weakref.WeakSet()
 
 
 def _close_all() -> None:
@@ -324,12 +328,16 @@ def _close_all() -> None:
     CPython ends a foreign thread that asks for the interpreter after its end, which aborts the
     process ("exception not rethrown") when zenoh's Rust is on the thread's stack. A callback that
     had begun before the session closed can be at that point; zenoh tells when it has let go of it.
+    A call of another thread that had begun comes back to Python likewise; a later one is refused.
     """
     if process.forked:  # they are the other process's, and nothing here would answer
         return
     for transport in list(_open_transports):
         transport.close()
     held.wait(LET_GO_S)
+    for executor in list(_loopbacks):
+        executor.join(LET_GO_S)
+    inside.wait_idle(LET_GO_S)
 
 
 atexit.register(_close_all)

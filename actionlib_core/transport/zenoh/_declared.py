@@ -84,17 +84,22 @@ class Publisher(Declared):
         if not self._users:
             super().close()
 
+    def _check_open(self) -> None:
+        process.check(self._key)
+        if self._inlet.closed:
+            raise TransportError(
+                f"{self._key}: the publisher is closed. Try sending before the node is closed."
+            )
+
     def put(self, payload: bytes, attachment: bytes | None = None) -> None:
+        if self._inlet.closed:  # not inside, or threads that go on sending never leave
+            self._check_open()
         self._users.append(None)
         depths, me = inside.depths, get_ident()
         depths[me] = depths.get(me, 0) + 1  # as `with inside`, in half the time
         try:
-            if process.forked:
-                process.check(self._key)
-            if self._inlet.closed:
-                raise TransportError(
-                    f"{self._key}: the publisher is closed. Try sending before the node is closed."
-                )
+            if self._inlet.closed or process.forked:
+                self._check_open()
             self._port.put(payload, source_info=self._source, attachment=attachment)
         except zenoh.ZError as error:
             raise TransportError(f"{self._key}: cannot send: {error}") from error
@@ -107,13 +112,14 @@ class Publisher(Declared):
                 self.close()
 
     def matching(self) -> bool:
+        process.check(self._key)
         self._users.append(None)
         try:
-            process.check(self._key)
-            if self._inlet.closed:
-                return False
-            status: Any = self._port.matching_status  # zenoh's stub says bool
-            return bool(status.matching)
+            with inside:
+                if self._inlet.closed:
+                    return False
+                status: Any = self._port.matching_status  # zenoh's stub says bool
+                return bool(status.matching)
         except zenoh.ZError:  # the session is closed
             return False
         finally:
@@ -272,6 +278,7 @@ class ZenohQuery:
         if raw is not None:
             with inside:
                 raw.drop()  # type: ignore[no-untyped-call]  # zenoh's stub
+                del raw  # which leaves the interpreter once more
 
 
 class Queryable(Declared):
@@ -285,7 +292,12 @@ class Queryable(Declared):
         self._keep(transport.session.declare_queryable(key, direct(self._on_query)))
 
     def _on_query(self, raw: zenoh.Query) -> None:
-        self._inlet.take(self._answer, raw, zenoh.Query.drop)
+        self._inlet.take(self._answer, raw, self._refuse)
+
+    @staticmethod
+    def _refuse(raw: zenoh.Query) -> None:
+        with inside:
+            raw.drop()  # type: ignore[no-untyped-call]  # zenoh's stub
 
     def _answer(self, raw: zenoh.Query) -> None:
         query = ZenohQuery(raw)

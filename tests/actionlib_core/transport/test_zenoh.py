@@ -17,6 +17,7 @@ from actionlib_core.clock import RealClock
 from actionlib_core.config import Config, load_config
 from actionlib_core.exceptions import ConfigError, TransportError
 from actionlib_core.transport import Quality
+from actionlib_core.transport._inlet import Inside
 from actionlib_core.transport.zenoh import ZenohTransport
 
 pytestmark = pytest.mark.zenoh
@@ -66,6 +67,7 @@ def child(code, **environment):
 START = """
 import sys, threading, time
 from actionlib_core.transport import Quality
+from actionlib_core.transport._inlet import Inside
 from actionlib_core.transport.zenoh import ZenohTransport
 t = ZenohTransport()
 t.subscribe("goal", lambda sample: None)
@@ -419,6 +421,7 @@ def test_router_command_serves_until_it_is_told_to_end():
 
 LETS_GO = """
 import threading
+from actionlib_core.transport._inlet import Inside
 from actionlib_core.transport.zenoh import ZenohTransport
 from actionlib_core.transport.zenoh._callbacks import held
 
@@ -455,6 +458,7 @@ _FORK = """
 import os, sys, time
 from actionlib_core import SimpleActionClient, SimpleActionServer, get_node
 from actionlib_core.interfaces.actionlib.msg import TestAction, TestGoal
+from actionlib_core.transport._inlet import Inside
 from actionlib_core.transport.zenoh import ZenohTransport
 
 server = SimpleActionServer("demo", TestAction, lambda goal: server.set_succeeded())
@@ -484,3 +488,36 @@ def test_forked_process_is_told_that_it_has_no_network():
     told = ["this process was forked"] * 3
     assert output.splitlines() == [*told, "exit code 0", "status 3"], errors
     assert "Traceback" not in errors
+
+
+def test_end_of_the_interpreter_waits_for_calls_that_have_begun():
+    """A thread that came back from zenoh after the interpreter's end aborted the process."""
+    calls = Inside()
+    begun, release = threading.Event(), threading.Event()
+
+    def call():
+        with calls:
+            begun.set()
+            release.wait(WAIT_S)
+
+    thread = threading.Thread(target=call)
+    thread.start()
+    assert begun.wait(WAIT_S)
+    calls.wait_idle(0.01)
+    assert calls.depths
+    with calls:  # a thread does not wait for itself
+        release.set()
+        calls.wait_idle(WAIT_S)
+        assert list(calls.depths) == [threading.get_ident()]
+    thread.join(WAIT_S)
+
+
+def test_closed_publisher_is_not_entered():
+    transport = ZenohTransport()
+    publisher = transport.publisher("closed")
+    publisher.close()
+    publisher._port = None  # whatever is called on it raises AttributeError
+    with pytest.raises(TransportError, match="closed: the publisher is closed"):
+        publisher.put(b"x")
+    assert not publisher.matching()
+    transport.close()
