@@ -72,13 +72,25 @@ class Target:
         return machine
 
     def _check_arguments(self, arguments: dict[str, object]) -> None:
+        signature = inspect.signature(self.thing)
+        missing = [
+            name
+            for name, parameter in signature.parameters.items()
+            if parameter.default is parameter.empty
+            and parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
+        ]
+        if missing and not arguments:
+            raise TargetError(
+                self.name,
+                f"{self.source} needs {', '.join(missing)}; expected what needs no arguments. "
+                "Try a function of your own that calls it with some.",
+            )
         try:
-            inspect.signature(self.thing).bind(**arguments)
+            signature.bind(**arguments)
         except TypeError as error:
             raise TargetError(
                 self.name,
-                f"{self.source}{inspect.signature(self.thing)} cannot be called with "
-                f"{sorted(arguments)}: {error}.",
+                f"{self.source}{signature} cannot be called with {sorted(arguments)}: {error}.",
             ) from error
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import smachpy
 import smachpy.targets
-from smachpy.targets import TargetError, list_missions, load_target
+from smachpy.targets import Target, TargetError, list_missions, load_target
 
 FILE = '''
 import smachpy
@@ -106,6 +106,12 @@ def test_a_wrong_name_says_what_is_wrong(file, text, words):
 def test_a_factory_that_gives_no_machine_is_an_error(file):
     with pytest.raises(TargetError, match="returned 3; expected a state machine"):
         load_target("drive_about.py:other").build()
+
+
+def test_a_factory_that_needs_arguments_is_named_with_them_where_there_are_none():
+    target = Target("go", "here:go", "", lambda robot, x, y=0.0, **more: None)
+    with pytest.raises(TargetError, match=r"here:go needs robot, x; expected .* Try a function"):
+        target.build()
 
 
 def test_an_argument_the_factory_does_not_take_is_an_error(file):
