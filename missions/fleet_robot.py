@@ -47,9 +47,6 @@ from missions.interfaces.srv import Permit, PermitRequest, PermitResponse
 from missions.maps import OFFICE_FLEET, OFFICE_MAP, OFFICE_ROBOT
 from missions.move_base.config import load_config
 from missions.move_base.geometry import Pose2D, finite
-from missions.move_base.occupancy import load_map
-from missions.move_base.server import RobotServer
-from missions.move_base.world import Robot, World
 from missions.robot_process import end_with_stdin
 from missions.waypoint_file import load_site
 from smachpy import (
@@ -63,6 +60,7 @@ from smachpy import (
     logwarn,
 )
 from smachpy.checks import ignore
+from smachpy.extras import advice
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -72,6 +70,7 @@ if TYPE_CHECKING:
         MoveBaseGoal,
         MoveBaseResult,
     )
+    from missions.move_base.world import Robot
 
     Note = Callable[[UserData], object]
 
@@ -382,6 +381,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (MissionError, ActionlibError) as error:
         sys.stderr.write(f"fleet_robot: {error}\n")
         return EXIT_BAD_INPUT
+    except ModuleNotFoundError as error:
+        text = advice(error)
+        if text is None:
+            raise
+        sys.stderr.write(f"fleet_robot: {text}\n")
+        return EXIT_BAD_INPUT
 
 
 def serve(args: argparse.Namespace) -> int:
@@ -400,6 +405,8 @@ def serve(args: argparse.Namespace) -> int:
         )
         node = stack.enter_context(Node("fleet_robot", namespace=args.name))
         if body is not None:
+            from missions.move_base.server import RobotServer
+
             base = RobotServer(body, node=node)
             stack.callback(base.close)
             base.start()
@@ -418,6 +425,9 @@ def make_body(site_file: Path, pose: Pose2D | None) -> Robot:
         InputFileError: the site, the map or the robot's file is wrong.
         NavigationError: it cannot stand there.
     """
+    from missions.move_base.occupancy import load_map
+    from missions.move_base.world import Robot, World
+
     site = load_site(site_file)
     world = World(load_map(site.map or OFFICE_MAP))
     for dock in site.docks:

@@ -193,7 +193,7 @@ def _serve(args: argparse.Namespace) -> int:
             saver.close()
         if saver.waypoints:
             count = len(load_tour(args.file).waypoints)  # what missions will read
-            print(f"{args.file}: {count} waypoints")
+            print(f"{args.file}: {count} waypoint{'s' if count > 1 else ''}")
     return 0
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import sys
+
 import pytest
 
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from missions.fleet import fleet
-from missions.fleet_robot import GentleHands, deliver, recharge
+from missions.fleet_robot import GentleHands, deliver, main, recharge
 from missions.interfaces import (
     ChargeAction,
     DeliverAction,
@@ -310,3 +312,10 @@ def test_the_same_seed_gives_the_same_run_twice():
     first = [verdict(seed) for seed in range(20)]
     assert first == [verdict(seed) for seed in range(20)]
     assert {outcome for outcome, *_ in first} == {"succeeded"}
+
+
+def test_a_missing_package_is_named_with_its_extra(capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "PIL", None)
+    assert main(["robot_0"]) == 2
+    expected = "fleet_robot: package 'PIL' is missing. Try: pip install 'smachpy[sim]'\n"
+    assert capsys.readouterr().err == expected
