@@ -173,6 +173,17 @@ class Floor:
         with use_node(self.node):
             return self.machine.execute()
 
+    def ask_in_turn(self):
+        """Let each robot's line ask for its first task a second after the one before it."""
+        late = {robot.name: float(n) for n, robot in enumerate(self.robots)}
+        ask = self.desk.next_task
+
+        def next_task(robot):
+            self.clock.sleep(late.pop(robot, 0.0))
+            return ask(robot)
+
+        self.desk.next_task = next_task
+
     def at(self, seconds, do):
         """Do something `seconds` after the start."""
 
@@ -292,6 +303,7 @@ def kill_as_granted(step):
 )
 def test_a_robot_that_dies_with_an_order(floor_of, arm, stage, given):
     floor = floor_of([*team(1), Robot("robot_1", Pose2D(0.0, 500.0, 0.0))], ONE)
+    floor.ask_in_turn()
     arm(floor)
     outcome = floor.run()
     floor.check()
@@ -316,6 +328,7 @@ def test_the_last_robot_dies(floor_of):
 
 def test_a_robot_whose_link_is_cut_delivers_nothing_that_was_given_to_another(floor_of):
     floor = floor_of([*team(1), Robot("robot_1", Pose2D(0.0, 500.0, 0.0))], ONE)
+    floor.ask_in_turn()
     floor.at(15.0, floor.robots[0].link.cut)
     assert floor.run() == "undelivered"
     floor.check()
@@ -325,6 +338,7 @@ def test_a_robot_whose_link_is_cut_delivers_nothing_that_was_given_to_another(fl
 
 def test_a_robot_that_cannot_reach_the_parcel_leaves_it_to_another(floor_of):
     floor = floor_of(team(2), ONE)
+    floor.ask_in_turn()
     floor.robots[0].drive = None
     floor.robots[0].base.execute_callback = lambda _goal: floor.robots[0].base.set_aborted()
     outcome = floor.run()
@@ -335,6 +349,7 @@ def test_a_robot_that_cannot_reach_the_parcel_leaves_it_to_another(floor_of):
 
 def test_a_robot_that_is_stuck_with_a_parcel_is_out_and_the_order_reported(floor_of):
     floor = floor_of(team(2), ONE)
+    floor.ask_in_turn()
     robot = floor.robots[0]
     drive = robot.base.execute_callback
 
@@ -363,6 +378,7 @@ def test_without_a_coordinator_nothing_is_taken(clock, floor_of):
 def test_a_fleet_that_is_stopped_says_where_the_parcels_are(clock, floor_of):
     orders = [*ONE, Order("order 2", place("far shelf", 200.0), place("desk", 30.0))]
     floor = floor_of(team(2), orders)
+    floor.ask_in_turn()
     floor.at(20.0, floor.machine.request_preempt)
     assert floor.run() == "preempted"
     floor.check()
