@@ -27,6 +27,7 @@ from actionlib_core.interfaces.sensor_msgs.msg import BatteryState, LaserScan
 from actionlib_core.topic import Subscriber
 from missions.exceptions import MissionError
 from missions.maps import OFFICE_EXPLORER
+from missions.move_base.geometry import Pose2D
 from missions.parts import DRIVE_TIMEOUT, SIGNAL_TIMEOUT, drive_back, locate, pose_of
 from missions.progress import Progress
 from missions.waypoint_file import goal_at
@@ -47,11 +48,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterator as Items
 
     from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseGoal
-    from missions.move_base.geometry import Pose2D
     from missions.seen_map import Frontier
 
 IN_VAIN = 8  # so many places in a row out of reach: something is wrong with the robot
 POSES_KEPT = 50  # of which a scan takes the one with the nearest stamp
+LONGEST_STEP = 0.2  # [s] for which a twist is taken to hold
 
 
 def explore(
@@ -269,7 +270,11 @@ class Mapper(State):
 
 
 def pose_at(poses: deque[Odometry], scan: LaserScan) -> Pose2D:
-    """Return the pose whose stamp is nearest to the scan's."""
+    """Return the pose at the scan's stamp: the one nearest to it, moved on as its twist says."""
     stamp = scan.header.stamp.to_sec()
     nearest = min(tuple(poses), key=lambda pose: abs(pose.header.stamp.to_sec() - stamp))
-    return pose_of(nearest.pose.pose)
+    late = min(max(stamp - nearest.header.stamp.to_sec(), -LONGEST_STEP), LONGEST_STEP)
+    twist = nearest.twist.twist
+    turn = twist.angular.z * late / 2
+    here = pose_of(nearest.pose.pose).then(Pose2D(0.0, 0.0, turn))
+    return here.then(Pose2D(twist.linear.x * late, 0.0, turn))

@@ -215,6 +215,15 @@ def test_a_scan_gets_the_pose_of_its_own_time():
     assert pose_at(poses, hall(1, 1, at=9.0)).x == 3.0
 
 
+def test_a_scan_that_comes_before_its_pose_gets_the_one_that_the_twist_leads_to():
+    from collections import deque
+
+    latest = odometry(1, 0, at=1.0)
+    latest.twist.twist.linear.x, latest.twist.twist.angular.z = 0.5, 1.0
+    pose = pose_at(deque([latest]), hall(1, 1, at=1.1))
+    assert pose == pytest.approx((1.05, 0.0025, 0.1), abs=1e-4)
+
+
 @pytest.mark.parametrize(
     ("name", "value", "text"),
     [
@@ -261,7 +270,7 @@ def test_the_simulated_robot_sees_the_rooms_around_it(simulation, path):
         x, y = seen.centre(row, column)
         wrong += real.cells[real.cell(x, y)] != FREE
     assert (seen.cells == FREE).sum() > 3000
-    assert wrong < 0.02 * (seen.cells == FREE).sum()
+    assert wrong < 0.03 * (seen.cells == FREE).sum()
 
 
 @pytest.mark.parametrize("seed", range(3))
