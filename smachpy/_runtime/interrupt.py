@@ -16,6 +16,7 @@ of Python signal handlers".
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
@@ -83,11 +84,42 @@ def close(frame: Frame) -> None:
         _set_exception(frame.thread, None)
 
 
+class _Attention(BaseException):
+    """Raised and caught in `_set_exception`, to be seen by nobody."""
+
+
 def _set_exception(ident: int, kind: type[BaseException] | None) -> None:
+    """Set the exception that the thread `ident` raises next, or take it back with None.
+
+    Before 3.13 the interpreter then looks for it at every step of every thread until a thread has
+    raised one. It would look for ever when the exception is taken back or its thread stays in C,
+    which costs time, and in 3.11 a function that is traced then (by a debugger, by coverage) never
+    begins. So this thread raises one itself; a thread that returns from C looks on its own. No
+    function is called between the two, as it could be a traced one.
+    """
     import ctypes
 
+    set_exception = ctypes.pythonapi.PyThreadState_SetAsyncExc
     pointer = None if kind is None else ctypes.py_object(kind)
-    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(ident), pointer)
+    target, me = ctypes.c_ulong(ident), ctypes.c_ulong(threading.get_ident())
+    attention = ctypes.py_object(_Attention)
+    if sys.version_info >= (3, 13) or (kind is not None and target.value == me.value):
+        set_exception(target, pointer)
+        return
+    try:
+        set_exception(target, pointer)
+        set_exception(me, attention)
+        while True:  # it comes as this turns
+            pass
+    except _Attention:
+        return
+    except BaseException:  # a signal's handler has raised first
+        try:
+            while True:
+                pass
+        except _Attention:
+            pass
+        raise
 
 
 def use_signals() -> None:
