@@ -97,6 +97,8 @@ class MissionApp(App[None]):
 
     def refresh_view(self) -> None:
         """Draw what has changed."""
+        if not self.query("#status"):  # at the end the widgets go before the timer does
+            return
         machine = self._machine or self._first()
         self._machine = machine
         if machine is None or machine.record is None:

@@ -104,3 +104,16 @@ def test_a_preempt_says_who_asked_and_who_holds_it_up(tmp_path, clock):
     assert "DEEP holds it up for" in found["preempt"]
     assert "of 5 s" in found["preempt"]
     assert "asked to stop by operator ann" in found["log"]
+
+
+def test_a_frame_that_comes_after_the_widgets_have_gone_is_none(tmp_path, clock):
+    machines = Machines()
+    machines.obtain("job").reset(recorded(tmp_path).history())
+
+    async def leave():
+        app = MissionApp(machines, None)
+        async with app.run_test():
+            await app.screen.query("*").remove()
+            app.refresh_view()
+
+    asyncio.run(leave())
