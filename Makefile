@@ -2,6 +2,8 @@
 BIN := .venv/bin
 # Continuous integration (CI=true) runs the slow tests and those in a browser too.
 TESTS := $(if $(CI),,-m "not slow and not browser")
+# One worker more than two cores: many tests wait for processes.
+WORKERS := -n 3 --dist worksteal
 
 # The commands and the tests start many processes; each is quicker with cached bytecode.
 unexport PYTHONDONTWRITEBYTECODE
@@ -16,7 +18,7 @@ run:  ## Drive the simulated robot through the patrol mission
 	@$(BIN)/smachpy run patrol --start-robot --out out
 
 test: lint types  ## Check everything: ruff, mypy, import-linter, pytest
-	$(BIN)/python -m pytest -q -n 2 $(TESTS)
+	$(BIN)/python -m pytest -q $(WORKERS) $(TESTS)
 
 lint:
 	@.ci/venv dot,sim,test
