@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+import os
 import threading
+import weakref
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core._action_wire import pack_goal
@@ -34,6 +36,18 @@ UNSURE = " and had not acknowledged the goal, which may or may not have begun"
 REMEMBERED = 1024  # ids of ended goals whose result may come again
 
 
+_managers: weakref.WeakSet[GoalManager] = weakref.WeakSet()
+
+
+def _free_locks() -> None:
+    """Give a forked child locks of its own: who held one then is a thread of its parent."""
+    for manager in _managers:
+        manager._lock = threading.RLock()  # noqa: SLF001
+
+
+os.register_at_fork(after_in_child=_free_locks)
+
+
 class GoalManager:
     """The goals of one client. Registers a goal before it is sent; nothing that comes back is lost.
 
@@ -57,6 +71,7 @@ class GoalManager:
         self._server_lost_timeout = server_lost_timeout
         self._clock = node.clock
         self._lock = threading.RLock()
+        _managers.add(self)
         self._machines: dict[str, CommStateMachine] = {}
         self._ended: dict[str, None] = {}
         self._acks: list[str] = []
