@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from actionlib_core._action_wire import (
     ActionKeys,
@@ -18,11 +18,12 @@ from actionlib_core._action_wire import (
     unpack_statuses,
 )
 from actionlib_core._bursts import Bursts
+from actionlib_core._readable import Readable
 from actionlib_core.exceptions import ActionlibError, TypeMismatchError
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from actionlib_core.presence import Kind, find_mismatch, parse_token, token_key, token_pattern
 from actionlib_core.transport import Quality
-from actionlib_core.wire import check_encoding, encoding_of
+from actionlib_core.wire import encoding_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -93,7 +94,7 @@ class ClientPort:
         self.keys: ActionKeys = action_keys(name)
         self._lock = threading.Lock()
         self._declared: list[Closable] = []
-        self._wrong: set[str] = set()
+        self._readable = Readable(log)
         self.endpoint = node.endpoint(
             Kind.ACTION_CLIENT,
             name,
@@ -107,8 +108,6 @@ class ClientPort:
             self.keys.cancel, encoding_of(GoalID), GOAL
         )
         self._acks: PublisherPort | None = None
-        self._feedback_encoding = encoding_of(types.action_feedback)
-        self._result_encoding = encoding_of(types.action_result)
         self._feedback: Bursts[Sample] = Bursts(node.clock, spawn, self._read_feedback)
 
     def open(self) -> None:
@@ -175,7 +174,7 @@ class ClientPort:
 
     def _on_status(self, sample: Sample) -> None:
         self._feedback.flush()
-        if self._is_readable(sample, GoalStatusArray):
+        if self._readable.check(sample, GoalStatusArray):
             try:
                 entries = unpack_statuses(sample.payload)
                 frame = unpack_frame(sample.payload)
@@ -189,9 +188,7 @@ class ClientPort:
                 self._listener.on_statuses(entries, sample.source)
 
     def _read_feedback(self, sample: Sample) -> None:
-        if sample.encoding != self._feedback_encoding and not self._is_readable(
-            sample, self._types.action_feedback
-        ):
+        if not self._readable.check(sample, self._types.action_feedback):
             return
         try:
             entry, start = unpack_report(sample.payload)
@@ -202,9 +199,7 @@ class ClientPort:
 
     def _on_result(self, sample: Sample) -> None:
         self._feedback.flush()
-        if sample.encoding == self._result_encoding or self._is_readable(
-            sample, self._types.action_result
-        ):
+        if self._readable.check(sample, self._types.action_result):
             self._read_result(sample.payload, sample.source)
 
     def _read_result(self, payload: bytes, source: str) -> None:
@@ -224,7 +219,7 @@ class ClientPort:
                 self._listener.on_answer(unpack_status(reply.payload))
             except ValueError as error:
                 self._report("an answer", error)
-        elif reply.encoding == self._result_encoding:
+        elif reply.encoding == encoding_of(self._types.action_result):
             self._read_result(reply.payload, "")
         else:
             self._report("an answer", f"unknown encoding {reply.encoding!r}")
@@ -232,30 +227,7 @@ class ClientPort:
     def _report(self, what: str, error: object) -> None:
         """Report a message that is dropped; once of a kind, a server may go on like this."""
         text = f"action '{self.name}': {what} cannot be read: {error}"
-        self._report_once(what, ActionlibError(text))
-
-    def _is_readable(self, sample: Sample, message_class: Any) -> bool:
-        """Check the type; a wrong one is reported once per sender and type."""
-        if sample.encoding == encoding_of(message_class):
-            return True
-        try:
-            check_encoding(
-                sample.encoding,
-                message_class,
-                name=sample.key,
-                sender=f"session {sample.source or 'unknown'}",
-            )
-        except TypeMismatchError as error:
-            self._report_once(f"{sample.source} {sample.encoding}", error)
-            return False
-        return True
-
-    def _report_once(self, about: str, error: ActionlibError) -> None:
-        with self._lock:
-            known = about in self._wrong
-            self._wrong.add(about)
-        if not known:
-            log.error("%s", error)
+        self._readable.report(what, ActionlibError(text))
 
     def _on_presence(self, presence: Presence) -> None:
         server = parse_token(presence.key)
@@ -267,5 +239,5 @@ class ClientPort:
             return
         error = find_mismatch([server], self.endpoint)
         if error is not None:
-            self._report_once(f"{server.session} {server.type} {server.md5}", error)
+            self._readable.report(f"{server.session} {server.type} {server.md5}", error)
         self._listener.on_server(server, error)

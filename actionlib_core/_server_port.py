@@ -15,11 +15,11 @@ from actionlib_core._action_wire import (
     unpack_goal_id,
     unpack_statuses,
 )
+from actionlib_core._readable import Readable
 from actionlib_core.exceptions import (
     ActionlibError,
     ServerConflictError,
     TransportError,
-    TypeMismatchError,
 )
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatusArray
 from actionlib_core.presence import (
@@ -31,7 +31,7 @@ from actionlib_core.presence import (
     token_pattern,
 )
 from actionlib_core.transport import Quality
-from actionlib_core.wire import check_encoding, encoding_of
+from actionlib_core.wire import encoding_of
 
 if TYPE_CHECKING:
     from actionlib_core._action_wire import ActionTypes, StatusEntry
@@ -99,9 +99,8 @@ class ServerPort:
         self._token: Closable | None = None
         self._clients: dict[str, Endpoint] = {}
         self._unaware: set[str] = set()  # tokens of clients that the farewell has not reached
-        self._wrong: set[str] = set()
+        self._readable = Readable(log)
         self._closed = False
-        self._goal_encoding = encoding_of(types.action_goal)
         endpoint = node.endpoint(
             Kind.ACTION_SERVER,
             name,
@@ -224,9 +223,7 @@ class ServerPort:
     # -- what arrives --------------------------------------------------------------------------
 
     def _on_goal(self, sample: Sample) -> None:
-        if sample.encoding != self._goal_encoding and not self._is_readable(
-            sample, self._types.action_goal
-        ):
+        if not self._readable.check(sample, self._types.action_goal):
             return
         try:
             goal_id, stamp_ns, body = unpack_goal(sample.payload)
@@ -237,7 +234,7 @@ class ServerPort:
         self._listener.on_goal(goal_id, stamp_ns, content, sample.source)
 
     def _on_cancel(self, sample: Sample) -> None:
-        if not self._is_readable(sample, GoalID):
+        if not self._readable.check(sample, GoalID):
             return
         try:
             goal_id, stamp_ns = unpack_goal_id(sample.payload)
@@ -280,33 +277,10 @@ class ServerPort:
                 query.reply(payload, encoding_of(self._types.action_goal))
         query.finish()
 
-    def _is_readable(self, sample: Sample, message_class: Any) -> bool:
-        """Check the type; a wrong one is reported once per sender and type."""
-        if sample.encoding == encoding_of(message_class):
-            return True
-        try:
-            check_encoding(
-                sample.encoding,
-                message_class,
-                name=sample.key,
-                sender=f"session {sample.source or 'unknown'}",
-            )
-        except TypeMismatchError as error:
-            self._report_once(f"{sample.source} {sample.encoding}", error)
-            return False
-        return True
-
     def _report_unreadable(self, what: str, sample: Sample, error: Exception) -> None:
         """Report a message that is dropped; a sender that goes on like this is told of once."""
         text = f"action '{self.name}': {what} of session {sample.source} cannot be read: {error}"
-        self._report_once(f"{sample.source} {what}", ActionlibError(text))
-
-    def _report_once(self, about: str, error: ActionlibError) -> None:
-        with self._lock:
-            known = about in self._wrong
-            self._wrong.add(about)
-        if not known:
-            log.error("%s", error)
+        self._readable.report(f"{sample.source} {what}", ActionlibError(text))
 
     # -- who is there --------------------------------------------------------------------------
 
@@ -335,7 +309,7 @@ class ServerPort:
             self._clients[presence.key] = client
             error = find_mismatch([client], self.endpoint)
             if error is not None:
-                self._report_once(f"{client.session} {client.type} {client.md5}", error)
+                self._readable.report(f"{client.session} {client.type} {client.md5}", error)
         elif self._clients.pop(presence.key, None) is not None:
             if presence.key in self._unaware:
                 self._unaware.discard(presence.key)
