@@ -67,7 +67,8 @@ class Concurrence(Container):
             None to leave it to the rules.
         child_termination_cb: Called with label -> outcome (None: still runs) each time a child
             has ended; returns True to preempt all others, a list of labels to preempt those,
-            False to let them run. Called in the container's thread, never two at once.
+            False to let them run. Called in the container's thread, never two at once, and not
+            after a child or it itself has raised.
         name: Name of the machine when it is the root.
         userdata_type: A dataclass or TypedDict: the userdata has its fields, and their defaults.
         **options: See `StateOptions`.
@@ -270,7 +271,7 @@ class Concurrence(Container):
             raise
 
     def _see_them_end(self, group: Group) -> None:
-        failure: BaseException | None = None
+        failure: InvalidUserCodeError | None = None
         running = True
         while running or group.reports:
             running = group.wait() if running else False
@@ -279,12 +280,11 @@ class Concurrence(Container):
                 try:
                     self._branch_ended(group, branch)
                 except InvalidUserCodeError as error:
-                    failure = failure or error
+                    failure = error
+                    group.failed = True
                     with asking("concurrence", group.frame.path, "child_termination_cb raised"):
                         self._preempt_branches(group, group.running())
-        if failure is not None:
-            raise failure
-        group.raise_errors()
+        group.raise_errors(failure)
 
     def _branch_ended(self, group: Group, branch: Branch) -> None:
         if branch.error is not None:
@@ -293,8 +293,8 @@ class Concurrence(Container):
             return
         if self._transition_cbs:
             self.call_transition_cbs()
-        if self._child_termination_cb is None:
-            return
+        if self._child_termination_cb is None or group.failed:
+            return  # an outcome that a child did not live to give would pass for one that runs
         try:
             answer = self._child_termination_cb(group.outcomes())
         except Exception as error:

@@ -169,9 +169,10 @@ class Group:
     Attributes:
         reports: Ended branches that the container has not looked at yet.
         each: The container wants to be woken for every end, not only for the last.
+        failed: A branch or a callback has raised; the container will raise too.
     """
 
-    __slots__ = ("_left", "_wake", "branches", "container", "each", "frame", "reports")
+    __slots__ = ("_left", "_wake", "branches", "container", "each", "failed", "frame", "reports")
 
     def __init__(
         self, container: Container, frame: Frame, steps: list[Step], *, each: bool
@@ -179,6 +180,7 @@ class Group:
         self.container = container
         self.frame = frame
         self.each = each
+        self.failed = False
         self.reports: deque[Branch] = deque()
         self._wake: ClockEvent = frame.run.clock.event()
         self.branches = [Branch(self, step) for step in steps]
@@ -211,9 +213,11 @@ class Group:
             branch.answered = answered
             if not branch.dead:
                 branch.step.state.recall_preempt()
+            if error is not None:
+                self.failed = True
+            self.reports.append(branch)  # before it is counted: who sees the last sees them all
             self._left -= 1
             last = self._left == 0
-        self.reports.append(branch)
         if last or self.each or error is not None:
             self._wake.set()
 
@@ -238,14 +242,17 @@ class Group:
         """Return label -> outcome, None for those that run."""
         return {branch.step.label: branch.outcome for branch in self.branches}
 
-    def raise_errors(self) -> None:
-        """Raise what the branches raised, all of it.
+    def raise_errors(self, failure: InvalidUserCodeError | None) -> None:
+        """Raise what the branches raised, all of it, and `failure`, what a callback raised.
 
         Raises:
-            InvalidUserCodeError: from an `ExceptionGroup` of the branches' exceptions.
+            InvalidUserCodeError: `failure` when no branch raised, else from an `ExceptionGroup` of
+                the branches' exceptions and `failure`.
         """
         failed = [branch for branch in self.branches if branch.error is not None]
         if not failed:
+            if failure is not None:
+                raise failure
             return
         errors: list[Exception] = []
         for branch in failed:
@@ -257,6 +264,9 @@ class Group:
         raised = ", ".join(
             f"{branch.here()}: {type(branch.error).__name__}: {branch.error}" for branch in failed
         )
+        if failure is not None:
+            errors.append(failure)
+            raised += f"; {failure}"
         raise InvalidUserCodeError(
             f"{self.frame.path}: {len(failed)} of {len(self.branches)} children raised: {raised}",
             path=getattr(first.error, "path", "") or first.here(),

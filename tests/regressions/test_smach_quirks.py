@@ -416,6 +416,38 @@ def test_concurrence_reports_all_children_that_raise(clock):
     assert {str(e) for e in group.exceptions} <= {"one", "two"}
 
 
+def test_a_child_that_raises_is_told_and_not_shown_to_callbacks_as_one_that_runs(clock):
+    def fail(ud):
+        raise ValueError("motor on fire")
+
+    asked = []
+    made = both(smach.CBState(fail, outcomes=["ok"]), Sleeper(), child_termination_cb=asked.append)
+    with pytest.raises(smach.InvalidUserCodeError, match="motor on fire"):
+        made.execute()
+    assert asked == []
+
+
+def test_concurrence_reports_a_raising_callback_with_the_children_that_raise(clock):
+    class FailsToo(Sleeper):
+        def execute(self, userdata):
+            self.sleep(self.seconds)
+            raise ValueError("motor on fire")
+
+    asked = []
+
+    def ask(outcomes):
+        asked.append(outcomes)
+        raise RuntimeError("callback")
+
+    made = both(Say("ok"), FailsToo(), Sleeper(), child_termination_cb=ask)
+    with pytest.raises(smach.InvalidUserCodeError, match=r"motor on fire.*callback") as caught:
+        made.execute()
+    group = caught.value.__cause__
+    assert [str(e) for e in group.exceptions if isinstance(e, ValueError)] == ["motor on fire"]
+    assert [str(e.__cause__) for e in group.exceptions if e.__cause__] == ["callback"]
+    assert len(asked) == 1
+
+
 @pytest.mark.parametrize("which", ["child_termination_cb", "outcome_cb"])
 def test_raising_concurrence_callbacks_raise_instead_of_hanging(clock, which):
     def fail(outcomes):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
+from collections import deque
 
 import pytest
 
@@ -101,6 +102,30 @@ def test_a_child_that_raises_or_is_preempted_ends_neither_thread_nor_run(clock):
             both.execute()
     fine = concurrence(*[lambda: None] * 5)
     assert fine.execute() == "ok"
+
+
+def test_an_end_is_reported_before_it_is_counted(clock, monkeypatch):
+    """Else the last child, overtaking, lets the container leave with a report on its way."""
+    free = []
+
+    class Watched(deque):
+        def append(self, branch):
+            def look():
+                if branch.group.container._lock.acquire(blocking=False):
+                    branch.group.container._lock.release()
+                    free.append(branch)
+
+            looker = threading.Thread(target=look)
+            looker.start()
+            looker.join()
+            super().append(branch)
+
+    monkeypatch.setattr("smachpy._runtime.branches.deque", Watched)
+    seen = []
+    both = concurrence(lambda: None, lambda: None, child_termination_cb=seen.append)
+    assert both.execute() == "ok"
+    assert len(seen) == 2
+    assert free == []
 
 
 def test_no_thread_left_is_an_error_of_the_children_and_no_hang(clock, monkeypatch):
