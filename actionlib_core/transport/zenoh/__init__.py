@@ -65,6 +65,7 @@ CLOSE_S = 0.5  # zenoh may take so long to leave the network; it is left behind 
 LET_GO_S = 0.5  # the interpreter's end waits so long for callbacks that had begun
 IDLE_S = 0.3  # `close` waits so long for callbacks that are running
 ACCESS_S = 1.0  # longest wait for the other side's access rules
+LIST_ASKS = 2  # questions for tokens of which the first may end too early
 ASK_S = 5.0  # longest wait for a latched publisher's answer
 DEFAULT = Quality()
 
@@ -187,6 +188,7 @@ class ZenohTransport:
         compile_pattern(pattern)
         self._check_open(pattern)
         found: set[str] = set()
+        answered: list[bool] = []
         done = self.clock.event()
 
         def on_token(token: zenoh.Sample) -> None:
@@ -195,17 +197,24 @@ class ZenohTransport:
 
         def on_reply(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
+                answered.append(True)
                 found.add(str(reply.ok.key_expr))
 
         # Soon after a session came, a router may end a liveliness query (zenoh 1.10, about one
-        # of 200) without an answer. It answers a subscriber's wish for history before that end.
+        # of 200) without an answer. It answers a subscriber's wish for history all the same, at
+        # times just after that end: so a question that nobody answered is asked again.
+        deadline = self.clock.now() + timeout
         try:
             with inside:
                 liveliness = self.session.liveliness()
                 history = liveliness.declare_subscriber(pattern, direct(on_token), history=True)
-                callback = direct(on_reply, done.set)
-                liveliness.get(pattern, callback, timeout=timeout)
-            done.wait(timeout)
+            for _ in range(LIST_ASKS):
+                left = max(0.0, deadline - self.clock.now())
+                done.clear()
+                with inside:
+                    liveliness.get(pattern, direct(on_reply, done.set), timeout=left)
+                if not done.wait(left) or answered:
+                    break
             with inside:
                 history.undeclare()  # type: ignore[no-untyped-call]  # zenoh's stub
         except zenoh.ZError as error:
