@@ -76,6 +76,8 @@ class Publisher(Declared):
         )
         self._source = zenoh.SourceInfo(self._port.id, 0)
         self._users: list[None] = []  # one per call in progress; list operations are atomic
+        self._watched = False
+        self._matched = False  # as zenoh has told; asking it costs 5 us and more
         self._keep(self._port)
 
     def close(self) -> None:
@@ -113,11 +115,16 @@ class Publisher(Declared):
 
     def matching(self) -> bool:
         process.check(self._key)
+        if self._matched and not self._inlet.closed:
+            return True
         self._users.append(None)
         try:
             with inside:
                 if self._inlet.closed:
                     return False
+                if not self._watched:
+                    self._watched = True
+                    self._keep(self._port.declare_matching_listener(direct(self._on_matching)))
                 status: Any = self._port.matching_status  # zenoh's stub says bool
                 return bool(status.matching)
         except zenoh.ZError:  # the session is closed
@@ -126,6 +133,10 @@ class Publisher(Declared):
             self._users.pop()
             if self._inlet.closed:
                 self.close()
+
+    def _on_matching(self, status: zenoh.MatchingStatus) -> None:
+        # Inline is right here: it calls nothing foreign and takes no lock.
+        self._matched = status.matching
 
 
 class LatchedPublisher(Publisher):
