@@ -285,6 +285,7 @@ class ActionServer:
 
     def accept(self, tracker: StatusTracker, text: str = "") -> None:
         """Accept a goal; as `ServerGoalHandle.set_accepted`."""
+        text = self._readable(text, "set_accepted()")
         with self.lock:
             self._goals.step(tracker.record, "accept", "set_accepted()", text)
         self._status.on_change()
@@ -304,9 +305,12 @@ class ActionServer:
 
         Raises:
             IllegalTransitionError: the goal's state does not allow it.
-            MessageError: `result` does not fit the action.
+            ActionException: `result` is not of the action's type, or `text` is no text.
+            FieldError: a field of `result` has a wrong type.
         """
+        # Whatever can fail comes first: a goal that has ended must have a result.
         body = self._body(result, self.types.result, call)
+        text = self._readable(text, call)
         record = tracker.record
         with self.lock:
             self._goals.step(record, event, call, text)
@@ -328,7 +332,7 @@ class ActionServer:
         """Send a result under any status. Handles do it for you.
 
         Raises:
-            MessageError: `result` does not fit the action.
+            FieldError: `result` does not fit the action.
         """
         body = self._body(result, self.types.result, "publish_result()")
         self._port.send_result(pack_report(self._clock.time_ns(), entry_of_status(status), body))
@@ -337,7 +341,7 @@ class ActionServer:
         """Send feedback for the goal that `status` names.
 
         Raises:
-            MessageError: `feedback` does not fit the action.
+            FieldError: `feedback` does not fit the action.
         """
         body = self._body(feedback, self.types.feedback, "publish_feedback()")
         self._port.send_feedback(pack_report(self._clock.time_ns(), entry_of_status(status), body))
@@ -358,6 +362,14 @@ class ActionServer:
             )
         body: bytes = message.to_bytes()
         return body
+
+    def _readable(self, text: Any, call: str) -> str:
+        """Return `text` as it can be sent; characters that UTF-8 does not have are escaped."""
+        if not isinstance(text, str):
+            raise ActionException(
+                f"action '{self.ns}': {call}: text: got {text!r}; expected a string. Try str(...)."
+            )
+        return text if text.isascii() else text.encode("utf-8", "backslashreplace").decode()
 
     def _send_status(self, goals: list[ServerGoal]) -> None:
         entries = [entry_of(goal) for goal in goals]

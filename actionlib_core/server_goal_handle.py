@@ -48,6 +48,7 @@ class ServerGoalHandle:
 
         Raises:
             IllegalTransitionError: the goal is in another state.
+            ActionException: `text` is not a string.
         """
         self.action_server.accept(self.status_tracker, text)
 
@@ -60,7 +61,8 @@ class ServerGoalHandle:
 
         Raises:
             IllegalTransitionError: the goal has ended.
-            MessageError: `result` does not fit the action.
+            ActionException: `result` is not of the action's type, or `text` is not a string; the
+                goal goes on.
         """
         self.action_server.finish(self.status_tracker, "cancel", "set_canceled()", result, text)
 
@@ -84,7 +86,7 @@ class ServerGoalHandle:
         """Send feedback to the goal's client.
 
         Raises:
-            MessageError: `feedback` does not fit the action.
+            FieldError: `feedback` does not fit the action.
             TransportError: the server's node is closed.
         """
         self.action_server.publish_feedback(self.get_goal_status(), feedback)

@@ -268,8 +268,9 @@ class SimpleActionServer:
 
         Raises:
             IllegalTransitionError: the goal has ended already.
-            ActionException: no goal was accepted, or `result` is not of the action's type.
-            MessageError: a field of `result` has a wrong type.
+            ActionException: no goal was accepted, `result` is not of the action's type, or `text`
+                is not a string; the goal goes on.
+            FieldError: a field of `result` has a wrong type.
         """
         self._end("set_succeeded()", "succeed", result, text)
 
@@ -311,7 +312,7 @@ class SimpleActionServer:
 
         Raises:
             ActionException: no goal was accepted, or `feedback` is not of the action's type.
-            MessageError: a field of `feedback` has a wrong type.
+            FieldError: a field of `feedback` has a wrong type.
         """
         goal = self._policy.current
         if goal is None:

@@ -302,6 +302,43 @@ def test_callbacks_are_functions(nodes):
     assert simple.get_state() == GoalStatus.LOST  # no goal was sent
 
 
+@pytest.mark.parametrize("end", ["set_canceled", "set_rejected", "set_aborted", "set_succeeded"])
+def test_text_that_is_none_leaves_the_goal_as_it_was(nodes, clock, end):
+    """The goal had ended, without a result that could be sent: its client waited for ever."""
+    taken = []
+    server = ActionServer("demo", msg.TestAction, taken.append, node=nodes[0])
+    client = ActionClient("demo", msg.TestAction, node=nodes[1])
+    assert client.wait_for_server(LONG_S)
+    sent = client.send_goal(msg.TestGoal(1))
+    clock.sleep(1.0)
+    with pytest.raises(ActionlibError, match=r"demo.*set_accepted.*: text: got 5; expected a str"):
+        taken[0].set_accepted(5)
+    assert taken[0].get_goal_status().status == GoalStatus.PENDING
+    if end not in {"set_canceled", "set_rejected"}:
+        taken[0].set_accepted()
+    with pytest.raises(ActionlibError, match=rf"demo.*{end}.*: text: got ValueError.*; expected"):
+        getattr(taken[0], end)(text=ValueError("no"))
+    getattr(taken[0], end)(text="a file caf\udce9.yaml")
+    assert sent.wait(LONG_S)
+    assert sent.get_goal_status_text() == "a file caf\\udce9.yaml"
+    assert server.status_list
+    server.stop()
+
+
+def test_error_whose_text_cannot_be_sent_ends_its_goal(nodes):
+    def execute(goal):
+        raise OSError("no file caf\udce9.yaml")
+
+    server = SimpleActionServer("demo", msg.TestAction, execute, node=nodes[0])
+    client = SimpleActionClient("demo", msg.TestAction, node=nodes[1])
+    assert client.wait_for_server(LONG_S)
+    client.send_goal(msg.TestGoal(1))
+    assert client.wait_for_result(LONG_S)
+    assert client.get_state() == GoalStatus.ABORTED
+    assert client.get_goal_status_text().endswith("no file caf\\udce9.yaml")
+    server.stop()
+
+
 def test_service_class_is_one(nodes):
     for make in (ServiceProxy, lambda *args, **kw: Service(*args, print, **kw)):
         with pytest.raises(ActionlibError, match=r"demo.*got .*String.*; expected a service class"):
