@@ -7,10 +7,16 @@ import re
 import shutil
 import subprocess
 import sys
+import threading
+import time
 import urllib.request
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
+
+from smachpy import CBState, StateMachine
+from smachpy.introspection import describe
 
 HERE = Path(__file__).parent
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -81,6 +87,65 @@ class View(Child):
         request = urllib.request.Request(self.base + path.lstrip("/"), headers=headers)
         with urllib.request.urlopen(request, timeout=10) as answer:
             return answer.status, dict(answer.headers), answer.read()
+
+
+class Served:
+    """The page of machines that this process makes up: no mission, no network."""
+
+    def __init__(self):
+        from viz.live.machines import Machines
+
+        self.machines = Machines()
+        self.commands = []
+        self._server = self._thread = None
+        self._began = time.time_ns()
+
+    def add(self, name, label="JOB", labels="AB", events=(), **history):
+        """A chain of states; `events` are (kind, path[, facts]) a millisecond apart."""
+        sm = StateMachine(outcomes=["done"], name=label)
+        with sm:
+            for one, after in zip(labels, [*labels[1:], "done"], strict=True):
+                StateMachine.add(one, CBState(lambda _: "ok", outcomes=["ok"]), {"ok": after})
+        machine = self.machines.obtain(name)
+        told = {"epoch": f"{name} {label}", "problems": [], "base": None, "control": None}
+        record = asdict(describe(sm))
+        machine.reset({**told, **history, "description": record, "events": self.events(events)})
+        return machine
+
+    def events(self, events, after=0):
+        """Events as a machine sends them; `at` [s] moves one away from its place."""
+        made = []
+        for seq, (kind, path, *more) in enumerate(events, after + 1):
+            facts = more[0] if more else {}
+            stamp = self._began + int(facts.pop("at", seq / 1000) * 1e9)
+            made.append({"kind": kind, "path": path, "stamp_ns": stamp, "t": 0.0, **facts})
+            made[-1]["seq"] = seq
+        return made
+
+    def start(self, **viewer):
+        from viz.live.app import Viewer
+        from viz.live.server import PageServer
+
+        self._server = PageServer(Viewer(self.machines, send=self._send, **viewer), "127.0.0.1", 0)
+        self._thread = threading.Thread(target=self._server.serve_here)
+        self._thread.start()
+        return self._server.address
+
+    def _send(self, _name, command):
+        self.commands.append(command)
+        return {"ok": True, "text": "", "paused": False, "breakpoints": []}
+
+    def end(self):
+        if self._server is not None:
+            self._server.stop()
+            self._thread.join()
+
+
+@pytest.fixture
+def served():
+    served = Served()
+    yield served
+    served.end()
 
 
 @pytest.fixture(scope="session")

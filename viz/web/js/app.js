@@ -380,7 +380,7 @@ function App({ page }) {
 store.applyTheme();
 const page = new Page();
 window.smachpy = { page, store }; // for tests and the curious
-store.cursor.subscribe(() => { if (page.diagram) { page.paintAll(); page.timeline.draw(); } });
+store.place.subscribe(() => { if (page.diagram) { page.paintAll(); page.timeline.draw(); } });
 store.facts.subscribe(() => { if (page.diagram?.size) page.paintAll(); });
 render(html`<${App} page=${page} />`, document.getElementById("app"));
 document.querySelector(".boot")?.remove();

@@ -210,7 +210,7 @@ const clock = (ns, data) => {
 // What the transition at the cursor changed.
 function Difference({ page }) {
   if (store.cursor.value === null) return null;
-  const run = store.run, at = run.indexAt(store.cursor.value);
+  const run = store.run, at = store.happened();
   let from = at - 1;
   while (from > 0 && !["Left", "Failed", "Finished", "Started"].includes(run.events[from]?.kind)) from--;
   let before = from - 1;
@@ -265,7 +265,7 @@ function Log({ page }) {
   store.slowTick.value; // components that read signals are drawn again only when those change
   const [text, setText] = useState("");
   const run = store.run, kinds = GROUPS[store.logFilter.value];
-  const end = store.cursor.value === null ? run.events.length : run.indexAt(store.cursor.value);
+  const end = store.happened();
   const begun = ms(store.shown().started) ?? run.first();
   const lines = [];
   const wanted = text.toLowerCase();
@@ -275,7 +275,7 @@ function Log({ page }) {
     const [words, kind] = LINES[e.kind](e);
     if (wanted && !`${e.path} ${words}`.toLowerCase().includes(wanted)) continue;
     const edge = e.kind === "Left" ? target(e) : "";
-    lines.push(html`<li key=${e.seq} onClick=${() => { if (store.cursor.value !== null) store.seek(ms(e.stamp_ns)); }}>
+    lines.push(html`<li key=${e.seq} onClick=${() => { if (store.cursor.value !== null) store.seekTo(i + 1); }}>
       <time>${((ms(e.stamp_ns) - begun) / 1000).toFixed(2)}</time><${State} path=${e.path} page=${page} /> <span class=${`word ${kind}`}>${shorten(words, LINE)}</span>${edge}</li>`);
   }
   return html`<${Section} title="Log"><div class="filter">

@@ -1,5 +1,5 @@
 // What the page knows and what its user chose. Panels read signals; the diagram reads `shown()`.
-import { signal, computed } from "@preact/signals";
+import { batch, signal, computed } from "@preact/signals";
 import { Model } from "viewer/model";
 import { Run, emptyState, ms } from "viewer/fold";
 
@@ -20,6 +20,8 @@ export const failure = signal(null); // a text that the whole page should know
 export const tick = signal(0); // counts the changes that panels should show
 export const slowTick = signal(0); // the same, for panels of many words
 export const cursor = signal(null); // the instant shown [ms]; null: now
+const position = signal(null); // so many events have happened there: several may share an instant
+export const place = computed(() => [cursor.value, position.value]);
 export const gap = signal(null);
 export const selected = signal(null);
 export const query = signal("");
@@ -44,7 +46,7 @@ let autoDepth = 0; // levels opened by themselves; 0: somebody has chosen what i
 export function begin(base, events) {
   run = new Run(base, events);
   past = null;
-  cursor.value = null;
+  batch(() => { cursor.value = null; position.value = null; });
 }
 
 export const shown = () => (cursor.value === null ? run.now : past ?? run.now);
@@ -54,27 +56,36 @@ export const nowMs = () => {
   return ended ? run.last() ?? Date.now() : Math.max(Date.now(), run.last() ?? 0);
 };
 
+// So many of the kept events have happened by what is shown.
+export const happened = () => position.value ?? run.events.length;
+
+function show(t, count) {
+  if (count !== null) past = run.after(count);
+  batch(() => {
+    cursor.value = t;
+    position.value = count;
+    tick.value += 1;
+    slowTick.value += 1;
+  });
+}
+
 // Show the instant t [ms]; null: now.
 export function seek(t) {
-  if (t !== null) {
-    t = Math.max(run.first() ?? t, Math.min(t, run.last() ?? t));
-    past = run.after(run.indexAt(t));
-  }
-  cursor.value = t;
-  tick.value += 1;
-  slowTick.value += 1;
+  if (t === null) { show(null, null); return; }
+  t = Math.max(run.first() ?? t, Math.min(t, run.last() ?? t));
+  show(t, run.indexAt(t));
+}
+
+// Show what the first `count` events add up to.
+export function seekTo(count) {
+  const event = run.events[count - 1];
+  if (event) show(ms(event.stamp_ns), count);
 }
 
 export function seekEvent(step) {
-  const here = cursor.value === null ? run.events.length : run.indexAt(cursor.value);
-  const to = Math.max(1, Math.min(here + step, run.events.length));
-  if (to >= run.events.length && step > 0) { seek(null); return; }
-  const event = run.events[to - 1];
-  if (!event) return;
-  past = run.after(to);
-  cursor.value = ms(event.stamp_ns);
-  tick.value += 1;
-  slowTick.value += 1;
+  const to = Math.max(1, happened() + step);
+  if (to >= run.events.length && step > 0) seek(null);
+  else seekTo(Math.min(to, run.events.length));
 }
 
 export const isActive = (state) => state?.since != null;
