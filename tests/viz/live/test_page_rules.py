@@ -56,3 +56,72 @@ def test_single_events_back_and_on_though_they_share_an_instant(served, look):
     assert on == seen[3::-1]
     page.keyboard.press(".")
     assert page.evaluate("() => smachpy.store.cursor.value") is None
+
+
+GOAL = ("GoalSent", "/JOB/A", {"action": "drive", "goal_id": "1", "goal": {"x": 1}})
+
+
+def test_links_and_summaries_keep_their_keys(served, look, tmp_path):
+    served.add("one", events=[*run()[:2], GOAL], control={"paused": False, "breakpoints": []})
+    page = look(f"{served.start(token='t')}#token=t")
+    wait_for(page, "document.querySelector('#pause')")
+    page.focus("summary:text-is('goal')")
+    page.keyboard.press("Space")
+    wait_for(page, "document.querySelector('details[open] pre')")
+    page.keyboard.press("Enter")
+    wait_for(page, "!document.querySelector('details[open] pre')")
+    page.click(".menu > button")
+    page.focus(".sheet a:text-is('recording')")
+    with page.expect_download() as download:
+        page.keyboard.press("Enter")
+    assert download.value.suggested_filename == "run.jsonl"
+    assert served.commands == []
+    page.evaluate("() => document.activeElement.blur()")
+    page.keyboard.press("Space")
+    page.wait_for_selector(".notice")
+    assert [one["command"] for one in served.commands] == ["pause"]
+
+
+def test_the_tree_by_keyboard(served, look):
+    served.add("one", events=run()[:2], control={"paused": False, "breakpoints": []})
+    page = look(f"{served.start(token='t')}#token=t")
+    wait_for(page, "document.querySelectorAll('[role=treeitem]').length === 3")
+    page.focus("[role=tree]")
+    here = """() => document.getElementById(document.querySelector('[role=tree]')
+        .getAttribute('aria-activedescendant')).title"""
+
+    def press(*keys):
+        for key in keys:
+            page.keyboard.press(key)
+        page.wait_for_timeout(50)
+        return page.evaluate(here)
+
+    assert page.evaluate(here) == "/JOB"
+    assert press("ArrowDown", "ArrowDown") == "/JOB/B"
+    assert press("ArrowDown") == "/JOB/B"
+    page.keyboard.press("Space")
+    assert page.evaluate("() => smachpy.store.selected.value") == "/JOB/B"
+    assert press("ArrowUp") == "/JOB/A"
+    page.keyboard.press("Enter")
+    assert page.evaluate("() => smachpy.store.selected.value") == "/JOB/A"
+    assert press("ArrowLeft") == "/JOB"
+    assert press("ArrowLeft") == "/JOB"
+    wait_for(page, "document.querySelectorAll('[role=treeitem]').length === 1")
+    assert page.get_attribute("[role=treeitem]", "aria-expanded") == "false"
+    press("ArrowRight")
+    wait_for(page, "document.querySelectorAll('[role=treeitem]').length === 3")
+    assert press("End") == "/JOB/B"
+    assert press("Home") == "/JOB"
+    assert served.commands == []
+
+
+def test_a_row_of_userdata_by_keyboard(served, look):
+    written = ("UserdataWritten", "/JOB/A", {"key": "load", "value": {"boxes": [1, 2]}})
+    served.add("one", events=[*run()[:2], written])
+    page = look(served.start())
+    page.wait_for_selector(".userdata tr")
+    page.focus(".userdata tr")
+    page.keyboard.press("Enter")
+    page.wait_for_selector(".userdata pre")
+    page.keyboard.press("Space")
+    wait_for(page, "!document.querySelector('.userdata pre')")

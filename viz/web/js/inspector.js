@@ -147,6 +147,13 @@ function More({ label, value }) {
   return html`<details open=${open} onToggle=${(e) => setOpen(e.target.open)}><summary>${label}</summary>${open && html`<pre>${pretty(value)}</pre>`}</details>`;
 }
 
+// Enter and Space on a row do what a click does.
+const pressAsClick = (e) => {
+  if (e.target !== e.currentTarget || (e.key !== "Enter" && e.key !== " ")) return;
+  e.preventDefault();
+  e.currentTarget.click();
+};
+
 const plain = (value) => value?.$msg ? { [value.$msg]: value.fields } : value;
 const pretty = (value) => JSON.stringify(value, (_k, v) => (v && v.$msg ? v.fields : v), 1).replace(/"([a-z_0-9]+)":/gi, "$1:").slice(0, 20_000);
 export function brief(value) {
@@ -174,7 +181,7 @@ function Userdata({ page, data, now }) {
       const fresh = now - ms(entry.at) < FLASH_MS;
       const first = several && entry.container !== container;
       container = entry.container;
-      return html`${first && html`<tr class="group"><th colspan="2" title=${container}>${container.split("/").filter(Boolean).slice(-2).map((part) => shorten(part)).join(" \u203a ")}</th></tr>`}<tr key=${id} class=${fresh ? "fresh" : ""} onClick=${() => setOpen(open === id ? null : id)}>
+      return html`${first && html`<tr class="group"><th colspan="2" title=${container}>${container.split("/").filter(Boolean).slice(-2).map((part) => shorten(part)).join(" \u203a ")}</th></tr>`}<tr key=${id} class=${fresh ? "fresh" : ""} tabindex="0" aria-expanded=${open === id} onClick=${() => setOpen(open === id ? null : id)} onKeyDown=${pressAsClick}>
         <th scope="row" title=${shorten(entry.container, 400)}>${shorten(entry.key, 80)}</th>
         <td><code>${open === id ? html`<pre>${pretty(entry.value)}</pre>` : text.slice(0, SHORT)}${open !== id && text.length > SHORT ? "\u2026" : ""}</code>
           ${open === id && wasShortened(text) && html`<${Whole} entry=${entry} />`}

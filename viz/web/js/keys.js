@@ -3,6 +3,7 @@ import * as store from "viewer/store";
 import { canControl, command, isFile, showActions } from "viewer/source";
 
 const STEP = 80;
+const PRESSED = "a[href], button, summary, tr[tabindex]"; // Enter and Space are theirs
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
 export function listen(page) {
@@ -31,7 +32,7 @@ export function listen(page) {
       if (e.key === "Escape") e.target.blur();
       return;
     }
-    if (e.target.tagName === "BUTTON" && (e.key === "Enter" || e.key === " ")) return;
+    if ((e.key === "Enter" || e.key === " ") && e.target.closest(PRESSED)) return;
     if (store.actionsOpen.value && !["a", "d", "?", "Escape"].includes(e.key)) return;
     if (e.key in ARROWS) {
       const [dx, dy] = ARROWS[e.key];

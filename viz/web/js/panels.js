@@ -123,6 +123,7 @@ function View({ page }) {
 export function Tree({ page }) {
   const [top, setTop] = useState(0);
   const [folded, setFolded] = useState(() => new Map());
+  const [chosen, setChosen] = useState(null);
   const box = useRef();
   store.tick.value;
   const model = store.model.value;
@@ -140,21 +141,38 @@ export function Tree({ page }) {
   const height = box.current?.clientHeight ?? 800;
   const first = Math.max(0, Math.floor(top / ROW) - 4);
   const visible = rows.slice(first, first + Math.ceil(height / ROW) + 8);
-  const fold = (node, e) => {
-    e.stopPropagation();
-    setFolded(new Map(folded).set(node.path, !node.treeOpen));
+  const fold = (node) => setFolded(new Map(folded).set(node.path, !node.treeOpen));
+  const at = Math.max(0, rows.findIndex((node) => node.path === (chosen ?? store.selected.value)));
+  const choose = (row) => {
+    const to = Math.max(0, Math.min(row, rows.length - 1)), y = to * ROW + 6;
+    setChosen(rows[to].path);
+    box.current.scrollTop = Math.max(y + ROW - height, Math.min(box.current.scrollTop, y - 6));
   };
-  return html`<aside class="tree" aria-label="states" role="tree" ref=${box} onScroll=${(e) => setTop(e.target.scrollTop)}>
+  const onKeyDown = (e) => {
+    if (e.ctrlKey || e.metaKey || e.altKey) return;
+    const node = rows[at], inside = node.children.length > 0, screen = Math.max(1, Math.floor(height / ROW) - 1);
+    const rowOf = { ArrowDown: at + 1, ArrowUp: at - 1, Home: 0, End: rows.length - 1, PageDown: at + screen, PageUp: at - screen };
+    if (e.key in rowOf) choose(rowOf[e.key]);
+    else if (e.key === "ArrowRight") { if (inside && !node.treeOpen) fold(node); else if (inside) choose(at + 1); }
+    else if (e.key === "ArrowLeft") { if (inside && node.treeOpen) fold(node); else if (node.parent) choose(rows.indexOf(node.parent)); }
+    else if (e.key === "Enter" || e.key === " ") page.goTo(node.path);
+    else return;
+    e.preventDefault();
+    e.stopPropagation();
+  };
+  return html`<aside class="tree" aria-label="states" role="tree" ref=${box} onScroll=${(e) => setTop(e.target.scrollTop)}
+    tabindex="0" aria-activedescendant=${`row-${rows[at].number}`} onKeyDown=${onKeyDown}>
     <div style=${{ height: `${rows.length * ROW}px` }} class="rows">
       ${visible.map((node, i) => {
         const state = states[node.path];
         const active = state?.since != null;
         const kind = state?.outcome != null ? outcomeClass(state.outcome) : "";
-        return html`<div key=${node.path} role="treeitem" aria-level=${node.depth + 1} aria-selected=${store.selected.value === node.path}
-          class=${`row ${active ? "active" : ""} ${state?.preempt && active ? "preempting" : ""} ${store.selected.value === node.path ? "selected" : ""}`}
+        return html`<div key=${node.path} role="treeitem" id=${`row-${node.number}`} aria-level=${node.depth + 1} aria-selected=${store.selected.value === node.path}
+          aria-expanded=${node.children.length ? node.treeOpen : undefined}
+          class=${`row ${first + i === at ? "at" : ""} ${active ? "active" : ""} ${state?.preempt && active ? "preempting" : ""} ${store.selected.value === node.path ? "selected" : ""}`}
           style=${{ top: `${(first + i) * ROW}px`, paddingLeft: `${8 + Math.min(node.depth, 12) * 14}px` }} title=${node.path}
-          onClick=${() => page.goTo(node.path)}>
-          ${node.children.length ? html`<button class="fold" tabindex="-1" aria-label=${node.treeOpen ? "close" : "open"} onClick=${(e) => fold(node, e)}>${node.treeOpen ? "\u25be" : "\u25b8"}</button>`
+          onClick=${() => { setChosen(node.path); page.goTo(node.path); }}>
+          ${node.children.length ? html`<button class="fold" tabindex="-1" aria-label=${node.treeOpen ? "close" : "open"} onClick=${(e) => { e.stopPropagation(); fold(node); }}>${node.treeOpen ? "\u25be" : "\u25b8"}</button>`
             : html`<span class="kind">${GLYPH[node.kind] ?? "\u00b7"}</span>`}
           <span class="name">${node.name}</span>
           ${!active && kind && html`<span class=${`ended ${kind}`}>${{ success: "\u2713", failure: "\u2715", preempted: "\u25a0", other: "\u2022" }[kind]}</span>`}
