@@ -486,6 +486,9 @@ class ActionServer:
         except Exception as error:
             self.give_up(handle.status_tracker, f"Exception in goal callback: {error}")
             raise
+        except BaseException as error:  # `sys.exit`, which ends this thread
+            self.give_up(handle.status_tracker, f"Exception in goal callback: {error!r}")
+            raise
 
     def give_up(self, tracker: StatusTracker, text: str) -> None:
         """End a goal that its code has left without an end; one that has ended stays."""

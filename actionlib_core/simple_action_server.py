@@ -407,6 +407,16 @@ class SimpleActionServer:
 
     def executeLoop(self) -> None:  # noqa: N802  actionlib's name
         """Run the goals that wait, until none has come for `LINGER_S`."""
+        try:
+            self._run_waiting()
+        except BaseException:  # `sys.exit` in a callback: another thread goes on with the rest
+            with self.lock:
+                self._task = self._idle = None
+                if self._policy.waiting:
+                    self._start_execution()
+            raise
+
+    def _run_waiting(self) -> None:
         come = self.action_server.node.clock.event(f"a goal for {self._name}")
         while True:
             with self.lock:
@@ -442,8 +452,6 @@ class SimpleActionServer:
             text = self._report(error)
         except BaseException as error:
             self._abort(handle, f"Exception in execute callback: {error!r}")
-            with self.lock:
-                self._task = self._idle = None
             raise
         self._abort(handle, text)
 

@@ -24,7 +24,8 @@ class SerialExecutor:
     """Runs submitted callables in order, one at a time, in a task that ends when idle.
 
     User callbacks go through one of these, so that they may block without holding up the
-    transport, and callbacks of one owner never overlap.
+    transport, and callbacks of one owner never overlap. An exception is reported, and so is what
+    ends a thread (`sys.exit`, for one); what was submitted after it runs all the same.
 
     Threads: `submit` may be called from any thread and never waits for a callable.
     """
@@ -51,11 +52,29 @@ class SerialExecutor:
 
         Blocks: until idle or `timeout` [s] has passed. Not to be called from a submitted callable.
         """
-        with self._lock:
-            task = self._task
-        return task is None or task.join(timeout)
+        while True:
+            with self._lock:
+                task = self._task
+            if task is None:
+                return True
+            if not task.join(timeout):
+                return False
+            if task.error is None:  # else another task goes on with the rest
+                return True
 
     def _drain(self) -> None:
+        try:
+            self._run_all()
+        except BaseException as error:
+            if isinstance(error, SystemExit):  # the one that a thread ends with in silence
+                _log_exit(self._name, error)
+            with self._lock:
+                self._task = None
+                if self._queue:
+                    self._task = self._clock.spawn(self._drain, name=self._name)
+            raise
+
+    def _run_all(self) -> None:
         while True:
             with self._lock:
                 if not self._queue:
@@ -66,6 +85,13 @@ class SerialExecutor:
                 function()
             except Exception:  # noqa: BLE001  a border: reported, and the next callable still runs
                 report_thread_exception()
+
+
+def _log_exit(name: str, error: SystemExit) -> None:
+    import logging  # 4 ms that a state machine alone never needs
+
+    log = logging.getLogger(__name__)
+    log.error("%s: a callback raised SystemExit: %s", name, error, exc_info=error)
 
 
 def report_thread_exception() -> None:

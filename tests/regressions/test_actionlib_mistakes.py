@@ -365,6 +365,68 @@ def test_handler_that_ends_its_thread_answers(nodes, caplog):
     assert "the handler raised" in caplog.text
 
 
+def test_done_callback_that_ends_its_thread_holds_nobody_up(nodes, caplog):
+    """It was the last callback that this client ever called, and the wait never ended."""
+    server = SimpleActionServer(
+        "demo", msg.TestAction, lambda _: server.set_succeeded(), node=nodes[0]
+    )
+    client = SimpleActionClient("demo", msg.TestAction, node=nodes[1])
+    assert client.wait_for_server(LONG_S)
+    done = []
+
+    def leave(*_):
+        raise SystemExit("enough")
+
+    client.send_goal(msg.TestGoal(1), done_cb=leave)
+    assert client.wait_for_result(LONG_S)
+    client.send_goal(msg.TestGoal(2), done_cb=lambda status, _: done.append(status))
+    assert client.wait_for_result(LONG_S)
+    assert done == [GoalStatus.SUCCEEDED]
+    assert "a callback raised SystemExit: enough" in caplog.text
+    server.stop()
+
+
+@pytest.mark.parametrize("policy", ["queue", "preempt"])
+def test_execute_callback_that_ends_its_thread_holds_no_goal_up(nodes, clock, policy):
+    """The goals that waited were never started."""
+    server_node, client_node = nodes
+
+    def execute(goal):
+        clock.sleep(1.0)
+        if goal.goal == 1:
+            raise SystemExit("enough")
+        server.set_succeeded()
+
+    server = SimpleActionServer("demo", msg.TestAction, execute, node=server_node, policy=policy)
+    client = ActionClient("demo", msg.TestAction, node=client_node)
+    assert client.wait_for_server(LONG_S)
+    first = client.send_goal(msg.TestGoal(1))
+    clock.sleep(0.5)
+    second = client.send_goal(msg.TestGoal(2))
+    assert first.wait(LONG_S)
+    assert first.get_goal_status() == GoalStatus.ABORTED
+    assert "SystemExit('enough')" in first.get_goal_status_text()
+    assert second.wait(LONG_S)
+    assert second.get_goal_status() == GoalStatus.SUCCEEDED
+    server.stop()
+
+
+def test_goal_callback_that_ends_its_thread_ends_the_goal(nodes, caplog):
+    """The goal stayed PENDING, without anybody who could end it."""
+
+    def on_goal(handle):
+        raise SystemExit("enough")
+
+    server = ActionServer("demo", msg.TestAction, on_goal, node=nodes[0])
+    client = ActionClient("demo", msg.TestAction, node=nodes[1])
+    assert client.wait_for_server(LONG_S)
+    handle = client.send_goal(msg.TestGoal(1))
+    assert handle.wait(LONG_S)
+    assert handle.get_goal_status() == GoalStatus.REJECTED
+    assert handle.get_goal_status_text() == "Exception in goal callback: SystemExit('enough')"
+    server.stop()
+
+
 def test_wrong_policy_and_callback_leave_nothing_behind(nodes):
     with pytest.raises(ActionlibError):
         SimpleActionServer("demo", msg.TestAction, 1, node=nodes[0])

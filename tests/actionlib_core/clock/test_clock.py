@@ -167,6 +167,45 @@ def test_serial_executor_goes_on_after_an_error(any_clock, monkeypatch):
     assert (reported, order) == ([ZeroDivisionError], ["next"])
 
 
+@pytest.mark.parametrize("raised", [SystemExit, KeyboardInterrupt, asyncio.CancelledError])
+def test_serial_executor_goes_on_after_what_ends_a_thread(any_clock, monkeypatch, caplog, raised):
+    """What was queued never ran, in silence."""
+    reported, order = [], []
+    monkeypatch.setattr(threading, "excepthook", lambda args: reported.append(args.exc_type))
+    executor = SerialExecutor(any_clock, "serial")
+    begin = any_clock.event()
+
+    def leave():
+        raise raised("enough")
+
+    executor.submit(lambda: begin.wait(5))
+    for number in range(3):
+        executor.submit(leave)
+        executor.submit(lambda number=number: order.append(number))
+    begin.set()
+    assert executor.join(5)
+    assert order == [0, 1, 2]
+    executor.submit(lambda: order.append("later"))
+    assert executor.join(5)
+    assert order[3:] == ["later"]
+    told = [record.getMessage() for record in caplog.records]
+    if raised is SystemExit:
+        assert (reported, len(told)) == ([], 3)
+        assert "serial: a callback raised SystemExit: enough" in told[0]
+    else:
+        assert (reported, told) == ([raised] * 3, [])
+
+
+def test_serial_executor_of_a_closed_clock_runs_nothing_more():
+    ran = []
+    with VirtualClock() as clock:
+        executor = SerialExecutor(clock, "serial")
+        executor.submit(lambda: clock.sleep(1.0))
+        executor.submit(lambda: ran.append(1))
+        clock.sleep(0.5)
+    assert ran == []
+
+
 def test_serial_executor_accepts_work_from_its_own_work(any_clock):
     executor, done = SerialExecutor(any_clock, "serial"), any_clock.event()
     executor.submit(lambda: executor.submit(done.set))
