@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from actionlib_core._action_wire import pack_goal
 from actionlib_core._callbacks import CallbackQueue
 from actionlib_core._client_port import ClientPort
-from actionlib_core._core.client_goal import ClientGoal, Duty, Path
+from actionlib_core._core.client_goal import UNLISTED_S, ClientGoal, Duty, Path
 from actionlib_core._core.states import TERMINAL, Status
 from actionlib_core.comm_state_machine import CommStateMachine
 from actionlib_core.exceptions import ActionlibError, TransportError
@@ -33,10 +33,15 @@ ACK_AT = 64  # so many acknowledgements go out at once
 _ONLY_GOAL: Duty = Duty.GOAL
 STATUSES = {int(status): status for status in Status}
 UNSURE = " and had not acknowledged the goal, which may or may not have begun"
-REMEMBERED = 1024  # ids of ended goals whose result may come again
-
+REMEMBERED = 1024  # ids of ended goals whose result may come again, and sessions of servers
 
 _managers: weakref.WeakSet[GoalManager] = weakref.WeakSet()
+
+
+def _trim(remembered: dict[str, None]) -> None:
+    """Forget the oldest beyond the limit."""
+    if len(remembered) > REMEMBERED:
+        del remembered[next(iter(remembered))]
 
 
 def _free_locks() -> None:
@@ -79,6 +84,8 @@ class GoalManager:
         self._away: dict[Endpoint, float] = {}
         self._leaving: set[Endpoint] = set()
         self._current: Endpoint | None = None
+        self._met: dict[str, None] = {}
+        self._foreign_until = 0.0
         self._waiters: list[Event] = []
         self._timer: Timer | None = None
         self._due = 0.0
@@ -113,6 +120,28 @@ class GoalManager:
         """Find the server after a change. Needs the lock."""
         ends = (end for end, error in self._servers.items() if error is None)
         self._current = next((end for end in ends if end not in self._leaving), None)
+
+    def _meet(self, server: Endpoint) -> None:
+        """Note that a server is one of ours: it shows a token. Needs the lock."""
+        self._met[server.session] = None
+        self._foreign_until = 0.0
+        _trim(self._met)
+
+    def _hear_foreign(self, session: str) -> None:
+        """Take a status list while no server shows a token: a bridge may stand for one.
+
+        The last words of a server that has left do not count.
+        """
+        now = self._clock.now()
+        with self._lock:
+            if session in self._met or self._current is not None:
+                return
+            if self._foreign_until <= now:
+                for machine in self._machines.values():
+                    if not machine.goal.acknowledged:
+                        machine.goal.hurry(now)
+                self._arm(now)
+            self._foreign_until = now + UNLISTED_S
 
     def wait_for_server(self, timeout: float | None) -> bool:
         """Wait for a server; return whether there is one, False also when the client was stopped.
@@ -155,6 +184,7 @@ class GoalManager:
         now = self._clock.now()
         with self._lock:
             self._servers[server] = error
+            self._meet(server)
             self._choose_server()
             if error is None:
                 returned = self._away.pop(server, None) is not None
@@ -194,6 +224,7 @@ class GoalManager:
         with self._lock:
             if self._closed:
                 return
+            self._meet(server)
             if server in self._servers:
                 self._leaving.add(server)
                 self._choose_server()
@@ -335,6 +366,8 @@ class GoalManager:
 
     def on_statuses(self, entries: list[StatusEntry], server: str) -> None:
         """Take a status list."""
+        if self._current is None:
+            self._hear_foreign(server)
         if not self._machines:
             return
         now = self._clock.now()
@@ -447,8 +480,7 @@ class GoalManager:
             if machine.ended is not None:
                 machine.ended.set()
             self._ended[machine.goal.id] = None
-            if len(self._ended) > REMEMBERED:
-                del self._ended[next(iter(self._ended))]
+            _trim(self._ended)
         if machine.on_transition is None:
             if machine.goal.over and machine.on_feedback is not None:
                 self.callbacks.call(machine.settled.set)  # behind the last feedback
@@ -509,7 +541,11 @@ class GoalManager:
             self._port.ask(goal.id, machine.on_answered)
 
     def _offer(self, machine: CommStateMachine) -> None:
-        """Send a goal if somebody listens: one that was not sent cannot run twice."""
+        """Send a goal if a server listens: one that was not sent cannot run twice.
+
+        Others may listen, too, so that it is heard is not enough; and before its subscription is
+        known, the token alone is not either.
+        """
         goal = machine.goal
         if not self._port.is_heard():
             return
@@ -517,6 +553,8 @@ class GoalManager:
             if goal.over:  # cancelled or stopped while it had not been sent
                 return
             server = self._current
+            if server is None and self._foreign_until <= self._clock.now():
+                return
             goal.on_offered(server.session if server is not None else "")
         self._port.send_goal(machine.payload)
         if not goal.offered:  # a farewell came in between: another server may have heard it

@@ -8,6 +8,7 @@ from collections import Counter
 
 import pytest
 
+from actionlib_core._action_wire import pack_statuses
 from actionlib_core.action_client import ActionClient, CommState, TerminalState
 from actionlib_core.action_server import ActionServer
 from actionlib_core.exceptions import (
@@ -17,10 +18,11 @@ from actionlib_core.exceptions import (
     TypeMismatchError,
 )
 from actionlib_core.interfaces.actionlib import msg
-from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from actionlib_core.simple_action_client import SimpleActionClient, SimpleGoalState
 from actionlib_core.simple_action_server import SimpleActionServer
 from actionlib_core.time import Duration
+from actionlib_core.wire import encoding_of
 
 S = GoalStatus
 C = CommState
@@ -309,6 +311,31 @@ def test_cancel_before_any_server_recalls_the_goal(world):
     client.cancel_goal()
     assert client.wait_for_result(LONG_S)
     assert client.get_state() == S.RECALLED
+
+
+def test_goal_that_only_an_onlooker_hears_is_recalled_at_once(world):
+    heard = []
+    world.node("onlooker").transport.subscribe("demo/goal", heard.append, history=False)
+    client = ActionClient("demo", msg.TestAction, node=world.node("client"))
+    handle = client.send_goal(msg.TestGoal(5))
+    handle.cancel()
+    assert handle.get_terminal_state() is TerminalState.RECALLED
+    assert heard == []
+
+
+def test_server_behind_a_bridge_is_known_by_its_status_lists(world):
+    transport = world.node("bridge").transport
+    heard = world.event()
+    transport.subscribe("demo/goal", lambda _: heard.set(), history=False)
+    lists = transport.publisher("demo/status", encoding_of(GoalStatusArray))
+    client = ActionClient("demo", msg.TestAction, node=world.node("client"))
+    client.send_goal(msg.TestGoal(5))
+    assert not heard.is_set()
+    for _ in range(round(LONG_S / 0.2)):  # as ROS does
+        lists.put(pack_statuses(world.clock.time_ns(), []))
+        if heard.wait(0.2):
+            break
+    assert heard.is_set()
 
 
 def test_server_that_leaves_its_session_makes_goals_lost(world):

@@ -10,15 +10,18 @@ import hypothesis.strategies as st
 import pytest
 from hypothesis import given, settings
 
+from actionlib_core._action_wire import pack_statuses
 from actionlib_core._core.client_goal import TEXT_NEVER_TAKEN
 from actionlib_core.action_client import ActionClient, CommState
 from actionlib_core.action_server import ActionServer
 from actionlib_core.clock import VirtualClock, use_clock
 from actionlib_core.interfaces.actionlib import msg
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatusArray
 from actionlib_core.node import Node
 from actionlib_core.simple_action_server import SimpleActionServer
 from actionlib_core.transport.faulty import FaultyTransport, RandomFaults, ScriptedFaults
 from actionlib_core.transport.memory import MemoryNetwork
+from actionlib_core.wire import encoding_of
 
 ENDS = {"PREEMPTED", "SUCCEEDED", "ABORTED", "REJECTED", "RECALLED"}
 
@@ -453,6 +456,33 @@ def test_cancelled_goal_that_a_leaving_server_never_took_is_recalled():
         servers.serve("second")
         servers.clock.sleep(10.0)
         assert servers.runs == []
+
+
+def test_nothing_is_sent_to_a_server_that_has_said_farewell():
+    """It stays a little, as the answer to its farewell is lost, and somebody looks on."""
+    with row(client_plan=ScriptedFaults({"demo/ack": [()] * 9})) as servers:
+        heard = []
+        onlooker = servers.node("onlooker", None).transport
+        onlooker.subscribe("demo/goal", heard.append, history=False)
+        first = servers.serve("first")
+        assert servers.client.wait_for_server(1.0)
+        servers.clock.call_later(0.2, lambda: handles.append(send()))
+
+        def send():
+            assert not first.action_server.stopped
+            return servers.client.send_goal(msg.TestGoal(1))
+
+        handles = []
+        servers.clock.sleep(0.1)
+        first.stop()
+        lists = first.action_server.node.transport.publisher(
+            "demo/status", encoding_of(GoalStatusArray)
+        )
+        lists.put(pack_statuses(servers.clock.time_ns(), []))  # its last words, overtaken
+        servers.clock.sleep(5.0)
+        assert heard == []
+        handles[0].cancel()
+        assert end_of(handles[0])[0] == "RECALLED"
 
 
 def test_goal_still_waits_no_longer_than_its_ack_timeout_for_the_next_server():
