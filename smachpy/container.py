@@ -328,9 +328,11 @@ class Container(Openable, Callbacks, State):
             if frame is None:
                 self._asker = current_asker()
             else:
-                if frame.parent is None and frame.run.watched:
+                if frame.parent is None:
+                    asker = current_asker()
                     frame.asked = True
-                    frame.note(frame.path, PreemptRequested, *current_asker())
+                    frame.called_off = frame.called_off or asker.source != "timeout"
+                    frame.note(frame.path, PreemptRequested, *asker)
                 self._tell_children(frame)
         if frame is not None and frame.parent is None:
             frame.run.flush()

@@ -111,6 +111,7 @@ class Frame:
         step: What runs now: anything with `label` and `state`; None between runs.
         told: The step whose state was asked to stop.
         asked: The root itself was asked to stop.
+        called_off: It was asked by somebody else than its own timeout.
         answered: The container ends because a preempt was taken up.
         watch: What sees to it that the told step stops.
         override: What an operator wants instead of the told step's outcome.
@@ -134,6 +135,7 @@ class Frame:
     watch: Any = None
     override: Override | None = None
     asked = False
+    called_off = False
     answered = False
     injected = False
     dead = False

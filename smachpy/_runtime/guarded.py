@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import inspect
+import threading
 from typing import TYPE_CHECKING, Any
 
 from smachpy._runtime.asker import asking
 from smachpy._runtime.frame import FRAME
 from smachpy._runtime.interrupt import Interruption
 from smachpy._runtime.watch import disarm, note_answer
-from smachpy.events import Retried
+from smachpy.events import PreemptServiced, Retried, TimedOut
 from smachpy.exceptions import InvalidUserCodeError
 
 if TYPE_CHECKING:
     import asyncio
     from collections.abc import Callable, Coroutine
 
-    from smachpy._runtime.frame import Frame
+    from smachpy._runtime.frame import Frame, RootFrame
     from smachpy.state import State
 
 
@@ -29,8 +30,13 @@ def runner_of(state: State) -> Callable[[Any], Any]:
     return guarded(state, execute)
 
 
-def guarded(state: State, execute: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return `execute` with the options of `state` around it; itself when there are none."""
+def guarded(
+    state: State, execute: Callable[[Any], Any], root: RootFrame | None = None
+) -> Callable[[Any], Any]:
+    """Return `execute` with the options of `state` around it; itself when there are none.
+
+    `root` is the frame of `state` itself when it is the root: no step of a container watches it.
+    """
     if (
         state.timeout is None
         and state.retry is None
@@ -39,7 +45,7 @@ def guarded(state: State, execute: Callable[[Any], Any]) -> Callable[[Any], Any]
         and not state.on_exception
     ):
         return execute
-    return _Guarded(state, execute)
+    return _Guarded(state, execute, root)
 
 
 class _Async:
@@ -83,9 +89,10 @@ def _cancel(task: asyncio.Task[Any]) -> None:
 class _Guarded:
     """Runs a state with its options around it."""
 
-    def __init__(self, state: State, execute: Callable[[Any], Any]) -> None:
+    def __init__(self, state: State, execute: Callable[[Any], Any], root: RootFrame | None) -> None:
         self._state = state
         self._execute = execute
+        self._root = root
 
     def __call__(self, userdata: Any) -> Any:
         state = self._state
@@ -118,14 +125,22 @@ class _Guarded:
             except Exception as error:  # noqa: BLE001  raised again unless somebody wants it
                 result = error
             retry = state.retry
-            asked = state.preempt_requested() or (frame is not None and frame.told is not None)
+            asked = state.preempt_requested() or self._is_told(frame)
             if retry is None or asked or not retry.wants(attempt, result):
                 return self._conclude(result)
-            if frame is not None:
+            if self._root is not None:
+                self._root.emit_own(Retried, attempt, _reason(result))
+            elif frame is not None:
                 frame.emit(Retried, attempt, _reason(result))
             if retry.backoff and state.sleep(retry.wait_s(attempt)):
                 return self._conclude(result)
             attempt += 1
+
+    def _is_told(self, frame: Frame | None) -> bool:
+        """Tell whether somebody wants an end, not just the timeout of this attempt."""
+        if self._root is not None:
+            return self._root.called_off
+        return frame is not None and frame.told is not None
 
     def _conclude(self, result: Any) -> Any:
         """Return the outcome, or raise what no `on_exception` entry wants."""
@@ -144,7 +159,12 @@ class _Guarded:
         timeout = self._state.timeout
         if timeout is None:
             return self._execute(userdata)
-        guard = Timeout(self._state, frame, timeout)
+        guard: Timeout | _RootTimeout
+        if self._root is not None:
+            guard = _RootTimeout(self._root, timeout)
+        else:
+            assert frame is not None  # a container runs it
+            guard = Timeout(self._state, frame, timeout)
         try:
             outcome = self._execute(userdata)
         except Interruption:
@@ -168,16 +188,14 @@ class Timeout:
         ended: The state has ended; both are changed with the container's lock held.
     """
 
-    def __init__(self, state: State, frame: Frame | None, seconds: float) -> None:
+    def __init__(self, state: State, frame: Frame, seconds: float) -> None:
         self.seconds = seconds
         self.passed = False
         self.ended = False
         self._state = state
-        step = None if frame is None else frame.step
-        # A root's own frame has no step yet, or another one: nobody above watches it.
-        self._frame = frame if step is not None and step.state is state else None
-        self._step: Any = step
-        self._timer = state._clock().call_later(seconds, self._over)  # noqa: SLF001  one machinery
+        self._frame = frame
+        self._step: Any = frame.step
+        self._timer = frame.run.clock.call_later(seconds, self._over)
 
     def end(self, outcome: object) -> None:
         """The state has ended with `outcome`: the timeout, and the preempt it caused, end too.
@@ -186,11 +204,6 @@ class Timeout:
         """
         self._timer.cancel()
         frame = self._frame
-        if frame is None:
-            self.ended = True
-            if self.passed:
-                self._state.recall_preempt()
-            return
         if self.passed and frame.run.watched:
             note_answer(frame, outcome)
         with frame.container._lock:  # noqa: SLF001  one machinery
@@ -201,13 +214,49 @@ class Timeout:
 
     def _over(self) -> None:
         frame = self._frame
-        if frame is None:
-            if not self.ended:
-                self.passed = True
-                self._state.request_preempt()
-            return
         with asking("timeout", frame.here(), f"{self.seconds:g} s"):
             frame.container._time_out_child(frame, self._step, self)  # noqa: SLF001  one machinery
+
+
+class _RootTimeout:
+    """Preempts a root when its time is over.
+
+    The lock is for this alone: the end of an attempt waits for a request that is under way, so
+    that none hits the next attempt or run.
+
+    Attributes:
+        passed: The time was over before the attempt ended.
+    """
+
+    def __init__(self, frame: RootFrame, seconds: float) -> None:
+        self.passed = False
+        self._frame = frame
+        self._seconds = seconds
+        self._ended = False
+        self._calling = threading.RLock()
+        self._timer = frame.run.clock.call_later(seconds, self._over)
+
+    def end(self, _outcome: object) -> None:
+        """The attempt has ended, and with it the preempt that the timeout caused."""
+        self._timer.cancel()
+        with self._calling:
+            self._ended = True
+        frame = self._frame
+        if not self.passed or frame.called_off or frame.dead:
+            return
+        frame.container.recall_preempt()
+        if frame.asked and frame.answered:
+            frame.emit_own(PreemptServiced)
+        frame.asked = frame.answered = False
+
+    def _over(self) -> None:
+        frame = self._frame
+        with self._calling, asking("timeout", frame.path, f"{self._seconds:g} s"):
+            if self._ended or frame.dead:
+                return
+            self.passed = True
+            frame.note(frame.path, TimedOut, self._seconds)
+            frame.container.request_preempt()
 
 
 def _reason(result: Any) -> str:

@@ -83,7 +83,7 @@ def _run_root(
 def _run_in(root: Container, frame: RootFrame, parent_ud: UserData | Remapper | None) -> str:
     """Run `root` in `frame`, with its options around it if it has any."""
     run = partial(root._run, frame)  # noqa: SLF001  one machinery
-    outcome: str = guarded(root, run)(parent_ud)
+    outcome: str = guarded(root, run, frame)(parent_ud)
     return outcome
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import threading
 
 import pytest
 
 import smachpy
-from actionlib_core.clock import current_clock
-from smachpy.events import Abandoned, Retried, TimedOut
+from actionlib_core.clock import RealClock, current_clock, use_clock
+from smachpy.events import Abandoned, PreemptRequested, PreemptServiced, Retried, TimedOut
 
 
 class Waits(smachpy.State):
@@ -84,6 +85,78 @@ def test_timeout_of_a_container_and_of_the_root(clock):
     assert run(inner)[0] == "late"
     assert inner.execute() == "late"
     assert clock.now() == 4.0
+
+
+def root_of(state, **options):
+    sm = smachpy.StateMachine(["ok", "preempted"], name="ROOT", **options)
+    sm.add("A", state)
+    events = []
+    sm.subscribe(events.append)
+    return sm, events
+
+
+def test_timeout_of_the_root_is_told_as_that_of_a_state(clock):
+    sm, events = root_of(Waits(10.0), timeout=2.0)
+    assert sm.execute() == "aborted"
+    assert [(e.path, e.timeout) for e in events if isinstance(e, TimedOut)] == [("/ROOT", 2.0)]
+    asked = [e[3:6] for e in events if isinstance(e, PreemptRequested) and e.path == "/ROOT"]
+    assert asked == [("timeout", "/ROOT", "2 s")]
+    assert [e.path for e in events if isinstance(e, PreemptServiced)] == ["/ROOT/A", "/ROOT"]
+
+
+def test_timeout_of_the_root_ends_with_its_attempt(clock):
+    state = Listens([9.0, 1.0], says=True)
+    sm, events = root_of(state, timeout=2.0, retry=3)
+    assert sm.execute() == "ok"
+    assert (state.runs, clock.now()) == (2, 3.0)
+    assert [(e.path, e.reason) for e in events if isinstance(e, Retried)] == [("/ROOT", "aborted")]
+    assert [e.path for e in events if isinstance(e, PreemptServiced)] == ["/ROOT/A", "/ROOT"]
+
+
+@pytest.mark.parametrize("asked_at", [1.0, 2.5])
+def test_a_root_that_is_asked_to_stop_makes_no_further_attempt(clock, asked_at):
+    """Asked before its timeout at 2 s, or while it cleans up after it."""
+
+    class Tidies(Listens):
+        def execute(self, userdata):
+            outcome = super().execute(userdata)
+            current_clock().sleep(1.5)
+            return outcome
+
+    state = Tidies([9.0] * 5, says=True)
+    again = smachpy.Retry(5, 0, ["aborted", "preempted"])
+    sm, events = root_of(state, timeout=2.0, retry=again)
+    clock.call_later(asked_at, sm.request_preempt)
+    sm.execute()
+    assert state.runs == 1
+    assert not [e for e in events if isinstance(e, Retried)]
+    assert [e.path for e in events if isinstance(e, PreemptServiced)] == ["/ROOT/A", "/ROOT"]
+    state.seconds = [0.0]
+    assert sm.execute() == "ok"
+
+
+def test_timeout_of_the_root_that_comes_too_late_does_not_end_the_next_run():
+    asking, over, asked = threading.Event(), threading.Event(), threading.Event()
+
+    class Held(smachpy.StateMachine):
+        def request_preempt(self, **options):
+            asking.set()
+            over.wait(0.1)  # the run ends meanwhile, unless it waits for this
+            super().request_preempt(**options)
+            asked.set()
+
+    def wait(userdata):
+        assert asking.wait(20.0)
+        return "ok"
+
+    with use_clock(RealClock()):
+        sm = Held(["ok", "preempted"], timeout=0.001)
+        sm.add("A", smachpy.CBState(wait, outcomes=["ok"]))
+        sm.execute()
+        over.set()
+        assert asked.wait(20.0)
+        sm.timeout = None
+        assert sm.execute() == "ok"
 
 
 def test_timeout_in_a_concurrence_ends_that_branch_only(clock):
