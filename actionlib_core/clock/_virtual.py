@@ -335,7 +335,9 @@ class VirtualClock:
                     if chosen is not me:
                         self._note(me)
                     return chosen
-            self._call(chosen)
+                callback, chosen.callback = chosen.callback, None
+            if callback is not None:
+                self._call(callback)
 
     def _note(self, me: Participant | None) -> None:
         """Put the deadline of `me`, who waits, into the heap, where others see it."""
@@ -365,8 +367,8 @@ class VirtualClock:
 
     def _choose(self, me: Participant | None) -> Participant | VirtualTimer | None:
         ready = self._ready
-        if not ready:
-            self._jump(me)
+        if not ready and self._jump(me):
+            return me
         if ready:
             return ready.pop(0 if len(ready) == 1 or self._pick is None else self._pick(ready))
         if self._owner in self._waits:
@@ -395,18 +397,22 @@ class VirtualClock:
             heapq.heappop(deadlines)
         return None
 
-    def _jump(self, me: Participant | None) -> None:
-        """Advance to the next deadline; all that are due become ready."""
-        due = self._next_due()
+    def _jump(self, me: Participant | None) -> bool:
+        """Advance to the next deadline; all that are due become ready, `me` alone goes on at once.
+
+        Returns:
+            Whether that is so.
+        """
+        due = self._next_due() if self._deadlines else None
         if me is not None and me.deadline is not None and not me.noted:
             if (due is None or me.deadline < due) and not self._is_past(me.deadline):
                 self._now = me.deadline
-                self._end_wait(me, woken=False)
-                return
+                self._stop_waiting(me, woken=False)
+                return True
             self._note(me)
             due = self._next_due()
         if due is None or self._is_past(due):
-            return
+            return False
         self._now = max(due, self._now)
         self._stepped = time.monotonic() if self.rate is not None else 0.0
         while self._next_due() == due:
@@ -415,11 +421,9 @@ class VirtualClock:
                 self._ready.append(what)
             else:
                 self._end_wait(what, woken=False)
+        return False
 
-    def _call(self, timer: VirtualTimer) -> None:
-        callback, timer.callback = timer.callback, None
-        if callback is None:
-            return
+    def _call(self, callback: Callable[[], object]) -> None:
         self._in_callback = True
         try:
             contextvars.Context().run(callback)
@@ -440,13 +444,16 @@ class VirtualClock:
             self._end_wait(participant, woken=True)
 
     def _end_wait(self, participant: Participant, *, woken: bool) -> None:
+        self._stop_waiting(participant, woken=woken)
+        self._ready.append(participant)
+
+    def _stop_waiting(self, participant: Participant, *, woken: bool) -> None:
         del self._waits[participant]
         event, participant.event = participant.event, None
         if event is not None and participant in event._waiters:  # noqa: SLF001
             event._waiters.remove(participant)  # noqa: SLF001
         participant.noted = True
         participant.woken = woken
-        self._ready.append(participant)
 
 
 def _refusal(*, in_callback: bool) -> RuntimeError:
