@@ -34,6 +34,15 @@ class Decision(Generic[G]):
     announce: bool = False
 
 
+@dataclass(slots=True, eq=False)
+class _Waiting(Generic[G]):
+    """A goal that waits to be accepted, and whether it was asked to stop meanwhile."""
+
+    goal: G
+    stamp_ns: int
+    cancelled: bool = False
+
+
 ANNOUNCE: Decision[Any] = Decision(announce=True)
 
 
@@ -58,9 +67,8 @@ class SingleGoal(Generic[G]):
         self.current: G | None = None
         self.preempt_requested = False
         self._running = False
-        self._waiting: deque[tuple[G, int]] = deque()
+        self._waiting: deque[_Waiting[G]] = deque()
         self._current_stamp_ns = 0
-        self._cancelled_early = False
 
     @property
     def waiting(self) -> bool:
@@ -70,7 +78,7 @@ class SingleGoal(Generic[G]):
     @property
     def next(self) -> G | None:
         """The goal that is accepted next."""
-        return self._waiting[0][0] if self._waiting else None
+        return self._waiting[0].goal if self._waiting else None
 
     @property
     def running(self) -> bool:
@@ -79,41 +87,39 @@ class SingleGoal(Generic[G]):
 
     def find(self, goal: G) -> G:
         """Return the object known here that equals `goal`, else `goal`."""
-        known = [self.current, *(waiting for waiting, _ in self._waiting)]
+        known = [self.current, *(waiting.goal for waiting in self._waiting)]
         return next((entry for entry in known if entry is not None and entry == goal), goal)
 
     def withdraw(self) -> G | None:
         """Take the goal out that waits to be accepted next; None when none waits."""
-        return self._waiting.popleft()[0] if self._waiting else None
+        return self._waiting.popleft().goal if self._waiting else None
 
     def on_stop(self) -> list[G]:
         """Note that everything ends; return the goals that wait, which wait no more."""
         self.preempt_requested = self._running
-        waiting = [goal for goal, _ in self._waiting]
+        waiting = [entry.goal for entry in self._waiting]
         self._waiting.clear()
         return waiting
 
     def on_goal(self, goal: G, stamp_ns: int) -> Decision[G]:
         """Take a goal that arrived."""
         if self.policy == "queue":
-            self._waiting.append((goal, stamp_ns))
+            self._waiting.append(_Waiting(goal, stamp_ns))
             return ANNOUNCE
         if self.policy == "reject":
             if self._running or self._waiting:
                 return Decision(reject=goal)
-            self._waiting.append((goal, stamp_ns))
+            self._waiting.append(_Waiting(goal, stamp_ns))
             return ANNOUNCE
-        newest = self._waiting[-1][1] if self._waiting else 0
+        newest = self._waiting[-1].stamp_ns if self._waiting else 0
         if stamp_ns < newest or stamp_ns < self._current_stamp_ns:
             return Decision(recall=(goal,))
         if not self._waiting and not self._running:
-            self._waiting.append((goal, stamp_ns))
-            self._cancelled_early = False
+            self._waiting.append(_Waiting(goal, stamp_ns))
             return ANNOUNCE
-        older = tuple(waiting for waiting, _ in self._waiting)
+        older = tuple(waiting.goal for waiting in self._waiting)
         self._waiting.clear()
-        self._waiting.append((goal, stamp_ns))
-        self._cancelled_early = False
+        self._waiting.append(_Waiting(goal, stamp_ns))
         self.preempt_requested = self.preempt_requested or self._running
         return Decision(recall=older, preempt=self._running, announce=True)
 
@@ -129,12 +135,11 @@ class SingleGoal(Generic[G]):
             self.preempt_requested = True
             return Decision(preempt=True)
         for entry in self._waiting:
-            if entry[0] is goal:
+            if entry.goal is goal:
                 if recall_waiting:
                     self._waiting.remove(entry)
                     return Decision(recall=(goal,))
-                if entry is self._waiting[0]:
-                    self._cancelled_early = True
+                entry.cancelled = True
         return Decision()
 
     def accept(self) -> tuple[G | None, G | None]:
@@ -146,9 +151,10 @@ class SingleGoal(Generic[G]):
         if not self._waiting:
             return None, None
         pushed = self.current if self._running else None
-        self.current, self._current_stamp_ns = self._waiting.popleft()
+        new = self._waiting.popleft()
+        self.current, self._current_stamp_ns = new.goal, new.stamp_ns
         self._running = True
-        self.preempt_requested, self._cancelled_early = self._cancelled_early, False
+        self.preempt_requested = new.cancelled
         return self.current, pushed
 
     def on_ended(self, goal: G) -> None:

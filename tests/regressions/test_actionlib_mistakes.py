@@ -184,6 +184,31 @@ def test_preempt_callback_is_not_called_for_a_goal_that_has_ended(nodes, clock):
     assert preempted == [None]
 
 
+def test_cancel_of_a_goal_in_a_queue_is_seen_when_it_is_accepted(nodes, clock):
+    """Its client said PREEMPTING, and the server never knew."""
+    server_node, client_node = nodes
+    server = SimpleActionServer(
+        "demo", msg.TestAction, auto_start=False, node=server_node, policy="queue"
+    )
+    server.register_goal_callback(lambda: None)
+    server.start()
+    client = ActionClient("demo", msg.TestAction, node=client_node)
+    assert client.wait_for_server(LONG_S)
+    handles = [client.send_goal(msg.TestGoal(number)) for number in range(3)]
+    clock.sleep(1.0)
+    handles[1].cancel()
+    clock.sleep(1.0)
+    asked = []
+    for _ in handles:
+        server.accept_new_goal()
+        asked.append(server.is_preempt_requested())
+        server.set_preempted() if asked[-1] else server.set_succeeded()
+    assert asked == [False, True, False]
+    assert all(handle.wait(LONG_S) for handle in handles)
+    assert handles[1].get_goal_status() == GoalStatus.PREEMPTED
+    server.stop()
+
+
 def test_cancel_callback_is_not_called_for_a_goal_that_has_ended(nodes, clock):
     server_node, client_node = nodes
     taken, cancelled = [], []

@@ -52,6 +52,33 @@ def test_cancel_of_the_waiting_goal_recalls_it_or_starts_it_preempted():
     assert policy.preempt_requested
 
 
+def test_each_goal_of_a_queue_is_cancelled_for_itself():
+    """A cancel counted only for the goal that was next."""
+    policy, names = SingleGoal("queue"), ["a", "b", "c", "d"]
+    for name in names:
+        policy.on_goal(name, 1)
+    assert policy.on_cancel("c", recall_waiting=False).recall == ()
+    policy.on_cancel("d", recall_waiting=False)
+    preempted = []
+    for name in names:
+        assert policy.accept()[0] == name
+        preempted.append(policy.preempt_requested)
+        policy.on_ended(name)
+    assert preempted == [False, False, True, True]
+
+
+@pytest.mark.parametrize("policy_name", POLICIES)
+def test_cancel_of_a_goal_that_is_withdrawn_preempts_no_other(policy_name):
+    """The next goal began as if it had been cancelled."""
+    policy = SingleGoal(policy_name)
+    policy.on_goal("a", 1)
+    policy.on_cancel("a", recall_waiting=False)
+    assert policy.withdraw() == "a"
+    policy.on_goal("b", 2)
+    assert policy.accept() == ("b", None)
+    assert not policy.preempt_requested
+
+
 def test_queue_runs_goals_in_order_and_preempts_none():
     policy = SingleGoal("queue")
     policy.on_goal("a", 3)
