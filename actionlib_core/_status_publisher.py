@@ -101,7 +101,7 @@ class StatusPublisher:
                 return
             soonest = self._goals.expire(self._clock.now())
             since = self._clock.now() - self._published
-            if since > PERIOD_S / 2 and not self._goals.listed():
+            if not self._change_waits and since > PERIOD_S / 2 and not self._goals.listed():
                 if soonest is not None:
                     self._arm(soonest)
                 return

@@ -1,0 +1,97 @@
+"""When a server says how its goals stand, also when its timer is late."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+from actionlib_core._core.server_goals import ServerGoal, ServerGoals
+from actionlib_core._status_publisher import GAP_S, PERIOD_S, StatusPublisher
+
+
+class LateClock:
+    """A clock whose timers run when the test says so, as on a computer that was suspended."""
+
+    def __init__(self):
+        self.time = 100.0
+        self.timers = []
+
+    def now(self):
+        return self.time
+
+    def call_later(self, delay, callback):
+        timer = LateTimer(self.time + delay, callback)
+        self.timers.append(timer)
+        return timer
+
+    def run(self, time):
+        """Let `time` come, and then run what was due before."""
+        self.time = time
+        due, self.timers = self.timers, []
+        for timer in due:
+            if timer.callback is not None and timer.due <= time:
+                timer.callback()
+            elif timer.callback is not None:
+                self.timers.append(timer)
+
+
+class LateTimer:
+    def __init__(self, due, callback):
+        self.due = due
+        self.callback = callback
+
+    def cancel(self):
+        self.callback = None
+
+
+class Server:
+    """Goals and what was said of them."""
+
+    def __init__(self):
+        self.clock = LateClock()
+        self.goals = ServerGoals("demo")
+        self.said = []
+        self.status = StatusPublisher(self.clock, threading.RLock(), self.goals, self._send)
+
+    def _send(self, goals):
+        self.said.append([goal.id for goal in goals])
+
+    def take(self, goal_id):
+        self.goals.on_goal(ServerGoal(goal_id, 1), self.clock.now())
+        self.status.on_change()
+
+    def end(self, goal_id):
+        goal = self.goals.find(goal_id)
+        self.goals.step(goal, "reject", "set_rejected()")
+        self.goals.finish(goal, self.clock.now())
+        self.goals.on_acknowledged([goal_id], self.clock.now())
+        self.status.on_change()
+
+
+@pytest.mark.parametrize("late_s", [0.0, 10 * PERIOD_S])
+def test_status_goes_on_after_a_timer_that_was_late(late_s):
+    """Nothing was ever said again when the list was empty as a late timer ran."""
+    server = Server()
+    server.take("a")
+    server.end("a")
+    assert server.said == [["a"]]
+    server.clock.run(server.clock.time + GAP_S + late_s)
+    assert server.said == [["a"], []]
+    server.clock.run(server.clock.time + 2 * PERIOD_S)
+    server.take("b")
+    assert server.said == [["a"], [], ["b"]]
+    assert len(server.clock.timers) > 0
+
+
+def test_an_empty_list_is_not_said_again_and_needs_no_timer():
+    server = Server()
+    server.take("a")
+    server.clock.run(server.clock.time + PERIOD_S)
+    assert server.said == [["a"]] * 2
+    server.end("a")
+    server.clock.run(server.clock.time + PERIOD_S)
+    server.clock.run(server.clock.time + PERIOD_S)
+    server.clock.run(server.clock.time + PERIOD_S)
+    assert server.said == [["a"], ["a"], []]
+    assert server.clock.timers == []
