@@ -15,8 +15,9 @@ from smachpy.exceptions import InvalidUserCodeError
 
 if TYPE_CHECKING:
     import asyncio
-    from collections.abc import Callable, Coroutine
+    from collections.abc import Callable, Coroutine, Iterator
 
+    from smachpy._core.retry import Retry
     from smachpy._runtime.frame import Frame, RootFrame
     from smachpy.state import State
 
@@ -126,7 +127,7 @@ class _Guarded:
                 result = error
             retry = state.retry
             asked = state.preempt_requested() or self._is_told(frame)
-            if retry is None or asked or not retry.wants(attempt, result):
+            if retry is None or asked or not self._wants(retry, attempt, result):
                 return self._conclude(result)
             if self._root is not None:
                 self._root.emit_own(Retried, attempt, _reason(result))
@@ -142,15 +143,20 @@ class _Guarded:
             return self._root.called_off
         return frame is not None and frame.told is not None
 
+    def _wants(self, retry: Retry, attempt: int, result: Any) -> bool:
+        """Tell whether to run again after `result`, or after what a container's children raised."""
+        if retry.wants(attempt, result):
+            return True
+        return isinstance(result, Exception) and all(
+            retry.wants(attempt, error) for error in _raised(result)
+        )
+
     def _conclude(self, result: Any) -> Any:
         """Return the outcome, or raise what no `on_exception` entry wants."""
         if not isinstance(result, Exception):
             return result
-        cause = result
-        if isinstance(result, InvalidUserCodeError) and isinstance(result.__cause__, Exception):
-            cause = result.__cause__  # a container's child raised it
         for kind, outcome in (self._state.on_exception or {}).items():
-            if isinstance(result, kind) or isinstance(cause, kind):
+            if isinstance(result, kind) or all(isinstance(e, kind) for e in _raised(result)):
                 return outcome
         raise result
 
@@ -261,3 +267,19 @@ class _RootTimeout:
 
 def _reason(result: Any) -> str:
     return f"{type(result).__name__}: {result}" if isinstance(result, Exception) else str(result)
+
+
+def _raised(error: BaseException) -> Iterator[BaseException]:
+    """Yield what the code of states raised: `error`, or what a container made it from.
+
+    Several children of a concurrence may have raised; an error that nobody wants must not
+    disappear beside one that somebody does, so all count.
+    """
+    cause = error.__cause__ if isinstance(error, InvalidUserCodeError) else None
+    if isinstance(cause, BaseExceptionGroup):
+        for one in cause.exceptions:
+            yield from _raised(one)
+    elif cause is not None:
+        yield from _raised(cause)
+    else:
+        yield error

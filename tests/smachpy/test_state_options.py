@@ -213,6 +213,48 @@ def test_exceptions_of_children_become_outcomes_of_the_container():
     assert run(inner)[0] == "broken"
 
 
+def beside(*states, **options):
+    both = smachpy.Concurrence(["ok", "aborted"], "ok", **options)
+    for i, state in enumerate(states):
+        both.add(f"C{i}", state)
+    return both
+
+
+def within(state, **options):
+    sm = smachpy.StateMachine(["ok", "aborted"], **options)
+    sm.add("IN", state)
+    return sm
+
+
+@pytest.mark.parametrize("around", [within, beside, lambda s, **o: beside(within(s), **o)])
+def test_a_container_is_run_again_for_what_its_children_raise(around):
+    state = Fails(2, OSError("busy"))
+    assert run(around(state, retry=(3, 0.0, OSError)))[0] == "ok"
+    assert state.runs == 3
+    state = Fails(9, OSError("busy"))
+    with pytest.raises(smachpy.InvalidUserCodeError, match="busy"):
+        run(around(state, retry=(3, 0.0, ValueError)))
+    assert state.runs == 1
+    assert run(around(Fails(9, OSError("busy")), on_exception={OSError: "broken"}))[0] == "broken"
+
+
+def test_of_several_children_that_raise_none_is_lost(clock):
+    class LaterToo(Fails):
+        def execute(self, userdata):
+            self.sleep(1.0)
+            return super().execute(userdata)
+
+    def both(error, **options):
+        return beside(Fails(1, OSError("busy")), LaterToo(1, error), **options)
+
+    assert run(both(OSError("too"), on_exception={OSError: "broken"}))[0] == "broken"
+    with pytest.raises(smachpy.InvalidUserCodeError, match="motor"):
+        run(both(ValueError("motor"), on_exception={OSError: "broken"}))
+    with pytest.raises(smachpy.InvalidUserCodeError, match="motor"):
+        run(both(ValueError("motor"), retry=(3, 0.0, OSError)))
+    assert run(both(ValueError("motor"), retry=(3, 0.0, [OSError, ValueError])))[0] == "ok"
+
+
 def test_hooks_run_around_the_state():
     heard = []
     state = smachpy.State(["ok"])
