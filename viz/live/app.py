@@ -2,7 +2,7 @@
 
     GET  /                    the page
     GET  /api/events          everything about one machine as server-sent events:
-                              snap, facts, machines, actions, and unnamed batches of events
+                              snap, facts, machines, actions, beat, and unnamed batches of events
     GET  /api/model           structure of a machine
     GET  /api/picture         svg, png, pdf or dot
     GET  /api/export          the run as .html or .jsonl
@@ -50,7 +50,9 @@ LIST_S = 0.5
 ACTIONS_S = 0.15
 """Between two messages about goals that were sent from here."""
 
-BEAT_S = 5.0
+BEAT_S = 2.0
+"""A page hears so often at least; it takes the server for lost when it does not."""
+
 FARTHEST = 3_000
 """A page that is more events behind gets a snapshot."""
 
@@ -299,8 +301,8 @@ class Viewer:
         one = _Page(
             self._machines,
             request.query_params.get("machine", ""),
-            request.headers.get("last-event-id", ""),
-            {"follow": self._follow, "control": self._token is not None},
+            request.headers.get("last-event-id") or request.query_params.get("last", ""),
+            {"follow": self._follow, "control": self._token is not None, "beat": BEAT_S},
             self._actions,
         )
         return StreamingResponse(self._stream(one), media_type="text/event-stream")
@@ -339,6 +341,7 @@ class _Page:
         self._facts: dict[str, Any] = {}
         self._list = ""
         self._listed = 0.0
+        self._beaten = 0.0
         self._actions = actions
         self._told = -1  # revision of the actions
         self._told_at = 0.0
@@ -361,6 +364,10 @@ class _Page:
                     self._list = text
                     yield f"event: machines\ndata: {text}\n\n"
                 due = BEAT_S
+            if self._beaten + BEAT_S <= loop.time():
+                self._beaten = loop.time()
+                yield "event: beat\ndata: null\n\n"
+            due = min(due, self._beaten + BEAT_S - loop.time())
             if self._actions is not None and self._told != self._actions.revision:
                 wait = self._told_at + ACTIONS_S - loop.time()
                 if wait <= 0:
@@ -371,8 +378,7 @@ class _Page:
                 await asyncio.wait_for(self.news.wait(), max(due, COALESCE_S))
                 await asyncio.sleep(COALESCE_S)
             except TimeoutError:
-                if due >= BEAT_S:
-                    yield ": beat\n\n"
+                continue
 
     def _tell_actions(self, actions: Actions, now: float) -> str:
         self._told, self._told_at = actions.revision, now

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import time
+import urllib.request
 
 import pytest
 
@@ -125,3 +128,85 @@ def test_a_row_of_userdata_by_keyboard(served, look):
     page.wait_for_selector(".userdata pre")
     page.keyboard.press("Space")
     wait_for(page, "!document.querySelector('.userdata pre')")
+
+
+def test_a_server_that_says_nothing_is_lost_and_found_again(start, look):
+    view = start.view()
+    page = look(view.base, drawn=False)
+    wait_for(page, "smachpy.store.connection.value === 'live'")
+    os.kill(view.pid, signal.SIGSTOP)
+    try:
+        wait_for(page, "smachpy.store.connection.value === 'lost'")
+        page.wait_for_selector("text=does not answer")
+    finally:
+        os.kill(view.pid, signal.SIGCONT)
+    wait_for(page, "smachpy.store.connection.value === 'live'")
+
+
+def test_a_page_that_was_cut_off_goes_on_where_it_was(served, look):
+    machine = served.add("one", events=run()[:2])
+    page = look(served.start())
+    page.keyboard.press(",")
+    page.evaluate("async () => (await import('viewer/source')).reconnect()")
+    wait_for(page, "smachpy.store.connection.value === 'live'")
+    machine.add(served.events(run()[2:4], after=2))
+    wait_for(page, "smachpy.store.run.events.length === 4")
+    assert page.evaluate("() => smachpy.store.cursor.value") is not None  # still looking back
+
+
+def test_a_busy_network_does_not_hold_the_beat_up(served):
+    served.add("one", events=run())
+    busy = served.machines.obtain("busy")
+    with urllib.request.urlopen(f"{served.start()}api/events?machine=one", timeout=10) as stream:
+        began = time.monotonic()
+        beats = 0
+        while beats < 2:
+            busy.set_stale(None)  # wakes the page
+            if stream.readline() == b"event: beat\n":
+                beats += 1
+        assert time.monotonic() - began < 10.0
+
+
+def test_the_machine_chosen_last_is_shown_however_late_the_first_answers(served, look):
+    served.add("one", label="ONE")
+    served.add("two", label="TWO", labels="XYZ")
+    page = look(served.start())
+    held = []
+    page.route("**/api/model?machine=one*", lambda route: held.append(route))
+    choose = "async (name) => (await import('viewer/source')).choose(name)"
+    page.evaluate(choose, "two")
+    page.wait_for_selector('g[data-path="/TWO/Z"]')
+    page.evaluate(choose, "one")
+    wait_for(page, "smachpy.store.facts.value?.name === 'one'")
+    page.evaluate(choose, "two")
+    page.wait_for_selector('g[data-path="/TWO/Z"]')
+    wait_for(page, "smachpy.store.facts.value?.name === 'two'")
+    page.wait_for_timeout(100)
+    assert len(held) == 1
+    held[0].continue_()
+    page.wait_for_timeout(300)
+    assert page.evaluate("() => smachpy.store.model.value.root.path") == "/TWO"
+    assert page.query_selector('g[data-path="/TWO/Z"]') is not None
+
+
+def test_a_structure_that_could_not_be_fetched_is_asked_for_again(served, look):
+    served.add("one", label="ONE")
+    address = served.start()
+    page = look("about:blank", drawn=False)
+    page.route("**/api/model?*", lambda route: route.abort(), times=1)
+    page.goto(address)
+    page.wait_for_selector('g[data-path="/ONE/A"]')
+
+
+def test_what_the_server_answers_is_told_as_it_is(served, look):
+    served.add("one")
+    page = look(served.start())
+    ask = "async (address) => (await import('viewer/source')).ask(address)"
+    gone = page.evaluate(ask, "/api/compare?machine=one&with=gone")
+    assert gone["ok"] is False
+    assert "404" in gone["text"]
+    assert "nothing there: machine=one&with=gone" in gone["text"]
+    page.route("**/api/compare?*", lambda route: route.fulfill(status=500, body="Internal"))
+    assert "500 Internal Server Error: Internal" in page.evaluate(ask, "/api/compare?")["text"]
+    page.route("**/api/compare?*", lambda route: route.abort())
+    assert "does not answer" in page.evaluate(ask, "/api/compare?")["text"]

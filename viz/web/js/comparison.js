@@ -18,7 +18,9 @@ export async function compare(page, name) {
     show(page, alone);
     return;
   }
+  const asked = store.facts.value?.name;
   const found = await ask(link("compare", `&with=${encodeURIComponent(name)}`));
+  if (asked !== store.facts.value?.name) return; // another machine has been chosen
   if (!found.model) { store.say(found.text ?? "cannot be compared", "error"); return; }
   const alone = store.comparison.value?.alone ?? store.model.value.payload;
   store.comparison.value = { ...found, alone };

@@ -2,7 +2,14 @@
 import { batch } from "@preact/signals";
 import * as store from "viewer/store";
 
+const SILENT_BEATS = 2; // a server that says nothing for so long is lost
+const AGAIN_MS = 250, LATEST_MS = 4000; // between two tries to fetch a structure
+
 let stream = null;
+let lastId = ""; // of the newest message of events
+let silence = 0; // half beats without a word
+let watchdog = 0;
+let loads = 0; // the newest one counts
 let token = null;
 let wanted = new URLSearchParams(location.search).get("machine") ?? "";
 let onEvents = () => {};
@@ -58,6 +65,9 @@ export function choose(name) {
   address.searchParams.set("machine", name);
   history.replaceState(null, "", address);
   store.facts.value = null;
+  store.statistics.value = null;
+  lastId = "";
+  loads += 1;
   open();
 }
 
@@ -66,20 +76,42 @@ export const link = (what, more = "") => `/api/${what}?machine=${named()}${more}
 
 function open() {
   stream?.close();
-  stream = new EventSource(`/api/events?machine=${encodeURIComponent(wanted)}`);
-  const on = (name, take) =>
-    stream.addEventListener(name, (message) => take(JSON.parse(message.data)));
-  on("settings", (s) => { store.settings.value = s; store.connection.value = "live"; });
+  const last = lastId ? `&last=${encodeURIComponent(lastId)}` : "";
+  stream = new EventSource(`/api/events?machine=${encodeURIComponent(wanted)}${last}`);
+  const on = (name, take) => stream.addEventListener(name, (message) => {
+    silence = 0;
+    lastId = message.lastEventId || lastId;
+    take(JSON.parse(message.data));
+  });
+  on("settings", (s) => { store.settings.value = s; store.connection.value = "live"; watch(s.beat * 1000); });
+  on("beat", () => { store.connection.value = "live"; });
   on("machines", (list) => { store.machines.value = list; });
   on("actions", (found) => { store.actions.value = found; });
   on("facts", takeFacts);
   on("snap", takeSnap);
-  stream.onmessage = (message) => onEvents(JSON.parse(message.data));
+  on("message", (events) => onEvents(events));
   stream.onopen = () => { store.connection.value = "live"; };
   stream.onerror = () => {
     store.connection.value = "lost";
     if (stream.readyState === EventSource.CLOSED) setTimeout(open, 1000);
   };
+}
+
+// A connection that was cut shows no error for minutes: it is lost when the beats [ms] stay away.
+function watch(beat) {
+  clearInterval(watchdog);
+  silence = 0;
+  watchdog = setInterval(() => {
+    silence += 1;
+    if (silence > 2 * SILENT_BEATS) reconnect();
+  }, beat / 2);
+}
+
+// Ask anew for what comes after the last message.
+export function reconnect() {
+  silence = 0;
+  store.connection.value = "lost";
+  open();
 }
 
 async function takeFacts(facts) {
@@ -105,20 +137,38 @@ async function takeSnap(snap, payload) {
   else await load(snap);
 }
 
+// Fetch the structure of a machine, until it comes or another one is wanted.
 async function load(facts) {
-  const answer = await fetch(`/api/model?machine=${named(facts.name)}`);
-  if (!answer.ok) return;
-  store.setModel(await answer.json());
-  fetch(`/api/statistics?machine=${named(facts.name)}`).then(async (found) => {
-    if (found.ok) store.statistics.value = await found.json();
-  });
+  const mine = loads += 1;
+  const wait = (time) => new Promise((done) => { setTimeout(done, time); });
+  const fetched = async (what) => {
+    try {
+      const answer = await fetch(`/api/${what}?machine=${named(facts.name)}`);
+      return answer.ok ? await answer.json() : null;
+    } catch { return null; } // the connection tells that the server is gone
+  };
+  let found = null;
+  for (let pause = AGAIN_MS; !found; pause = Math.min(2 * pause, LATEST_MS)) {
+    found = await fetched("model");
+    if (!found) await wait(pause);
+    if (mine !== loads) return;
+  }
+  store.setModel(found);
   onMachine();
+  const statistics = await fetched("statistics");
+  if (mine === loads) store.statistics.value = statistics;
 }
 
-// The JSON answer of the server; when it does not answer, the same shape.
+// The JSON answer of the server; when it gives none, the same shape.
 export async function ask(address, options = {}) {
-  try { return await (await fetch(address, options)).json(); }
-  catch (error) { return { ok: false, text: `The viewer\u2019s server does not answer (${error.message}).` }; }
+  let answer, text;
+  try {
+    answer = await fetch(address, options);
+    text = await answer.text();
+  } catch (error) { return { ok: false, text: `The viewer\u2019s server does not answer (${error.message}).` }; }
+  try { return JSON.parse(text); } catch { /* told as it is */ }
+  const said = [`${answer.status} ${answer.statusText}`.trim(), text.trim().slice(0, 300)].filter(Boolean).join(": ");
+  return { ok: false, text: `The viewer\u2019s server answered ${said}` };
 }
 const post = (address, data) => ask(address, {
   method: "POST",
