@@ -32,17 +32,25 @@ class NameWatch:
         own: Our own end; it is not counted.
         kinds: Which ends concern us.
         any_type: Another type than our own is no error.
+        on_new: Gets each end that appears, on the network's thread.
 
     Threads: every method may be called from any thread; `wait` not from a transport callback.
     """
 
     def __init__(
-        self, node: Node, own: Endpoint, kinds: Collection[Kind], *, any_type: bool = False
+        self,
+        node: Node,
+        own: Endpoint,
+        kinds: Collection[Kind],
+        *,
+        any_type: bool = False,
+        on_new: Callable[[Endpoint], object] | None = None,
     ) -> None:
         self._node = node
         self._own = own
         self._kinds = frozenset(kinds)
         self._any_type = any_type
+        self._on_new = on_new
         self._lock = threading.Lock()
         self._ends: dict[str, Endpoint] = {}
         self._mismatches: dict[Endpoint, TypeMismatchError] = {}
@@ -84,8 +92,15 @@ class NameWatch:
         logger.error("%s %s", self._own.kind.value, error)
         self.wake()
 
-    def wait(self, condition: Callable[[], bool], timeout: float | None) -> bool:
+    def wait(
+        self, condition: Callable[[], bool], timeout: float | None, changed: Event | None = None
+    ) -> bool:
         """Wait until `condition` holds, looking again whenever an end appears or vanishes.
+
+        Args:
+            condition: What is waited for.
+            timeout: Longest wait [s]; None: no limit.
+            changed: Its owner sets it when the condition may hold, which wakes this wait alone.
 
         Returns:
             Whether it holds.
@@ -95,7 +110,7 @@ class NameWatch:
         """
         clock = self._node.clock
         deadline = None if timeout is None else clock.now() + timeout
-        changed = clock.event()
+        changed = clock.event() if changed is None else changed
         with self._lock:
             self._waiters.append(changed)
         forget = current_shutdown().on_shutdown(changed.set)
@@ -143,6 +158,8 @@ class NameWatch:
             self.note(error, end)
         else:
             self.wake()
+        if presence.alive and self._on_new is not None:
+            self._on_new(end)
 
     def _find_mismatch(self, end: Endpoint) -> TypeMismatchError | None:
         return None if self._any_type else find_mismatch([end], self._own)

@@ -25,10 +25,12 @@ from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatusArray
 from actionlib_core.presence import (
     Kind,
     find_mismatch,
+    is_younger,
     list_endpoints,
     parse_token,
     token_key,
     token_pattern,
+    with_age,
 )
 from actionlib_core.transport import Quality
 from actionlib_core.wire import encoding_of
@@ -107,9 +109,7 @@ class ServerPort:
             types.action._type,
             types.action._md5sum,
         )
-        # The older of two servers stays, so the number tells the age: milliseconds, then a count.
-        stamp = node.clock.time_ns() // 1_000_000 * 1_000_000 + endpoint.entity % 1_000_000
-        self.endpoint = endpoint._replace(entity=stamp)
+        self.endpoint = with_age(endpoint, node.clock.time_ns())
 
     def open(self) -> None:
         """Declare everything; the token comes last, so who sees it can be heard.
@@ -294,7 +294,7 @@ class ServerPort:
             self._meet_client(presence, other)
 
     def _meet_server(self, other: Endpoint) -> None:
-        if (self.endpoint.entity, self.endpoint.session) > (other.entity, other.session):
+        if is_younger(self.endpoint, other):
             self._listener.on_conflict(self._conflict(other))
         else:
             log.error("%s", self._conflict(other, stays=True))

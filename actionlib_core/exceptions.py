@@ -13,6 +13,8 @@ Exception
       |    +-- ServiceUnavailableError there is no server
       |    +-- ServiceTimeoutError     no answer in time
       |    +-- ServiceLostError        the server died during the call
+      |    +-- ServiceBusyError        too many calls are under way, or the handler calls itself
+      |    +-- ServiceConflictError    another server has the name
       +-- TypeMismatchError     two ends of a name disagree on the type
       +-- InterfaceError        a .msg/.srv/.action file or an interface name cannot be used
       |    +-- FieldError       a value does not fit the field of a message
@@ -139,6 +141,24 @@ class ServiceLostError(ServiceException):
     """The server died or left during the call."""
 
 
+class ServiceBusyError(ServiceException):
+    """The server runs as many calls at once as it takes."""
+
+
+class ServiceConflictError(ServiceException):
+    """Two servers have one name; this one does not answer, so that no call is executed twice.
+
+    Attributes:
+        mine: (node, session) of the server that gave way.
+        other: (node, session) of the one that stays.
+    """
+
+    def __init__(self, name: str, mine: tuple[str, str], other: tuple[str, str]) -> None:
+        self.mine = mine
+        self.other = other
+        super().__init__(name, _two_servers(mine, other))
+
+
 class TypeMismatchError(ActionlibError, TypeError):
     """Two ends of a name disagree on what travels there.
 
@@ -242,11 +262,15 @@ class ServerConflictError(ActionException):
         self.name = name
         self.mine = mine
         self.other = other
-        super().__init__(
-            f"action {name!r}: two servers: got one of node '{mine[0]}' (session {mine[1]}) beside "
-            f"one of node '{other[0]}' (session {other[1]}); expected one. Try another name or a "
-            "name space for this one, or end the other."
-        )
+        super().__init__(f"action {name!r}: {_two_servers(mine, other)}")
+
+
+def _two_servers(mine: tuple[str, str], other: tuple[str, str]) -> str:
+    return (
+        f"two servers: got one of node '{mine[0]}' (session {mine[1]}) beside one of node "
+        f"'{other[0]}' (session {other[1]}); expected one. Try another name or a name space for "
+        "this one, or end the other."
+    )
 
 
 class GoalFailedError(ActionException):

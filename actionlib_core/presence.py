@@ -58,6 +58,20 @@ class Endpoint(NamedTuple):
     entity: int = 0
 
 
+def with_age(endpoint: Endpoint, now_ns: int) -> Endpoint:
+    """Return `endpoint` with a number that tells its age: milliseconds, then its own number.
+
+    For names that only one may have: of two, the older stays.
+    """
+    entity = now_ns // 1_000_000 * 1_000_000 + endpoint.entity % 1_000_000
+    return endpoint._replace(entity=entity)
+
+
+def is_younger(endpoint: Endpoint, other: Endpoint) -> bool:
+    """Tell whether `endpoint` came after `other`; both sides say the same."""
+    return (endpoint.entity, endpoint.session) > (other.entity, other.session)
+
+
 def token_key(endpoint: Endpoint) -> str:
     """Return the key of the token that shows `endpoint`."""
     kind, name, type_name, md5, session, node, entity = endpoint

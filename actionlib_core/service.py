@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import json
 import logging
+import threading
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,8 @@ from actionlib_core._name_watch import NameWatch
 from actionlib_core.exceptions import (
     ActionlibError,
     NodeError,
+    ServiceBusyError,
+    ServiceConflictError,
     ServiceException,
     ServiceLostError,
     ServiceTimeoutError,
@@ -29,8 +32,8 @@ from actionlib_core.exceptions import (
     WaitTimeoutError,
 )
 from actionlib_core.node import get_node
-from actionlib_core.presence import Endpoint, Kind, token_key
-from actionlib_core.shutdown import current_shutdown, requested
+from actionlib_core.presence import Endpoint, Kind, is_younger, list_endpoints, token_key, with_age
+from actionlib_core.shutdown import requested
 from actionlib_core.time import to_seconds
 from actionlib_core.wire import check_encoding, encoding_of, parse_encoding
 
@@ -39,6 +42,7 @@ if TYPE_CHECKING:
     from types import TracebackType
     from typing import Self
 
+    from actionlib_core.clock import Event
     from actionlib_core.interfaces import Message, ServiceType
     from actionlib_core.node import Node
     from actionlib_core.time import Duration
@@ -47,6 +51,8 @@ if TYPE_CHECKING:
 logger = logging.getLogger("actionlib_core")
 
 NAME_KIND = "service name"
+CALLS_AT_ONCE = 500  # of one service; each has a thread
+LIST_TIMEOUT_S = 1.0
 CALL_TIMEOUT_S = 60.0  # default limit of a call
 APPEAR_S = 2.0  # how much of it a call gives a server to appear
 FOREVER_S = 1e8  # for the network, which wants a number: three years
@@ -101,13 +107,22 @@ class Service(_ServiceEnd):
         handler: Gets the request; returns the response, or what makes one: a dict of its fields, a
             tuple or list of all of them, or the value of its only field.
         node: Where it lives; the node in force when None.
+        alone: False when others may have the name too: each of them runs its handler for every
+            call, and the caller takes the first answer.
+
+    Attributes:
+        error: Why it stopped by itself: an older server has the name; None while all is well.
 
     Raises:
         InvalidNameError: the name breaks the ROS rules.
         NodeError: the node is closed.
+        ServiceConflictError: the name has a server already.
+
+    Blocks: until the network has said who has the name, 1 s at most.
 
     Threads: each call of the handler has a thread of the node's clock, so calls may overlap, block,
-        and call services themselves. An exception goes to the caller, and to the log.
+        and call services themselves. An exception goes to the caller, and to the log. A caller that
+        finds `CALLS_AT_ONCE` under way gets a `ServiceBusyError`.
     """
 
     def __init__(
@@ -117,10 +132,18 @@ class Service(_ServiceEnd):
         handler: Callable[[Any], Any],
         *,
         node: Node | None = None,
+        alone: bool = True,
     ) -> None:
         check_function(f"service {name!r}", "handler", handler)
         super().__init__(name, service_class, node)
+        self._own = with_age(self._own, self.node.clock.time_ns())
         self.handler = handler
+        self.error: ServiceConflictError | None = None
+        self._alone = alone
+        self._lock = threading.Lock()
+        self._running = 0
+        self._shown = False
+        self._refuse_second()
         self._servers = self._watch()
         self._parts: list[Closable] = [self._servers]
         self._forget = self.node.on_close(self.close)
@@ -129,6 +152,7 @@ class Service(_ServiceEnd):
         try:
             self._parts.append(transport.queryable(self.resolved_name, self._on_query))
             self._parts.append(transport.declare_alive(token_key(self._own)))
+            self._meet_servers()
         except BaseException:
             self.close()
             raise
@@ -157,11 +181,59 @@ class Service(_ServiceEnd):
         self.close()
 
     def spin(self) -> None:
-        """Answer until the program is to end.
+        """Answer until the service is closed or the program is to end.
+
+        Raises:
+            ServiceConflictError: it stopped because an older server has the name.
 
         Blocks: until then.
         """
-        current_shutdown().event(self.node.clock).wait()
+        self._servers.wait(lambda: self._closed, None)
+        if self.error is not None:
+            raise self.error
+
+    # -- other servers -------------------------------------------------------------------------
+
+    def _watch(self) -> NameWatch:
+        return NameWatch(self.node, self._own, {Kind.SERVICE}, on_new=self._on_server)
+
+    def _refuse_second(self) -> None:
+        if not self._alone:
+            return
+        there = list_endpoints(
+            self.node.transport,
+            kind=Kind.SERVICE,
+            name=self.resolved_name,
+            timeout=LIST_TIMEOUT_S,
+        )
+        if there:
+            raise self._conflict(there[0])
+
+    def _meet_servers(self) -> None:
+        """Look at the servers that were found while this one was made, and from now on at all."""
+        self._shown = True
+        for other in self._servers.ends(any_type=True):
+            self._on_server(other)
+        if self.error is not None:
+            raise self.error
+
+    def _on_server(self, other: Endpoint) -> None:
+        """Stop when `other` is older: a session that has just been opened hears of it late."""
+        if not (self._alone and self._shown) or self._closed:
+            return
+        if not is_younger(self._own, other):
+            logger.error("%s", self._conflict(other, stays=True))
+            return
+        self.error = self._conflict(other)
+        logger.error("%s", self.error)
+        self.close()
+
+    def _conflict(self, other: Endpoint, *, stays: bool = False) -> ServiceConflictError:
+        ends = [(end.node, end.session) for end in (self._own, other)]
+        mine, others = reversed(ends) if stays else ends
+        return ServiceConflictError(self.resolved_name, mine, others)
+
+    # -- calls ---------------------------------------------------------------------------------
 
     def _on_query(self, query: Query) -> None:
         try:
@@ -170,12 +242,41 @@ class Service(_ServiceEnd):
             self._servers.note(error, _caller_of(query))
             _fail(query, error)
             return
-        self._calls.spawn(partial(self._answer, query), f"service /{self.resolved_name}")
+        if not self._admit():
+            # Without an end, handlers that call themselves would take all threads there are.
+            busy = ServiceBusyError(self.resolved_name, _BUSY.format(CALLS_AT_ONCE))
+            logger.error("%s", busy)
+            _fail(query, busy)
+            return
+        try:
+            self._calls.spawn(partial(self._answer, query), f"service /{self.resolved_name}")
+        except BaseException:
+            self._leave()
+            raise
+
+    def _admit(self) -> bool:
+        with self._lock:
+            if self._running >= CALLS_AT_ONCE:
+                return False
+            self._running += 1
+            return True
+
+    def _leave(self) -> None:
+        with self._lock:
+            self._running -= 1
 
     def _answer(self, query: Query) -> None:
         try:
+            self._reply(query)
+        finally:
+            self._leave()
+
+    def _reply(self, query: Query) -> None:
+        try:
             response = self._respond(self.handler(self.request_class.from_bytes(query.payload)))
             query.reply(response.to_bytes(), encoding_of(self.service_class))
+        except ServiceBusyError as error:  # logged where it came from
+            _fail(query, error)
         except BaseException as error:  # sys.exit() too: the caller waits for an answer
             logger.exception("service /%s: the handler raised", self.resolved_name)
             _fail(query, error)
@@ -199,6 +300,12 @@ class Service(_ServiceEnd):
                 f"the handler returned None; expected {name}, a dict or its field values",
             )
         return make() if result is None else make(result)
+
+
+_BUSY = (
+    "{} calls are under way; expected fewer. Try looking whether the handler calls its own "
+    "service, directly or through another, or ending calls sooner."
+)
 
 
 def _show(seconds: float | None) -> str:
@@ -277,6 +384,7 @@ class ServiceProxy(_ServiceEnd):
             ServiceUnavailableError: there is no server.
             ServiceTimeoutError: the server did not answer in time.
             ServiceLostError: the server died or left during the call.
+            ServiceBusyError: too many calls are under way there, or its handler calls itself.
             TypeMismatchError: the server has another type.
             NodeError: the node is closed, or the program is to end.
 
@@ -342,14 +450,15 @@ class ServiceProxy(_ServiceEnd):
         """
         replies: list[Reply] = []
         done: list[bool] = []
+        news = self.node.clock.event(f"the answer of service /{self.resolved_name}")
 
         def on_reply(reply: Reply) -> None:
             replies.append(reply)
-            self._servers.wake()
+            news.set()
 
         def on_done() -> None:
             done.append(True)
-            self._servers.wake()
+            news.set()
 
         query = self.node.transport.query(
             self.resolved_name,
@@ -364,14 +473,16 @@ class ServiceProxy(_ServiceEnd):
             return bool(replies or done or self._closed)
 
         try:
-            in_time = self._wait_for_answer(settled, timeout)
+            in_time = self._wait_for_answer(settled, timeout, news)
         finally:
             query.close()
         if replies:
             return replies[0]
         raise self._explain_silence(timeout, in_time=in_time)
 
-    def _wait_for_answer(self, settled: Callable[[], bool], timeout: float | None) -> bool:
+    def _wait_for_answer(
+        self, settled: Callable[[], bool], timeout: float | None, news: Event
+    ) -> bool:
         """Wait until a call is settled, or whoever may have got it is gone; return whether.
 
         When the servers that were known at the call go right after it, a new one that has just
@@ -384,13 +495,13 @@ class ServiceProxy(_ServiceEnd):
         def over() -> bool:
             return settled() or asked.isdisjoint(servers.ends())
 
-        in_time = servers.wait(over, timeout)
+        in_time = servers.wait(over, timeout, news)
         stale = start + STALE_S - now()
         if in_time and stale > 0:
-            servers.wait(lambda: settled() or bool(servers.ends()), stale)
+            servers.wait(lambda: settled() or bool(servers.ends()), stale, news)
             asked = set(servers.ends())
             left = None if timeout is None else start + timeout - now()
-            in_time = servers.wait(over, left)
+            in_time = servers.wait(over, left, news)
         return in_time
 
     def _explain_silence(self, timeout: float | None, *, in_time: bool) -> ActionlibError:
@@ -422,6 +533,9 @@ class ServiceProxy(_ServiceEnd):
             remote_type, remote_text = "", text
         if remote_type == TypeMismatchError.__name__:
             self._raise_mismatch(remote_text)
+        if remote_type == ServiceBusyError.__name__:
+            _, _, reason = remote_text.partition(": ")
+            raise ServiceBusyError(self.resolved_name, reason)
         raise ServiceException(
             self.resolved_name,
             f"the handler raised {remote_type or 'an error'}: {remote_text}",

@@ -88,7 +88,9 @@ class AskOperator(State):
             )
             if self.answers == YES_NO:
                 confirm = f"{self.channel}/confirm"
-                open_ends.enter_context(Service(confirm, SetBool, inbox.on_confirm, node=node))
+                open_ends.enter_context(
+                    Service(confirm, SetBool, inbox.on_confirm, node=node, alone=False)
+                )
             ask.publish(String(f"{self.question} ({', '.join(self.answers)})"))
             logwarn(self._invitation(node))
             answer = inbox.wait(self.patience)

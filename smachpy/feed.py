@@ -93,7 +93,9 @@ class Feed:
         self._describe()
         self._session = node.transport.session_id
         self._values = ValueServer(server_name, machine, path, node)
-        self._history = Service(server_name + HISTORY_SERVICE, Trigger, self._tell, node=node)
+        self._history = Service(
+            server_name + HISTORY_SERVICE, Trigger, self._tell, node=node, alone=False
+        )
         self._events = Publisher(server_name + EVENTS_TOPIC, String, node=node)  # what viewers seek
         self._tape = machine.tape(self._on_news, limit=QUEUED_EVENTS, name=path)
 

@@ -52,7 +52,9 @@ class ValueServer:
     def __init__(self, server_name: str, machine: Container, path: str, node: Node) -> None:
         self._machine = machine
         self._path = path
-        self._service = Service(server_name + VALUE_SERVICE, ReadValue, self._answer, node=node)
+        self._service = Service(
+            server_name + VALUE_SERVICE, ReadValue, self._answer, node=node, alone=False
+        )
 
     def close(self) -> None:
         """Answer no more; a second call does nothing."""

@@ -9,6 +9,8 @@ import pytest
 from actionlib_core.clock import RealClock
 from actionlib_core.exceptions import (
     NodeError,
+    ServiceBusyError,
+    ServiceConflictError,
     ServiceException,
     ServiceLostError,
     ServiceTimeoutError,
@@ -20,6 +22,7 @@ from actionlib_core.interfaces import define_service
 from actionlib_core.interfaces.std_srvs.srv import Empty, SetBool, SetBoolResponse, Trigger
 from actionlib_core.node import Node
 from actionlib_core.service import Service, ServiceProxy, wait_for_service
+from actionlib_core.transport.faulty import FaultyTransport
 from actionlib_core.transport.memory import MemoryNetwork
 
 AddTwoInts = define_service("test_pkg/AddTwoInts", "int64 a\nint64 b\n---\nint64 sum\n")
@@ -208,12 +211,115 @@ def test_wrong_type_is_told_on_both_sides(nodes, clock, caplog):
     assert (error.expected_type, error.found_type) == ("std_srvs/SetBool", "std_srvs/Trigger")
 
 
-def test_two_servers_answer_once(nodes, network, clock):
+def test_second_server_on_a_name_is_refused_and_names_both(nodes):
+    server, caller = nodes
+    calls = []
+    Service("who", Trigger, lambda _: (calls.append("first") or True, "first"), node=server)
+    for other in (server, caller):
+        with pytest.raises(ServiceConflictError, match="service /who: two servers") as caught:
+            Service("who", Trigger, lambda _: (calls.append("second") or True, ""), node=other)
+        assert caught.value.mine == (other.full_name, other.transport.session_id)
+        assert caught.value.other == ("server", server.transport.session_id)
+    assert ServiceProxy("who", Trigger, node=caller)().message == "first"
+    assert calls == ["first"]
+
+
+def test_server_of_another_type_on_a_name_is_refused_too(nodes):
+    server, caller = nodes
+    Service("grip", SetBool, lambda _: (True, "first"), node=server)
+    with pytest.raises(ServiceConflictError):
+        Service("grip", Trigger, lambda _: (True, "second"), node=caller)
+    assert ServiceProxy("grip", SetBool, node=caller)(True).message == "first"
+
+
+def test_name_can_be_taken_again_once_its_server_has_left(nodes):
+    server, caller = nodes
+    for name in ("first", "second"):
+        with Service("who", Trigger, lambda _, name=name: (True, name), node=server):
+            assert ServiceProxy("who", Trigger, node=caller)().message == name
+
+
+@pytest.fixture
+def strangers(clock, network):
+    """Two nodes of which neither hears of the other before a second has passed."""
+    made = []
+    for name in ("older", "younger"):
+        link = FaultyTransport(network.session(), clock=clock, lease=0.0)
+        made.append(Node(name, transport=link, clock=clock))
+        link.cut(1.0)
+        clock.sleep(0.1)
+    yield made
+    for node in made:
+        node.close()
+        node.transport.close()
+
+
+def test_younger_of_two_servers_that_meet_late_stops_and_the_older_goes_on(
+    strangers, nodes, clock, caplog
+):
+    older, younger = strangers
+    Service("who", Trigger, lambda _: (True, "older"), node=older)
+    clock.sleep(0.2)
+    service = Service("who", Trigger, lambda _: (True, "younger"), node=younger)
+    with pytest.raises(ServiceConflictError) as caught:
+        service.spin()
+    assert clock.now() < 2.0
+    assert service.error is caught.value
+    assert (caught.value.mine[0], caught.value.other[0]) == ("younger", "older")
+    assert caplog.text.count("service /who: two servers") == 2  # each side says it, once
+    assert ServiceProxy("who", Trigger, node=nodes[1])().message == "older"
+
+
+def test_servers_that_share_a_name_answer_once(nodes, network, clock, caplog):
     server, caller = nodes
     third = Node("second", transport=network.session(), clock=clock)
-    Service("who", Trigger, lambda _: (True, "first"), node=server)
-    Service("who", Trigger, lambda _: (True, "second"), node=third)
-    assert ServiceProxy("who", Trigger, node=caller)().message in {"first", "second"}
+    for node in (server, third):
+        Service("who", Trigger, lambda _, n=node: (True, n.name), node=node, alone=False)
+    clock.sleep(1.0)
+    assert ServiceProxy("who", Trigger, node=caller)().message in {"server", "second"}
+    assert "two servers" not in caplog.text
+
+
+def test_spin_ends_with_the_service(nodes, clock):
+    service = Service("who", Trigger, lambda _: (True, ""), node=nodes[0])
+    clock.call_later(5.0, service.close)
+    service.spin()
+    assert clock.now() == pytest.approx(5.0)
+
+
+# -- a handler that calls its own service --------------------------------------------------------
+
+
+def test_handler_may_call_its_own_service(nodes):
+    server, caller = nodes
+    add = ServiceProxy("sum", AddTwoInts, node=server)
+
+    def handler(request):
+        return request.a + (add(request.a - 1, 0).sum if request.a else 0)
+
+    Service("sum", AddTwoInts, handler, node=server)
+    assert ServiceProxy("sum", AddTwoInts, node=caller)(20, 0).sum == 210
+
+
+@pytest.mark.parametrize("names", [["a"], ["a", "b"]])
+def test_handlers_that_call_each_other_for_ever_end_in_an_error(nodes, caplog, monkeypatch, names):
+    monkeypatch.setattr("actionlib_core.service.CALLS_AT_ONCE", 20)
+    server, caller = nodes
+    runs = []
+    for name, other in zip(names, names[1:] + names[:1], strict=True):
+        proxy = ServiceProxy(other, Trigger, node=server)
+        Service(name, Trigger, lambda _, p=proxy: runs.append(1) or p(), node=server)
+    with pytest.raises(ServiceBusyError) as caught:
+        ServiceProxy("a", Trigger, node=caller)()
+    assert str(caught.value) == (
+        "service /a: 20 calls are under way; expected fewer. Try looking whether the handler calls "
+        "its own service, directly or through another, or ending calls sooner."
+    )
+    assert len(runs) == 20 * len(names)
+    assert caplog.text.count("calls are under way") == 1
+    # The service has not suffered.
+    with pytest.raises(ServiceBusyError):
+        ServiceProxy("a", Trigger, node=caller)()
 
 
 def test_answer_of_a_foreign_server_with_a_plain_error(nodes, clock):
