@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 from actionlib_core.exceptions import ActionlibError
+from actionlib_core.time import to_seconds
 
 
 def check_function(where: str, argument: str, value: object) -> None:
@@ -50,3 +53,26 @@ def check_queue_size(where: str, value: object) -> None:
             f"{where}: queue_size: got {value!r}; expected a number of messages, or None for no "
             "limit."
         )
+
+
+def check_seconds(where: str, argument: str, value: object) -> float:
+    """Return a time that has an end, as a number; refuse what is none.
+
+    Args:
+        where: Whose, "action 'dock'" for example.
+        argument: Its name.
+        value: What was given: seconds as a number or a `Duration`.
+
+    Raises:
+        ActionlibError: it is neither, or negative, or has no end.
+    """
+    try:
+        seconds = to_seconds(value)  # type: ignore[call-overload]
+    except TypeError:
+        seconds = None
+    if seconds is None or not (math.isfinite(seconds) and seconds >= 0):
+        raise ActionlibError(
+            f"{where}: {argument}: got {value!r}; expected seconds, 0 or more, as a number or a "
+            "Duration."
+        )
+    return float(seconds)

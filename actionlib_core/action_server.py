@@ -15,7 +15,7 @@ from actionlib_core._action_wire import (
     pack_status,
     pack_statuses,
 )
-from actionlib_core._arguments import check_function
+from actionlib_core._arguments import check_function, check_seconds
 from actionlib_core._callbacks import CallbackQueue
 from actionlib_core._core.server_goals import RESULT_TIMEOUT_S, Arrival, ServerGoal, ServerGoals
 from actionlib_core._core.states import TERMINAL, Status
@@ -37,7 +37,6 @@ from actionlib_core.status_tracker import (
     entry_of_status,
     text_of_past,
 )
-from actionlib_core.time import to_seconds
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -75,7 +74,7 @@ class ActionServer:
         node: Where; the current node when None.
         on_client_lost: What happens to the goals of a client that died: "continue" as in ROS, or
             "cancel", as if the client had cancelled them.
-        result_timeout: How long a result waits for a client that lost its link [s].
+        result_timeout: How long a result waits for a client that lost its link [s]; 0 or more.
 
     Attributes:
         lock: Guards the server's data. Holding it keeps goals as they are; never wait with it.
@@ -83,6 +82,7 @@ class ActionServer:
 
     Raises:
         ActionException: `ActionSpec` is not an action class.
+        ActionlibError: a callback is no function, or `result_timeout` no length of time.
         InvalidNameError: the name breaks the ROS rules.
         ServerConflictError: the name has a server already (from `start`).
         TransportError: the network session is closed.
@@ -109,6 +109,7 @@ class ActionServer:
             )
         check_function(f"action {ns!r}", "goal_cb", goal_cb)
         check_function(f"action {ns!r}", "cancel_cb", cancel_cb)
+        keep = check_seconds(f"action {ns!r}", "result_timeout", result_timeout)
         self.node = node if node is not None else get_node()
         self.types = ActionTypes.of(ActionSpec)
         self.ns = self.node.resolve(ns, "action name")
@@ -118,7 +119,7 @@ class ActionServer:
         self.error: ServerConflictError | None = None
         self._on_client_lost = on_client_lost
         self._clock = self.node.clock
-        self._goals = ServerGoals(self.ns, result_timeout=to_seconds(result_timeout))
+        self._goals = ServerGoals(self.ns, result_timeout=keep)
         self._ids = GoalIDGenerator(f"/{self.node.full_name}", clock=self._clock)
         self._port = ServerPort(self.node, self.ns, self.types, self)
         self.callback_queue = CallbackQueue(self.node, f"{self.ns} callbacks")

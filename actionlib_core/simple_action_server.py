@@ -73,7 +73,7 @@ class SimpleActionServer:
             ROS; "queue" waits its turn; "reject" is turned away.
         on_client_lost: What happens to the goal of a client that died: "continue" as in ROS, or
             "cancel", as if the client had cancelled it.
-        result_timeout: How long a result waits for a client that lost its link [s].
+        result_timeout: How long a result waits for a client that lost its link [s]; 0 or more.
 
     Attributes:
         action_server: The `ActionServer` beneath.
@@ -81,6 +81,7 @@ class SimpleActionServer:
 
     Raises:
         ActionException: `ActionSpec` is not an action class.
+        ActionlibError: a callback is no function, or `result_timeout` no length of time.
         InvalidNameError: the name breaks the ROS rules.
         ServerConflictError: the name has a server already (from `start`).
         TransportError: the network session is closed.

@@ -19,6 +19,7 @@ from actionlib_core.sent_goal import SentGoal
 from actionlib_core.service import Service, ServiceProxy
 from actionlib_core.simple_action_client import SimpleActionClient
 from actionlib_core.simple_action_server import SimpleActionServer
+from actionlib_core.time import Duration
 from actionlib_core.topic import Publisher, Subscriber
 from actionlib_core.transport.memory import MemoryNetwork
 
@@ -362,6 +363,17 @@ def test_error_whose_text_cannot_be_sent_ends_its_goal(nodes):
     assert client.get_state() == GoalStatus.ABORTED
     assert client.get_goal_status_text().endswith("no file caf\\udce9.yaml")
     server.stop()
+
+
+@pytest.mark.parametrize("wrong", [None, -1.0, float("nan"), float("inf"), "60"])
+def test_result_timeout_is_a_number(nodes, wrong):
+    """With None the goal ended, and its result was never sent."""
+    for make in (ActionServer, SimpleActionServer):
+        with pytest.raises(
+            ActionlibError, match=r"demo.*: result_timeout: got .*; expected seconds"
+        ):
+            make("demo", msg.TestAction, node=nodes[0], result_timeout=wrong)
+    make("demo", msg.TestAction, node=nodes[0], result_timeout=Duration(2)).stop()
 
 
 def test_service_class_is_one(nodes):
