@@ -138,21 +138,32 @@ def _import_file(text: str, path: Path) -> ModuleType:
     if not path.is_file():
         near = sorted(str(p) for p in path.parent.glob("*.py")) if path.parent.is_dir() else []
         raise TargetError(text, f"no file {str(path)!r}; {_suggest(str(path), near)}")
-    spec = importlib.util.spec_from_file_location(path.stem, path)
+    name = _free_name(path.stem)
+    spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise TargetError(
             text, f"{str(path)!r} is not a Python file; expected a name ending in .py"
         )
     module = importlib.util.module_from_spec(spec)
-    sys.modules.setdefault(path.stem, module)  # dataclasses and pickles look their module up
+    sys.modules[name] = module  # dataclasses and pickles look their module up
     sys.path.insert(0, str(path.parent.resolve()))  # as `python path.py` would
     try:
         spec.loader.exec_module(module)
     except Exception as error:
+        sys.modules.pop(name, None)  # half of it is there
         raise TargetError(text, f"running the file raised {_text_of(error)}") from error
     finally:
         sys.path.remove(str(path.parent.resolve()))
     return module
+
+
+def _free_name(stem: str) -> str:
+    """Return `stem`, with a number after it if a module, another file's maybe, has that name."""
+    name, number = stem, 1
+    while name in sys.modules:
+        number += 1
+        name = f"{stem}_{number}"
+    return name
 
 
 def _import_module(text: str, name: str) -> ModuleType:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from importlib.metadata import EntryPoint
 
 import pytest
@@ -130,3 +131,51 @@ def test_a_file_without_a_machine_says_what_it_looked_for(file):
     file.write_text("x = 1\n")
     with pytest.raises(TargetError, match="which machine is meant"):
         load_target("drive_about.py")
+
+
+TYPED = """
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import smachpy
+
+
+@dataclass
+class {name}:
+    n: int = 0
+
+
+@dataclass
+class Data:
+    item: {name} | None = None
+
+
+def write(ud):
+    ud.item = {name}()
+    return "done"
+
+
+def mission():
+    sm = smachpy.StateMachine(["done"], userdata_type=Data)
+    sm.add("GO", smachpy.CBState(write, outcomes=["done"], output_keys=["item"]))
+    return sm
+"""
+
+
+def test_files_of_one_name_have_modules_of_their_own(file):
+    """Annotations of a dataclass are looked up in the module of its name."""
+    for folder, name in [("here", "Box"), ("there", "Crate"), ("here", "Box")]:
+        path = file.parent / folder / "typed_target.py"
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(TYPED.format(name=name))
+        machine = load_target(str(path)).build()
+        assert machine.execute() == "done"
+        assert type(machine.userdata.item).__name__ == name
+
+
+def test_a_file_that_raises_leaves_no_half_module_behind(file):
+    (file.parent / "half_target.py").write_text("1 / 0\n")
+    with pytest.raises(TargetError):
+        load_target("half_target.py")
+    assert "half_target" not in sys.modules
