@@ -98,7 +98,7 @@ class Served:
         self.machines = Machines()
         self.commands = []
         self._server = self._thread = None
-        self._began = time.time_ns()
+        self.began = time.time_ns()
 
     def add(self, name, label="JOB", labels="AB", events=(), **history):
         """A chain of states; `events` are (kind, path[, facts]) a millisecond apart."""
@@ -117,7 +117,7 @@ class Served:
         made = []
         for seq, (kind, path, *more) in enumerate(events, after + 1):
             facts = more[0] if more else {}
-            stamp = self._began + int(facts.pop("at", seq / 1000) * 1e9)
+            stamp = self.began + int(facts.pop("at", seq / 1000) * 1e9)
             made.append({"kind": kind, "path": path, "stamp_ns": stamp, "t": 0.0, **facts})
             made[-1]["seq"] = seq
         return made

@@ -210,3 +210,23 @@ def test_what_the_server_answers_is_told_as_it_is(served, look):
     assert "500 Internal Server Error: Internal" in page.evaluate(ask, "/api/compare?")["text"]
     page.route("**/api/compare?*", lambda route: route.abort())
     assert "does not answer" in page.evaluate(ask, "/api/compare?")["text"]
+
+
+@pytest.mark.parametrize("hours", [-3, 3])
+def test_clocks_that_differ_do_not_show_as_time_spent(served, look, hours):
+    served.began += hours * 3_600_000_000_000
+    machine = served.add("one", events=run()[:2])
+    page = look(served.start())
+    off = "Math.abs(smachpy.store.nowMs() - smachpy.store.run.last())"
+    if hours < 0:
+        assert page.evaluate(f"() => {off}") > 3_000_000  # nothing has been heard yet
+    deadline = time.monotonic() + 10.0
+    seq = 2
+    while page.evaluate(f"() => {off}") > 1000 or seq < 3:
+        assert time.monotonic() < deadline
+        since = (time.time_ns() - served.began) / 1e9 + hours * 3600
+        done = [("Iterated", "/JOB/A", {"number": seq, "at": since})]
+        machine.add(served.events(done, after=seq))
+        seq += 1
+        page.wait_for_timeout(100)
+    wait_for(page, "smachpy.store.nowMs() - smachpy.store.run.last() > 200")  # it goes on

@@ -3,12 +3,14 @@ import { batch } from "@preact/signals";
 import * as store from "viewer/store";
 
 const SILENT_BEATS = 2; // a server that says nothing for so long is lost
+const CAUGHT_UP_MS = 1000; // until then a stream may tell of what happened long ago
 const AGAIN_MS = 250, LATEST_MS = 4000; // between two tries to fetch a structure
 
 let stream = null;
 let lastId = ""; // of the newest message of events
 let silence = 0; // half beats without a word
 let watchdog = 0;
+let begun = 0; // when the stream began [ms]
 let loads = 0; // the newest one counts
 let token = null;
 let wanted = new URLSearchParams(location.search).get("machine") ?? "";
@@ -83,13 +85,16 @@ function open() {
     lastId = message.lastEventId || lastId;
     take(JSON.parse(message.data));
   });
-  on("settings", (s) => { store.settings.value = s; store.connection.value = "live"; watch(s.beat * 1000); });
+  on("settings", (s) => { begun = performance.now(); store.settings.value = s; store.connection.value = "live"; watch(s.beat * 1000); });
   on("beat", () => { store.connection.value = "live"; });
   on("machines", (list) => { store.machines.value = list; });
   on("actions", (found) => { store.actions.value = found; });
   on("facts", takeFacts);
   on("snap", takeSnap);
-  on("message", (events) => onEvents(events));
+  on("message", (events) => {
+    if (performance.now() - begun > CAUGHT_UP_MS) store.hearClock(events.at(-1).stamp_ns);
+    onEvents(events);
+  });
   stream.onopen = () => { store.connection.value = "live"; };
   stream.onerror = () => {
     store.connection.value = "lost";
@@ -123,6 +128,7 @@ async function takeFacts(facts) {
 async function takeSnap(snap, payload) {
   wanted ||= snap.name;
   const known = store.facts.value;
+  if (known?.name !== snap.name || known.epoch !== snap.epoch) store.forgetClock();
   batch(() => {
     store.facts.value = snap;
     store.problems.value = snap.problems;

@@ -10,6 +10,8 @@ export const save = (name, value) => {
   try { localStorage.setItem(`smachpy.${name}`, JSON.stringify(value)); } catch { /* a file has no storage */ }
 };
 
+const LAGS_MS = 30_000; // a robot's clock that was set is believed after twice that at most
+
 export const connection = signal("connecting"); // connecting, live, lost, file
 export const settings = signal({ follow: false, control: false });
 export const machines = signal([]);
@@ -53,8 +55,25 @@ export const shown = () => (cursor.value === null ? run.now : past ?? run.now);
 export const nowMs = () => {
   if (cursor.value !== null) return cursor.value;
   const ended = run.now.ended != null || facts.value?.stale != null || connection.value === "file";
-  return ended ? run.last() ?? Date.now() : Math.max(Date.now(), run.last() ?? 0);
+  const robot = Date.now() - behind;
+  return ended ? run.last() ?? robot : Math.max(robot, run.last() ?? 0);
 };
+
+// How far the robot's clock is behind this one's [ms], ways included: the least of the newest lags.
+let behind = 0;
+let lags = { since: 0, least: Infinity, before: Infinity };
+
+export function forgetClock() {
+  behind = 0;
+  lags = { since: performance.now(), least: Infinity, before: Infinity };
+}
+
+export function hearClock(stamp_ns) {
+  if (performance.now() - lags.since > LAGS_MS)
+    lags = { since: performance.now(), least: Infinity, before: lags.least };
+  lags.least = Math.min(lags.least, Date.now() - ms(stamp_ns));
+  behind = Math.min(lags.least, lags.before);
+}
 
 // So many of the kept events have happened by what is shown.
 export const happened = () => position.value ?? run.events.length;
