@@ -88,7 +88,11 @@ class _TopicEnd:
         return self._ends.wait(lambda: self.get_num_connections() >= count, to_seconds(timeout))
 
     def unregister(self) -> None:
-        """Leave the topic; a second call does nothing. No callback starts after it returned."""
+        """Leave the topic; a second call does nothing.
+
+        What has not reached a callback yet never does. One that runs in another thread then, or is
+        just being entered there, is not waited for.
+        """
         if self._closed:
             return
         self._closed = True
@@ -263,6 +267,8 @@ class Subscriber(_TopicEnd, Generic[M]):
             self._ends.note(error, _sender_of(sample))
             return
         message = self._read(sample.payload)
+        if self._closed:  # while it was read
+            return
         if self.callback_args is None:
             self.callback(message)
         else:

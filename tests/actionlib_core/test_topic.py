@@ -168,6 +168,25 @@ def test_unregistered_subscriber_hears_nothing(nodes, clock):
     assert heard == [String("a")]
 
 
+def test_message_that_is_being_read_at_the_end_does_not_start_a_callback(nodes, clock):
+    talker, listener = nodes
+    heard = []
+    subscriber = Subscriber("chatter", String, heard.append, node=listener)
+    read = subscriber._read
+
+    def slow(payload):
+        message = read(payload)
+        clock.sleep(1.0)
+        return message
+
+    subscriber._read = slow
+    Publisher("chatter", String, node=talker).publish("late")
+    clock.sleep(0.5)
+    subscriber.unregister()
+    clock.sleep(5.0)
+    assert heard == []
+
+
 def test_unregistered_publisher_raises(nodes):
     publisher = Publisher("chatter", String, node=nodes[0])
     publisher.unregister()
