@@ -84,10 +84,10 @@ def remove(clock: VirtualClock) -> None:
 
 
 def _here() -> VirtualClock | None:
-    """Return the clock that the calling thread takes part in."""
+    """Return the clock that the calling thread takes part in, the innermost of several."""
     ident = threading.get_ident()
     if ident not in _bypass:
-        for clock in _clocks:
+        for clock in reversed(_clocks):
             if clock.is_participant(ident):
                 return clock
     return None

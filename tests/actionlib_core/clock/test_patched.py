@@ -346,6 +346,15 @@ def test_a_rate_is_above_zero(rate):
         VirtualClock(rate=rate)
 
 
+def test_the_innermost_of_two_blocks_has_the_thread():
+    with VirtualClock() as outer, outer.patched():
+        with VirtualClock() as inner, inner.patched():
+            time.sleep(5)
+            assert (inner.now(), outer.now()) == (5, 0)
+        time.sleep(2)
+        assert outer.now() == 2
+
+
 def test_a_chooser_decides_the_interleaving():
     asked = []
 
