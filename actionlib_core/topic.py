@@ -266,8 +266,10 @@ class Subscriber(_TopicEnd, Generic[M]):
         except TypeMismatchError as error:
             self._ends.note(error, _sender_of(sample))
             return
-        message = self._read(sample.payload)
-        if self._closed:  # while it was read
+        self._call_back(self._read(sample.payload))
+
+    def _call_back(self, message: M) -> None:
+        if self._closed or self.callback is None:  # it may have left while the message was read
             return
         if self.callback_args is None:
             self.callback(message)
