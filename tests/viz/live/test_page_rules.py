@@ -230,3 +230,22 @@ def test_clocks_that_differ_do_not_show_as_time_spent(served, look, hours):
         seq += 1
         page.wait_for_timeout(100)
     wait_for(page, "smachpy.store.nowMs() - smachpy.store.run.last() > 200")  # it goes on
+
+
+def test_a_machine_that_is_not_there_is_named_and_another_can_be_chosen(served, look):
+    served.add("one", label="ONE")
+    address = served.start()
+    page = look(f"{address}?machine=gone", drawn=False)
+    wait_for(page, "document.querySelector('.empty')?.textContent.includes('“gone”')")
+    assert "gone" in page.text_content(".chooser select option:checked")
+    page.click(".empty button:text-is('one')")
+    page.wait_for_selector('g[data-path="/ONE/A"]')
+    assert page.query_selector(".chooser") is None  # there is no other one
+    page = look(f"{address}?machine=gone", drawn=False)
+    page.wait_for_selector(".chooser select")
+    page.select_option(".chooser select", "one")
+    page.wait_for_selector('g[data-path="/ONE/A"]')
+    page = look(f"{address}?machine=late", drawn=False)
+    wait_for(page, "document.querySelector('.empty')?.textContent.includes('“late”')")
+    served.add("late", label="LATE")
+    page.wait_for_selector('g[data-path="/LATE/A"]')

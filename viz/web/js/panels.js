@@ -12,6 +12,7 @@ import { KIND_NAMES, SIGNS, outcomeClass, shorten } from "viewer/model";
 
 export const html = htm.bind(h);
 const ROW = 24;
+const MOST_NAMES = 12;
 const GLYPH = { action: "\u25b6", service: "\u21c4", monitor: "\u25c9", condition: "?", machine: "\u25a3",
   sequence: "\u2192", concurrence: "\u2016", iterator: "\u21bb", missing: "\u2715" };
 
@@ -39,10 +40,12 @@ export function TopBar({ page }) {
 function Chooser() {
   const list = store.machines.value, facts = store.facts.value;
   const name = facts ? shorten(facts.label, 60) : "no machine yet";
-  if (isFile() || list.length < 2) return html`<h1 title=${facts?.name}>${name}</h1>`;
+  const others = list.some((m) => m.name !== facts?.name);
+  if (isFile() || !others) return html`<h1 title=${facts?.name}>${name}</h1>`;
   const word = (m) => m.recorded ? "recording" : m.stale != null && m.ended == null ? "stale" : m.ended != null ? `ended: ${m.outcome}` : "running";
   return html`<label class="chooser"><span class="hidden">machine</span>
-    <select value=${facts?.name} onChange=${(e) => choose(e.target.value)}>
+    <select value=${facts?.name ?? ""} onChange=${(e) => choose(e.target.value)}>
+      ${!facts && html`<option value="" disabled>${shorten(store.wanted.value || "choose a machine", 60)}</option>`}
       ${list.map((m) => html`<option value=${m.name} title=${m.node ? `in node ${m.node}` : ""}>${m.name} \u2013 ${word(m)}</option>`)}
     </select></label>`;
 }
@@ -205,7 +208,13 @@ export function Help() {
 }
 
 export function Empty() {
-  const word = store.connection.value === "lost" ? "The viewer\u2019s server does not answer. This page tries again."
+  const name = store.wanted.value, list = store.machines.value;
+  if (store.connection.value === "lost") return html`<div class="empty"><p>The viewer\u2019s server does not answer. This page tries again.</p></div>`;
+  const missing = name && !list.some((m) => m.name === name);
+  const word = missing ? `No machine is called \u201c${shorten(name, 80)}\u201d. It shows up here as soon as one runs.`
     : "No machine on the network yet. It shows up here as soon as one runs.";
-  return html`<div class="empty"><p>${word}</p><pre>smachpy run patrol --start-robot</pre></div>`;
+  if (!missing && list.length) return null; // it comes
+  return html`<div class="empty"><p>${word}</p>${list.length ? html`<p>There ${list.length > 1 ? "are" : "is"}</p>
+    <p class="others">${list.slice(0, MOST_NAMES).map((m) => html`<button onClick=${() => choose(m.name)}>${shorten(m.name, 60)}</button>`)}
+      ${list.length > MOST_NAMES && `and ${list.length - MOST_NAMES} more, in the list above`}</p>` : html`<pre>smachpy run patrol --start-robot</pre>`}</div>`;
 }

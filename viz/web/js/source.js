@@ -13,7 +13,6 @@ let watchdog = 0;
 let begun = 0; // when the stream began [ms]
 let loads = 0; // the newest one counts
 let token = null;
-let wanted = new URLSearchParams(location.search).get("machine") ?? "";
 let onEvents = () => {};
 let onMachine = () => {};
 
@@ -62,7 +61,7 @@ export const canControl = () =>
   store.connection.value === "live" && store.facts.value.stale == null;
 
 export function choose(name) {
-  wanted = name;
+  store.wanted.value = name;
   const address = new URL(location.href);
   address.searchParams.set("machine", name);
   history.replaceState(null, "", address);
@@ -79,7 +78,7 @@ export const link = (what, more = "") => `/api/${what}?machine=${named()}${more}
 function open() {
   stream?.close();
   const last = lastId ? `&last=${encodeURIComponent(lastId)}` : "";
-  stream = new EventSource(`/api/events?machine=${encodeURIComponent(wanted)}${last}`);
+  stream = new EventSource(`/api/events?machine=${encodeURIComponent(store.wanted.value)}${last}`);
   const on = (name, take) => stream.addEventListener(name, (message) => {
     silence = 0;
     lastId = message.lastEventId || lastId;
@@ -126,7 +125,7 @@ async function takeFacts(facts) {
 }
 
 async function takeSnap(snap, payload) {
-  wanted ||= snap.name;
+  store.wanted.value ||= snap.name;
   const known = store.facts.value;
   if (known?.name !== snap.name || known.epoch !== snap.epoch) store.forgetClock();
   batch(() => {

@@ -15,6 +15,7 @@ const LAGS_MS = 30_000; // a robot's clock that was set is believed after twice 
 export const connection = signal("connecting"); // connecting, live, lost, file
 export const settings = signal({ follow: false, control: false });
 export const machines = signal([]);
+export const wanted = signal(new URLSearchParams(location.search).get("machine") ?? ""); // by name
 export const facts = signal(null);
 export const problems = signal([]);
 export const model = signal(null);
