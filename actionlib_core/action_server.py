@@ -138,10 +138,16 @@ class ActionServer:
         Raises:
             ServerConflictError: the name has a server already.
             TransportError: the network session is closed.
+            ActionException: the server was stopped.
 
         Blocks: until the network has said who has the name, 1 s at most.
         """
         with self.lock:
+            if self._stopped:
+                raise ActionException(
+                    f"action '{self.ns}': start(): the server was stopped; expected one that was "
+                    "not. Try making a new one."
+                )
             if self._started:
                 return
             self._started = True
@@ -161,20 +167,23 @@ class ActionServer:
         """End all goals (ABORTED, or REJECTED when not yet accepted) and leave the name.
 
         Clients see the result of each goal, then the server's absence; what they sent too late goes
-        to the next server. A second call does nothing.
+        to the next server. A second call does nothing, nor does one before `start`. A server that
+        was stopped is not started again.
 
         Blocks: until the clients have heard all that, `DRAIN_S` at most.
         """
-        self.close_to_goals()
         with self.lock:
             if self._stopped or not self._started:
                 return
+            self._goals.close()
             open_goals = [goal for goal in self._goals.listed() if goal.status not in TERMINAL]
-        for goal in open_goals:
-            if goal.arrived and isinstance(goal.tag, StatusTracker):
-                self.give_up(goal.tag, TEXT_STOPPED)
-        self._say_farewell()
-        self._leave()
+        try:
+            for goal in open_goals:
+                if goal.arrived and isinstance(goal.tag, StatusTracker):
+                    self.give_up(goal.tag, TEXT_STOPPED)
+            self._say_farewell()
+        finally:
+            self._leave()
 
     def close_to_goals(self) -> None:
         """Take no more goals, what comes from now on is for the next server; not for users."""
@@ -216,8 +225,10 @@ class ActionServer:
             self._status.close()
         if self._forget is not None:
             self._forget()
-        self._port.close()
-        self._left.set()
+        try:
+            self._port.close()
+        finally:
+            self._left.set()
 
     def wait(self, timeout: float | None = None) -> bool:
         """Wait until the server has stopped; for programs that do nothing else.
@@ -377,7 +388,7 @@ class ActionServer:
         try:
             self._port.send_status(pack_statuses(self._clock.time_ns(), entries))
         except TransportError:
-            if not self._stopped:  # else `stop` came in between
+            if not self._goals.closed:  # else `stop` came in between
                 raise
 
     # -- what arrives (on the network's thread) ------------------------------------------------
@@ -471,6 +482,7 @@ class ActionServer:
             if self.error is not None or self._stopped:
                 return
             self.error = error
+            self._goals.close()
         log.error("%s", error)
         self._leave()
 
@@ -496,8 +508,13 @@ class ActionServer:
         status = tracker.record.status
         if status not in TERMINAL:
             event = "abort" if status in ACCEPTED else "reject"
-            with contextlib.suppress(IllegalTransitionError):  # another thread has just ended it
+            try:
                 self.finish(tracker, event, "the end of its callback", None, text)
+            except IllegalTransitionError:
+                return  # another thread has just ended it
+            except TransportError:
+                if not self._goals.closed:  # else the server stops after its session was closed
+                    raise
 
     def _deliver_cancel(self, handle: ServerGoalHandle) -> None:
         self.callback_queue.call(self._run_cancel_callback, handle)

@@ -137,6 +137,7 @@ class SimpleActionServer:
         Raises:
             ServerConflictError: the name has a server already.
             TransportError: the network session is closed.
+            ActionException: the server was stopped.
 
         Blocks: until the network has said who has the name, 1 s at most.
         """
@@ -147,6 +148,9 @@ class SimpleActionServer:
 
     def stop(self) -> None:
         """Ask the running goal to stop, end all goals, leave the name.
+
+        A second call does nothing, nor does one before `start`. A stopped server is not started
+        again.
 
         Blocks: until `execute_cb` has returned, 0.4 s at most; then its goal is ABORTED.
         """
@@ -180,9 +184,9 @@ class SimpleActionServer:
             waiting = self._policy.on_stop()
             if self._idle is not None:
                 self._idle.set()
-        for handle in waiting:
-            handle.set_rejected(None, TEXT_STOPPED)
         self._preempted.set()
+        for handle in waiting:
+            self.action_server.give_up(handle.status_tracker, TEXT_STOPPED)
 
     # -- goals ---------------------------------------------------------------------------------
 

@@ -78,6 +78,9 @@ class ServerGoals:
         name: The action's name, for errors.
         result_timeout: How long a result waits for its acknowledgement [s].
 
+    Attributes:
+        closed: No more goals are taken.
+
     Threads: none of its own, no lock; the owner calls it under its lock.
     """
 
@@ -87,7 +90,7 @@ class ServerGoals:
         self._goals: dict[str, ServerGoal] = {}
         # Status, when it was forgotten, whether acknowledged; plain numbers: nothing to collect.
         self._past: dict[str, tuple[int, float, bool]] = {}
-        self._closed = False
+        self.closed = False
         self._last_cancel_ns = 0
         self._steps = server_life_cycle()
 
@@ -116,7 +119,7 @@ class ServerGoals:
             return Arrival.REPEAT, known
         if known is None and arrived.id in self._past:
             return Arrival.REPEAT, None
-        if self._closed:
+        if self.closed:
             return Arrival.LATE, None
         self._goals[arrived.id] = arrived
         if known is not None:
@@ -212,7 +215,7 @@ class ServerGoals:
 
     def close(self) -> None:
         """Take no more goals."""
-        self._closed = True
+        self.closed = True
 
     def taken(self) -> Iterator[tuple[str, Status, ServerGoal | None]]:
         """Return the goals ever taken, without those whose clients have acknowledged their end.

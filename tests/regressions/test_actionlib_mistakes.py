@@ -290,6 +290,46 @@ def test_stopped_client_waits_for_no_server(nodes):
     server.stop()
 
 
+def test_server_whose_session_is_closed_stops(nodes, clock):
+    """`stop` raised, and who waited for the server waited for ever."""
+    server_node, client_node = nodes
+    server = ActionServer("demo", msg.TestAction, node=server_node)
+    client = ActionClient("demo", msg.TestAction, node=client_node)
+    assert client.wait_for_server(LONG_S)
+    for number in range(3):
+        client.send_goal(msg.TestGoal(number))
+    clock.sleep(1.0)
+    taken = server.status_list
+    server.accept(taken[0])
+    server_node.transport.close()
+    server.stop()
+    assert server.wait(LONG_S)
+    assert server.stopped
+    ends = [tracker.status.status for tracker in taken]
+    assert ends == [GoalStatus.ABORTED, GoalStatus.REJECTED, GoalStatus.REJECTED]
+
+
+def test_simple_server_whose_session_is_closed_stops(nodes, clock):
+    """Nor was the execute callback told to stop."""
+    server_node, client_node = nodes
+    told = []
+
+    def execute(goal):
+        told.append(server.wait_preempt(LONG_S))
+
+    server = SimpleActionServer("demo", msg.TestAction, execute, node=server_node, policy="queue")
+    client = ActionClient("demo", msg.TestAction, node=client_node)
+    assert client.wait_for_server(LONG_S)
+    for number in range(3):
+        client.send_goal(msg.TestGoal(number))
+    clock.sleep(1.0)
+    server_node.transport.close()
+    server.stop()
+    assert told == [True]
+    assert server.wait(LONG_S)
+    assert clock.now() < 2.0
+
+
 # -- mistakes ----------------------------------------------------------------------------------
 
 
@@ -374,6 +414,32 @@ def test_result_timeout_is_a_number(nodes, wrong):
         ):
             make("demo", msg.TestAction, node=nodes[0], result_timeout=wrong)
     make("demo", msg.TestAction, node=nodes[0], result_timeout=Duration(2)).stop()
+
+
+@pytest.mark.parametrize("kind", [ActionServer, SimpleActionServer])
+def test_stopped_server_is_not_started_again(nodes, kind):
+    """It said nothing, and offered nothing."""
+    server = kind("demo", msg.TestAction, node=nodes[0])
+    server.start()
+    server.stop()
+    server.stop()
+    with pytest.raises(ActionlibError, match=r"demo.*start\(\): .*stopped; expected.* Try making"):
+        server.start()
+
+
+@pytest.mark.parametrize("kind", [ActionServer, SimpleActionServer])
+def test_stop_before_the_start_changes_nothing(nodes, kind):
+    """A server that was started then was seen, and ignored every goal."""
+    server = kind("demo", msg.TestAction, auto_start=False, node=nodes[0])
+    server.stop()
+    server.start()
+    client = ActionClient("demo", msg.TestAction, node=nodes[1])
+    assert client.wait_for_server(LONG_S)
+    handle = client.send_goal(msg.TestGoal(1))
+    assert not handle.wait(1.0)
+    assert handle.get_comm_state() == CommState.PENDING
+    server.stop()
+    assert handle.wait(LONG_S)
 
 
 def test_service_class_is_one(nodes):
