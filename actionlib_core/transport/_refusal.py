@@ -46,10 +46,13 @@ def _explain(endpoint: str, config: Config) -> str:
     protocol, _, address = endpoint.partition("/")
     if protocol not in {"tcp", "tls"}:
         return "it cannot be reached. Try checking the address and that the router runs."
+    context = _tls_context(config.tls) if protocol == "tls" else None
+    if isinstance(context, str):
+        return context
     host, _, port = address.partition("#")[0].partition("?")[0].rpartition(":")
     try:
         with socket.create_connection((host.strip("[]"), int(port)), PROBE_S) as plain:
-            problem = _explain_tls(plain, host, config.tls) if protocol == "tls" else ""
+            problem = "" if context is None else _explain_tls(plain, host, context, config.tls)
     except ValueError:
         return f"got port {port!r}; expected a number."
     except OSError as error:
@@ -60,12 +63,36 @@ def _explain(endpoint: str, config: Config) -> str:
     return problem or _explain_login(config)
 
 
-def _explain_tls(plain: socket.socket, host: str, tls: Tls) -> str:
-    """Return what is wrong with the certificates, "" when nothing is."""
-    context = ssl.create_default_context(cafile=tls.ca)
+def _tls_context(tls: Tls) -> ssl.SSLContext | str:
+    """Return what encrypts as `tls` says, or what is wrong with its files."""
+    try:
+        context = ssl.create_default_context(cafile=tls.ca)
+    except OSError as error:  # ssl's own are of this kind too
+        return (
+            f"tls.ca {tls.ca!r}: it cannot be used: {_reason(error)}; expected a file of "
+            "certificates in PEM form."
+        )
     context.check_hostname = tls.verify_name
-    if tls.certificate:
-        context.load_cert_chain(tls.certificate, tls.key)
+    if not tls.certificate:
+        return context
+    try:
+        # Zenoh takes no key with a password; without an empty one ssl would ask on the terminal.
+        context.load_cert_chain(tls.certificate, tls.key, password="")
+    except OSError as error:
+        return (
+            f"tls.certificate {tls.certificate!r} and tls.key {tls.key!r}: they cannot be used: "
+            f"{_reason(error)}; expected a certificate and the key it was made with, both in PEM "
+            "form, without a password."
+        )
+    return context
+
+
+def _reason(error: OSError) -> str:
+    return (isinstance(error, ssl.SSLError) and error.reason) or str(error)
+
+
+def _explain_tls(plain: socket.socket, host: str, context: ssl.SSLContext, tls: Tls) -> str:
+    """Return what is wrong with the certificates, "" when nothing is."""
     try:
         with context.wrap_socket(plain, server_hostname=host) as secure:
             # A refusal of our certificate comes after the handshake, with the first bytes.
@@ -81,7 +108,7 @@ def _explain_tls(plain: socket.socket, host: str, tls: Tls) -> str:
     except ssl.SSLError as error:
         shown = repr(tls.certificate) if tls.certificate else "no certificate"
         return (
-            f"it refuses us: {error.reason or error}: got {shown}; expected a client certificate "
+            f"it refuses us: {_reason(error)}: got {shown}; expected a client certificate "
             "that it knows. Try tls.certificate and tls.key signed by its certificate authority."
         )
     except OSError:

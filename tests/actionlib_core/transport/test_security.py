@@ -1,15 +1,20 @@
-"""Logins and access rules, enforced by a router; certificates are in docs/security.md."""
+"""Logins and access rules, enforced by a router; certificates at work are in docs/security.md."""
 
 from __future__ import annotations
 
+import datetime as dt
 import socket
 
 import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
 
 from actionlib_core.clock import RealClock
-from actionlib_core.config import AccessRule, Config
+from actionlib_core.config import AccessRule, Config, Tls
 from actionlib_core.exceptions import AccessDeniedError, TransportError
 from actionlib_core.transport import Quality
+from actionlib_core.transport._refusal import explain_refusal
 from actionlib_core.transport.zenoh import ZenohTransport
 
 pytestmark = pytest.mark.zenoh
@@ -136,3 +141,77 @@ def test_who_does_not_ask_is_stopped_all_the_same(join):
     assert saw.wait(WAIT_S)
     assert bob.list_alive("@smachpy/*/*/*/*/*/*/robot_1/**", WAIT_S) == []
     assert [p.key.rpartition("/m/")[2] for p in seen] == ["public/bob"]
+
+
+# -- certificates that cannot be used ------------------------------------------------------------
+
+
+def write_certificate(folder, name, password=b""):
+    """Write `name`.pem and its key `name`.key; the key needs `password`."""
+    key = ec.generate_private_key(ec.SECP256R1())
+    subject = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, name)])
+    now = dt.datetime.now(dt.UTC)
+    certificate = (
+        x509.CertificateBuilder(subject, subject, key.public_key(), x509.random_serial_number())
+        .not_valid_before(now)
+        .not_valid_after(now + dt.timedelta(days=1))
+        .sign(key, hashes.SHA256())
+    )
+    (folder / f"{name}.pem").write_bytes(certificate.public_bytes(serialization.Encoding.PEM))
+    locked = serialization.BestAvailableEncryption(password) if password else None
+    (folder / f"{name}.key").write_bytes(
+        key.private_bytes(
+            serialization.Encoding.PEM,
+            serialization.PrivateFormat.PKCS8,
+            locked or serialization.NoEncryption(),
+        )
+    )
+
+
+@pytest.fixture(scope="module")
+def certificates(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("certificates")
+    write_certificate(folder, "ca")
+    write_certificate(folder, "robot")
+    write_certificate(folder, "locked", b"secret")
+    (folder / "text.pem").write_text("no certificate\n")
+    (folder / "empty.pem").write_text("")
+    return folder
+
+
+CA = "tls.ca {ca!r}: "
+PAIR = "tls.certificate {certificate!r} and tls.key {key!r}: "
+
+
+@pytest.mark.parametrize(
+    ("ca", "certificate", "key", "told"),
+    [
+        ("ca", "robot.pem", "ca.key", PAIR),
+        ("ca", "robot.pem", "locked.key", PAIR),
+        ("ca", "locked.pem", "locked.key", PAIR),
+        ("ca", "text.pem", "robot.key", PAIR),
+        ("text", "", "", CA),
+        ("empty", "robot.pem", "robot.key", CA),
+    ],
+    ids=["another key", "another locked key", "locked key", "no certificate", "no ca", "empty ca"],
+)
+def test_certificates_that_cannot_be_used_are_told(
+    endpoint, certificates, ca, certificate, key, told
+):
+    ca = str(certificates / f"{ca}.pem")
+    certificate, key = (str(certificates / name) if name else "" for name in (certificate, key))
+    address = endpoint.replace("tcp/", "tls/")
+    config = Config(
+        mode="client",
+        connect=(address,),
+        discovery="off",
+        tls=Tls(ca=ca, certificate=certificate, key=key),
+        connect_timeout=0.2,
+    )
+    with pytest.raises(TransportError) as caught:
+        ZenohTransport(config)
+    text = str(caught.value)
+    assert f"{address}: {told.format(ca=ca, certificate=certificate, key=key)}" in text
+    assert "expected a" in text
+    assert "nothing answers" not in text
+    assert explain_refusal(config) in text
