@@ -277,7 +277,7 @@ class GoalManager:
             TypeMismatchError: the action's server has another type.
             TransportError: the client is stopped.
         """
-        goal = ClientGoal(goal_id, ack_timeout=ack_timeout)
+        goal = ClientGoal(goal_id, stamp_ns, ack_timeout=ack_timeout)
         payload = pack_goal(stamp_ns, goal_id, stamp_ns, body)
         machine = CommStateMachine(goal, self, payload, on_transition, on_feedback)
         self._begin(machine, created)
@@ -314,8 +314,7 @@ class GoalManager:
     ) -> None:
         goal = machine.goal
         with self._lock:
-            if self._closed:
-                raise TransportError(f"action '{self.name}': the client is stopped.")
+            self._check_open()
             if self._current is None:
                 self._check_types()
             now = self._clock.now()
@@ -329,14 +328,41 @@ class GoalManager:
     def cancel(self, machine: CommStateMachine) -> None:
         """Ask for a goal's end."""
         with self._lock:
-            path, duty = machine.goal.cancel(self._clock.now())
-            self._take(machine, path)
-            self._arm(machine.goal.due)
+            duty = self._cancel(machine)
         self._fulfil(machine, duty)
 
+    def _cancel(self, machine: CommStateMachine) -> Duty:
+        """Note that a goal is to end; return what to send. Needs the lock."""
+        path, duty = machine.goal.cancel(self._clock.now())
+        self._take(machine, path)
+        self._arm(machine.goal.due)
+        return duty
+
     def cancel_many(self, stamp_ns: int) -> None:
-        """Cancel the goals of all clients: all of them (0), or those at or before a stamp [ns]."""
+        """Cancel the goals of all clients: all of them (0), or those at or before a stamp [ns].
+
+        This is said once. Our own goals among them are cancelled by their ids as well: that is
+        repeated until the server has heard it.
+
+        Raises:
+            TransportError: the client is stopped.
+        """
+        with self._lock:
+            self._check_open()
+            meant = [
+                machine
+                for machine in list(self._machines.values())
+                if not stamp_ns or 0 < machine.goal.stamp_ns <= stamp_ns
+            ]
+            duties = [(machine, self._cancel(machine)) for machine in meant]
         self._port.send_cancel("", stamp_ns)
+        for machine, duty in duties:
+            if not machine.goal.acknowledged:  # the goal itself may be on its way still
+                self._fulfil(machine, duty)
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise TransportError(f"action '{self.name}': the client is stopped.")
 
     def wait_until_over(self, machine: CommStateMachine, timeout: float | None) -> bool:
         """Wait until a goal is over, whatever its callbacks do; for use inside a callback.
@@ -392,6 +418,8 @@ class GoalManager:
             return
         if server:
             machine.goal.server = server
+        if not machine.goal.stamp_ns:  # one that was attached to
+            machine.goal.stamp_ns = entry.stamp_ns
         before = machine.goal.comm
         self._take(machine, machine.goal.on_status(status, entry.text, now))
         if machine.goal.comm is not before:

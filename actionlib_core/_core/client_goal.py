@@ -43,11 +43,13 @@ class ClientGoal:
 
     Args:
         goal_id: The goal's id.
+        stamp_ns: When it was sent [ns since the epoch]; 0 when unknown.
         attached: The goal was sent in an earlier life: it is never sent, only asked for.
         ack_timeout: Without a word from a server for so long [s] the goal is LOST; None: no limit.
 
     Attributes:
         id: The goal's id.
+        stamp_ns: See above.
         comm: Where it stands.
         status: The last thing the server said; LOST once the goal is lost.
         text: What the server said about that, or why the goal is lost.
@@ -73,14 +75,21 @@ class ClientGoal:
         "offered",
         "result",
         "server",
+        "stamp_ns",
         "status",
         "text",
     )
 
     def __init__(
-        self, goal_id: str, *, attached: bool = False, ack_timeout: float | None = None
+        self,
+        goal_id: str,
+        stamp_ns: int = 0,
+        *,
+        attached: bool = False,
+        ack_timeout: float | None = None,
     ) -> None:
         self.id = goal_id
+        self.stamp_ns = stamp_ns
         self.attached = attached
         self.ack_timeout = ack_timeout
         self.comm = CommState.WAITING_FOR_GOAL_ACK

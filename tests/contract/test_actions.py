@@ -15,6 +15,7 @@ from actionlib_core.exceptions import (
     ActionException,
     IllegalTransitionError,
     ServerConflictError,
+    TransportError,
     TypeMismatchError,
 )
 from actionlib_core.interfaces.actionlib import msg
@@ -305,12 +306,22 @@ def test_goal_without_a_server_is_lost_after_its_ack_timeout(world):
     assert "no action server took this goal within 0.1 s" in client.get_goal_status_text()
 
 
-def test_cancel_before_any_server_recalls_the_goal(world):
+@pytest.mark.parametrize("cancel", ["cancel_goal", "cancel_all_goals"])
+def test_cancel_before_any_server_recalls_the_goal(world, cancel):
     client = SimpleActionClient("demo", msg.TestAction, node=world.node("client"))
     client.send_goal(msg.TestGoal(5))
-    client.cancel_goal()
+    getattr(client, cancel)()
     assert client.wait_for_result(LONG_S)
     assert client.get_state() == S.RECALLED
+
+
+def test_stopped_client_says_so_when_goals_are_to_be_cancelled(world):
+    client = ActionClient("demo", msg.TestAction, node=world.node("client"))
+    client.stop()
+    with pytest.raises(TransportError, match=r"action 'demo': the client is stopped\."):
+        client.cancel_all_goals()
+    with pytest.raises(TransportError, match=r"action 'demo': the client is stopped\."):
+        client.cancel_goals_at_and_before_time(1.0)
 
 
 def test_goal_that_only_an_onlooker_hears_is_recalled_at_once(world):

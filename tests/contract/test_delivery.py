@@ -19,6 +19,7 @@ from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatusArray
 from actionlib_core.node import Node
 from actionlib_core.simple_action_server import SimpleActionServer
+from actionlib_core.time import Time
 from actionlib_core.transport.faulty import FaultyTransport, RandomFaults, ScriptedFaults
 from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.wire import encoding_of
@@ -239,6 +240,45 @@ def test_lost_cancel_is_sent_again():
         handle.cancel()
         assert list(pair.check([handle])) == ["PREEMPTED"]
         assert pair.clock.now() < 5.0
+
+
+@pytest.mark.parametrize("stamped", [False, True])
+def test_cancel_of_all_goals_is_sent_again_for_those_of_this_client(stamped):
+    with bad() as pair:
+        handle = pair.client.send_goal(msg.TestGoal(1000))
+        pair.clock.sleep(1.0)
+        pair.links["client"].cut(5.0)
+        if stamped:
+            now = Time.now()
+            pair.clock.sleep(0.1)
+            later = pair.client.send_goal(msg.TestGoal(60))
+            pair.client.cancel_goals_at_and_before_time(now)
+            assert list(pair.check([handle, later])) == ["PREEMPTED", "SUCCEEDED"]
+        else:
+            pair.client.cancel_all_goals()
+            assert list(pair.check([handle])) == ["PREEMPTED"]
+        assert pair.clock.now() < 14.0
+
+
+def test_cancel_of_all_goals_overtaking_a_goal_recalls_it():
+    plan = ScriptedFaults({"demo/goal": [(1.0,)]})
+    with bad(client_plan=plan) as pair:
+        handle = pair.client.send_goal(msg.TestGoal(5))
+        pair.client.cancel_all_goals()
+        assert list(pair.check([handle])) == ["RECALLED"]
+        assert pair.runs == {}
+
+
+def test_cancel_by_time_covers_a_goal_that_is_followed_by_its_id():
+    with bad() as pair:
+        goal_id = pair.client.send_goal(msg.TestGoal(1000)).get_goal_id()
+        pair.clock.sleep(1.0)
+        other = ActionClient("demo", msg.TestAction, node=pair.nodes["client"])
+        handle = other.attach(goal_id)
+        pair.clock.sleep(1.0)
+        pair.links["client"].cut(5.0)
+        other.cancel_goals_at_and_before_time(Time.now())
+        assert list(pair.check([handle])) == ["PREEMPTED"]
 
 
 def test_result_is_dropped_at_the_server_once_acknowledged():
