@@ -2,7 +2,8 @@
 
     GET  /                    the page
     GET  /api/events          everything about one machine as server-sent events:
-                              snap, facts, machines, actions, beat, and unnamed batches of events
+                              snap, gap, facts, machines, actions, beat, and unnamed batches of
+                              events
     GET  /api/model           structure of a machine
     GET  /api/picture         svg, png, pdf or dot
     GET  /api/export          the run as .html or .jsonl
@@ -397,17 +398,19 @@ class _Page:
         texts: list[str] = []
         behind = machine.since(self._seq) if machine.epoch == self._epoch else None
         if behind is None or len(behind) > FARTHEST:
-            short = behind is not None
+            missed, before = behind is not None, self._seq
             self._epoch = machine.epoch
-            self._seq, snap = machine.snapshot(short=short)
+            self._seq, snap = machine.snapshot(short=missed)
             texts.append(f"event: snap\nid: {self._epoch}:{self._seq}\ndata: {snap}\n\n")
+            if missed:
+                texts.append(f"event: gap\ndata: {self._seq - before}\n\n")
             behind = []
         facts = machine.facts()
         if facts != self._facts:
             self._facts = facts
             texts.append(f"event: facts\ndata: {json.dumps(facts)}\n\n")
         if behind:
-            self._seq += len(behind)
+            self._seq = json.loads(behind[-1])["seq"]  # there may be gaps
             data = f"[{','.join(behind)}]"
             texts.append(f"id: {self._epoch}:{self._seq}\ndata: {data}\n\n")
         return texts

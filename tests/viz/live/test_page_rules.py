@@ -6,6 +6,7 @@ import os
 import signal
 import time
 import urllib.request
+from dataclasses import asdict
 
 import pytest
 
@@ -249,3 +250,39 @@ def test_a_machine_that_is_not_there_is_named_and_another_can_be_chosen(served, 
     wait_for(page, "document.querySelector('.empty')?.textContent.includes('“late”')")
     served.add("late", label="LATE")
     page.wait_for_selector('g[data-path="/LATE/A"]')
+
+
+ASKED = ("PreemptRequested", "/JOB/A", {"source": "operator", "by": "me", "why": "", "grace": 5.0})
+
+
+def test_a_page_that_could_not_follow_says_so_and_keeps_the_preempt(served, look):
+    machine = served.add("one", events=[*run()[:2], ASKED])
+    page = look(served.start())
+    page.wait_for_selector(".preempt-banner")
+    assert page.query_selector(".gap") is None
+    many = [("Iterated", "/JOB/A", {"number": n}) for n in range(3_100)]
+    machine.add(served.events(many, after=3))
+    wait_for(page, "document.querySelector('.gap')?.textContent.includes('3,100 events')")
+    # Who asked, and who holds it up, is still known.
+    page.wait_for_selector(".preempt-banner >> text=operator me")
+    page.wait_for_selector(".waterfall button:text-is('A')")
+    machine.add(served.events([("PreemptServiced", "/JOB/A")], after=3_103))
+    wait_for(page, "document.querySelector('.waterfall').textContent.includes('cleans up')")
+
+
+def test_events_that_the_mission_had_to_drop_are_missed(served, look):
+    machine = served.add("one", events=run()[:2])
+    page = look(served.start())
+    left = served.events(run()[4:], after=400)
+    left[0]["dropped"] = 398
+    if not machine.add(left):  # a server asks for the history then
+        machine.reset(
+            {
+                "epoch": "x",
+                "description": asdict(machine.record),
+                "events": [*machine.events(), *left],
+            }
+        )
+    wait_for(page, "document.querySelector('.gap')?.textContent.includes('398 events')")
+    assert "398 events missing here" in page.text_content(".log")
+    wait_for(page, "smachpy.store.runStatus.value.word === 'ended: done'")

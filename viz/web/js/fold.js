@@ -118,8 +118,8 @@ export class Run {
     this.open = new Map();
     this.preempts = []; // each: from, and a row for every state that was asked
     this.begun = null;
-    for (const [path, s] of Object.entries(this.now.states))
-      if (s.since != null) this.#openSpan(path, ms(s.since));
+    this.dropped = 0; // so many events were not told
+    this.#resume();
     this.push(events);
   }
 
@@ -127,9 +127,25 @@ export class Run {
     for (const e of events) {
       if (this.events.length % KEYFRAME === 0) this.frames.push(JSON.stringify(this.now));
       this.events.push(e);
+      this.dropped += e.dropped ?? 0;
       this.#span(e);
       foldOne(this.now, e);
     }
+  }
+
+  // What the base says is under way: states that run, and the preempt of some of them.
+  #resume() {
+    const rows = [];
+    for (const [path, s] of Object.entries(this.now.states)) {
+      if (s.since == null) continue;
+      this.#openSpan(path, ms(s.since));
+      if (!s.preempt) continue;
+      const span = this.open.get(path);
+      Object.assign(span, { preempt: ms(s.preempt), asked: s.asked, serviced: ms(s.serviced), abandoned: ms(s.abandoned) });
+      rows.push(span);
+    }
+    rows.sort((a, b) => a.preempt - b.preempt);
+    if (rows.length) this.preempts.push({ from: rows[0].preempt, rows });
   }
 
   #openSpan(path, from) {

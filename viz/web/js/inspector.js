@@ -19,6 +19,7 @@ const SHORT = 160, LINE = 200; // characters; the browser takes minutes to break
 const RECENT_MS = 30_000; // a preempt that is over is shown so long while the mission goes on
 const MOST_ROWS = 24;
 
+const count = (events) => `${events.toLocaleString("en")} event${events === 1 ? "" : "s"}`;
 const Section = ({ title, count, children }) =>
   html`<section><h2>${title}${count != null && html` <span class="number">${count}</span>`}</h2>${children}</section>`;
 const State = ({ path, page }) => {
@@ -32,7 +33,8 @@ export function Inspector({ page }) {
   if (!model) return html`<aside class="inspector"></aside>`;
   const data = store.shown(), now = store.nowMs();
   return html`<aside class="inspector" aria-label="details">
-    ${store.gap.value && html`<p class="hint">This page could not follow; what happened before is not in the timeline.</p>`}
+    ${store.gap.value !== null && html`<p class="hint gap" role="status">This page could not follow: ${count(store.gap.value)} and what was before are counted, but are not in the timeline.</p>`}
+    ${store.run.dropped > 0 && html`<p class="hint gap" role="status">The mission was faster than it can be told: ${count(store.run.dropped)} are missing.</p>`}
     <${Selected} page=${page} data=${data} now=${now} model=${model} />
     <${Differences} page=${page} State=${State} />
     <${Preempts} page=${page} data=${data} now=${now} />
@@ -277,7 +279,8 @@ function Log({ page }) {
   const lines = [];
   const wanted = text.toLowerCase();
   for (let i = end - 1; i >= 0 && lines.length < LOG_LINES && end - i < 6000; i--) {
-    const e = run.events[i];
+    const e = run.events[i], missing = i + 1 < end && run.events[i + 1].dropped;
+    if (missing) lines.push(html`<li key=${-e.seq} class="hint">${count(missing)} missing here</li>`);
     if (!(e.kind in LINES) || (kinds && !kinds.includes(e.kind)) || (!kinds && e.kind === "UserdataWritten")) continue;
     const [words, kind] = LINES[e.kind](e);
     if (wanted && !`${e.path} ${words}`.toLowerCase().includes(wanted)) continue;

@@ -90,6 +90,7 @@ function open() {
   on("actions", (found) => { store.actions.value = found; });
   on("facts", takeFacts);
   on("snap", takeSnap);
+  on("gap", (count) => { store.gap.value = count; });
   on("message", (events) => {
     if (performance.now() - begun > CAUGHT_UP_MS) store.hearClock(events.at(-1).stamp_ns);
     onEvents(events);

@@ -25,7 +25,7 @@ export const slowTick = signal(0); // the same, for panels of many words
 export const cursor = signal(null); // the instant shown [ms]; null: now
 const position = signal(null); // so many events have happened there: several may share an instant
 export const place = computed(() => [cursor.value, position.value]);
-export const gap = signal(null);
+export const gap = signal(null); // so many events went by this page
 export const selected = signal(null);
 export const query = signal("");
 export const follow = signal(false);
@@ -49,7 +49,7 @@ let autoDepth = 0; // levels opened by themselves; 0: somebody has chosen what i
 export function begin(base, events) {
   run = new Run(base, events);
   past = null;
-  batch(() => { cursor.value = null; position.value = null; });
+  batch(() => { cursor.value = null; position.value = null; gap.value = null; });
 }
 
 export const shown = () => (cursor.value === null ? run.now : past ?? run.now);
