@@ -6,6 +6,7 @@ One `ServerGoals` per action server. It decides; the shell sends, calls back and
 from __future__ import annotations
 
 import enum
+from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -90,6 +91,7 @@ class ServerGoals:
         self._goals: dict[str, ServerGoal] = {}
         # Status, when it was forgotten, whether acknowledged; plain numbers: nothing to collect.
         self._past: dict[str, tuple[int, float, bool]] = {}
+        self._oldest: deque[str] = deque()  # its ids; a dict is slow to tell its first one
         self.closed = False
         self._last_cancel_ns = 0
         self._steps = server_life_cycle()
@@ -265,15 +267,14 @@ class ServerGoals:
     def _forget(self, goal: ServerGoal, now: float, *, acknowledged: bool = False) -> None:
         del self._goals[goal.id]
         self._past[goal.id] = (int(goal.status), now, acknowledged)
+        self._oldest.append(goal.id)
         if len(self._past) > MEMORY_GOALS:
             self._trim(now)
 
     def _trim(self, now: float) -> None:
         """Drop remembered ids beyond the limits; the oldest come first."""
-        for goal_id in list(self._past)[: max(0, len(self._past) - MEMORY_GOALS)]:
-            del self._past[goal_id]
-        while self._past:
-            oldest = next(iter(self._past))
-            if self._past[oldest][1] + MEMORY_S > now:
+        while self._oldest:
+            oldest = self._oldest[0]
+            if len(self._past) <= MEMORY_GOALS and self._past[oldest][1] + MEMORY_S > now:
                 return
-            del self._past[oldest]
+            del self._past[self._oldest.popleft()]

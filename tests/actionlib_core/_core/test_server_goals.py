@@ -119,6 +119,26 @@ def test_ids_are_remembered_within_bounds(monkeypatch):
     assert goals.past_status("g5") is None
 
 
+def test_memory_of_ids_is_not_walked_through_for_each_goal(monkeypatch):
+    """With 100,000 ids each goal, and each tick of the status, took milliseconds."""
+
+    class Past(dict):
+        def __iter__(self):
+            raise AssertionError("walked through")
+
+    monkeypatch.setattr(server_goals, "MEMORY_GOALS", 2)
+    goals = book()
+    goals._past = Past()
+    for index in range(5):
+        goals.on_goal(ServerGoal(f"g{index}", 1), 0.0)
+        end(goals, f"g{index}")
+        goals.on_acknowledged([f"g{index}"], float(index))
+        goals.expire(float(index))
+    assert len(goals._past) == 2
+    goals.expire(4.0 + server_goals.MEMORY_S)
+    assert len(goals._past) == 0
+
+
 def test_client_lost_asks_only_its_goals():
     goals = ServerGoals("demo")
     goals.on_goal(ServerGoal("a", 1, client="one"), 0.0)
