@@ -260,6 +260,9 @@ class ActionClient(Generic[A_co]):
 
         The server is asked for it: its state, or its result when it has ended and the result is
         still kept. A goal the server does not know is LOST. Arguments and errors as `send_goal`.
+
+        Raises:
+            ActionlibError: `goal_id` is no id, or this client follows that goal.
         """
         machine = self.manager.attach(
             goal_id,

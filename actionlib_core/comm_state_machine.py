@@ -26,7 +26,7 @@ class CommStateMachine:
 
     Attributes:
         ended: Set when the goal is over; made when somebody waits for that.
-        settled: Set when the goal is over and its last callback has returned.
+        settled: Set when the goal is over and its last callback has returned, or nobody follows it.
     """
 
     __slots__ = (
@@ -60,6 +60,11 @@ class CommStateMachine:
         self.settled: Event = manager.node.clock.event()
         self._shown: CommState | None = None
         self._shown_to = 0
+
+    @property
+    def forgotten(self) -> bool:
+        """Whether it runs on and nobody follows it."""
+        return self.settled.is_set() and not self.goal.over
 
     def on_answered(self) -> None:
         """Note that a question about the goal was answered, or that its time is over."""

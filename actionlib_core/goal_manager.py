@@ -12,7 +12,7 @@ from actionlib_core._action_wire import pack_goal
 from actionlib_core._callbacks import CallbackQueue
 from actionlib_core._client_port import ClientPort
 from actionlib_core._core.client_goal import UNLISTED_S, ClientGoal, Duty, Path
-from actionlib_core._core.states import TERMINAL, Status
+from actionlib_core._core.states import TERMINAL, CommState, Status
 from actionlib_core.comm_state_machine import CommStateMachine
 from actionlib_core.exceptions import ActionlibError, TransportError
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from actionlib_core._action_wire import ActionTypes, StatusEntry
-    from actionlib_core._core.states import CommState
     from actionlib_core.clock import Event, Timer
     from actionlib_core.exceptions import TypeMismatchError
     from actionlib_core.node import Node
@@ -280,8 +279,7 @@ class GoalManager:
         goal = ClientGoal(goal_id, stamp_ns, ack_timeout=ack_timeout)
         payload = pack_goal(stamp_ns, goal_id, stamp_ns, body)
         machine = CommStateMachine(goal, self, payload, on_transition, on_feedback)
-        self._begin(machine, created)
-        return machine
+        return self._begin(machine, created)
 
     def attach(
         self,
@@ -292,29 +290,32 @@ class GoalManager:
         ack_timeout: float | None = None,
         created: Callable[[CommStateMachine], None] | None = None,
     ) -> CommStateMachine:
-        """Follow a goal that was sent in an earlier life; arguments as `send`."""
+        """Follow a goal that was sent in an earlier life, or that `forget` was called for.
+
+        Arguments and errors as `send`.
+
+        Raises:
+            ActionlibError: `goal_id` is none, or this client follows the goal.
+        """
         if not isinstance(goal_id, str) or not goal_id:
             raise ActionlibError(
                 f"action '{self.name}': goal id: got {goal_id!r}; expected the id of a goal that "
                 "was sent, SentGoal.id for example."
             )
-        with self._lock:
-            known = self._machines.get(goal_id)
-        if known is not None:
-            raise ActionlibError(
-                f"goal {goal_id} on '{self.name}': this client follows it already."
-            )
         goal = ClientGoal(goal_id, attached=True, ack_timeout=ack_timeout)
         machine = CommStateMachine(goal, self, b"", on_transition, on_feedback)
-        self._begin(machine, created)
-        return machine
+        return self._begin(machine, created)
 
     def _begin(
         self, machine: CommStateMachine, created: Callable[[CommStateMachine], None] | None
-    ) -> None:
+    ) -> CommStateMachine:
+        """Follow a goal and send it, or ask for it; one that was forgotten is taken up again."""
         goal = machine.goal
         with self._lock:
             self._check_open()
+            known = self._machines.get(goal.id)
+            if known is not None:
+                return self._take_up(known, machine, created)
             if self._current is None:
                 self._check_types()
             now = self._clock.now()
@@ -324,6 +325,32 @@ class GoalManager:
                 created(machine)
             self._arm(goal.due)
         self._fulfil(machine, duty)
+        return machine
+
+    def _take_up(
+        self,
+        known: CommStateMachine,
+        wanted: CommStateMachine,
+        created: Callable[[CommStateMachine], None] | None,
+    ) -> CommStateMachine:
+        """Follow a goal again that was forgotten and still runs. Needs the lock.
+
+        Raises:
+            ActionlibError: it is followed.
+        """
+        if not known.forgotten:
+            raise ActionlibError(
+                f"goal {known.goal.id} on '{self.name}': this client follows it already."
+            )
+        known.on_transition, known.on_feedback = wanted.on_transition, wanted.on_feedback
+        known.settled = wanted.settled
+        known.goal.limit_ack(wanted.goal.ack_timeout, self._clock.now())
+        self._arm(known.goal.due)
+        if created is not None:
+            created(known)
+        if known.goal.comm is not CommState.WAITING_FOR_GOAL_ACK:
+            self._take(known, (known.goal.comm,))
+        return known
 
     def cancel(self, machine: CommStateMachine) -> None:
         """Ask for a goal's end."""

@@ -189,7 +189,7 @@ class SimpleActionClient(Generic[A]):
         *,
         ack_timeout: float | Duration | None = None,
     ) -> None:
-        """Send a goal; the former one is followed no more, but not cancelled.
+        """Send a goal; the former one is followed no more (if no error is raised), not cancelled.
 
         Args:
             goal: The goal message (XGoal).
@@ -208,7 +208,6 @@ class SimpleActionClient(Generic[A]):
         """
         packed = self.action_client.pack(goal)
         entry = _Goal(self, done_cb, active_cb, feedback_cb)
-        self.stop_tracking_goal()
         self.action_client.manager.send(
             *packed,
             on_transition=entry.on_transition,
@@ -226,12 +225,12 @@ class SimpleActionClient(Generic[A]):
         *,
         ack_timeout: float | Duration | None = None,
     ) -> None:
-        """Follow a goal that an earlier life of this program sent, by its id.
+        """Follow a goal by its id: an earlier life of this program sent it, or it was let go of.
 
-        See `ActionClient.attach`; the other arguments are those of `send_goal`.
+        The former goal is followed no more, as with `send_goal`, unless an error is raised. See
+        `ActionClient.attach`; the other arguments are those of `send_goal`.
         """
         entry = _Goal(self, done_cb, active_cb, feedback_cb)
-        self.stop_tracking_goal()
         self.action_client.manager.attach(
             goal_id,
             on_transition=entry.on_transition,
@@ -241,8 +240,9 @@ class SimpleActionClient(Generic[A]):
         )
 
     def follow(self, goal: _Goal) -> None:
-        """Make `goal` the one that is followed; not for users."""
-        self._goal = goal
+        """Make `goal` the one that is followed, and the former one not; not for users."""
+        former, self._goal = self._goal, goal
+        _forget(former)
 
     def settle(self, machine: CommStateMachine) -> None:
         """Note that the last callback of a goal has returned; not for users."""
@@ -342,6 +342,10 @@ class SimpleActionClient(Generic[A]):
     def stop_tracking_goal(self) -> None:
         """Follow the goal no more; it is not cancelled. Callbacks already due may still run."""
         goal, self._goal = self._goal, None
-        if goal is not None and goal.handle is not None:
-            machine = goal.handle.comm_state_machine
-            machine.manager.forget(machine)
+        _forget(goal)
+
+
+def _forget(goal: _Goal | None) -> None:
+    if goal is not None and goal.handle is not None:
+        machine = goal.handle.comm_state_machine
+        machine.manager.forget(machine)

@@ -115,8 +115,15 @@ class ClientGoal:
     def begin(self, now: float) -> Duty:
         """Start; return what to send."""
         self._due = now + RESEND_FIRST_S
-        self._ack_by = None if self.ack_timeout is None else now + self.ack_timeout
+        self.limit_ack(self.ack_timeout, now)
         return Duty.ASK if self.attached else Duty.GOAL
+
+    def limit_ack(self, ack_timeout: float | None, now: float) -> None:
+        """Be LOST without a word from a server for so long from now [s]; None: no limit."""
+        self.ack_timeout = ack_timeout
+        self._ack_by = None
+        if ack_timeout is not None and not self.acknowledged:
+            self._ack_by = now + ack_timeout
 
     def on_offered(self, server: str) -> None:
         """Note that the goal was put on the network where a server could take it."""

@@ -6,6 +6,8 @@ import threading
 
 import pytest
 
+from actionlib_core import goal_manager
+from actionlib_core._core.client_goal import ClientGoal
 from actionlib_core.action_client import ActionClient, CommState
 from actionlib_core.action_server import ActionServer
 from actionlib_core.clock import RealClock
@@ -17,7 +19,7 @@ from actionlib_core.interfaces.std_srvs.srv import Trigger
 from actionlib_core.node import Node
 from actionlib_core.sent_goal import SentGoal
 from actionlib_core.service import Service, ServiceProxy
-from actionlib_core.simple_action_client import SimpleActionClient
+from actionlib_core.simple_action_client import SimpleActionClient, SimpleGoalState
 from actionlib_core.simple_action_server import SimpleActionServer
 from actionlib_core.time import Duration
 from actionlib_core.topic import Publisher, Subscriber
@@ -340,6 +342,86 @@ def test_goal_to_follow_has_an_id(nodes):
             client.attach(wrong)
         with pytest.raises(ActionlibError, match=r"demo.*goal id: got .*; expected"):
             client.follow(wrong)
+
+
+def test_goal_is_followed_once_by_one_client(nodes, clock, monkeypatch):
+    """Of two that began at once, one was never told of the end."""
+    client = ActionClient("demo", msg.TestAction, node=nodes[1])
+    both = threading.Barrier(2, timeout=LONG_S)
+
+    def meet(*args, **kwargs):
+        both.wait()
+        return ClientGoal(*args, **kwargs)
+
+    monkeypatch.setattr(goal_manager, "ClientGoal", meet)
+    handles, errors = [], []
+
+    def attach():
+        try:
+            handles.append(client.attach("/nobody-1"))
+        except ActionlibError as error:
+            errors.append(str(error))
+
+    threads = [threading.Thread(target=attach) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(LONG_S)
+    assert errors == ["goal /nobody-1 on 'demo': this client follows it already."]
+    client.stop()
+    assert handles[0].wait(1.0)
+
+
+def test_goal_stays_followed_when_it_is_attached_to_again(nodes, clock):
+    """The client refused, and had let go of the goal before."""
+    SimpleActionServer("demo", msg.TestAction, lambda _: clock.sleep(1.0), node=nodes[0])
+    client = SimpleActionClient("demo", msg.TestAction, node=nodes[1])
+    done = []
+    client.send_goal(msg.TestGoal(1), done_cb=lambda status, _: done.append(status))
+    handle = client.gh
+    with pytest.raises(ActionlibError, match="this client follows it already"):
+        client.attach(handle.get_goal_id())
+    assert client.gh is handle
+    assert client.wait_for_result(LONG_S)
+    assert done == [GoalStatus.ABORTED]
+
+
+def test_goal_that_was_let_go_of_is_followed_again(nodes, clock):
+    SimpleActionServer("demo", msg.TestAction, lambda _: clock.sleep(5.0), node=nodes[0])
+    client = SimpleActionClient("demo", msg.TestAction, node=nodes[1])
+    seen = []
+
+    def callbacks(name):
+        return {
+            "done_cb": lambda status, _: seen.append((name, status)),
+            "active_cb": lambda: seen.append((name, "active")),
+        }
+
+    client.send_goal(msg.TestGoal(1), **callbacks("first"))
+    clock.sleep(1.0)
+    goal_id = client.gh.get_goal_id()
+    client.stop_tracking_goal()
+    assert client.gh is None
+    client.attach(goal_id, **callbacks("again"))
+    assert client.simple_state is SimpleGoalState.ACTIVE
+    assert not client.wait_for_result(1.0)
+    assert client.wait_for_result(LONG_S)
+    aborted = GoalStatus.ABORTED
+    assert seen == [("first", "active"), ("again", "active"), ("again", aborted)]
+
+
+def test_goal_that_was_let_go_of_before_any_server_was_there_is_followed_again(nodes, clock):
+    """It is still sent: following it by its id must not make it one that is only asked for."""
+    client = SimpleActionClient("demo", msg.TestAction, node=nodes[1])
+    client.send_goal(msg.TestGoal(1), ack_timeout=5.0)
+    goal_id = client.gh.get_goal_id()
+    client.stop_tracking_goal()
+    clock.sleep(4.0)
+    client.attach(goal_id, ack_timeout=30.0)
+    clock.sleep(4.0)
+    SimpleActionServer("demo", msg.TestAction, lambda _: clock.sleep(1.0), node=nodes[0])
+    assert client.wait_for_result(LONG_S)
+    assert client.get_state() == GoalStatus.ABORTED
 
 
 def test_callbacks_are_functions(nodes):
