@@ -5,7 +5,7 @@
                               snap, gap, facts, machines, actions, beat, and unnamed batches of
                               events
     GET  /api/model           structure of a machine
-    GET  /api/picture         svg, png, pdf or dot
+    GET  /api/picture         svg, png, pdf or dot; `theme` and the paths that are `active`
     GET  /api/export          the run as .html or .jsonl
     GET  /api/statistics      of recorded runs
     GET  /api/compare         a machine and another one in one drawing
@@ -233,9 +233,11 @@ class Viewer:
             return _unknown(request)
         from viz.drawing import picture
 
+        asked = set(request.query_params.getlist("active"))
+        paths = {state.path for state in machine.record.walk()}
         looks: dict[str, Any] = {
             "theme": "dark" if request.query_params.get("theme") == "dark" else "light",
-            "active": [p for p in machine.active() if request.query_params.get("active")],
+            "active": sorted(paths & asked),
         }
         async with self._drawing:
             try:

@@ -129,7 +129,8 @@ class Served:
         self._server = PageServer(Viewer(self.machines, send=self._send, **viewer), "127.0.0.1", 0)
         self._thread = threading.Thread(target=self._server.serve_here)
         self._thread.start()
-        return self._server.address
+        self.address = self._server.address
+        return self.address
 
     def _send(self, _name, command):
         self.commands.append(command)

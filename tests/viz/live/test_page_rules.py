@@ -286,3 +286,33 @@ def test_events_that_the_mission_had_to_drop_are_missed(served, look):
     wait_for(page, "document.querySelector('.gap')?.textContent.includes('398 events')")
     assert "398 events missing here" in page.text_content(".log")
     wait_for(page, "smachpy.store.runStatus.value.word === 'ended: done'")
+
+
+def test_a_saved_picture_has_the_colours_and_the_active_states_of_the_page(served, look):
+    served.add("one", events=run()[:4])
+    page = look(served.start(), color_scheme="dark")
+    page.click(".menu > button")
+
+    def link():
+        return page.get_attribute(".sheet a:text-is('svg')", "href")
+
+    assert "&theme=dark" in link()
+    assert "&active=%2FJOB&active=%2FJOB%2FB" in link()
+    page.evaluate("() => smachpy.page.setTheme('light')")
+    wait_for(page, "document.querySelector('.sheet a').href.includes('&theme=light')")
+    # Of the instant that is shown.
+    page.evaluate("() => smachpy.store.seekTo(2)")
+    wait_for(page, "document.querySelector('.sheet a').href.endsWith('&active=%2FJOB%2FA')")
+    with page.expect_download() as download:
+        page.click(".sheet a:text-is('svg')")
+    text = download.value.path().read_text()
+    with urllib.request.urlopen(f"{served.address}api/picture?machine=one&active=1") as answer:
+        assert text != answer.read().decode()
+
+
+def test_the_saved_page_of_a_run_that_goes_on_says_that_it_ends_there(served, look, tmp_path):
+    served.add("one", events=run()[:4], control={"paused": True, "breakpoints": []})
+    with urllib.request.urlopen(f"{served.start()}api/export?machine=one&format=html") as answer:
+        (tmp_path / "run.html").write_bytes(answer.read())
+    page = look((tmp_path / "run.html").as_uri())
+    assert page.text_content("[data-testid=status]") == "recording ends here"

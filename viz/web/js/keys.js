@@ -15,7 +15,7 @@ export function listen(page) {
     ",": () => store.seekEvent(-1), ".": () => store.seekEvent(1), l: () => page.timeline.live(),
     i: () => page.setImplicit(!store.implicit.value),
     a: () => { if (!isFile()) showActions(!store.actionsOpen.value); },
-    d: () => page.setTheme(isDark() ? "light" : "dark"),
+    d: () => page.setTheme(store.isDark() ? "light" : "dark"),
     "?": () => { store.help.value = !store.help.value; },
     Enter: () => page.toggleSelected(),
     Escape: () => {
@@ -44,8 +44,3 @@ export function listen(page) {
     e.preventDefault();
   });
 }
-
-const isDark = () => {
-  const chosen = document.documentElement.dataset.theme;
-  return chosen ? chosen === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
-};

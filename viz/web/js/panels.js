@@ -13,6 +13,7 @@ import { KIND_NAMES, SIGNS, outcomeClass, shorten } from "viewer/model";
 export const html = htm.bind(h);
 const ROW = 24;
 const MOST_NAMES = 12;
+const MOST_ACTIVE = 200; // in an address
 const GLYPH = { action: "\u25b6", service: "\u21c4", monitor: "\u25c9", condition: "?", machine: "\u25a3",
   sequence: "\u2192", concurrence: "\u2016", iterator: "\u21bb", missing: "\u2715" };
 
@@ -113,13 +114,20 @@ function View({ page }) {
       <${CompareLine} page=${page} done=${() => setOpen(false)} />
       <label class="line"><span>Colours</span><select value=${store.theme.value} onChange=${(e) => page.setTheme(e.target.value)}>
         <option value="system">as the system</option><option value="light">light</option><option value="dark">dark</option></select></label>
-      ${!isFile() && html`<div class="line"><span>Save picture</span><span class="group">${["svg", "png", "pdf", "dot"].map((f) =>
-        html`<a class="button" href=${link("picture", `&format=${f}`)} download>${f}</a>`)}</span></div>
+      ${!isFile() && html`<${SavePicture} />
       <div class="line"><span>Save run</span><span class="group"><a class="button" href=${link("export", "&format=html")} download>html page</a>
         <a class="button" href=${link("export", "&format=jsonl")} download>recording</a></span></div>`}
       <div class="line"><span>Keys</span><button onClick=${() => { store.help.value = true; setOpen(false); }}>show (?)</button></div>
     </div>`}
   </div>`;
+}
+
+// The whole machine in the page's colours, with what is active at the instant shown.
+function SavePicture() {
+  const active = store.activePaths.value.slice(0, MOST_ACTIVE).map((path) => `&active=${encodeURIComponent(path)}`).join("");
+  const looks = `&theme=${store.isDark() ? "dark" : "light"}${active}`;
+  return html`<div class="line"><span>Save picture</span><span class="group">${["svg", "png", "pdf", "dot"].map((f) =>
+    html`<a class="button" href=${link("picture", `&format=${f}${looks}`)} download>${f}</a>`)}</span></div>`;
 }
 
 // The tree draws only the rows that are in view.

@@ -123,6 +123,7 @@ export const runStatus = computed(() => {
   const data = shown(), about = facts.value;
   if (!about) return { word: "waiting", kind: "other" };
   if (cursor.value !== null) return { word: "replay", kind: "preempted" };
+  if (connection.value === "file" && data.ended == null && data.started != null) return { word: "recording ends here", kind: "active" };
   if (about.stale != null && data.ended == null) return { word: "stale", kind: "waiting" };
   if (connection.value === "lost") return { word: "reconnecting", kind: "waiting" };
   if (data.ended != null) return { word: `ended: ${data.outcome}`, kind: "done" };
@@ -190,6 +191,9 @@ export function applyTheme() {
   else document.documentElement.dataset.theme = theme.value;
   save("theme", theme.value);
 }
+
+const darkSystem = matchMedia("(prefers-color-scheme: dark)");
+export const isDark = () => (theme.value === "system" ? darkSystem.matches : theme.value === "dark");
 
 let noticeTimer = 0;
 export function say(text, kind = "info") {
