@@ -34,6 +34,7 @@ from starlette.routing import Route
 from smachpy.exceptions import SmachError
 from viz.live import page
 from viz.live.actions import GoalRefusedError
+from viz.live.machines import KEPT_EVENTS
 from viz.live.security import Guard, refuse_command
 
 if TYPE_CHECKING:
@@ -305,7 +306,12 @@ class Viewer:
             self._machines,
             request.query_params.get("machine", ""),
             request.headers.get("last-event-id") or request.query_params.get("last", ""),
-            {"follow": self._follow, "control": self._token is not None, "beat": BEAT_S},
+            {
+                "follow": self._follow,
+                "control": self._token is not None,
+                "beat": BEAT_S,
+                "kept": KEPT_EVENTS,
+            },
             self._actions,
         )
         return StreamingResponse(self._stream(one), media_type="text/event-stream")

@@ -316,3 +316,72 @@ def test_the_saved_page_of_a_run_that_goes_on_says_that_it_ends_there(served, lo
         (tmp_path / "run.html").write_bytes(answer.read())
     page = look((tmp_path / "run.html").as_uri())
     assert page.text_content("[data-testid=status]") == "recording ends here"
+
+
+def test_what_the_page_keeps_has_an_end(served, look):
+    """The newest events can be wound back; what was before them counts on."""
+    from smachpy.run_state import RunState
+
+    page = look(served.start(), drawn=False)
+    there = served.events(
+        [
+            ("Started", "/JOB"),
+            *[
+                event
+                for _ in range(1_500)
+                for event in [("Entered", "/JOB/A"), ("Left", "/JOB/A", {"outcome": "ok"})]
+            ],
+        ]
+    )
+    kept = page.evaluate(
+        """async (events) => {
+          const { Run, emptyState } = await import('viewer/fold');
+          const run = new Run(emptyState(), []);
+          let gone = 0;
+          for (let i = 0; i < events.length; i += 10) {
+            run.push(events.slice(i, i + 10));
+            gone += run.trim(1000);
+          }
+          const { events: kept, spans, frames, open } = run;
+          return { kept: kept.length, first: kept[0].seq, gone, spans: spans.length, frames: frames.length,
+            open: [...open.keys()], began: run.first(), now: run.now, old: run.after(100), base: run.after(0) };
+        }""",
+        there,
+    )
+    assert 1000 <= kept["kept"] <= 1400
+    assert kept["gone"] == len(there) - kept["kept"] == kept["first"] - 1
+    assert kept["spans"] <= kept["kept"] / 2 + 2
+    assert kept["frames"] <= 4
+    assert kept["open"] == ["/JOB"]
+    for count, mine in [(0, kept["base"]), (100, kept["old"]), (kept["kept"], kept["now"])]:
+        state = RunState()
+        for event in there[: kept["gone"] + count]:
+            state.fold(event)
+        for path in ("/JOB", "/JOB/A"):
+            theirs = state.data["states"][path]
+            for fact in ("visits", "outcome", "outcomes"):
+                assert mine["states"][path][fact] == theirs[fact]
+            assert (mine["states"][path]["since"] is None) == (theirs["since"] is None)
+
+
+def test_looking_back_stays_where_it_is_while_older_events_are_forgotten(served, look):
+    machine = served.add("one", events=run()[:2])
+    page = look(served.start())
+    page.evaluate(
+        "() => { smachpy.store.settings.value = { ...smachpy.store.settings.value, kept: 1000 }; }"
+    )
+    pairs = [("Left", "/JOB/A", {"outcome": "ok"}), ("Entered", "/JOB/A")]
+    seq = 2
+    for turn in range(8):
+        machine.add(served.events(pairs * 150, after=seq))
+        seq += 300
+        wait_for(page, f"smachpy.store.run.events.at(-1).seq === {seq}")
+        if turn == 5:
+            shown = page.evaluate(
+                "() => { smachpy.store.seekTo(smachpy.store.run.events.length - 11); return smachpy.store.shown().states; }"
+            )
+    assert page.evaluate("() => smachpy.store.run.events.length") < 1400
+    assert page.evaluate("() => smachpy.store.shown().states") == shown
+    page.evaluate("() => { smachpy.store.seekEvent(-1); smachpy.store.seekEvent(1); }")
+    assert page.evaluate("() => smachpy.store.shown().states") == shown
+    assert page.evaluate("() => smachpy.page.flashes.length") == 0

@@ -84,9 +84,9 @@ class Page {
     const live = store.cursor.value === null;
     for (const e of events) {
       this.dirty.add(e.path);
-      if (e.kind === "Left" || e.kind === "Failed") this.flashes.push(e);
+      if (live && (e.kind === "Left" || e.kind === "Failed")) this.flashes.push(e);
     }
-    store.run.push(events);
+    store.take(events);
     if (events.length && events.length < 500 && live) this.arrived = (this.arrived ?? []).concat(events.map((e) => ms(e.stamp_ns)));
     if (!events.length) this.paintAll();
     this.#schedule();
@@ -119,8 +119,8 @@ class Page {
     if (moment - (this.wordsAt ?? 0) > WORDS_MS) {
       this.wordsAt = moment;
       store.slowTick.value += 1;
-      const left = store.run.events.length - (this.counted ?? 0);
-      this.counted = store.run.events.length;
+      const newest = store.run.events.at(-1)?.seq ?? 0, left = newest - (this.counted ?? 0);
+      this.counted = newest;
       this.diagram.svg.classList.toggle("busy", left > 3 * BUSY * (WORDS_MS / 1000));
     }
     this.mapsDue ||= setTimeout(() => this.#maps(), PANELS_MS / 2); // not all in one long task

@@ -133,6 +133,22 @@ export class Run {
     }
   }
 
+  // Forget the oldest events where more than `limit` are kept; returns how many were forgotten.
+  trim(limit) {
+    const blocks = Math.floor((this.events.length - limit) / KEYFRAME);
+    if (blocks < 1) return 0;
+    const gone = blocks * KEYFRAME;
+    this.frames.splice(0, blocks);
+    this.base = this.frames[0] ?? JSON.stringify(this.now);
+    this.events.splice(0, gone);
+    const first = this.events.length ? ms(this.events[0].stamp_ns) : Infinity;
+    const kept = (span) => (span.to === null ? this.open.get(span.path) === span : span.to >= first);
+    this.spans = this.spans.filter(kept);
+    this.preempts = this.preempts.filter((one) => one.rows.some(kept));
+    this.begun = this.spans.reduce((least, span) => Math.min(least, span.from), first);
+    return gone;
+  }
+
   // What the base says is under way: states that run, and the preempt of some of them.
   #resume() {
     const rows = [];

@@ -89,6 +89,13 @@ function show(t, count) {
   });
 }
 
+// Take new events in; the oldest are forgotten when there are more than the server keeps.
+export function take(events) {
+  run.push(events);
+  const gone = run.trim(settings.value.kept ?? Infinity);
+  if (gone && position.value !== null) position.value = Math.max(0, position.value - gone);
+}
+
 // Show the instant t [ms]; null: now.
 export function seek(t) {
   if (t === null) { show(null, null); return; }

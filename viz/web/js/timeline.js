@@ -57,10 +57,10 @@ export class Timeline {
   // Lanes in tree order; made again when a container shows up for the first time.
   #makeLanes(model, spans) {
     const key = `${model.root.path} ${spans.length}`;
-    if (this.known === key && this.model === model) return;
+    if (this.known === key && this.model === model && this.spans === spans) return;
     const before = this.byPath;
     if (this.model !== model || !before) { this.byPath = new Map(); this.seen = 0; this.containers = new Set(); }
-    if (this.run !== store.run) { this.byPath = new Map(); this.seen = 0; this.containers = new Set(); this.run = store.run; }
+    if (this.spans !== spans) { this.byPath = new Map(); this.seen = 0; this.containers = new Set(); this.spans = spans; } // another run, or a shorter one
     for (; this.seen < spans.length; this.seen++) {
       const span = spans[this.seen];
       const node = model.get(span.path);
