@@ -76,3 +76,14 @@ def check_seconds(where: str, argument: str, value: object) -> float:
             "Duration."
         )
     return float(seconds)
+
+
+def check_limit(where: str, argument: str, value: object) -> float | None:
+    """Return the longest time for something; None, or infinity, sets no limit. As `check_seconds`.
+
+    Raises:
+        ActionlibError: it is no time, or negative.
+    """
+    if value is None or value == math.inf:
+        return None
+    return check_seconds(where, argument, value)

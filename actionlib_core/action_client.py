@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from actionlib_core._action_wire import ActionTypes
-from actionlib_core._arguments import check_function
+from actionlib_core._arguments import check_function, check_limit, check_seconds
 from actionlib_core._core.states import CommState, TerminalState
 from actionlib_core.comm_state_machine import CommStateMachine
 from actionlib_core.exceptions import ActionException
@@ -160,6 +160,7 @@ class ActionClient(Generic[A_co]):
 
     Raises:
         ActionException: `ActionSpec` is not an action class.
+        ActionlibError: `server_lost_timeout` is no time, negative or without end.
         InvalidNameError: the name breaks the ROS rules.
         TransportError: the network session is closed.
 
@@ -175,15 +176,11 @@ class ActionClient(Generic[A_co]):
         node: Node | None = None,
         server_lost_timeout: float | Duration = 0.0,
     ) -> None:
+        grace = check_seconds(f"action {ns!r}", "server_lost_timeout", server_lost_timeout)
         self.node = node if node is not None else get_node()
         self.types = ActionTypes.of(ActionSpec)
         self.ns = self.node.resolve(ns, "action name")
-        self.manager = GoalManager(
-            self.node,
-            self.ns,
-            self.types,
-            server_lost_timeout=to_seconds(server_lost_timeout),
-        )
+        self.manager = GoalManager(self.node, self.ns, self.types, server_lost_timeout=grace)
         self._ids = GoalIDGenerator(f"/{self.node.full_name}", clock=self.node.clock)
         self._forget = self.node.on_close(self.stop)
 
@@ -232,10 +229,11 @@ class ActionClient(Generic[A_co]):
             transition_cb: Called with the handle at each new `CommState`.
             feedback_cb: Called with the handle and each XFeedback message.
             ack_timeout: When no server has taken the goal after so long [s], it is LOST; None: it
-                waits as long as it takes.
+                waits as long as it takes; 0: it is LOST at once.
 
         Raises:
             ActionException: `goal` is not of the action's type.
+            ActionlibError: `ack_timeout` is no time, or negative.
             MessageError: a field of `goal` has a wrong type.
             TypeMismatchError: the action's server has another type.
             TransportError: the client is stopped.
@@ -244,7 +242,7 @@ class ActionClient(Generic[A_co]):
             *self.pack(goal),
             on_transition=self._on_transition(transition_cb),
             on_feedback=self._on_feedback(feedback_cb),
-            ack_timeout=to_seconds(ack_timeout),
+            ack_timeout=check_limit(f"action '{self.ns}'", "ack_timeout", ack_timeout),
         )
         return ClientGoalHandle(machine)
 
@@ -268,7 +266,7 @@ class ActionClient(Generic[A_co]):
             goal_id,
             on_transition=self._on_transition(transition_cb),
             on_feedback=self._on_feedback(feedback_cb),
-            ack_timeout=to_seconds(ack_timeout),
+            ack_timeout=check_limit(f"action '{self.ns}'", "ack_timeout", ack_timeout),
         )
         return ClientGoalHandle(machine)
 

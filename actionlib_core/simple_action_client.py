@@ -6,10 +6,9 @@ import threading
 from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from actionlib_core._arguments import check_function
+from actionlib_core._arguments import check_function, check_limit
 from actionlib_core._core.states import CommState, SimpleGoalState, Status
 from actionlib_core.action_client import ActionClient, ClientGoalHandle, to_timeout
-from actionlib_core.time import to_seconds
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -108,6 +107,7 @@ class SimpleActionClient(Generic[A]):
 
     Raises:
         ActionException: `ActionSpec` is not an action class.
+        ActionlibError: `server_lost_timeout` is no time, negative or without end.
         InvalidNameError: the name breaks the ROS rules.
         TransportError: the network session is closed.
 
@@ -198,10 +198,11 @@ class SimpleActionClient(Generic[A]):
             active_cb: Called when the goal starts to run.
             feedback_cb: Called with each XFeedback message.
             ack_timeout: When no server has taken the goal after so long [s], it is LOST; None: it
-                waits as long as it takes.
+                waits as long as it takes; 0: it is LOST at once.
 
         Raises:
             ActionException: `goal` is not of the action's type.
+            ActionlibError: `ack_timeout` is no time, or negative.
             MessageError: a field of `goal` has a wrong type.
             TypeMismatchError: the action's server has another type.
             TransportError: the client is stopped.
@@ -212,7 +213,9 @@ class SimpleActionClient(Generic[A]):
             *packed,
             on_transition=entry.on_transition,
             on_feedback=entry.on_feedback if feedback_cb is not None else None,
-            ack_timeout=to_seconds(ack_timeout),
+            ack_timeout=check_limit(
+                f"action '{self.action_client.ns}'", "ack_timeout", ack_timeout
+            ),
             created=entry.on_created,
         )
 
@@ -235,7 +238,9 @@ class SimpleActionClient(Generic[A]):
             goal_id,
             on_transition=entry.on_transition,
             on_feedback=entry.on_feedback if feedback_cb is not None else None,
-            ack_timeout=to_seconds(ack_timeout),
+            ack_timeout=check_limit(
+                f"action '{self.action_client.ns}'", "ack_timeout", ack_timeout
+            ),
             created=entry.on_created,
         )
 

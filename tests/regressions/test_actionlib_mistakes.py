@@ -424,6 +424,23 @@ def test_goal_that_was_let_go_of_before_any_server_was_there_is_followed_again(n
     assert client.get_state() == GoalStatus.ABORTED
 
 
+@pytest.mark.parametrize("kind", [ActionClient, SimpleActionClient])
+def test_timeouts_of_a_client_are_times(nodes, kind):
+    """None for the server's absence raised in the network's thread, and no goal was ever LOST."""
+    where = "action 'demo': server_lost_timeout: got "
+    for value in (None, -1, float("nan"), float("inf"), "1"):
+        with pytest.raises(ActionlibError, match=where):
+            kind("demo", msg.TestAction, node=nodes[1], server_lost_timeout=value)
+    client = kind("demo", msg.TestAction, node=nodes[1])
+    for value in (-1, float("nan"), "1"):
+        with pytest.raises(ActionlibError, match="action 'demo': ack_timeout: got "):
+            client.send_goal(msg.TestGoal(1), ack_timeout=value)
+        with pytest.raises(ActionlibError, match="action 'demo': ack_timeout: got "):
+            client.attach("/nobody-1", ack_timeout=value)
+    client.send_goal(msg.TestGoal(1), ack_timeout=float("inf"))
+    client.cancel_all_goals()
+
+
 def test_callbacks_are_functions(nodes):
     """A callback that is none was reported when it was due, from a thread without a place."""
     node = nodes[0]
