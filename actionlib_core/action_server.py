@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-DRAIN_S = 0.3  # how long `stop` waits for acknowledgements
+DRAIN_S = 0.3  # how long `stop` waits for acknowledgements; less as one of many on a node
 FAREWELL_S = 0.1  # it says farewell again after so long
 
 ACCEPTED = frozenset({Status.ACTIVE, Status.PREEMPTING})
@@ -204,7 +204,7 @@ class ActionServer:
                 else entry_of(goal)
                 for goal_id, status, goal in self._goals.taken()
             ]
-        until = now + DRAIN_S
+        until = now + self.node.time_to_leave(DRAIN_S)
         with contextlib.suppress(TransportError):  # the session is closed: nobody can be told
             listened = self._port.begin_farewell()
             while listened:

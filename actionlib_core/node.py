@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+CLOSE_S = 0.8  # what is closed with a node waits no longer, all together
+
 _NO_ZENOH = (
     "{what}: the clock is not the real one, so a session on zenoh does not fit; expected one on "
     "the same clock. Try use_node(Node(..., clock=clock, "
@@ -95,7 +97,9 @@ class Node:
         self._shared_lock = threading.Lock()  # held while something is made
         self._shared: dict[Hashable, Any] = {}
         self._closers: dict[int, Callable[[], object]] = {}
+        self._asks: dict[int, Callable[[], object]] = {}
         self._closed = False
+        self._leave_by: float | None = None
 
     def __repr__(self) -> str:
         state = " closed" if self._closed else ""
@@ -159,8 +163,15 @@ class Node:
             made: T = self._shared[key]
             return made
 
-    def on_close(self, closer: Callable[[], object]) -> Callable[[], None]:
+    def on_close(
+        self, closer: Callable[[], object], *, ask: Callable[[], object] | None = None
+    ) -> Callable[[], None]:
         """Call `closer` when the node closes, the newest first, before the network is left.
+
+        Args:
+            closer: Closes its owner; it may wait for as long as `time_to_leave` says.
+            ask: Called before, for all owners one after another; it asks what still works to end,
+                and does not wait for that. So they all end at the same time.
 
         Returns:
             Forgets `closer` again; for owners that were closed before.
@@ -176,27 +187,45 @@ class Node:
                 )
             number = next(self._entities)
             self._closers[number] = closer
+            if ask is not None:
+                self._asks[number] = ask
 
         def forget() -> None:
             with self._lock:
                 self._closers.pop(number, None)
+                self._asks.pop(number, None)
 
         return forget
+
+    def time_to_leave(self, longest: float) -> float:
+        """Return how long what is being closed may wait [s].
+
+        That is `longest`, or what is left of the `CLOSE_S` that all have together when it is closed
+        with its node.
+        """
+        if self._leave_by is None:
+            return longest
+        return max(0.0, min(longest, self._leave_by - self.clock.now()))
 
     def close(self) -> None:
         """Close what was made on this node, then leave the network; a second call does nothing.
 
-        Blocks: under a second.
+        Blocks: under a second, however much there is to close.
         """
         with self._lock:
             if self._closed:
                 return
             self._closed = True
-            closers = [self._closers[number] for number in sorted(self._closers, reverse=True)]
+            self._leave_by = self.clock.now() + CLOSE_S
+            closers, asks = (
+                [made[number] for number in sorted(made, reverse=True)]
+                for made in (self._closers, self._asks)
+            )
             self._closers.clear()
-        for closer in closers:
+            self._asks.clear()
+        for call in (*asks, *closers):
             try:
-                closer()
+                call()
             except Exception:  # noqa: BLE001  a border: reported, the others are closed too
                 report_thread_exception()
         if self._owns_transport:

@@ -110,6 +110,7 @@ class SimpleActionServer:
         self._task: Task | None = None
         self._idle: Event | None = None
         self._stopping = False
+        self._grace_ends: float | None = None
         self.action_server = _QuickServer(
             name,
             ActionSpec,
@@ -144,7 +145,8 @@ class SimpleActionServer:
         self.action_server.start()
         with self.lock:
             if self._forget is None:
-                self._forget = self.action_server.node.on_close(self.stop)
+                node = self.action_server.node
+                self._forget = node.on_close(self.stop, ask=self._begin_to_stop)
 
     def stop(self) -> None:
         """Ask the running goal to stop, end all goals, leave the name.
@@ -159,11 +161,21 @@ class SimpleActionServer:
             return
         forget()
         task = self._task
-        self.action_server.close_to_goals()
-        self._ask_to_stop()
+        grace_ends = self._begin_to_stop()
         if task is not None:
-            task.join(STOP_GRACE_S)
+            task.join(max(0.0, grace_ends - self.action_server.node.clock.now()))
         self.action_server.stop()
+
+    def _begin_to_stop(self) -> float:
+        """Ask everything to end; return until when it may take its time [s, clock].
+
+        A node that closes does this for all its servers before it stops the first.
+        """
+        if self._grace_ends is None:
+            self._grace_ends = self.action_server.node.clock.now() + STOP_GRACE_S
+            self.action_server.close_to_goals()
+            self._ask_to_stop()
+        return self._grace_ends
 
     def wait(self, timeout: float | None = None) -> bool:
         """Wait until the server has stopped; for programs that do nothing else.

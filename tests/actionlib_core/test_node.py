@@ -9,11 +9,15 @@ import threading
 
 import pytest
 
+from actionlib_core.action_client import ActionClient
 from actionlib_core.clock import RealClock, VirtualClock, use_clock
 from actionlib_core.exceptions import InvalidNameError, NameSetupError, NodeError, TransportError
+from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.names import parse_arguments
-from actionlib_core.node import Node, get_node, use_node
+from actionlib_core.node import CLOSE_S, Node, get_node, use_node
 from actionlib_core.presence import Kind, list_endpoints
+from actionlib_core.simple_action_server import SimpleActionServer
+from actionlib_core.transport.faulty import FaultyTransport
 from actionlib_core.transport.memory import MemoryNetwork
 
 
@@ -75,6 +79,66 @@ def test_closing_calls_the_newest_first_and_survives_errors(network, clock, monk
     assert (order, reported, node.closed) == (["third", "first"], ["second"], True)
     with pytest.raises(NodeError, match="nav: it is closed"):
         node.on_close(print)
+
+
+def test_closing_asks_all_before_it_closes_the_first(network, clock, monkeypatch):
+    reported = []
+    monkeypatch.setattr(threading, "excepthook", lambda args: reported.append(str(args.exc_value)))
+    node = Node("nav", transport=network.session())
+    order = []
+
+    def fail():
+        raise ValueError("asked")
+
+    node.on_close(lambda: order.append("first"), ask=lambda: order.append("ask first"))
+    node.on_close(lambda: order.append("second"), ask=fail)
+    node.on_close(lambda: order.append("third"))
+    node.on_close(lambda: order.append("fourth"), ask=lambda: order.append("ask fourth"))
+    node.close()
+    assert order == ["ask fourth", "ask first", "fourth", "third", "second", "first"]
+    assert reported == ["asked"]
+
+
+def test_closers_share_the_time_that_a_node_has(network, clock):
+    node = Node("nav", transport=network.session())
+    assert node.time_to_leave(0.3) == 0.3
+    left = []
+    for _ in range(5):
+        node.on_close(lambda: (left.append(node.time_to_leave(0.3)), clock.sleep(left[-1])))
+    before = clock.now()
+    node.close()
+    assert clock.now() - before == pytest.approx(CLOSE_S)
+    assert left == pytest.approx([0.3, 0.3, CLOSE_S - 0.6, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("trouble", ["stubborn callbacks", "a dead client"])
+def test_node_with_many_servers_closes_within_a_second(network, clock, trouble):
+    """The servers stopped one after another, each with all the time that one may take."""
+    node = Node("nav", transport=network.session())
+    client_node = Node("client", transport=FaultyTransport(network.session(), clock=clock))
+    running, release = [], clock.event()
+
+    def execute(goal):
+        running.append(goal)
+        release.wait(5.0) if trouble == "stubborn callbacks" else None
+
+    clients = []
+    for number in range(6):
+        SimpleActionServer(f"demo_{number}", msg.TestAction, execute, node=node)
+        clients.append(ActionClient(f"demo_{number}", msg.TestAction, node=client_node))
+        assert clients[-1].wait_for_server(5.0)
+    if trouble == "a dead client":
+        client_node.transport.cut(100.0)
+    else:
+        for client in clients:
+            client.send_goal(msg.TestGoal(1))
+        clock.sleep(1.0)
+        assert len(running) == 6
+    before = clock.now()
+    node.close()
+    assert clock.now() - before < 1.0
+    release.set()
+    client_node.close()
 
 
 def test_closing_leaves_a_transport_that_was_given_open(network, clock):
