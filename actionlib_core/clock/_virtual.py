@@ -66,6 +66,7 @@ class VirtualClock:
     Attributes:
         limit: When time would pass this [s], the wait of the thread that made the clock raises
             `TimeLimit` instead; None, the default: never.
+        most_turns: When so many turns were taken and no time passed, it does, too; None: never.
         numbers: Counts for ids that are to be the same in every run.
 
     Threads: only participants may wait; `Event.set` and `call_later` may come from any thread.
@@ -87,6 +88,9 @@ class VirtualClock:
         self.rate = rate
         self._pick = _picker(seed, choose)
         self.limit: float | None = None
+        self.most_turns: int | None = None
+        self._turns = 0  # since this moment:
+        self._moment = 0.0
         self.numbers = itertools.count(1)
         self._now = 0.0
         self._stepped = time.monotonic()
@@ -369,6 +373,8 @@ class VirtualClock:
         ready = self._ready
         if not ready and self._jump(me):
             return me
+        if self.most_turns is not None and self._is_stuck() and self._stop_owner():
+            return self._owner
         if ready:
             return ready.pop(0 if len(ready) == 1 or self._pick is None else self._pick(ready))
         if self._owner in self._waits:
@@ -379,6 +385,25 @@ class VirtualClock:
             ready.clear()
             return self._owner
         return None
+
+    def _is_stuck(self) -> bool:
+        """Count a turn; whether there were too many since time passed."""
+        if self._now != self._moment:
+            self._moment, self._turns = self._now, 0
+        self._turns += 1
+        return self.most_turns is not None and self._turns > self.most_turns
+
+    def _stop_owner(self) -> bool:
+        """End a wait of the owner: turns are taken again and again, and no time passes."""
+        owner = self._owner
+        if owner not in self._waits and owner not in self._ready:
+            return False
+        waits = name_waits({owner: 0, **self._waits}, self._participants)
+        owner.error = TimeLimit(self._now, waits, self._turns - 1)
+        self._wake(owner)
+        self._ready.remove(owner)
+        self._turns = 0
+        return True
 
     def _is_past(self, due: float) -> bool:
         return self.limit is not None and due > self.limit

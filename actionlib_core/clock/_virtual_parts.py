@@ -38,19 +38,23 @@ class Deadlock(Exception):  # noqa: N818  the field's word
 
 
 class TimeLimit(Exception):  # noqa: N818  as Deadlock
-    """Time would have passed `VirtualClock.limit`.
+    """Time would have passed `VirtualClock.limit`, or stands still (`VirtualClock.most_turns`).
 
     Attributes:
         waits: Participant name -> what it waits for.
+        turns: So many turns were taken at one moment; 0 when time is up.
     """
 
-    def __init__(self, now: float, waits: Mapping[str, str]) -> None:
+    def __init__(self, now: float, waits: Mapping[str, str], turns: int = 0) -> None:
         self.waits = dict(waits)
+        self.turns = turns
         lines = [f"  - {name}: waits for {what}" for name, what in self.waits.items()]
-        super().__init__(
-            f"virtual clock: time is up at {now:g} s; expected an end before its limit:\n"
-            + "\n".join(lines)
+        what = (
+            f"{turns} turns were taken at {now:g} s; expected time to pass"
+            if turns
+            else f"time is up at {now:g} s; expected an end before its limit"
         )
+        super().__init__(f"virtual clock: {what}:\n" + "\n".join(lines))
 
 
 class Stopped(BaseException):

@@ -206,6 +206,30 @@ def test_a_limit_ends_waits_that_would_pass_it(clock):
     assert clock.now() == 15
 
 
+def test_most_turns_end_a_wait_while_others_take_turns_and_no_time_passes(clock):
+    clock.most_turns = 100
+    ping, pong = clock.event("ping"), clock.event("pong")
+
+    def answer(mine, other):
+        while True:
+            mine.wait()
+            mine.clear()
+            other.set()
+
+    for _ in range(200):  # as long as time passes, turns do not add up
+        clock.sleep(1)
+        clock.spawn(lambda: None, name="short").join()
+    clock.spawn(lambda: answer(ping, pong), name="a")
+    clock.spawn(lambda: answer(pong, ping), name="b")
+    ping.set()
+    with pytest.raises(TimeLimit, match="100 turns were taken at 200 s") as caught:
+        clock.event("the end").wait()
+    assert caught.value.turns == 100
+    assert caught.value.waits["MainThread"] == "the end"
+    with pytest.raises(TimeLimit):
+        clock.sleep(1)
+
+
 def test_a_limit_hides_no_deadlock(clock):
     clock.limit = 10
     with pytest.raises(Deadlock):
