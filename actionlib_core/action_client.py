@@ -190,7 +190,11 @@ class ActionClient(Generic[A_co]):
         return self.types.action
 
     def stop(self) -> None:
-        """Leave the name. Goals that run go on at the server; here they are LOST."""
+        """Leave the name. Goals that run go on at the server; here they are LOST.
+
+        A server with `on_client_lost="cancel"` cancels them, unless another client of the action
+        is left in this session.
+        """
         self._forget()
         self.manager.close()
 

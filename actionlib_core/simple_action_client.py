@@ -175,7 +175,11 @@ class SimpleActionClient(Generic[A]):
         return self.action_client.wait_for_server(timeout)
 
     def stop(self) -> None:
-        """Leave the name. A goal that runs goes on at the server; here it is LOST."""
+        """Leave the name. A goal that runs goes on at the server; here it is LOST.
+
+        A server with `on_client_lost="cancel"` cancels it, unless another client of the action is
+        left in this session.
+        """
         self.action_client.stop()
 
     # -- goals ---------------------------------------------------------------------------------

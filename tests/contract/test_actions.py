@@ -564,13 +564,14 @@ def test_result_is_kept_for_a_client_that_attaches_later(world):
     assert unknown.get_terminal_state() is TerminalState.LOST
 
 
+@pytest.mark.parametrize("end", ["dies", "stops"])
 @pytest.mark.parametrize("what", ["continue", "cancel"])
-def test_client_that_dies(world, what):
+def test_client_that_dies_or_stops(world, what, end):
     doubler = Doubler(world, on_client_lost=what)
     client = simple_client(world)
     client.send_goal(msg.TestGoal(-1))
     doubler.wait_started()
-    client.action_client.node.transport.close()
+    client.stop() if end == "stops" else client.action_client.node.transport.close()
     assert doubler.server.wait_preempt(LONG_S if what == "cancel" else 0.2) is (what == "cancel")
     doubler.server._preempted.set()
 
