@@ -13,6 +13,7 @@ import re
 from dataclasses import dataclass, field
 
 from actionlib_core.exceptions import InterfaceError
+from actionlib_core.interfaces._extent import too_large
 
 INTEGERS = {
     "int8": (-(2**7), 2**7 - 1),
@@ -40,6 +41,9 @@ RESERVED = frozenset(
         *("to_yaml", "from_yaml", "to_dict", "from_dict", "self"),
     }
 )
+
+_LENGTH_DIGITS = 18  # of an array; more are too many whatever its elements are
+_LONGEST_SHOWN = 40
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
 _TYPE = re.compile(r"([A-Za-z0-9_/]+?)(\[(\d*)\])?\Z")
@@ -234,12 +238,16 @@ class _Reader:
         if match is None or not _TYPE_PATH.match(match[1]):
             self._bad_type(at, text)
             return None
-        base, is_array, length = match[1], match[2] is not None, match[3]
+        base, is_array, length = match[1], match[2] is not None, (match[3] or "").lstrip("0")
+        if len(length) > _LENGTH_DIGITS:
+            shown = text if len(text) < _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
+            self._problem(at, at.column, f"{shown}: {too_large(f'10^{len(length) - 1} bytes')}")
+            return None
         if base == "Header":
             base = "std_msgs/Header"
         elif base not in BUILTINS and "/" not in base:
             base = f"{self.package}/{base}"
-        return FieldType(base, is_array, int(length) if length else None)
+        return FieldType(base, is_array, int(length or 0) if match[3] else None)
 
     def _bad_type(self, at: Position, text: str) -> None:
         if "<=" in text:

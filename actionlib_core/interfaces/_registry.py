@@ -14,6 +14,15 @@ from actionlib_core.interfaces._definition import (
     did_you_mean,
     parse,
 )
+from actionlib_core.interfaces._extent import (
+    DEEPEST,
+    NESTED,
+    Extent,
+    field_extent,
+    find_excess,
+    message_extent,
+    too_many,
+)
 from actionlib_core.interfaces._message import Message, make_class
 from actionlib_core.interfaces._sources import PATH_VARIABLE, Kind, Source, Sources
 
@@ -57,6 +66,7 @@ class Registry:
         self._lock = threading.RLock()
         self._messages: dict[str, type[Message]] = {}
         self._services: dict[str, type[ServiceType]] = {}
+        self._extents: dict[str, Extent] = {}
         self._building: list[str] = []
 
     def message(self, name: str) -> type[Message]:
@@ -176,6 +186,7 @@ class Registry:
         try:
             definition = parse(full, source.text, source=source.origin, first_line=first_line)
             self._check_types(definition)
+            self._check_extent(definition)
             cls = make_class(
                 definition,
                 self.message,
@@ -194,6 +205,11 @@ class Registry:
         for field in definition.fields:
             if field.type.is_builtin or field.type.base in self._messages:
                 continue
+            if len(self._building) >= DEEPEST:
+                problems.append(
+                    field.position.problem(too_many(f"over {DEEPEST}", NESTED, DEEPEST))
+                )
+                continue
             try:
                 self.message(field.type.base)
             except _UnknownTypeError as error:
@@ -202,6 +218,19 @@ class Registry:
                 problems += error.problems
         if problems:
             raise InterfaceError(*dict.fromkeys(problems))
+
+    def _check_extent(self, definition: Definition) -> None:
+        """Refuse a message that no computer could make, at the field that is most to blame."""
+        extents = {
+            field: field_extent(field.type, self._extents.__getitem__)
+            for field in definition.fields
+        }
+        extent = message_extent(extents.values())
+        if found := find_excess(extent):
+            attribute, problem = found
+            most = max(extents, key=lambda field: getattr(extents[field], attribute))
+            raise InterfaceError(most.position.problem(problem))
+        self._extents[definition.name] = extent
 
     def _unknown(self, what: str, full: str) -> str:
         short = full.partition("/")[2]

@@ -134,6 +134,73 @@ def test_recursion_is_found(tmp_path: Path) -> None:
         registry_of(tmp_path).message("p/A")
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("int32[99999999999] x", r":2: got a message of 399,999,999,997 bytes at least; expected"),
+        ("std_msgs/Empty[99999999999] x", r"got a message of 100,000,000,000 bytes at least"),
+        ("std_msgs/String[30000000] x", r"got a message of 120,000,001 bytes at least"),
+        (f"int32[{'9' * 5000}] x", r":2: int32\[9{34}\.\.\.: got a message of 10\^4999 bytes"),
+    ],
+)
+def test_message_that_no_memory_holds_is_refused_at_its_field(text: str, said: str) -> None:
+    with pytest.raises(InterfaceError, match=said) as caught:
+        registry_of().define("msg", "p/Huge", f"int8 a\n{text}\n")
+    assert str(caught.value).endswith("    ^")
+    assert registry_of().define("msg", "p/Huge", "uint8[6220800] photo\n")().photo == bytes(6220800)
+
+
+def test_large_arrays_of_large_arrays_are_refused() -> None:
+    registry = registry_of()
+    registry.define("msg", "p/Row", "float64[10000] values\n")
+    with pytest.raises(InterfaceError, match=r"p/msg/Map .*:2: got a message of 800,000,001 bytes"):
+        registry.define("msg", "p/Map", "bool b\nRow[10000] rows\n")
+    assert len(registry.define("msg", "p/Map", "Row[100] rows\n")().rows) == 100
+
+
+def test_types_nested_without_an_end_are_refused_and_fifty_are_not(tmp_path: Path) -> None:
+    files = {f"p/msg/T{n}.msg": f"int8 a\nT{n - 1} inner\n" for n in range(1, 1500)}
+    write(tmp_path, {"p/msg/T0.msg": "int32 x\n", **files})
+    deepest = registry_of(tmp_path).message("p/T49")
+    message = deepest.from_bytes(bytes(range(49)) + b"\1\0\0\0")
+    assert deepest.from_yaml(message.to_yaml()) == message
+    for top in (50, 1499):
+        with pytest.raises(InterfaceError, match=r":2: got over 50 types in one another; expected"):
+            registry_of(tmp_path).message(f"p/T{top}")
+
+
+def grow(registry: Registry, text: str) -> None:
+    """Define T0, T1, ... without an end, each of the one before."""
+    for n in range(1, 1500):
+        registry.define("msg", f"p/T{n}", text.replace("BEFORE", f"T{n - 1}"))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("BEFORE inner\nint8[9] largest\n", r"p/msg/T50 .*:1: got 51 types in one another"),
+        ("BEFORE[1] x\n", r"p/msg/T20 .*:1: got 20 arrays in one another; expected 19 at most"),
+        ("BEFORE a\nBEFORE b\n", r"p/msg/T16 .*:1: got 65,536 fields, nested ones counted"),
+    ],
+)
+def test_types_that_grow_one_by_one_are_refused_where_it_is_too_much(text: str, said: str) -> None:
+    registry = registry_of()
+    registry.define("msg", "p/T0", "int32 x\n")
+    with pytest.raises(InterfaceError, match=said):
+        grow(registry, text)
+    made = registry.message("p/T10")
+    assert made.from_bytes(made().to_bytes()) == made()
+
+
+def test_as_many_arrays_in_one_another_as_python_takes_work() -> None:
+    registry = registry_of()
+    registry.define("msg", "p/T0", "int32 x\n")
+    with pytest.raises(InterfaceError):
+        grow(registry, "BEFORE[1] x\n")
+    made = registry.message("p/T19")
+    assert made.from_bytes(b"\7\0\0\0").to_bytes() == b"\7\0\0\0"
+
+
 def test_define_is_checked_and_forgotten_on_error() -> None:
     registry = registry_of()
     for bad in ("string a\n---\nString b\n---\n", "int32 a\n"):
