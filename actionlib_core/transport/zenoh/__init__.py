@@ -26,6 +26,7 @@ import zenoh
 from zenoh import handlers
 
 from actionlib_core.clock import RealClock, SerialExecutor, current_clock
+from actionlib_core.clock._threads import hasten_switching
 from actionlib_core.config import Config, load_config
 from actionlib_core.exceptions import AccessDeniedError, TransportError
 from actionlib_core.transport import Presence, Quality, Reply, Sample
@@ -341,6 +342,7 @@ def _close_all() -> None:
     """
     if process.forked:  # they are the other process's, and nothing here would answer
         return
+    hasten_switching()
     for transport in list(_open_transports):
         transport.close()
     held.wait(LET_GO_S)

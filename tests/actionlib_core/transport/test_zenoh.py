@@ -121,6 +121,37 @@ def test_program_ends_within_a_second_on_every_path(ending):
         transport.close()
 
 
+BUSY = """
+def publish(n):
+    publisher = t.publisher(f"busy{n % 3}")
+    while True:
+        publisher.put(bytes(100))
+def declare(n):
+    while True:
+        t.subscribe("busy0", lambda sample: None).close()
+def mark(n):
+    while True:
+        t.declare_alive(f"@test/busy{n}").close()
+def for_ever(function, n):
+    while True:
+        with contextlib.suppress(Exception):
+            function(n)
+import contextlib
+for n in range(24):
+    function = (publish, declare, mark)[n % 3]
+    threading.Thread(target=for_ever, args=(function, n), daemon=True).start()
+sys.stdin.readline()
+"""
+
+
+@pytest.mark.slow
+def test_program_ends_while_its_threads_go_on_using_the_network():
+    for _ in range(3):
+        with child(START + BUSY) as process:
+            _, errors = process.communicate("\n", timeout=60)
+            assert process.returncode == 0, errors
+
+
 def test_killed_process_is_seen_at_once():
     transport = ZenohTransport()
     try:
