@@ -65,7 +65,8 @@ class SimpleActionServer:
         name: The action's name.
         ActionSpec: The action class (XAction).
         execute_cb: Called with the goal message (XGoal); it must call `set_succeeded`,
-            `set_aborted`, `set_preempted` or `set_rejected` before it returns.
+            `set_aborted` or `set_preempted` before it returns. The goal is accepted before, as in
+            ROS, so it can be aborted and not rejected any more; `server` offers both.
         auto_start: Start at once; a goal may then come before the constructor has returned. When
             the callback uses the server, pass False and call `start` afterwards.
         node: Where; the current node when None.
@@ -307,6 +308,12 @@ class SimpleActionServer:
         """
         with self.lock:
             handle = self._policy.withdraw()
+        if handle is None and self.execute_callback is not None:
+            raise ActionException(
+                f"action '{self._name}': set_rejected(): the goal that runs is accepted already; "
+                "expected one that waits. Try set_aborted(), or @server, whose function may raise "
+                "Reject."
+            )
         if handle is None:
             raise ActionException(
                 f"action '{self._name}': set_rejected(): got no waiting goal; expected one. Try "

@@ -12,6 +12,7 @@ from actionlib_core.action_client import ActionClient, CommState
 from actionlib_core.action_server import ActionServer
 from actionlib_core.clock import RealClock
 from actionlib_core.exceptions import ActionlibError
+from actionlib_core.goal_server import Reject
 from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.interfaces.std_msgs.msg import String
@@ -539,6 +540,30 @@ def test_stop_before_the_start_changes_nothing(nodes, kind):
     assert handle.get_comm_state() == CommState.PENDING
     server.stop()
     assert handle.wait(LONG_S)
+
+
+@pytest.mark.parametrize("way", ["call", "raise"])
+def test_execute_callback_cannot_reject_and_is_told_what_can(nodes, caplog, way):
+    """Its goal is ACTIVE, which no goal is rejected from, in actionlib's table as here."""
+
+    def execute(goal):
+        if way == "raise":
+            raise Reject("too far")
+        server.set_rejected(text="too far")
+
+    server = SimpleActionServer("demo", msg.TestAction, execute, node=nodes[0])
+    client = SimpleActionClient("demo", msg.TestAction, node=nodes[1])
+    assert client.wait_for_server(LONG_S)
+    client.send_goal(msg.TestGoal(1))
+    assert client.wait_for_result(LONG_S)
+    assert client.get_state() == GoalStatus.ABORTED
+    said = client.get_goal_status_text()
+    if way == "raise":
+        assert said == "Exception in execute callback: too far"
+    else:
+        assert "set_rejected(): the goal that runs is accepted already" in said
+        assert "Try set_aborted(), or @server" in said
+    server.stop()
 
 
 def test_service_class_is_one(nodes):
