@@ -385,3 +385,47 @@ def test_looking_back_stays_where_it_is_while_older_events_are_forgotten(served,
     page.evaluate("() => { smachpy.store.seekEvent(-1); smachpy.store.seekEvent(1); }")
     assert page.evaluate("() => smachpy.store.shown().states") == shown
     assert page.evaluate("() => smachpy.page.flashes.length") == 0
+
+
+class Network:
+    """The actions of a network, as `viz.live.actions.Actions` tells them."""
+
+    revision = 0
+
+    def __init__(self):
+        self.names = []
+
+    def listen(self, on_change):
+        self.on_change = on_change
+
+    def summary(self):
+        one = {"type": "a/B", "node": "n", "servers": 1}
+        return {"actions": [{"name": name, **one} for name in self.names], "goals": []}
+
+    def turn(self, *names):
+        self.names = list(names)
+        self.revision += 1
+        self.on_change()
+
+
+def test_a_state_whose_goal_has_no_server_waits_and_does_not_run(served, look):
+    network = Network()
+    served.add("one", events=[*run()[:2], GOAL])
+    page = look(served.start(actions=network))
+    page.wait_for_selector('g.waiting[data-path="/JOB/A"]')
+    label = page.get_attribute('g[data-path="/JOB/A"]', "aria-label")
+    assert label == "/JOB/A, waits for a server of drive"
+    wait_for(page, "document.querySelector('.goal .pill-text').textContent === 'no server'")
+    network.turn("drive")
+    wait_for(page, "!document.querySelector('g.waiting')")
+    assert page.get_attribute('g[data-path="/JOB/A"]', "aria-label") == "/JOB/A, running"
+    wait_for(page, "document.querySelector('.goal .pill-text').textContent === 'active'")
+    network.turn()  # gone again: nobody works on it
+    page.wait_for_selector('g.waiting[data-path="/JOB/A"]')
+
+
+def test_without_a_look_at_the_network_no_server_is_missed(served, look):
+    served.add("one", events=[*run()[:2], GOAL])
+    page = look(served.start())
+    page.wait_for_selector('g.active[data-path="/JOB/A"]')
+    assert page.query_selector("g.waiting") is None

@@ -164,12 +164,12 @@ class Page {
     if (!this.diagram.nodes.has(path)) return;
     let goal = null;
     for (const one of Object.values(data.goals)) if (one.path === path && one.ended == null) goal = one;
-    this.diagram.paint(path, data.states[path], now, goal);
+    this.diagram.paint(path, data.states[path], now, goal, store.unserved(goal));
   }
 
   paintAll() {
     const data = store.shown(), now = store.nowMs(), goals = this.#goalOf(data);
-    for (const path of this.diagram.boxes.keys()) this.diagram.paint(path, data.states[path], now, goals.get(path));
+    for (const path of this.diagram.boxes.keys()) this.diagram.paint(path, data.states[path], now, goals.get(path), store.unserved(goals.get(path)));
     const stops = store.facts.value?.control?.breakpoints ?? [];
     this.diagram.mark(stops.map(([path]) => path), "stopped");
     this.diagram.mark(store.selected.value ? [store.selected.value] : [], "selected");
@@ -381,6 +381,7 @@ store.applyTheme();
 const page = new Page();
 window.smachpy = { page, store }; // for tests and the curious
 store.place.subscribe(() => { if (page.diagram) { page.paintAll(); page.timeline.draw(); } });
+store.served.subscribe(() => { if (page.diagram?.size) page.paintAll(); });
 store.facts.subscribe(() => { if (page.diagram?.size) page.paintAll(); });
 render(html`<${App} page=${page} />`, document.getElementById("app"));
 document.querySelector(".boot")?.remove();

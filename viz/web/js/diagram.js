@@ -241,7 +241,8 @@ export class Diagram {
 
   // -- restyling --------------------------------------------------------------------------------
 
-  paint(path, state, now, goal) {
+  // `goal`: what the state has sent and waits for; `unserved`: nobody is there to take it.
+  paint(path, state, now, goal, unserved = false) {
     const group = this.nodes.get(path);
     if (!group) return;
     const active = state?.since != null;
@@ -250,7 +251,7 @@ export class Diagram {
     classes.toggle("active", active);
     classes.toggle("preempting", active && !!state.preempt);
     classes.toggle("serviced", active && !!state.preempt && !!state.serviced);
-    classes.toggle("waiting", !!state?.waits || (active && goal?.status === "PENDING"));
+    classes.toggle("waiting", !!state?.waits || (active && unserved));
     classes.toggle("visited", (state?.visits ?? 0) > 0);
     for (const name of ["success", "failure", "preempted", "other"])
       classes.toggle(`was-${name}`, !active && kind === name);
@@ -260,7 +261,7 @@ export class Diagram {
     write(group.badge, active ? elapsed(state, now) : group.note || "");
     const part = active ? goal?.progress?.fraction ?? 0 : 0;
     if (group.bar && group.bar.part !== part) group.bar.style.transform = `scaleX(${group.bar.part = part})`;
-    const status = active ? (state.preempt ? `asked to stop${state.serviced ? ", takes it up" : ""}` : "running") : state?.outcome ?? "not visited";
+    const status = active ? (state.preempt ? `asked to stop${state.serviced ? ", takes it up" : ""}` : unserved ? `waits for a server of ${goal.action}` : "running") : state?.outcome ?? "not visited";
     const label = `${path}, ${status}${group.change ? `, ${group.change}` : ""}`;
     if (group.label !== label) group.setAttribute("aria-label", group.label = label);
     this.minisDue.set(path, active);

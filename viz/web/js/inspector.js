@@ -128,7 +128,8 @@ function Goals({ page, data, now }) {
   return html`<${Section} title="Goals">
     ${!goals.length && html`<p class="hint">none</p>`}
     ${goals.map((g) => {
-      const kind = g.ended == null ? "active" : outcomeClass(g.status === "REJECTED" || g.status === "LOST" ? "failed" : g.status);
+      const waits = store.unserved(g);
+      const kind = waits ? "waiting" : g.ended == null ? "active" : outcomeClass(g.status === "REJECTED" || g.status === "LOST" ? "failed" : g.status);
       const part = g.ended != null && g.status === "SUCCEEDED" ? 1 : g.progress?.fraction;
       const until = g.ended != null ? ms(g.ended) : now;
       return html`<div class=${`goal ${kind}`} key=${g.id} title=${g.id}>
@@ -136,7 +137,7 @@ function Goals({ page, data, now }) {
           <span class="times">${g.attempt > 1 ? `attempt ${g.attempt} \u00b7 ` : ""}${span((until - ms(g.since)) / 1000)}</span></div>
         <div class=${`bar ${part == null && g.ended == null ? "unknown" : ""}`} role="progressbar" aria-valuenow=${part == null ? undefined : Math.round(part * 100)}>
           <i style=${{ width: `${Math.round((part ?? (g.ended != null ? 1 : 0)) * 100)}%` }}></i></div>
-        <div class="text"><span class=${`pill-text ${kind}`}>${g.ended == null ? "active" : g.status.toLowerCase()}</span>
+        <div class="text"><span class=${`pill-text ${kind}`}>${waits ? "no server" : g.ended == null ? "active" : g.status.toLowerCase()}</span>
           ${" "}${g.text || [g.progress?.distance != null ? `${g.progress.distance.toFixed(2)} m left` : "", g.progress?.text ?? ""].filter(Boolean).join(" \u00b7 ")}
           ${part != null && g.ended == null ? html`<span class="times">${Math.round(part * 100)} %</span>` : ""}</div>
         <${More} label="goal" value=${g.goal} /></div>`;

@@ -87,7 +87,7 @@ function open() {
   on("settings", (s) => { begun = performance.now(); store.settings.value = s; store.connection.value = "live"; watch(s.beat * 1000); });
   on("beat", () => { store.connection.value = "live"; });
   on("machines", (list) => { store.machines.value = list; });
-  on("actions", (found) => { store.actions.value = found; });
+  on("actions", (found) => { store.actions.value = { ...found, known: true }; });
   on("facts", takeFacts);
   on("snap", takeSnap);
   on("gap", (count) => { store.gap.value = count; });

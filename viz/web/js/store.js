@@ -37,7 +37,7 @@ export const statistics = signal(null);
 export const notice = signal(null);
 export const help = signal(false);
 export const comparison = signal(null); // with another machine: its name, the differences
-export const actions = signal({ actions: [], goals: [] }); // on the network; goals sent from here
+export const actions = signal({ actions: [], goals: [], known: false }); // on the network; goals sent from here
 export const actionsOpen = signal(false);
 export const picked = signal(null); // name of the action whose form is shown
 export const logFilter = signal("all");
@@ -113,6 +113,16 @@ export function seekEvent(step) {
   const to = Math.max(1, happened() + step);
   if (to >= run.events.length && step > 0) seek(null);
   else seekTo(Math.min(to, run.events.length));
+}
+
+// Names of the actions that have a server, as one text; null when nobody has looked.
+export const served = computed(() => (actions.value.known ? actions.value.actions.map((one) => one.name).join("\n") : null));
+
+// Whether a goal waits, as its action has no server.
+export function unserved(goal) {
+  if (served.value === null || !goal || goal.ended != null || goal.feedback != null) return false;
+  if (connection.value !== "live" || cursor.value !== null || facts.value?.stale != null || facts.value?.recorded) return false;
+  return !served.value.split("\n").includes(goal.action.replace(/^\//, ""));
 }
 
 export const isActive = (state) => state?.since != null;
