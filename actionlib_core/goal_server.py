@@ -91,7 +91,7 @@ class GoalContext(Generic[F]):
 
         Raises:
             ActionException: `message` is not of the action's type.
-            MessageError: a field of it has a wrong type.
+            FieldError: a field of it has a wrong type.
         """
         self.accept()
         self._runner.publish_feedback(message)

@@ -10,7 +10,7 @@ import threading
 import time
 from typing import TYPE_CHECKING, TypeVar
 
-from actionlib_core.clock._serial import report_thread_exception
+from actionlib_core.clock._serial import report_exit, report_thread_exception
 from actionlib_core.clock._threads import ThreadCache, mark_idle
 
 if TYPE_CHECKING:
@@ -187,7 +187,9 @@ class _TimerThread:
             if callback is not None:
                 try:
                     callback()
-                except Exception:  # noqa: BLE001  a border: reported, other timers go on
+                except SystemExit as error:
+                    report_exit("clock-timers", error)
+                except BaseException:  # noqa: BLE001  a border: reported, other timers go on
                     report_thread_exception()
 
 

@@ -67,7 +67,7 @@ class SerialExecutor:
             self._run_all()
         except BaseException as error:
             if isinstance(error, SystemExit):  # the one that a thread ends with in silence
-                _log_exit(self._name, error)
+                report_exit(self._name, error)
             with self._lock:
                 self._task = None
                 if self._queue:
@@ -87,7 +87,8 @@ class SerialExecutor:
                 report_thread_exception()
 
 
-def _log_exit(name: str, error: SystemExit) -> None:
+def report_exit(name: str, error: SystemExit) -> None:
+    """Log that a callback has called `sys.exit`, of which `threading.excepthook` says nothing."""
     import logging  # 4 ms that a state machine alone never needs
 
     log = logging.getLogger(__name__)

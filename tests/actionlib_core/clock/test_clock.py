@@ -131,6 +131,20 @@ def test_call_later_reports_an_error_and_runs_the_next(any_clock, monkeypatch):
     assert reported == [ZeroDivisionError]
 
 
+def test_timers_go_on_after_one_that_ends_its_thread(caplog):
+    """No timer of this clock ever ran again."""
+    clock = RealClock()
+    done = clock.event()
+
+    def leave():
+        raise SystemExit("enough")
+
+    clock.call_later(0.001, leave)
+    clock.call_later(0.002, done.set)
+    assert done.wait(5)
+    assert "clock-timers: a callback raised SystemExit: enough" in caplog.text
+
+
 def test_run_async_returns_the_result_and_uses_the_clock(any_clock):
     async def main():
         before = any_clock.now()
