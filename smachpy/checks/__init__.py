@@ -4,8 +4,8 @@
     assert report.ok, report
 
 A check takes milliseconds. Rules have ids (`RULES`), and are switched off with a reason: by
-`ignore(state, rule, reason)`, by a comment `# smachpy: ignore[rule] reason` in the state's class,
-by the argument `ignores`, or in pyproject.toml under [tool.smachpy.check].
+`ignore(state, rule, reason)`, by a comment `# smachpy: ignore[rule] reason` in the state's class or
+function, by the argument `ignores`, or in pyproject.toml under [tool.smachpy.check].
 """
 
 from __future__ import annotations

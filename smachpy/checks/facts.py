@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from typing import TYPE_CHECKING, Any
 
+from smachpy._runtime.messages import Outgoing
 from smachpy.checks import leaves, suppression
 from smachpy.checks._core.model import Facts, OutcomeRule, Place
 from smachpy.concurrence import Concurrence
@@ -14,7 +15,7 @@ from smachpy.state import CBState, State
 from smachpy.util import CBInterface
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from smachpy.introspection import StateRecord
 
@@ -40,7 +41,7 @@ def _walk(state: State, record: StateRecord) -> Iterator[tuple[str, State, State
 
 
 def _facts(state: State, record: StateRecord) -> Facts:
-    ignored = suppression.of_state(state)
+    ignored = suppression.of_state(state, _callback_of(state))
     if isinstance(state, Container):
         return _of_container(state, ignored)
     return _of_leaf(state, record, ignored)
@@ -78,7 +79,7 @@ def _of_leaf(state: State, record: StateRecord, ignored: dict[str, str]) -> Fact
     code = _code_of(state)
     waits = tuple(_endless_waits(record, code.place if code else None))
     if code is None:
-        return Facts(waits=waits, made=_made(state), ignored=ignored)
+        return Facts(waits=waits, made=_made(state), reads=_used(state), ignored=ignored)
     is_own = not _is_ours(state)
     returns, undeclared = _outcomes(record, code)
     return Facts(
@@ -88,7 +89,8 @@ def _of_leaf(state: State, record: StateRecord, ignored: dict[str, str]) -> Fact
         undeclared=undeclared,
         reads=code.reads,
         waits=waits or code.waits,
-        loops=code.loops,
+        loops=code.loops if type(state).request_preempt is State.request_preempt else (),
+        is_function=isinstance(state, CBState),
         ignored=ignored,
     )
 
@@ -99,16 +101,41 @@ def _is_ours(state: State) -> bool:
 
 def _code_of(state: State) -> leaves.Code | None:
     """Return what is known of the user's code in a leaf."""
-    if isinstance(state, CBState) and type(state).execute is CBState.execute:
-        given: Any = state._cb  # noqa: SLF001  one house
-        callback = given._cb if isinstance(given, CBInterface) else given  # noqa: SLF001
-        if not inspect.isfunction(callback):
-            return None
+    callback = _callback_of(state)
+    if callback is not None:
         return leaves.look_at(callback, userdata=0, owner=None)
     execute = type(state).execute
     if execute.__module__.partition(".")[0] == "smachpy" or "execute" in vars(state):
         return None
     return leaves.look_at(execute, userdata=1, owner=type(state))
+
+
+def _callback_of(state: State) -> Callable[..., Any] | None:
+    """Return the function that a callback state calls, if it is a plain one."""
+    if isinstance(state, CBState) and type(state).execute is CBState.execute:
+        return _function(state._cb)  # noqa: SLF001  one house
+    return None
+
+
+def _function(given: Any) -> Callable[..., Any] | None:
+    callback = given._cb if isinstance(given, CBInterface) else given  # noqa: SLF001  one house
+    return callback if inspect.isfunction(callback) else None
+
+
+def _used(state: State) -> frozenset[str] | None:
+    """Return the keys that a state of this package certainly reads; None for other states."""
+    if not _is_ours(state):
+        return None
+    keys: set[str] = set()
+    callbacks = [getattr(state, "_cond_cb", None)]
+    for sent in (getattr(state, "_goal", None), getattr(state, "_request", None)):
+        if isinstance(sent, Outgoing):
+            keys |= {*sent.slots} if sent.key is None else {sent.key, *sent.slots}
+            callbacks.append(sent.callback.function)
+    for callback in map(_function, callbacks):
+        code = None if callback is None else leaves.look_at(callback, userdata=0, owner=None)
+        keys |= set((code.reads if code else None) or ())
+    return frozenset(keys)
 
 
 def _outcomes(
@@ -120,7 +147,7 @@ def _outcomes(
     undeclared = tuple(
         (outcome, place)
         for outcome, place in code.returns.items()
-        if outcome not in record.outcomes
+        if outcome not in record.outcomes and outcome != "preempted"  # the answer to a preempt
     )
     return frozenset(code.returns), undeclared
 

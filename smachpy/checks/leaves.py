@@ -13,7 +13,9 @@ import textwrap
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from smachpy.checks._core import syntax
 from smachpy.checks._core.model import Place
+from smachpy.checks._core.reads import keys_read
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -27,7 +29,10 @@ _WAITS = frozenset(
 # Number of positional arguments before the timeout.
 _BEFORE_TIMEOUT = {"wait_for_service": 1, "wait_for_message": 2}
 _FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
-_DELAYS = frozenset({"sleep", "join", "acquire"}) | _WAITS
+_DELAYS = frozenset({"sleep", "join"}) | _WAITS
+_SHORT_S = 1.0  # a loop that is over by then need not look at the preempt
+# Context managers that limit what is awaited inside: of asyncio, async_timeout, anyio and trio.
+_LIMITERS = frozenset({"timeout", "timeout_at", "fail_after", "fail_at", "move_on_after"})
 
 
 @dataclass(slots=True)
@@ -63,14 +68,14 @@ def look_at(function: Callable[..., Any], *, userdata: int, owner: type | None) 
     if parsed is None:
         return None
     tree, file = parsed
-    body = _Function(tree, file)
+    body = _Function(tree, file, function)
     names = [argument.arg for argument in (*tree.args.posonlyargs, *tree.args.args)]
     own = names[0] if owner is not None and names else None
     data = names[userdata] if len(names) > userdata else None
     return Code(
         body.place(tree),
         body.returns(),
-        None if data is None else body.reads(data),
+        None if data is None else keys_read(tree, data),
         tuple(body.waits(own)),
         tuple(body.loops(own, owner)),
     )
@@ -94,10 +99,16 @@ def _parse(function: Any) -> tuple[ast.FunctionDef | ast.AsyncFunctionDef, str] 
 class _Function:
     """One function's syntax tree."""
 
-    def __init__(self, tree: ast.FunctionDef | ast.AsyncFunctionDef, file: str) -> None:
+    def __init__(
+        self,
+        tree: ast.FunctionDef | ast.AsyncFunctionDef,
+        file: str,
+        function: Callable[..., Any],
+    ) -> None:
         self._tree = tree
         self._file = file
-        self._nodes = list(_own_nodes(tree))
+        self._function = function
+        self._nodes = list(syntax.own_nodes(tree))
 
     def place(self, node: ast.AST) -> Place:
         return Place(self._file, getattr(node, "lineno", self._tree.lineno))
@@ -121,94 +132,90 @@ class _Function:
 
     def _constants(self) -> dict[str, set[str] | None]:
         """Return the local names that only ever get known strings."""
-        found: dict[str, set[str] | None] = {}
+        # Functions inside may bind a name of this one.
+        elsewhere = (n for n in ast.walk(self._tree) if isinstance(n, ast.Nonlocal | ast.Global))
+        found: dict[str, set[str] | None] = {n: None for node in elsewhere for n in node.names}
+        found.update((argument, None) for argument in syntax.parameters(self._tree))
         for node in self._nodes:
-            for name, value in _bindings(node):
+            for name, value in syntax.bindings(node):
                 texts = None if value is None else _texts(value, {})
                 known = found.get(name, set())
                 found[name] = None if texts is None or known is None else known | texts
         return found
 
-    # -- userdata ------------------------------------------------------------------------------
-
-    def reads(self, name: str) -> frozenset[str] | None:
-        """Return the keys read from the userdata called `name`; None if it goes elsewhere."""
-        reads: set[str] = set()
-        asked: set[str] = set()
-        plain = 0
-        for node in ast.walk(self._tree):
-            if isinstance(node, ast.Name) and node.id == name:
-                plain += 1
-            key = _key_of(node, name)
-            if key is not None:
-                plain -= 1
-                if isinstance(getattr(node, "ctx", None), ast.Load):
-                    reads.add(key)
-            elif isinstance(node, ast.Compare) and _is_asked(node, name):
-                plain -= 1
-                asked.add(str(getattr(node.left, "value", "")))
-            elif isinstance(node, ast.AugAssign):
-                changed = _key_of(node.target, name)
-                reads |= set() if changed is None else {changed}
-        written_first = self._written_first(name)
-        return None if plain else frozenset(reads - asked - written_first)
-
-    def _written_first(self, name: str) -> set[str]:
-        """Return the keys that its first plain statements write before it reads anything."""
-        written: set[str] = set()
-        for statement in self._tree.body:
-            if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
-                continue
-            if not isinstance(statement, ast.Assign):
-                break
-            keys = {_key_of(target, name) for target in statement.targets}
-            read = {_key_of(node, name) for node in ast.walk(statement.value)} - {None}
-            if read - written:
-                break
-            written |= {key for key in keys if key is not None}
-        return written
-
     # -- waits and loops -----------------------------------------------------------------------
 
     def waits(self, own: str | None) -> Iterator[tuple[str, Place]]:
         """Yield calls that wait without a limit."""
+        limited = {id(node) for node in self._limited()}
+        awaited = {id(node.value) for node in self._nodes if isinstance(node, ast.Await)}
         for node in self._nodes:
-            if isinstance(node, ast.Call) and _is_endless_wait(node, own):
+            if not isinstance(node, ast.Call) or id(node) in limited:
+                continue
+            if isinstance(self._tree, ast.AsyncFunctionDef) and id(node) not in awaited:
+                continue  # a coroutine, for somebody who may have a limit
+            if _is_endless_wait(node, own):
                 yield f"`{ast.unparse(node)}`", self.place(node)
+
+    def _limited(self) -> Iterator[ast.AST]:
+        """Yield the nodes that something around them gives a limit to."""
+        for node in self._nodes:
+            if not (isinstance(node, ast.Call) and syntax.called(node) == "wait_for"):
+                continue
+            if syntax.has_limit(node, 1):
+                yield from ast.walk(node)
+        yield from syntax.inside_calls(self._nodes, _LIMITERS)
 
     def loops(self, own: str | None, owner: type | None) -> Iterator[tuple[str, Place]]:
         """Yield loops that take time and never look at the preempt."""
         for node in self._nodes:
             if not isinstance(node, ast.While | ast.For):
                 continue
-            inside = list(_own_nodes(node))
-            if _takes_time(node, inside) and not self._may_look(inside, own, owner):
+            if _takes_time(node) and not self._may_look(list(ast.walk(node)), own, owner):
                 kind = "while" if isinstance(node, ast.While) else "for"
                 yield f"the `{kind}` loop", self.place(node)
 
-    def _may_look(self, nodes: list[ast.AST], own: str | None, owner: type | None) -> bool:
-        if any(isinstance(n, ast.Await | ast.AsyncFor | ast.AsyncWith) for n in nodes):
-            return True  # a preempt cancels the task there
-        if any(isinstance(n, ast.Attribute) and n.attr in _LOOKS - {"sleep"} for n in nodes):
-            return True
-        if own is None:  # a function: the state is not at hand, unless something global is asked
+    def _may_look(self, loop: list[ast.AST], own: str | None, owner: type | None) -> bool:
+        """Tell whether the nodes of a loop may look at the preempt."""
+        whole = list(ast.walk(self._tree))
+        return (
+            # A preempt cancels the task there.
+            any(isinstance(n, ast.Await | ast.AsyncFor | ast.AsyncWith) for n in loop)
+            or any(map(_looks, loop))
+            # The state is at hand under another name, or handed to somebody.
+            or any(map(_asks_for_state, whole))
+            or (own is not None and _hands_on(whole, own))
+            or any(self._helper_may_look(n) for n in loop if isinstance(n, ast.Call))
+            or (own is not None and any(_own_method_looks(n, own, owner) for n in loop))
+        )
+
+    def _helper_may_look(self, call: ast.Call) -> bool:
+        """Tell whether a function that is called by its name may look at the preempt."""
+        if not isinstance(call.func, ast.Name):
             return False
-        for node in nodes:
-            if isinstance(node, ast.Name) and node.id == own and not _is_part(node, nodes):
-                return True  # the state is handed to somebody
-            if _is_own_call(node, own) and _method_looks(owner, node.func.attr):  # type: ignore[attr-defined]
-                return True
-        return False
+        name, code = call.func.id, self._function.__code__
+        if name in (*code.co_varnames, *code.co_cellvars):
+            return True  # any function
+        cells = dict(zip(code.co_freevars, self._function.__closure__ or (), strict=True))
+        try:
+            helper = cells[name].cell_contents if name in cells else None
+        except ValueError:
+            return True  # not bound yet
+        helper = helper or self._function.__globals__.get(name)
+        if not inspect.isfunction(helper):
+            return False
+        parsed = _parse(helper)
+        return parsed is None or any(_asks_for_state(n) or _looks(n) for n in ast.walk(parsed[0]))
 
 
-def _own_nodes(tree: ast.AST) -> Iterator[ast.AST]:
-    """Yield the nodes below `tree`, those of functions inside it left out."""
-    for child in ast.iter_child_nodes(tree):
-        yield child
-        if not isinstance(
-            child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef
-        ):
-            yield from _own_nodes(child)
+def _looks(node: ast.AST) -> bool:
+    """Tell whether it names what tells of a preempt; `sleep` may be anybody's."""
+    return isinstance(node, ast.Attribute) and node.attr in _LOOKS - {"sleep"}
+
+
+def _asks_for_state(node: ast.AST) -> bool:
+    """Tell whether it is `current_state`, with or without a module before it."""
+    return "current_state" in (getattr(node, "id", None), getattr(node, "attr", None))
 
 
 def _texts(node: ast.expr | None, constants: dict[str, set[str] | None]) -> set[str] | None:
@@ -223,104 +230,84 @@ def _texts(node: ast.expr | None, constants: dict[str, set[str] | None]) -> set[
     return None
 
 
-def _bindings(node: ast.AST) -> Iterator[tuple[str, ast.expr | None]]:
-    """Yield the names that a node binds, with the value if it is plain to see."""
-    if isinstance(node, ast.Assign):
-        for target in node.targets:
-            if isinstance(target, ast.Name):
-                yield target.id, node.value
-            else:
-                yield from ((n.id, None) for n in ast.walk(target) if isinstance(n, ast.Name))
-    elif isinstance(node, ast.AnnAssign | ast.NamedExpr) and isinstance(node.target, ast.Name):
-        yield node.target.id, node.value
-    elif isinstance(node, ast.AugAssign | ast.For | ast.comprehension):
-        yield from ((n.id, None) for n in ast.walk(node.target) if isinstance(n, ast.Name))
-    elif isinstance(node, ast.withitem) and node.optional_vars is not None:
-        yield from ((n.id, None) for n in ast.walk(node.optional_vars) if isinstance(n, ast.Name))
-    elif isinstance(node, ast.Global | ast.Nonlocal):
-        yield from ((name, None) for name in node.names)
-
-
-def _key_of(node: ast.AST, name: str) -> str | None:
-    """Return the key if `node` is `name.key` or `name["key"]`."""
-    value = getattr(node, "value", None)
-    if not (isinstance(value, ast.Name) and value.id == name):
-        return None
-    if isinstance(node, ast.Attribute) and node.attr not in {"keys", "update"}:
-        return node.attr
-    if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant):
-        return str(node.slice.value)
-    return None
-
-
-def _is_asked(node: ast.Compare, name: str) -> bool:
-    """Tell whether it is `"key" in name`."""
-    right = node.comparators[0]
-    return (
-        isinstance(node.left, ast.Constant)
-        and isinstance(node.ops[0], ast.In | ast.NotIn)
-        and isinstance(right, ast.Name)
-        and right.id == name
-    )
-
-
-def _called(node: ast.Call) -> str:
-    return str(getattr(node.func, "attr", None) or getattr(node.func, "id", ""))
-
-
 def _is_endless_wait(node: ast.Call, own: str | None) -> bool:
-    name = _called(node)
+    name = syntax.called(node)
     if name not in _WAITS or any(k.arg in {"timeout", None} for k in node.keywords):
         return False
-    if own is not None and _is_own_call(node, own):
+    if own is not None and _own_call(node, own) is not None:
         return False
     if any(isinstance(argument, ast.Starred) for argument in node.args):
         return False
     return len(node.args) <= _BEFORE_TIMEOUT.get(name, 0)
 
 
-def _is_own_call(node: ast.AST, own: str) -> bool:
-    return (
-        isinstance(node, ast.Call)
-        and isinstance(node.func, ast.Attribute)
-        and isinstance(node.func.value, ast.Name)
-        and node.func.value.id == own
-    )
+def _own_call(node: ast.AST, own: str) -> str | None:
+    """Return the name of the method if it is a call `own.method(...)`."""
+    if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)):
+        return None
+    value = node.func.value
+    return node.func.attr if isinstance(value, ast.Name) and value.id == own else None
 
 
-def _is_part(name: ast.Name, nodes: list[ast.AST]) -> bool:
-    """Tell whether a name only stands in front of a dot."""
-    return any(isinstance(n, ast.Attribute) and n.value is name for n in nodes)
+def _hands_on(nodes: list[ast.AST], own: str) -> bool:
+    """Tell whether the name `own` stands anywhere but in front of a dot."""
+    parts = {id(n.value) for n in nodes if isinstance(n, ast.Attribute)}
+    return any(isinstance(n, ast.Name) and n.id == own and id(n) not in parts for n in nodes)
 
 
-def _takes_time(loop: ast.While | ast.For, inside: list[ast.AST]) -> bool:
+def _takes_time(loop: ast.While | ast.For) -> bool:
+    inside = list(syntax.own_nodes(loop))
     if isinstance(loop, ast.While) and isinstance(loop.test, ast.Constant) and loop.test.value:
         leaves = (ast.Return, ast.Break, ast.Raise)
         if not any(isinstance(n, leaves) for n in inside):
             return True
-    return any(isinstance(n, ast.Call) and _called(n) in _DELAYS and _is_wait(n) for n in inside)
+    delays = [n for n in inside if isinstance(n, ast.Call) and _is_delay(n)]
+    if isinstance(loop, ast.For) and all(map(_seconds, delays)):
+        return sum(map(_seconds, delays)) * _passes(loop.iter) >= _SHORT_S
+    return bool(delays)
 
 
-def _is_wait(node: ast.Call) -> bool:
-    """Tell a wait from `", ".join(...)`."""
-    text = isinstance(node.func, ast.Attribute) and isinstance(node.func.value, ast.Constant)
-    return not text and not (_called(node) == "join" and len(node.args) == 1)
+def _is_delay(call: ast.Call) -> bool:
+    """Tell a wait, also for a thread's end, from `", ".join(...)` and `os.path.join(...)`."""
+    return syntax.called(call) in _DELAYS and not (syntax.called(call) == "join" and call.args)
 
 
-def _method_looks(owner: type | None, name: str) -> bool:
-    """Tell whether a method of the state may look at the preempt; unknown methods may."""
-    if name in _LOOKS:
-        return True
+def _seconds(delay: ast.Call) -> float:
+    """Return how long a delay is [s], 0 where that is not plain to see."""
+    value = delay.args[0] if len(delay.args) == 1 and syntax.called(delay) == "sleep" else None
+    number = value.value if isinstance(value, ast.Constant) else None
+    return float(number) if isinstance(number, int | float) else 0.0
+
+
+def _passes(items: ast.expr) -> int:
+    """Return how often a loop over `items` is run, 1 where that is not plain to see."""
+    if isinstance(items, ast.List | ast.Tuple):
+        return len(items.elts)
+    if isinstance(items, ast.Call) and syntax.called(items) == "range":
+        numbers = [n.value for n in items.args if isinstance(n, ast.Constant)]
+        whole = [n for n in numbers if isinstance(n, int)]
+        if len(whole) == len(items.args) and 0 not in whole[2:]:
+            return len(range(*whole))
+    return 1
+
+
+def _own_method_looks(node: ast.AST, own: str, owner: type | None) -> bool:
+    """Tell whether it calls a method of the state that may look at the preempt."""
+    name = _own_call(node, own)
+    if name is None or name in _LOOKS:
+        return name is not None
     method = getattr(owner, name, None)
     parsed = _parse(method) if inspect.isfunction(method) else None
     if parsed is None:
-        return True
+        return True  # nothing is known of it
     tree, _ = parsed
-    own = tree.args.args[0].arg if tree.args.args else ""
+    its_own = tree.args.args[0].arg if tree.args.args else ""
     nodes = list(ast.walk(tree))
-    if any(isinstance(n, ast.Attribute) and n.attr in _LOOKS for n in nodes):
-        return True
     # Methods that call further methods of the state are not followed.
-    return any(_is_own_call(n, own) for n in nodes) or any(
-        isinstance(n, ast.Name) and n.id == own and not _is_part(n, nodes) for n in nodes
+    return _hands_on(nodes, its_own) or any(
+        _looks(n)
+        or (isinstance(n, ast.Attribute) and n.attr == "sleep")
+        or _asks_for_state(n)
+        or _own_call(n, its_own) is not None
+        for n in nodes
     )

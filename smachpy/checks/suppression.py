@@ -15,6 +15,7 @@ from smachpy.checks._core.rules import RULES
 from smachpy.exceptions import SmachError, did_you_mean
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from smachpy.checks._core.model import Problem
@@ -62,21 +63,31 @@ def ignore(state: S, rule: str, reason: str) -> S:
     return state
 
 
-def of_state(state: State) -> dict[str, str]:
-    """Return rule -> reason for a state: what `ignore` said and the comments of its class."""
+def of_state(state: State, function: Callable[..., Any] | None) -> dict[str, str]:
+    """Return rule -> reason for a state: what `ignore` said, and the comments of its code.
+
+    Args:
+        state: The state.
+        function: The plain function that it calls, if it is made from one.
+    """
     kind: Any = type(state)
-    return {**_comments(kind), **getattr(state, ATTRIBUTE, {})}
+    called: Any = function
+    comments = _comments(kind) if called is None else {**_comments(kind), **_comments(called)}
+    return {**comments, **getattr(state, ATTRIBUTE, {})}
 
 
 @functools.lru_cache(maxsize=1024)
-def _comments(cls: Any) -> dict[str, str]:
-    if cls.__module__.partition(".")[0] == "smachpy":
+def _comments(code: Any) -> dict[str, str]:
+    """Return rule -> reason from the comments of a class or function."""
+    if code.__module__.partition(".")[0] == "smachpy":
         return {}
+    is_class = isinstance(code, type)
+    where = f"comment in {'class' if is_class else 'function'} {code.__name__}"
     found = {}
-    for match in map(_COMMENT.search, _lines(cls)):
+    for match in map(_COMMENT.search, _lines(code) if is_class else _lines_of(code)):
         if match is not None:
             for rule in match[1].split(","):
-                _check(f"comment in class {cls.__name__}", rule.strip(), match[2].strip())
+                _check(where, rule.strip(), match[2].strip())
                 found[rule.strip()] = match[2].strip()
     return found
 
@@ -86,10 +97,7 @@ def _lines(cls: type) -> list[str]:
     methods = [inspect.unwrap(m) for m in vars(cls).values() if inspect.isfunction(m)]
     lines: list[str] = []
     for method in methods:
-        try:
-            lines += inspect.getsourcelines(method)[0]
-        except (OSError, TypeError):
-            continue  # typed at a prompt: there are no comments to be seen
+        lines += _lines_of(method)
     if methods:
         first = min(methods, key=lambda m: m.__code__.co_firstlineno)
         above = linecache.getlines(first.__code__.co_filename)[: first.__code__.co_firstlineno - 1]
@@ -98,6 +106,13 @@ def _lines(cls: type) -> list[str]:
             if re.match(rf"\s*class\s+{cls.__name__}\b", line):
                 break
     return lines
+
+
+def _lines_of(function: Callable[..., Any]) -> list[str]:
+    try:
+        return inspect.getsourcelines(function)[0]
+    except (OSError, TypeError):
+        return []  # typed at a prompt: there are no comments to be seen
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,6 +47,7 @@ class Facts:
         reads: Keys that its code certainly reads.
         waits: Waits without a limit: what waits, and the line.
         loops: Loops that wait and never look at the preempt: what, and the line.
+        is_function: Its code is a plain function, which has no `self`.
         preset: Keys of the container's userdata that have a value before the run.
         outcome_rules: A concurrence's rules.
         any_outcome: The concurrence has an outcome callback.
@@ -63,6 +64,7 @@ class Facts:
     reads: frozenset[str] | None = None
     waits: tuple[tuple[str, Place], ...] = ()
     loops: tuple[tuple[str, Place], ...] = ()
+    is_function: bool = False
     preset: frozenset[str] = frozenset()
     outcome_rules: tuple[OutcomeRule, ...] = ()
     any_outcome: bool = False

@@ -85,13 +85,14 @@ def _leaf(subject: Subject, record: StateRecord) -> Iterator[Problem]:
             "Declare the outcome, or return another.",
             place,
         )
+    state = "smachpy.current_state()" if facts.is_function else "self"
     for what, place in facts.loops:
         yield Problem(
             "deaf-loop",
             "warning",
             record.path,
             f"{record.path}: {what} waits without looking at the preempt.",
-            "Test self.preempt_requested() in the loop, or wait with self.sleep(...).",
+            f"Test {state}.preempt_requested() in the loop, or wait with {state}.sleep(...).",
             place,
         )
 
@@ -157,7 +158,8 @@ def _endless(graph: Graph, stuck: list[Node]) -> Iterator[Problem]:
 
 def _concurrence(subject: Subject, record: StateRecord) -> Iterator[Problem]:
     facts = subject.facts_of(record)
-    combined = runs.combinations(record, subject) or []
+    # A callback may decide before the rules are asked.
+    combined = [] if facts.any_outcome else runs.combinations(record, subject) or []
     told: set[frozenset[str]] = set()
     for outcomes in combined:
         holding = [rule for rule in facts.outcome_rules if rule.holds(outcomes)]
@@ -195,10 +197,9 @@ def _never_ending(subject: Subject, record: StateRecord) -> Iterator[Problem]:
 
 
 def _preempts(subject: Subject, record: StateRecord) -> Iterator[Problem]:
-    """A preempt that the container passes on as something else."""
-    nested = record.path != subject.root.path
-    if not nested and PREEMPTED not in record.outcomes:
-        return  # the machine as a whole knows no 'preempted': it has no better outcome
+    """A preempt that the container passes on to the one around it as something else."""
+    if record.path == subject.root.path:
+        return  # nothing is around it that could go on
     for child, outcome in _preempt_ends(subject, record):
         if outcome != PREEMPTED:
             yield _problem(

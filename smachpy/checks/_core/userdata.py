@@ -92,9 +92,9 @@ class _Flow:
     # -- rules ---------------------------------------------------------------------------------
 
     def _reads(self, record: StateRecord) -> list[str]:
-        """Return the keys that a leaf reads."""
-        known = self._subject.facts_of(record).reads
-        return [key for key in record.input_keys if known is None or key in known]
+        """Return the keys that a leaf certainly reads; none when its code is not known."""
+        known = self._subject.facts_of(record).reads or ()
+        return [key for key in record.input_keys if key in known]
 
     def unset(self) -> Iterator[Problem]:
         told: set[tuple[str, str]] = set()

@@ -48,6 +48,17 @@ class Leaf(State):
         return self.next
 
 
+class Reads(State):
+    """Reads those of these keys that it declares."""
+
+    def __init__(self, *keys, output_keys=()):
+        super().__init__(["done"], keys, output_keys)
+
+    def execute(self, ud):
+        self.all = ud.a, ud["b"], ud.c, ud.goal, ud.i, ud.n, ud.pose
+        return "done"
+
+
 def machine(*children, outcomes=("done",), **kwargs):
     sm = StateMachine(outcomes, name="M", **kwargs)
     with sm.opened(check=False):
@@ -182,7 +193,7 @@ def test_a_key_read_on_some_path_before_anyone_writes_it():
     sm = machine(
         ("LOOK", Leaf("found", "blind"), {"found": "FIND", "blind": "USE"}),
         ("FIND", Leaf(output_keys=["pose"]), {"done": "USE"}),
-        ("USE", Leaf(input_keys=["goal"]), {}, {"goal": "pose"}),
+        ("USE", Reads("goal"), {}, {"goal": "pose"}),
     )
     problem = the(check(sm), "unset-key")
     assert problem.path == "/M/USE"
@@ -192,13 +203,13 @@ def test_a_key_read_on_some_path_before_anyone_writes_it():
 
 def test_keys_set_beforehand_given_by_the_caller_or_by_containers_are_written():
     inner = machine(
-        ("READ", Leaf(input_keys=["a", "b"], output_keys=["c"]), {}),
+        ("READ", Reads("a", "b", output_keys=["c"]), {}),
         input_keys=["a", "b"],
         output_keys=["c"],
     )
     sm = machine(
         ("IN", inner, {"done": "OUT"}),
-        ("OUT", Leaf(input_keys=["c"]), {}),
+        ("OUT", Reads("c"), {}),
         input_keys=["b"],
     )
     sm.userdata.a = 1
@@ -227,7 +238,8 @@ def test_a_declared_key_that_the_code_asks_for_first_or_never_reads_is_no_proble
 
 
 def test_keys_that_a_callback_may_write_are_not_known():
-    sm = machine(("A", Leaf(input_keys=["pose"]), {}))
+    sm = machine(("A", Reads("pose"), {}))
+    assert not check(sm).ok
     sm.register_start_cb(lambda ud, initial: ud.update({"pose": 1}))
     assert check(sm).ok
 
@@ -253,7 +265,7 @@ def test_a_decorated_execute_is_not_known():
 def test_a_key_written_in_one_branch_and_read_in_another_is_a_race():
     both = Concurrence(["done"], "done")
     with both:
-        both.add("READ", Leaf(input_keys=["pose"]))
+        both.add("READ", Reads("pose"))
         both.add("FIND", Leaf(output_keys=["pose"]))
     problem = the(check(machine(("BOTH", both, {}))), "unset-key")
     assert problem.path == "/M/BOTH/READ"
@@ -266,16 +278,14 @@ def test_a_rule_of_a_concurrence_says_which_child_wrote():
     with both:
         both.add("FIND", Leaf("done", "failed", output_keys=["pose"]))
         both.add("WATCH", Leaf())
-    sm = machine(
-        ("BOTH", both, {"found": "USE", "lost": "done"}), ("USE", Leaf(input_keys=["pose"]), {})
-    )
+    sm = machine(("BOTH", both, {"found": "USE", "lost": "done"}), ("USE", Reads("pose"), {}))
     assert check(sm).ok
 
 
 def test_the_item_of_an_iterator_is_written():
     each = Iterator(["done"], [], [], it=range(3), it_label="i", exhausted_outcome="done")
     with each:
-        Iterator.set_contained_state("DO", Leaf(input_keys=["i"]))
+        Iterator.set_contained_state("DO", Reads("i"))
     assert check(machine(("EACH", each, {}))).ok
 
 
