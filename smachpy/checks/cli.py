@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from smachpy.checks import check
 from smachpy.checks.report import FORMATS
 from smachpy.checks.suppression import read_settings
+from smachpy.exceptions import did_you_mean
 from smachpy.targets import load_target
 
 if TYPE_CHECKING:
@@ -41,10 +43,22 @@ def run(args: argparse.Namespace) -> int:
     settings = read_settings(Path.cwd())
     reports = [_check(text, args, settings) for text in args.targets]
     print(FORMATS[args.format](reports))
+    _tell_unused(settings, [report.record.path[1:] for report in reports])
     if args.pictures:
         for report in reports:
             report.draw(args.pictures)
     return 0 if all(report.ok for report in reports) else 1
+
+
+def _tell_unused(settings: Settings, checked: list[str]) -> None:
+    """Say which properties of pyproject.toml no machine had: other machines', or a wrong name."""
+    for name, _ in settings.properties:
+        if name not in checked:
+            print(
+                f"smachpy: pyproject.toml: properties of {name!r} were not looked at; checked "
+                f"{', '.join(checked)}.{did_you_mean(name, checked)}",
+                file=sys.stderr,
+            )
 
 
 def _check(text: str, args: argparse.Namespace, settings: Settings) -> Report:

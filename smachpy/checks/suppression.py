@@ -15,7 +15,7 @@ from smachpy.checks._core.rules import RULES
 from smachpy.exceptions import SmachError, did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     from smachpy.checks._core.model import Problem
@@ -156,10 +156,22 @@ def _settings(file: Path, table: dict[str, Any]) -> Settings:
             )
         _check(f"{where}: ignore[{i}]", str(entry.get("rule", "")), str(entry.get("reason", "")))
         ignores.append(Ignore(entry["rule"], entry["reason"], entry.get("path", "*")))
-    properties = tuple(
-        (name, tuple(texts)) for name, texts in dict(table.get("properties", {})).items()
-    )
-    return Settings(tuple(ignores), properties)
+    return Settings(tuple(ignores), tuple(_properties(where, table.get("properties", {}))))
+
+
+def _properties(where: str, given: Any) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield the properties of each machine."""
+    if not isinstance(given, dict):
+        raise IgnoreError(
+            f"{where}: properties: got {given!r}; expected a table of machines' names."
+        )
+    for name, texts in given.items():
+        if not isinstance(texts, list) or not all(isinstance(text, str) for text in texts):
+            hint = f" Try [{texts!r}]." if isinstance(texts, str) else ""
+            raise IgnoreError(
+                f"{where}: properties: {name}: got {texts!r}; expected a list of texts.{hint}"
+            )
+        yield name, tuple(texts)
 
 
 def _check(where: str, rule: str, reason: str) -> None:

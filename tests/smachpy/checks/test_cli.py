@@ -56,12 +56,32 @@ def test_pyproject_switches_off_with_a_reason_and_adds_properties(folder, capsys
         ('ignore = [{rule = "unreachable-stat", reason = "x"}]', "unreachable-state"),
         ("ignore = [1]", "table"),
         ("ignored = []", "'ignored'"),
+        ('properties = "never(B)"', "properties: got 'never(B)'; expected a table"),
+        ('properties = {M = "never(B)"}', "M: got 'never(B)'; expected a list of texts. Try ['ne"),
+        ("properties = {M = [1]}", "M: got [1]; expected a list of texts"),
     ],
 )
 def test_a_pyproject_that_makes_no_sense(folder, capsys, text, said):
     (folder / "pyproject.toml").write_text(f"[tool.smachpy.check]\n{text}\n")
     assert main(["check", "m.py"]) == 2
     assert said in capsys.readouterr().err
+
+
+def test_properties_of_a_machine_that_is_not_checked_are_named(folder, capsys):
+    (folder / "pyproject.toml").write_text(
+        """
+        [tool.smachpy.check]
+        ignore = [
+            {rule = "unreachable-state", reason = "an operator sends it there"},
+            {rule = "impossible-outcome", reason = "as above"},
+        ]
+        properties = {MM = ["never(A)"]}
+        """
+    )
+    assert main(["check", "m.py", "--format", "json"]) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out)[0]["problems"] == []
+    assert "properties of 'MM' were not looked at; checked M. Did you mean 'M'?" in err
 
 
 def test_pictures(folder, capsys):
