@@ -13,6 +13,10 @@ from smachpy.testing.runs import find_path
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
+    from typing import TypeAlias
+
+    # Name of a state, what makes its double, and the list that gets it.
+    Replacement: TypeAlias = tuple[str, Callable[[Any], "Double"], list["Double"]]
 
 
 class DoubleError(SmachError):
@@ -85,6 +89,15 @@ class Double(State):
         for key, value in self._writes.items():
             ud[key] = value
         return self._script[0] if len(self._script) == 1 else self._script.popleft()
+
+    @property
+    def script(self) -> tuple[str, ...]:
+        """What it returns from here on; set it to begin again."""
+        return tuple(self._script)
+
+    @script.setter
+    def script(self, outcomes: Iterable[str]) -> None:
+        self._script = deque(outcomes)
 
     def describe_details(self) -> Any:
         """Return those of the state it stands for."""

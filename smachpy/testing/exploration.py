@@ -6,20 +6,21 @@ import contextlib
 import copy
 import inspect
 import logging
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core.clock import Deadlock, RealClock, VirtualClock
+from actionlib_core.clock import RealClock, VirtualClock
 from smachpy.container import Container
-from smachpy.events import Abandoned, Finished, PreemptRequested
 from smachpy.exceptions import SmachError
 from smachpy.introspection import describe
 from smachpy.testing._core.search import Choice, Search
 from smachpy.testing._core.values import Snapshot
 from smachpy.testing.action_choices import serve_actions
-from smachpy.testing.doubles import Places
+from smachpy.testing.doubles import Double, Places
 from smachpy.testing.explorers import Explorer, Options, kept_by
-from smachpy.testing.kit import MissionKit, TimeLimitError
+from smachpy.testing.kit import MissionKit
+from smachpy.testing.runs import find_path
+from smachpy.testing.verdicts import judge
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -27,7 +28,9 @@ if TYPE_CHECKING:
     from typing import Self
 
     from smachpy.testing.action_servers import ScriptedActionServer
+    from smachpy.testing.doubles import Replacement
     from smachpy.testing.runs import Run
+    from smachpy.testing.verdicts import Verdict
 
 LIMIT_S = 3600.0
 _COMPUTER = RealClock()  # for the time of the computer: `time` is a mission's while it runs
@@ -112,11 +115,14 @@ def explore(
     userdata: Mapping[str, Any] | None = None,
     folder: Callable[[], Path] | None = None,
     on_run: Callable[[Run], object] | None = None,
+    doubles: Iterable[Replacement] = (),
 ) -> Exploration:
     """Run a mission over every leaf outcome, preempt point, fault and interleaving.
 
     Every leaf is stood in for by a double that takes one second and ends with each of its outcomes
-    in turn. Runs with few unusual choices come first. Without invariants of your own, situations
+    in turn. Of those that run at once, each may be the next to end: it outlasts the others then.
+    Other times are not varied: those of what is kept, of retries' pauses, of scripted servers.
+    Runs with few unusual choices come first. Without invariants of your own, situations
     that are equal (active states, outcomes, items, userdata, tasks that can go on) are entered
     once, which makes machines with loops finite; what states keep elsewhere is not seen. An own
     invariant may look at the whole past, so then every sequence of choices is a case of its own.
@@ -130,23 +136,30 @@ def explore(
         max_time: Longest time [s of the computer].
         max_depth: Choices of a run after this many are not varied.
         max_steps: Leaves in a run; with more it counts as one that never ends.
-        invariants: Called with each run; false or an AssertionError is a counterexample.
-        faults: "hang": any leaf may never finish; "raise": may raise; "deaf": may ignore a preempt.
-            Leaves with a timeout, and watchers beside others, hang anyway.
+        invariants: Called with each run. Anything false but None, or an exception, is a
+            counterexample.
+        faults: "hang": any leaf may never finish; "raise": may raise, a RuntimeError and whatever
+            `on_exception` and `retry` of it and of its containers name; "deaf": may ignore a
+            preempt. Leaves with a timeout, and watchers beside others, hang anyway.
         preempts: Preempts per run, at most.
-        interleavings: Whether to vary who goes on first.
+        interleavings: Whether to vary who goes on first, and who outlasts whom.
         grace: Longest time from a preempt to the end [s].
-        keep: Leaves (paths or ends of paths) that stay as they are.
-        writes: Leaf (path) -> userdata that its double writes.
+        keep: Leaves, or containers with all leaves in them, that stay as they are; a name may mean
+            several. A preempt comes as soon as such a leaf waits.
+        writes: Leaf -> userdata that its double writes.
         real_actions: Only services, monitors and conditions are stood in for. Scripted servers do
             to each goal all that servers do: succeed, abort, reject, accept late, die, come back,
             lose the result, deliver twice, ignore a cancel; preempts come while one works.
         userdata: Put into the machine's userdata before each run.
         folder: Gives the folder for the picture.
         on_run: Called with each run, for coverage.
+        doubles: Those of the test, from `mission.replace`; kept as they are, from the beginning of
+            their scripts in each run.
 
     Raises:
         ValueError: there is no such fault.
+        UnknownStateError: `keep` or `writes` names a state that the machine does not have, or
+            `writes` one of several.
     """
     unknown = sorted(set(faults) - FAULTS)
     if unknown:
@@ -157,11 +170,13 @@ def explore(
     )
     begun = _COMPUTER.now()
     search = Search(max_depth)
-    with _Runner(machine, options, tuple(keep), userdata, real_actions=real_actions) as runner:
-        judge = _Judge(runner, own, grace)
+    with _Runner(
+        machine, options, tuple(keep), userdata, doubles, real_actions=real_actions
+    ) as runner:
+        shrinker = _Shrinker(runner, own, grace)
         runs = 0
         stopped_by = ""
-        found: tuple[str, Run] | None = None
+        found: tuple[Verdict, Run] | None = None
         while found is None and (told := search.next()) is not None:
             if runs >= max_runs or _COMPUTER.now() - begun > max_time:
                 stopped_by = "max_runs" if runs >= max_runs else "max_time"
@@ -170,12 +185,12 @@ def explore(
             runs += 1
             if on_run is not None:
                 on_run(run)
-            reason = judge.reason(run, error)
-            if reason is not None:
-                found = (reason, run)
+            verdict = shrinker.verdict(run, error)
+            if verdict is not None:
+                found = (verdict, run)
             else:
                 search.took(told, runner.explorer.choices)
-        example = None if found is None else judge.shrink(*found)
+        example = None if found is None else shrinker.shrink(*found)
     stopped_by = "counterexample" if example else stopped_by or ("max_depth" * search.is_cut)
     if example is not None:
         example = _drawn(example, folder)
@@ -195,6 +210,7 @@ def replay(
     writes: Mapping[str, Mapping[str, Any]] | None = None,
     real_actions: bool = False,
     userdata: Mapping[str, Any] | None = None,
+    doubles: Iterable[Replacement] = (),
 ) -> Run:
     """Repeat a run of `explore`.
 
@@ -209,13 +225,16 @@ def replay(
         writes: See there.
         real_actions: See there.
         userdata: See there.
+        doubles: See there.
 
     Raises:
         ReplayError: the machine has changed.
         Exception: what the run raised.
     """
     options = Options(frozenset(faults), preempts, interleavings, max_steps, dict(writes or {}))
-    with _Runner(machine, options, tuple(keep), userdata, real_actions=real_actions) as runner:
+    with _Runner(
+        machine, options, tuple(keep), userdata, doubles, real_actions=real_actions
+    ) as runner:
         run, error = runner.run(choices)
     if error is not None:
         raise error
@@ -231,6 +250,7 @@ class _Runner:
         options: Options,
         keep: tuple[str, ...],
         userdata: Mapping[str, Any] | None,
+        doubles: Iterable[Replacement] = (),
         *,
         real_actions: bool,
     ) -> None:
@@ -238,11 +258,13 @@ class _Runner:
         self.options = options
         self.keep = keep
         self.userdata = dict(userdata or {})
+        self.doubles = tuple(doubles)
         self.real_actions = real_actions
         self._places = Places()
         self._machine: Container | None = None
         self.goals_left: list[str] = []
         self._snapshot: list[tuple[Container, Snapshot]] = []
+        self._scripts: list[tuple[Double, tuple[str, ...]]] = []
         self._around = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
@@ -257,27 +279,45 @@ class _Runner:
 
     def __exit__(self, *_: object) -> None:
         self._around.close()
+        self._restore()
         self._places.restore()
-        self._restore_userdata()
 
     def _prepare(self) -> None:
         """Make the machine, and put doubles into it."""
         source = self.source
+        self._places.restore()  # and forget the machine before
         machine = source if isinstance(source, Container) else source()
         self._machine = machine
-        self.explorer = Explorer(machine, self.options)
+        for path, make, made in self.doubles:
+            made[:] = [self._places.put(machine, path, make)]  # type: ignore[list-item]
+        record = describe(machine)
+        writes = {find_path(record, leaf): data for leaf, data in self.options.writes.items()}
+        self.explorer = Explorer(machine, self.options._replace(writes=writes))
         self._snapshot = [
             (container, Snapshot(dict(container.userdata._data)))  # noqa: SLF001  one house
             for container in _containers(machine)
         ]
-        named = kept_by(self.keep)
+        self._scripts = [
+            (state, state.script)
+            for container in _containers(machine)
+            for state in container.get_children().values()
+            if isinstance(state, Double)
+        ]
+        named = kept_by(record, self.keep)
 
         def kept(path: str, state: Any) -> bool:
-            return named(path, state) or (self.real_actions and state.kind not in _OUTSIDE)
+            if path in named or isinstance(state, Double):
+                return True
+            return self.real_actions and state.kind not in _OUTSIDE
 
-        self.explorer.stand_in(self._places, machine, describe(machine).path, kept)
+        self.explorer.stand_in(self._places, machine, record.path, kept)
+        if self.real_actions:
+            self.explorer.served.update(s.path for s in record.walk() if s.kind == "action")
 
-    def _restore_userdata(self) -> None:
+    def _restore(self) -> None:
+        """Put the machine's userdata and the test's doubles back to the beginning."""
+        for double, script in self._scripts:
+            double.script = script
         for container, data in self._snapshot:
             container.userdata._data.clear()  # noqa: SLF001  one house
             container.userdata._data.update(data.copy())  # noqa: SLF001
@@ -286,10 +326,11 @@ class _Runner:
         """Run once; what it raised comes back with the run."""
         machine = self._machine
         if not isinstance(self.source, Container) and self.explorer.choices:
+            self._restore()  # of a function that gives the same machine each time
             self._prepare()  # a new machine for each run
             machine = self._machine
         assert machine is not None
-        self._restore_userdata()
+        self._restore()
         self.explorer.begin(told)
         runs: list[Run] = []
         unsubscribe = machine.subscribe(self.explorer.on_event)
@@ -297,7 +338,7 @@ class _Runner:
         # A kit for each run: what still waits in one must not reach into the next.
         with MissionKit(choose=self.explorer.turn, on_run=runs.append) as kit:
             kit.draws = False
-            self.explorer.now = kit.clock.now
+            self.explorer.clock = kit.clock
             servers: list[ScriptedActionServer] = []
             if self.real_actions:
                 servers = serve_actions(kit, machine, self.explorer)
@@ -307,6 +348,7 @@ class _Runner:
                 error = caught
             finally:
                 unsubscribe()
+                self.explorer.end()
             self.goals_left = [goal for server in servers for goal in server.left]
         if self.explorer.mismatch:
             raise ReplayError(self.explorer.mismatch) from error
@@ -331,51 +373,28 @@ def _containers(container: Container) -> Iterator[Container]:
             yield from _containers(child)
 
 
-@dataclass(slots=True)
-class _Judge:
+@dataclass(frozen=True, slots=True)
+class _Shrinker:
     """Tells good runs from bad ones, and finds the shortest bad one."""
 
     runner: _Runner
     own: tuple[Callable[[Run], object], ...]
     grace: float
-    kind: str = field(default="", init=False)
 
-    def reason(self, run: Run, error: Exception | None) -> str | None:
-        """Return what is wrong with a run."""
-        if isinstance(error, Deadlock | TimeLimitError) or self.runner.explorer.too_long:
-            return f"it never ends{f': {error}' if error is not None else ''}"
-        if error is not None:
-            kind = "" if isinstance(error, SmachError) else f"{type(error).__name__}: "
-            return f"it raises: {kind}{error}"
-        asked = [event.t for event in run.events if isinstance(event, PreemptRequested)]
-        ended = [event.t for event in run.events if isinstance(event, Finished)]
-        left = [event.path for event in run.events if isinstance(event, Abandoned)]
-        root = run.record.path
-        first = [e.t for e in run.events if isinstance(e, PreemptRequested) and e.path == root]
-        if asked and first and ended and (left or ended[-1] - first[0] > self.grace):
-            took = ended[-1] - first[0]
-            who = f", {', '.join(left)} ignored it" if left else ""
-            return f"a preempt takes {took:g} s{who}; expected at most {self.grace:g} s"
-        running = dict.fromkeys([*run.goals_left, *self.runner.goals_left])
-        if running:
-            return f"goals are left running: {', '.join(running)}"
-        return self._own_reason(run)
+    def verdict(self, run: Run, error: Exception | None) -> Verdict | None:
+        """Return what is wrong with the runner's last run."""
+        return judge(
+            run,
+            error,
+            self.runner.explorer,
+            grace=self.grace,
+            goals_left=self.runner.goals_left,
+            invariants=self.own,
+        )
 
-    def _own_reason(self, run: Run) -> str | None:
-        for invariant in self.own:
-            name = getattr(invariant, "__name__", repr(invariant))
-            try:
-                kept = invariant(run)
-            except AssertionError as error:
-                return f"invariant {name}: {error}"
-            if kept is False:
-                return f"invariant {name} does not hold"
-        return None
-
-    def shrink(self, reason: str, run: Run) -> Counterexample:
+    def shrink(self, verdict: Verdict, run: Run) -> Counterexample:
         """Return the shortest run that can be found that is wrong in the same way."""
-        kind = reason[:12]
-        best = run, reason, list(self.runner.explorer.choices)
+        best = run, verdict, list(self.runner.explorer.choices)
         tries = 0
         better = True
         while better and tries < SHRINKING_RUNS:
@@ -388,13 +407,15 @@ class _Judge:
                     found, error = self.runner.run(told)
                 except ReplayError:
                     continue  # there is no such run
-                why = self.reason(found, error)
+                why = self.verdict(found, error)
                 choices = list(self.runner.explorer.choices)
-                if why is None or why[:12] != kind or _size(found, choices) >= _size(run, best[2]):
+                if why is None or why.kind != verdict.kind:
+                    continue
+                if _size(found, choices) >= _size(run, best[2]):
                     continue
                 run, best, better = found, (found, why, choices), True
                 break
-        run, reason, choices = best
+        run, (_, reason), choices = best
         texts = tuple(str(choice) for choice in _without_usual_end(choices))
         return Counterexample(reason, run, texts, _script(self.runner, texts, reason))
 
@@ -427,6 +448,10 @@ def _script(runner: _Runner, choices: tuple[str, ...], reason: str) -> str:
         make = f"from {source.__module__} import {source.__name__} as machine"
     else:
         make = "machine = ...  # the machine, or a function that makes it"
+    call, note = "replay", "from smachpy.testing import replay\n"
+    if runner.doubles:
+        names = ", ".join(path for path, _, _ in runner.doubles)
+        call, note = "mission.replay", f"# in the test, after its mission.replace(...) of {names}\n"
     options = runner.options
     arguments = [
         f"faults={sorted(options.faults)!r}" if options.faults else "",
@@ -442,8 +467,8 @@ def _script(runner: _Runner, choices: tuple[str, ...], reason: str) -> str:
     listed = "".join(f"        {choice!r},\n" for choice in choices)
     first = reason.splitlines()[0]
     return (
-        f"# {first}\nfrom smachpy.testing import replay\n\n{make}\n\n"
-        f"run = replay(\n    machine,\n    [\n{listed}    ],\n{extra})\nprint(run.explain())\n"
+        f"# {first}\n{note}\n{make}\n\n"
+        f"run = {call}(\n    machine,\n    [\n{listed}    ],\n{extra})\nprint(run.explain())\n"
     )
 
 

@@ -2,32 +2,42 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from smachpy._runtime.asker import asking
 from smachpy.container import Container
-from smachpy.events import Entered, Iterated, Left
+from smachpy.events import Entered, Failed, Iterated, Left
 from smachpy.introspection import describe
 from smachpy.testing._core.search import Choice
 from smachpy.testing._core.values import Values
 from smachpy.testing.doubles import Double, Places
+from smachpy.testing.runs import find_path
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+    from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 
+    from actionlib_core.clock import Timer, VirtualClock
     from smachpy.events import Event
+    from smachpy.introspection import StateRecord
     from smachpy.state import State
 
 PREEMPTED = "preempted"
-STEP_S = 1.0  # how long a stand-in takes
+STEP_S = 1.0  # how long a stand-in takes, unless it outlasts others
+WITHIN = 0.9  # of what is left of its timeout: how long one goes on to outlast others
 TURN = "turn"
 
 PREEMPT = "is preempted"
 HANGS = "never finishes"
 RAISES = "raises"
 DEAF = "ignores a preempt"
+RAISED = "raised by the test"
 LATE = "{} as a preempt comes"
+OUTLASTS = "outlasts the others"
+RAISES_ONE = "raises {}"
+STAYS = "is left alone"
+ASKED = "runs as a preempt comes"
 
 
 class Options(NamedTuple):
@@ -36,7 +46,8 @@ class Options(NamedTuple):
     Attributes:
         faults: Of "hang", "raise", "deaf".
         preempts: Preempts per run, at most.
-        interleavings: Whether the order of tasks that can go on is chosen.
+        interleavings: Whether the order of tasks that can go on is chosen, and which of the
+            leaves that run at once ends next.
         most_steps: Leaves per run, at most.
         writes: Path of a leaf -> userdata that it writes.
         merges: Whether situations are compared.
@@ -58,7 +69,9 @@ class Explorer:
         options: What is explored.
 
     Attributes:
-        now: Time on the run's clock [s]; set for each run.
+        clock: The run's clock; set for each run.
+        doubles: Paths of the leaves that are stood in for.
+        served: Paths of those whose servers choose when a preempt comes.
         choices: What was chosen in the run, in order.
         too_long: It had too many leaves.
         mismatch: Why it could not go on as told.
@@ -72,9 +85,16 @@ class Explorer:
         self._timeless = {
             s.path for s in record.walk() if s.is_container and "timeout" not in dict(s.details)
         }
+        self._leaves = {s.path for s in record.walk() if not s.is_container}
+        self._raised = dict(_raised_in(root, record.path))
         self._root_path = record.path
         self._options = options
-        self.now: Callable[[], float] = float
+        # Longer than all the leaves of a run one after the other.
+        self._long_s = (options.most_steps + 1) * STEP_S
+        self.clock: VirtualClock | None = None
+        self.doubles: set[str] = set()
+        self.served: set[str] = set()
+        self._bounded: set[str] = set()
         self._told: Sequence[int | str] = ()
         self._values = Values()
         self.begin(())
@@ -93,6 +113,26 @@ class Explorer:
         self._items: dict[str, int] = {}
         self._attempts: dict[str, int] = {}
         self._hanging: set[str] = set()
+        self._outlasting: set[str] = set()  # since a leaf ended last
+        self._outlasted: list[tuple[float, float]] = []
+        self._asked: Timer | None = None
+
+    def end(self) -> None:
+        """Call off what the run that has ended left behind."""
+        if self._asked is not None:
+            self._asked.cancel()
+
+    def now(self) -> float:
+        """Return the time on the run's clock [s]."""
+        return 0.0 if self.clock is None else self.clock.now()
+
+    def outlasted_s(self, since: float) -> float:
+        """Return for how long, from `since` on, leaves ran only to outlast others [s]."""
+        total = 0.0
+        for begin, end in sorted(self._outlasted):
+            total += max(0.0, end - max(begin, since))
+            since = max(since, end)
+        return total
 
     def choose(self, where: str, options: Sequence[str], situation: Hashable = None) -> int:
         """Choose, as told or the first, and note it."""
@@ -129,12 +169,26 @@ class Explorer:
             inside = event.path + "/"
             for path in [path for path in self._ended if path.startswith(inside)]:
                 del self._ended[path]
-        elif isinstance(event, Left):
+            if event.path in self._leaves:
+                self._begins(event.path)
+        elif isinstance(event, Left | Failed):
             self._active.pop(event.path, None)
-            self._ended[event.path] = event.outcome
             self._hanging.discard(event.path)
+            if isinstance(event, Left):
+                self._ended[event.path] = event.outcome
+            if event.path in self._leaves:
+                self._outlasting.clear()  # another one may be the next to end
         elif isinstance(event, Iterated):
             self._items[event.path] = event[3]  # tuples have an `index` of their own
+
+    def _begins(self, path: str) -> None:
+        """Choose whether a preempt comes while a leaf that is kept runs."""
+        if path in self.doubles or path in self.served or not self._preempts:
+            return
+        if self.choose(path, (STAYS, ASKED), self._situation((path, ASKED))):
+            self.count_preempt()
+            assert self.clock is not None
+            self._asked = self.clock.call_later(0.0, self.preempt)  # as soon as it waits
 
     def _situation(self, about: Hashable) -> Hashable:
         """Return what the rest of the run depends on."""
@@ -142,9 +196,8 @@ class Explorer:
             return None
         now = self.now()
         running = {self._root_path, *self._active}
-        ageless = self._timeless | self._hanging
         active = (
-            (path, -1.0 if path in ageless else round(now - t, 6), self._attempts.get(path, 0))
+            (path, self._age(path, now - t), self._attempts.get(path, 0))
             for path, t in self._active.items()
         )
         return (
@@ -152,6 +205,7 @@ class Explorer:
             self._preempts,
             tuple(sorted(active)),
             tuple(sorted(self._hanging)),
+            tuple(sorted(self._outlasting)),
             tuple(
                 sorted(
                     (path, outcome)
@@ -162,6 +216,14 @@ class Explorer:
             tuple(sorted((p, i) for p, i in self._items.items() if p in running)),
             _userdata(self._root, self._values),
         )
+
+    def _age(self, path: str, age: float) -> float:
+        """Return what an active state's age [s] means to the rest of the run, if anything."""
+        if path in self._timeless or path in self._hanging:
+            return -1.0
+        if age > STEP_S and path in self.doubles - self._bounded:
+            return math.inf  # it outlasts others, however long that takes
+        return round(age, 6)
 
     @property
     def may_preempt(self) -> bool:
@@ -188,6 +250,9 @@ class Explorer:
             if isinstance(state, Container):
                 self.stand_in(places, state, where, kept)
             elif not kept(where, state):
+                self.doubles.add(where)
+                if state.timeout is not None or state.retry is not None:
+                    self._bounded.add(where)
                 places.exchange(container, label, partial(self._double, path=where))
 
     def _double(self, state: State, path: str) -> Double:
@@ -205,19 +270,59 @@ class Explorer:
             self.too_long = True
             self._root.request_preempt()
             return PREEMPTED if PREEMPTED in outcomes else outcomes[0]
-        if double.sleep(STEP_S) and PREEMPTED in outcomes:
-            double.service_preempt()
-            return PREEMPTED
-        picked = self._pick(double, path, outcomes)
+        self._visits[path] = self._visits.get(path, -1) + 1
+        begun = self.now()
+        seconds, picked = STEP_S, OUTLASTS
+        while picked == OUTLASTS:
+            if self._pass(double, seconds) and PREEMPTED in outcomes:
+                double.service_preempt()
+                return PREEMPTED
+            seconds = self._longer_s(double, path, begun)
+            picked = self._pick(double, path, outcomes, may_outlast=seconds > 0)
+            if picked == OUTLASTS:
+                self._outlasting.add(path)
         for key, value in self._options.writes.get(path, {}).items():
             ud[key] = value
         return self._act(double, path, picked, outcomes)
 
-    def _pick(self, double: Double, path: str, outcomes: tuple[str, ...]) -> str:
+    def _pass(self, double: Double, seconds: float) -> bool:
+        """Let a double's time pass; whether a preempt ended it."""
+        if seconds <= STEP_S:
+            return double.sleep(seconds)
+        assert self.clock is not None
+        if self.clock.limit is not None:
+            self.clock.limit += seconds  # a long run, but none that never ends
+        begin = self.clock.now()
+        asked = double.sleep(seconds)
+        self._outlasted.append((begin, self.clock.now()))
+        return asked
+
+    def _longer_s(self, double: Double, path: str, begun: float) -> float:
+        """Return how long a double would go on to outlast the others [s]; 0: it ends now.
+
+        So each of the leaves that run at once may be the next to end. The last of them does: that
+        none ends is the business of "hang".
+        """
+        others = self._active.keys() & self._leaves - self._hanging - self._outlasting - {path}
+        if (
+            not others
+            or not self._options.interleavings
+            or path in self._outlasting
+            or double.preempt_requested()
+        ):
+            return 0.0
+        if double.timeout is None:
+            return self._long_s
+        left = (double.timeout - (self.now() - begun)) * WITHIN
+        return 0.0 if left <= STEP_S else min(left, self._long_s)
+
+    def _pick(
+        self, double: Double, path: str, outcomes: tuple[str, ...], *, may_outlast: bool
+    ) -> str:
         plain = [outcome for outcome in outcomes if outcome != PREEMPTED] or list(outcomes)
-        visits = self._visits[path] = self._visits.get(path, -1) + 1
-        first = visits % len(plain)  # each outcome is the usual one in turn, so that loops end
+        first = self._visits[path] % len(plain)  # each is the usual one in turn: loops end
         options = plain[first:] + plain[:first]
+        options += [OUTLASTS] if may_outlast else []
         if self._preempts:
             options += [PREEMPT] if PREEMPTED in outcomes else []
             options += [LATE.format(outcome) for outcome in plain]
@@ -226,7 +331,7 @@ class Explorer:
         waits = dict(double.describe_details()[1])
         if bounded or "hang" in faults or self._may_wait(double, path, waits):
             options.append(HANGS)
-        options += [RAISES] if "raise" in faults else []
+        options += [RAISES, *self._raised.get(path, ())] if "raise" in faults else []
         options += [DEAF] if "deaf" in faults and self._preempts else []
         return options[self.choose(path, options, self._situation((path, *sorted(options))))]
 
@@ -239,7 +344,9 @@ class Explorer:
 
     def _act(self, double: Double, path: str, picked: str, outcomes: tuple[str, ...]) -> str:
         if picked == RAISES:
-            raise RuntimeError("raised by the test")
+            raise RuntimeError(RAISED)
+        if picked in self._raised.get(path, ()):
+            raise _made(self._raised[path][picked])
         if picked == HANGS:
             if double.timeout is None:
                 self._hanging.add(path)
@@ -265,6 +372,33 @@ class Explorer:
         self.preempt()
 
 
+def _raised_in(
+    container: Container, path: str, around: tuple[type[BaseException], ...] = ()
+) -> Iterator[tuple[str, dict[str, type[BaseException]]]]:
+    """Yield each leaf below `container`, with the exceptions that it or what is around expects."""
+    around += _expected(container)
+    for label, state in container.get_children().items():
+        where = f"{path}/{label}"
+        if isinstance(state, Container):
+            yield from _raised_in(state, where, around)
+        else:
+            kinds = (*_expected(state), *around)
+            yield where, {RAISES_ONE.format(k.__name__): k for k in kinds if k is not RuntimeError}
+
+
+def _expected(state: State) -> tuple[type[BaseException], ...]:
+    """Return the exceptions that the options of a state name."""
+    again = () if state.retry is None else state.retry.on
+    return (*(state.on_exception or ()), *(kind for kind in again if isinstance(kind, type)))
+
+
+def _made(kind: type[BaseException]) -> BaseException:
+    try:
+        return kind(RAISED)
+    except Exception:  # noqa: BLE001  it wants other arguments: nobody looks at them
+        return kind.__new__(kind, RAISED)
+
+
 def _userdata(container: Container, values: Values) -> Hashable:
     """Return the userdata of a container and of all below it, to be compared."""
     data = container.userdata
@@ -277,10 +411,21 @@ def _userdata(container: Container, values: Values) -> Hashable:
     return (own, inner)
 
 
-def kept_by(patterns: Collection[str]) -> Callable[[str, State], bool]:
-    """Return what tells the leaves that stay as they are: paths, or ends of paths."""
+def kept_by(record: StateRecord, names: Iterable[str]) -> set[str]:
+    """Return the paths of the leaves that stay as they are.
 
-    def kept(path: str, _state: State) -> bool:
-        return any(path == p or path.endswith("/" + p.strip("/")) for p in patterns)
+    Args:
+        record: The machine.
+        names: Paths, or ends of paths, which may mean several; a container means all in it.
 
+    Raises:
+        UnknownStateError: there is no such state.
+    """
+    leaves = [state.path for state in record.walk() if not state.is_container]
+    kept: set[str] = set()
+    for name in names:
+        ends = "/" + name.strip("/")
+        found = [s.path for s in record.walk() if s.path == name or s.path.endswith(ends)]
+        tops = found or [find_path(record, name)]  # which says what there is
+        kept.update(leaf for leaf in leaves if any(f"{leaf}/".startswith(f"{t}/") for t in tops))
     return kept

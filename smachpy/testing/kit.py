@@ -23,13 +23,14 @@ from smachpy.testing.doubles import Double, Places
 from smachpy.testing.runs import Run, find_path
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
     from types import TracebackType
     from typing import Self
 
     from smachpy.container import Container
     from smachpy.introspection import StateRecord
     from smachpy.testing.action_servers import ScriptedActionServer
+    from smachpy.testing.doubles import Replacement
     from smachpy.testing.ends import ScriptedEnd
     from smachpy.testing.exploration import Exploration
     from smachpy.testing.service_servers import ScriptedService
@@ -114,7 +115,7 @@ class MissionKit:
         self.on_run = on_run
         self._places = Places()
         self._triggers: list[_Trigger] = []
-        self._replacements: list[tuple[str, Callable[[Any], Double], list[Double]]] = []
+        self._replacements: list[Replacement] = []
         self._servers: list[ScriptedEnd] = []
         self._stack = contextlib.ExitStack()
 
@@ -336,10 +337,42 @@ class MissionKit:
     # -- all runs ------------------------------------------------------------------------------
 
     def explore(self, machine: Any, **options: Any) -> Exploration:
-        """Run a mission over everything that can happen; see `exploration.explore`."""
+        """Run a mission over everything that can happen; see `exploration.explore`.
+
+        States that `replace` names have its doubles in every run.
+
+        Raises:
+            ValueError: the test asked for a preempt, or has servers or topics of its own, which no
+                run would meet.
+        """
         from smachpy.testing.exploration import explore
 
-        return explore(machine, folder=self._folder, on_run=self.on_run, **options)
+        self._check_no_world("explore")
+        return explore(
+            machine,
+            folder=self._folder,
+            on_run=self.on_run,
+            doubles=tuple(self._replacements),
+            **options,
+        )
+
+    def replay(self, machine: Any, choices: Sequence[str], **options: Any) -> Run:
+        """Repeat a run of `explore`; see `exploration.replay`. Errors: those of both."""
+        from smachpy.testing.exploration import replay
+
+        self._check_no_world("replay")
+        return replay(machine, choices, doubles=tuple(self._replacements), **options)
+
+    def _check_no_world(self, what: str) -> None:
+        """Refuse what the test prepared for `mission(...)`, and what explored runs never meet."""
+        got = ["a preempt or interrupt"] * bool(self._triggers)
+        got += [f"a {type(end).__name__} {end.name!r}" for end in self._servers]
+        if got:
+            raise ValueError(
+                f"mission.{what}: got {', '.join(got)} of the test's own; expected none: each run "
+                "has a network of its own and chooses its preempts. Try real_actions=True, or "
+                "mission(...)."
+            )
 
 
 class _Watch:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import gc
 import time
+import weakref
 
 import pytest
 
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from actionlib_core.simple_action_client import SimpleActionClient
 from smachpy import CBState, Concurrence, Iterator, SimpleActionState, State, StateMachine
-from smachpy.testing import explore, mission_kit, replay
+from smachpy.testing import UnknownStateError, explore, mission_kit, replay
+from smachpy.testing.explorers import Explorer
 
 
 class Leaf(State):
@@ -325,6 +328,324 @@ def test_equal_situations_are_entered_once_and_nothing_is_missed():
     everything, all_states = seen(invariants=[lambda run: True], max_runs=400)
     assert everything.runs > 2 * merged.runs
     assert states == all_states
+
+
+# -- who outlasts whom -----------------------------------------------------------------------------
+
+
+def beside(termination, **options):
+    """A beside S, a chain of B and C."""
+    both = Concurrence(["done", "preempted"], "done", child_termination_cb=termination)
+    chain = StateMachine(["done", "preempted"])
+    with chain:
+        chain.add("B", Leaf(), {"done": "C"})
+        chain.add("C", Leaf())
+    with both:
+        both.add("A", Leaf(**options))
+        both.add("S", chain)
+    sm = StateMachine(["done", "preempted"], name="M")
+    with sm:
+        sm.add("BOTH", both)
+    return sm
+
+
+def planted(outcomes):
+    if outcomes["S"] == "done" and outcomes["A"] is None:
+        raise ValueError("S ended before A")
+
+
+@pytest.mark.parametrize("timeout", [None, 60.0])
+def test_a_leaf_may_outlast_a_chain_beside_it(timeout):
+    found = explore(beside(planted, timeout=timeout), preempts=0)
+    assert "ValueError: S ended before A" in reason(found)
+    choices = found.counterexample.choices
+    assert choices[-1] == "/M/BOTH/A: outlasts the others"
+    assert all(choice.startswith("turn: ") for choice in choices[:-1])
+    with pytest.raises(Exception, match="S ended before A"):
+        replay(beside(planted, timeout=timeout), choices, preempts=0)
+
+
+def test_leaves_that_run_at_once_end_in_every_order():
+    def two():
+        both = Concurrence(["done"], "done", name="C")
+        with both:
+            for label in "AB":
+                chain = StateMachine(["done"])
+                with chain:
+                    chain.add("1", Leaf("done"), {"done": "2"})
+                    chain.add("2", Leaf("done"), {"done": "3"})
+                    chain.add("3", Leaf("done"))
+                both.add(label, chain)
+        return both
+
+    orders, steps = set(), set()
+
+    def note(run):
+        ends = (e.path[3:] for e in run.events if type(e).__name__ == "Left")
+        order = "".join(end[0] for end in ends if "/" in end)
+        orders.add(order)
+        steps.update(("".join(sorted(order[:i])), end) for i, end in enumerate(order))
+
+    assert explore(two, preempts=0, on_run=note).exhaustive
+    assert len(steps) == 24  # in each of 16 places A goes on, or B: each ends in 3 of 4
+    assert explore(two, preempts=0, on_run=note, invariants=[lambda _: True]).exhaustive
+    assert len(orders) == 20  # 6! / 3! / 3!
+
+
+def test_the_order_of_ends_is_as_it_comes_when_nobody_asks_for_others():
+    found = explore(beside(planted), preempts=0, interleavings=False)
+    assert found.exhaustive
+    assert found.ok
+
+
+def test_nothing_outlasts_what_runs_alone():
+    longest = []
+    assert explore(sound(), on_run=lambda run: longest.append(run.duration)).exhaustive
+    assert max(longest) < 20
+
+
+def test_a_loop_of_long_leaves_is_no_run_that_never_ends(monkeypatch):
+    sm = StateMachine(["done", "preempted"], name="M")
+    with sm:
+        sm.add("ROUND", beside(None), {"done": "AGAIN"})
+        sm.add("AGAIN", Leaf("done", "again"), {"again": "ROUND"})
+    rounds = []
+
+    def choose(self, where, options, situation=None):
+        if "again" in options:
+            rounds.append(self.now())
+            return options.index("again" if len(rounds) < 25 else "done")
+        return options.index("outlasts the others") if "outlasts the others" in options else 0
+
+    monkeypatch.setattr(Explorer, "choose", choose)
+    found = explore(sm, preempts=0, max_runs=1)
+    assert found.ok, found
+    assert rounds[-1] > 3600
+
+
+def test_a_leaf_that_outlasts_others_after_a_preempt_takes_no_grace():
+    sm = beside(None)
+    stop = StateMachine(["done", "preempted"], name="R")
+    with stop:
+        stop.add("WORK", Leaf(), {"preempted": "TIDY"})
+        stop.add("TIDY", sm)
+    found = explore(stop)
+    assert found.ok, found
+    assert found.exhaustive
+
+
+# -- what stays as it is ---------------------------------------------------------------------------
+
+
+def sleeps():
+    def sleep(_userdata):
+        time.sleep(300)  # and looks at no preempt
+        return "done"
+
+    sm = StateMachine(["done", "preempted"], name="M")
+    with sm:
+        sm.add("X", CBState(sleep, outcomes=["done", "preempted"]))
+    return sm
+
+
+@pytest.mark.parametrize("options", [{"keep": ["X"]}, {"real_actions": True}])
+def test_a_preempt_comes_while_a_kept_leaf_runs(options):
+    found = explore(sleeps, **options)
+    assert reason(found) == "a preempt takes 10 s, /M/X ignored it; expected at most 10 s"
+    choices = ("/M/X: runs as a preempt comes",)
+    assert found.counterexample.choices == choices
+    assert replay(sleeps, choices, **options).abandoned() == ("/M/X",)
+    assert explore(sleeps, preempts=0, **options).ok
+
+
+def test_a_preempt_that_no_wait_lets_in_is_not_left_for_the_next_run():
+    sm = StateMachine(["done", "preempted"], name="M")
+    with sm:
+        sm.add("X", CBState(lambda _: "done", outcomes=["done"]))
+    outcomes = []
+    found = explore(sm, keep=["X"], on_run=lambda run: outcomes.append(run.outcome))
+    assert found.exhaustive
+    assert outcomes == ["done", "done"]
+    assert not sm.preempt_requested()
+
+
+def test_names_of_leaves_are_paths_or_ends_of_paths():
+    sm = StateMachine(["done"], name="M")
+    with sm:
+        sm.add("FIND", Leaf("done", output_keys=["n"]), {"done": "USE"})
+        sm.add("USE", CBState(lambda ud: str(ud.n), outcomes=["done"], input_keys=["n"]))
+    assert explore(sm, keep=["USE"], preempts=0, writes={"FIND": {"n": "done"}}).ok
+    with pytest.raises(UnknownStateError, match=r"'USED'.*Did you mean 'USE'"):
+        explore(sm, keep=["USED"])
+    with pytest.raises(UnknownStateError, match="'FIN'"):
+        explore(sm, writes={"FIN": {"n": 1}})
+
+
+def test_a_container_that_is_kept_keeps_all_in_it():
+    inner = StateMachine(["done"])
+    with inner:
+        inner.add("X", CBState(lambda _: "done", outcomes=["done", "odd"]), {"odd": "done"})
+    sm = StateMachine(["done"], name="M")
+    with sm:
+        sm.add("IN", inner, {"done": "A"})
+        sm.add("A", Leaf("done"))
+    assert explore(sm, preempts=0).runs == 2
+    assert explore(sm, preempts=0, keep=["IN"]).runs == 1
+
+
+# -- what is wrong with a run ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("answer", [False, 0, "", []])
+def test_whatever_is_false_breaks_an_invariant(answer):
+    assert "invariant <lambda> does not hold" in reason(
+        explore(sound(), invariants=[lambda _: answer])
+    )
+
+
+def test_an_invariant_that_asserts_returns_nothing():
+    assert explore(sound(), invariants=[lambda _: None]).ok
+
+
+def test_an_invariant_that_raises_is_broken():
+    found = explore(sound(), invariants=[lambda run: run.userdata["n"] == 1])
+    assert reason(found) == "invariant <lambda> raised KeyError: 'n'"
+
+
+def test_a_run_is_shortened_to_one_that_is_wrong_in_the_same_way():
+    sm = StateMachine(["done", "failed", "preempted"], name="M")
+    with sm:
+        sm.add("A", Leaf("done", "failed", "preempted"), {"failed": "C"})
+        sm.add("C", Leaf("done", "failed", "preempted"), {"done": "E", "failed": "E"})
+        sm.add("E", Leaf("done", "failed", "preempted"))
+
+    def no_c_before_e(run):
+        return not (run.visits("C") and run.visits("E"))
+
+    def no_preempt(run):
+        return run.outcome != "preempted"
+
+    for invariants in ([no_c_before_e, no_preempt], [no_preempt, no_c_before_e]):
+        found = explore(sm, invariants=invariants, preempts=0)
+        assert reason(found) == "invariant no_c_before_e does not hold"
+        assert found.counterexample.run.visits("E") == 1
+
+
+def test_a_run_that_raises_is_shortened_to_one_that_raises_the_same():
+    def broken(ud):
+        raise TypeError("short") if ud.n else ValueError("long")
+
+    sm = StateMachine(["done"], name="M")
+    sm.userdata.n = 0
+    with sm.opened(check=False):
+        sm.add("A", Leaf("long", "short", "odd"), {"long": "B", "short": "C", "odd": "done"})
+        sm.add("B", Leaf("done"), {"done": "X"})
+        sm.add("C", CBState(lambda _: 1 / 0, outcomes=["done"]))
+        sm.add("X", CBState(broken, outcomes=["done"], input_keys=["n"]))
+    found = explore(sm, keep=["C", "X"], preempts=0)
+    assert "ValueError: long" in reason(found)
+
+
+def test_leaves_raise_what_they_and_their_containers_expect():
+    class OddError(Exception):
+        def __init__(self, one, two):
+            super().__init__(one, two)
+
+    def machine():
+        inner = StateMachine(["done", "odd"], on_exception={OddError: "odd"})
+        with inner:
+            inner.add("A", Leaf("done", on_exception={ValueError: "broken"}), {"broken": "done"})
+        sm = StateMachine(["done", "odd"], name="M")
+        with sm:
+            sm.add("IN", inner)
+        return sm
+
+    for text, left in [("ValueError", "/M/IN/A -broken->"), ("OddError", "/M/IN -odd->")]:
+        run = replay(machine, [f"/M/IN/A: raises {text}"], preempts=0, faults=["raise"])
+        assert left in run.explain()
+    outcomes = set()
+    found = explore(
+        machine, preempts=0, faults=["raise"], on_run=lambda run: outcomes.add(run.outcome)
+    )
+    assert "RuntimeError: raised by the test" in reason(found)  # which nobody expects
+
+
+def test_a_value_that_no_double_has_written_is_told_with_the_way_out():
+    def machine():
+        each = Iterator(
+            ["done", "preempted"],
+            ["shelves"],
+            [],
+            it=lambda: each.userdata.shelves,
+            it_label="shelf",
+            exhausted_outcome="done",
+        )
+        with each:
+            Iterator.set_contained_state("DO", Leaf("ok"), ["ok"])
+        sm = StateMachine(["done", "preempted"], name="M")
+        with sm:
+            find = Leaf("done", output_keys=["found"])
+            sm.add("FIND", find, {"done": "EACH"}, {"found": "shelves"})
+            sm.add("EACH", each)
+        return sm
+
+    found = explore(machine, preempts=0)
+    assert "userdata key has no value" in reason(found)
+    assert "explore(..., writes={'/M/FIND': {'found': ...}})" in reason(found)
+    assert explore(machine, preempts=0, writes={"FIND": {"found": [1, 2]}}).ok
+
+
+def test_machines_of_a_function_are_let_go():
+    made, alive = [], []
+
+    def machine():
+        made.append(weakref.ref(sm := sound()))
+        return sm
+
+    def count(_run):
+        gc.collect()
+        alive.append(sum(ref() is not None for ref in made))
+
+    explore(machine, max_runs=4, on_run=count)
+    assert alive == [1] * 4
+
+
+# -- with what the test has prepared ---------------------------------------------------------------
+
+
+def test_doubles_of_the_test_stay_where_they_are(mission):
+    made = mission.replace("A", outcomes=["failed", "done"])
+    sm = sound()
+    before = dict(sm.get_children())
+    for machine in (sm, sound):
+        found = mission.explore(machine, invariants=[lambda run: run.outcomes("A") == ("failed",)])
+        assert found.ok, found
+        assert len(made) == 1
+    assert sm.get_children() == before
+    assert mission(sm).outcomes("A") == ("failed",)
+    assert mission.explore(sm, invariants=[lambda run: set(run.outcomes("A")) == {"done"}]).ok
+    assert made[-1].script == ("done",)
+
+
+def test_a_run_with_doubles_of_the_test_is_repeated_by_the_test(mission):
+    mission.replace("A", outcomes=["done"])
+    found = mission.explore(sound, preempts=0, invariants=[lambda run: run.visits("A") < 2])
+    assert "mission.replace(...) of A" in found.counterexample.script
+    assert "run = mission.replay(" in found.counterexample.script
+    run = mission.replay(sound, found.counterexample.choices, preempts=0)
+    assert run.outcomes("B")[0] == "again"
+
+
+def test_what_no_explored_run_would_meet_is_refused(mission):
+    mission.preempt(on="A")
+    with pytest.raises(ValueError, match=r"mission\.explore: got a preempt"):
+        mission.explore(sound())
+
+
+def test_servers_of_the_test_are_refused(mission, action_server):
+    action_server("move_base", MoveBaseAction)
+    with pytest.raises(ValueError, match=r"ScriptedActionServer 'move_base'.*real_actions=True"):
+        mission.explore(drive, keep=["DRIVE"])
 
 
 # -- what is found with real actions ---------------------------------------------------------------
