@@ -12,6 +12,7 @@ in place of `Left`.
 
 from __future__ import annotations
 
+import json
 import math
 from typing import Any, NamedTuple, TypeAlias
 
@@ -289,7 +290,17 @@ else; `by` is the thread, or what `request_preempt(by=...)` said.
 LONGEST_TEXT = 4_000
 LONGEST_LIST = 1_000
 DEEPEST = 20
-"""What of a value is put into a record; it is to be looked at, not to be computed with."""
+MOST_ITEMS = 10_000
+MOST_TEXT = 100_000
+WIDEST_INT = 1_024  # bits
+"""What of a value is put into a record; it is to be looked at, not to be computed with.
+
+The first three are for each part, the next two for all that is in a record: making it takes the
+machine some milliseconds at most.
+"""
+
+NUMBERS = frozenset({"seq", "dropped"})
+"""What a tape adds to a record: the event's number, and how many are missing before it."""
 
 _BY_NAME = {kind.__name__: kind for kind in EVENT_TYPES}
 
@@ -307,18 +318,27 @@ def to_record(event: Event) -> dict[str, Any]:
     replaced by their `repr`, and those that are too long to look at are cut or named by their size.
     """
     record: dict[str, Any] = {"kind": type(event).__name__}
+    room = _Room()
     for key, value in event._asdict().items():
-        record[key] = _plain(value)
+        record[key] = _plain(value, room)
     return record
 
 
+def record_text(record: dict[str, Any]) -> str:
+    """Return a record as JSON; what JSON does not take is replaced, the record is never lost."""
+    try:
+        return json.dumps(record)
+    except (TypeError, ValueError, RecursionError):
+        return json.dumps({key: _plain(value, _Room()) for key, value in record.items()})
+
+
 def from_record(record: dict[str, Any]) -> Event:
-    """Rebuild the event of a `to_record` dict.
+    """Rebuild the event of a `to_record` dict; the numbers of a tape in it are passed over.
 
     Raises:
         ValueError: `kind` names no event, or a field is missing or unknown.
     """
-    fields = dict(record)
+    fields = {key: v for key, v in record.items() if key not in NUMBERS}
     name = fields.pop("kind", None)
     kind = _BY_NAME.get(name) if isinstance(name, str) else None
     if kind is None:
@@ -332,48 +352,84 @@ def from_record(record: dict[str, Any]) -> Event:
         ) from error
 
 
-def _plain(value: Any, depth: int = 0) -> Any:
-    if value is None or isinstance(value, (bool, int)):
+class _Room:
+    """How much may still be put into a record."""
+
+    __slots__ = ("items", "text")
+
+    def __init__(self) -> None:
+        self.items = MOST_ITEMS
+        self.text = MOST_TEXT
+
+
+def _plain(value: Any, room: _Room, depth: int = 0) -> Any:
+    if value is None or isinstance(value, bool):
         return value
+    if isinstance(value, int):
+        bits = value.bit_length()
+        return value if bits <= WIDEST_INT else f"<int of {bits} bits>"
     if isinstance(value, float) and math.isfinite(value):
         return value
     if isinstance(value, str):
-        return value if len(value) <= LONGEST_TEXT else value[:LONGEST_TEXT] + "\u2026"
-    shown = _container(value, depth) if depth < DEEPEST else None
-    return _text_of(value) if shown is None else shown
+        return _cut(value, room)
+    try:
+        shown = _container(value, room, depth) if depth < DEEPEST else None
+    except Exception as error:  # noqa: BLE001  foreign code: its failure is what there is to show
+        return f"<{type(value).__name__}: looking at it raised {type(error).__name__}>"
+    return _cut(_text_of(value, room), room) if shown is None else shown
 
 
-def _container(value: Any, depth: int) -> Any:
+def _cut(text: str, room: _Room) -> str:
+    most = min(LONGEST_TEXT, max(room.text, 0))
+    room.text -= min(len(text), most)
+    return text if len(text) <= most else text[:most] + "\u2026"
+
+
+def _container(value: Any, room: _Room, depth: int) -> Any:
     """What is inside, None when it is no container or too long."""
     if isinstance(value, (list, tuple, dict)):
-        if len(value) > LONGEST_LIST:
+        if len(value) > min(LONGEST_LIST, room.items):
             return None
+        room.items -= len(value)
         if not isinstance(value, dict):
-            return [_plain(item, depth + 1) for item in value]
+            return [_plain(item, room, depth + 1) for item in value]
         pairs = list(value.items())
         if all(isinstance(key, str) for key, _ in pairs):
-            return {key: _plain(item, depth + 1) for key, item in pairs}
+            room.text -= sum(len(key) for key, _ in pairs)
+            return {key[:LONGEST_TEXT]: _plain(item, room, depth + 1) for key, item in pairs}
         return None
-    return _fields_of(value, depth)
+    return _fields_of(value, room, depth)
 
 
-def _fields_of(value: Any, depth: int) -> Any:
+def _fields_of(value: Any, room: _Room, depth: int) -> Any:
     """A message, or a ROS time or duration, by its fields; None when it is none."""
     if hasattr(value, "_md5sum") and hasattr(value, "__slots__"):
         fields = {name: getattr(value, name, None) for name in value.__slots__}
-        return {"$msg": value._type, "fields": _plain(fields, depth + 1)}
+        return {"$msg": value._type, "fields": _plain(fields, room, depth + 1)}
     if hasattr(value, "to_nsec") and hasattr(value, "nsecs"):
         return {"secs": value.secs, "nsecs": value.nsecs}
     return None
 
 
-def _text_of(value: Any) -> str:
+def _text_of(value: Any, room: _Room) -> str:
     if isinstance(value, (list, tuple, dict, set, frozenset, bytes, bytearray)):
         size = len(value)
-        if size > LONGEST_LIST:
+        if size > LONGEST_LIST or not _is_short(value, room.items):
             return f"<{type(value).__name__} of {size} elements>"
     try:
-        text = repr(value)
+        return repr(value)
     except Exception as error:  # noqa: BLE001  foreign code: its failure is what there is to show
         return f"<{type(value).__name__}: its repr raised {type(error).__name__}>"
-    return text if len(text) <= LONGEST_TEXT else text[:LONGEST_TEXT] + "\u2026"
+
+
+def _is_short(value: Any, most: int) -> bool:
+    """Whether at most so many things are in a container and in those inside it."""
+    waiting, seen = [value], 0
+    while waiting:
+        one = waiting.pop()
+        if isinstance(one, (list, tuple, dict, set, frozenset)):
+            seen += len(one)
+            if seen > most:
+                return False
+            waiting += [*one, *one.values()] if isinstance(one, dict) else one
+    return True

@@ -25,7 +25,7 @@ from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import Trigger
 from actionlib_core.service import Service
 from actionlib_core.topic import Publisher
-from smachpy.events import Started
+from smachpy.events import Started, record_text
 from smachpy.introspection import describe
 from smachpy.run_state import RunState
 from smachpy.value_server import ValueServer
@@ -42,10 +42,13 @@ DESCRIPTION_TOPIC = "/smach/description"
 HISTORY_SERVICE = "/smach/history"
 
 QUEUED_EVENTS = 20_000
-"""More than these wait for the network: the newest are dropped, which shows in `seq`."""
+"""When more wait for the network, those that come then are thinned out, which shows in `seq`."""
 
 KEPT_EVENTS = 5_000
 """So many events are kept for viewers that come late."""
+
+KEPT_BYTES = 8_000_000
+"""So much text of events is kept for them at most, and as much waits for the network."""
 
 STOP_S = 1.0
 
@@ -82,8 +85,10 @@ class Feed:
         self._epoch = uuid.uuid4().hex
         self._lock = threading.Lock()
         self._kept: deque[tuple[dict[str, Any], str]] = deque()
+        self._kept_bytes = 0
         self._base = RunState()
         self._queue: deque[str] = deque()
+        self._queued_bytes = 0
         self._executor = SerialExecutor(node.clock, f"events of {server_name}")
         self._description = ""
         self._problems: list[dict[str, str]] = []
@@ -132,13 +137,26 @@ class Feed:
                 kinds[record["path"]] = record["kind"]
                 if record["kind"] == Started.__name__:
                     self._executor.submit(self._describe)
-                text = json.dumps(record)
-                self._kept.append((record, text))
-                if len(self._kept) > KEPT_EVENTS:
-                    self._base.fold(self._kept.popleft()[0])
-                if wanted and len(self._queue) < QUEUED_EVENTS:
-                    self._queue.append(text)
+                text = record_text(record)
+                self._keep(record, text)
+                if wanted:
+                    self._enqueue(text)
         return kinds
+
+    def _keep(self, record: dict[str, Any], text: str) -> None:
+        self._kept.append((record, text))
+        self._kept_bytes += len(text)
+        while len(self._kept) > KEPT_EVENTS or self._kept_bytes > KEPT_BYTES:
+            old, text = self._kept.popleft()
+            self._kept_bytes -= len(text)
+            self._base.fold(old)
+
+    def _enqueue(self, text: str) -> None:
+        """Let it wait for the network; the newest say what goes on, so the oldest make room."""
+        self._queue.append(text)
+        self._queued_bytes += len(text)
+        while len(self._queue) > 2 * QUEUED_EVENTS or self._queued_bytes > KEPT_BYTES:
+            self._queued_bytes -= len(self._queue.popleft())
 
     def _tell(self, _request: object) -> tuple[bool, str]:
         """Answer with the history."""
@@ -160,8 +178,13 @@ class Feed:
         return True, f'{text}, "base": {base}, "events": [{", ".join(kept)}]}}'
 
     def _send(self) -> None:
-        while self._queue:
-            self._events.publish(self._queue.popleft())
+        while True:
+            with self._lock:
+                if not self._queue:
+                    return
+                text = self._queue.popleft()
+                self._queued_bytes -= len(text)
+            self._events.publish(text)
 
     def _describe(self) -> None:
         text = describe(self._machine, name=self._path.strip("/")).to_json()

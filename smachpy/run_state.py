@@ -33,7 +33,8 @@ class RunState:
             (when it took the preempt up), abandoned (when its grace was over); these four are None
             while it is not asked; attempt, item (of an iterator), waits (why it is held back);
             goals: by goal id: path, action, since, goal, feedback, first_feedback, status, text,
-            result, ended; userdata: by "container key": key, value, writer, at, container.
+            result, ended; userdata: by "container key": key, value, writer, at, container;
+            dropped: so many events were not told, so that counts are too low; left out when none.
 
     Threads: one at a time.
     """
@@ -69,6 +70,8 @@ class RunState:
 
     def fold(self, record: dict[str, Any]) -> None:
         """Take one record in; kinds that change nothing are passed over."""
+        if "dropped" in record:
+            self.data["dropped"] = self.data.get("dropped", 0) + record["dropped"]
         fold = self._fold.get(record["kind"])
         if fold is not None:
             fold(record)

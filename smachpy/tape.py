@@ -18,6 +18,7 @@ from itertools import repeat
 from typing import TYPE_CHECKING, Any
 
 from smachpy import log
+from smachpy._runtime.thinning import NOTHING, SLOTS, Begin, Dropped, thin
 from smachpy.events import (
     Entered,
     GoalDone,
@@ -43,28 +44,12 @@ LONGEST = 100_000
 _CHANGING: tuple[type, ...] = (UserdataWritten, GoalSent, GoalFeedback, GoalDone)
 """Events with values that may change later: they become records at once."""
 
-_NOTHING = (None, None, None)
+SLACK = 2_000
+"""So many entries more may be there before they are thinned out again."""
+
 _new = tuple.__new__  # an event without its class's own `__new__`, which costs more than the rest
 _ROUNDS = 256  # so many transitions between two looks at the limit
 _SAME_NS = 1_000_000  # a wall clock that goes back by less than this was only read inexactly
-
-
-_SLOTS = 5
-"""An entry is so many elements of a flat list: a tuple each would cost the machine more than all
-the rest, mostly in Python's garbage collector. `list.extend` with a tuple is one atomic step.
-
-    time [s], path of the container, step that ended or None, its outcome, step that begins or None
-    None, event or record or `_Begin`, None, None, None
-"""
-
-
-class _Begin:
-    """Entry: the tape's machine has this path from here on."""
-
-    __slots__ = ("path",)
-
-    def __init__(self, path: str) -> None:
-        self.path = path
 
 
 class Tape:
@@ -74,12 +59,13 @@ class Tape:
         machine: The container.
         on_news: Called when there is something to read, once until `read` has found nothing more;
             in the thread of the machine, which it holds up: let it wake a thread that reads.
-        limit: So many entries wait at most; when they are not read, the newest are dropped, which
-            `read` shows by a gap in `seq`.
+        limit: So many entries wait as they are; when they are not read, those that come then are
+            thinned out (`smachpy._runtime.thinning`): what is kept still says what goes on in the
+            end. `read` shows it by gaps in `seq`.
         name: What to call the machine in the records, "/SM_ROOT"; "" leaves its own path.
 
     Attributes:
-        dropped: So many events were dropped.
+        dropped: So many events were dropped, until now.
 
     Threads: the machine's threads write; `read` may be called from any thread, one at a time.
     """
@@ -94,9 +80,11 @@ class Tape:
     ) -> None:
         self.dropped = 0
         self.quiet = True
-        self._entries: list[Any] = []
-        self._lost: list[Any] = []
-        self._most = limit * _SLOTS
+        self._entries: list[Any] = []  # see `SLOTS`
+        self._most = limit * SLOTS
+        self._full = self._most + SLACK * SLOTS
+        self._cut = threading.Lock()  # held while entries are taken away
+        self._missing = 0
         self.path = ""
         self._machine = machine
         self._on_news = on_news
@@ -104,7 +92,6 @@ class Tape:
         self._read_path = ""
         self._lock = threading.Lock()
         self._seq = 0
-        self._seen_dropped = 0
         self._clock: Clock | None = None
         self._offset_ns = 0
         self._last_ns = 0
@@ -116,7 +103,8 @@ class Tape:
     def read(self) -> list[dict[str, Any]]:
         """Return the records (`smachpy.events.to_record`) since the last call, in order.
 
-        Each has `seq`, the number of the event on this tape, from 1; dropped events count too.
+        Each has `seq`, the number of the event on this tape, from 1; dropped events count too. The
+        first after a gap has `dropped`, so many are missing before it.
         """
         with self._lock:
             found = self._take_all()
@@ -128,33 +116,41 @@ class Tape:
                     return []
                 self.quiet = False
             self._set_clock()
-            places = range(0, len(found), _SLOTS)
-            records = [self._number(record) for at in places for record in self._records(found, at)]
-            self._count_lost()  # those are newer than what was found, as the tape was full
-            self._seq += self.dropped - self._seen_dropped
-            self._seen_dropped = self.dropped
-            return records
+            places = range(0, len(found), SLOTS)
+            return [self._number(record) for at in places for record in self._records(found, at)]
 
     # -- for the machinery ---------------------------------------------------------------------
 
     def take(self, event: Event) -> None:
         """Take an event down."""
-        self.put((None, to_record(event) if isinstance(event, _CHANGING) else event, *_NOTHING))
+        self.put((None, to_record(event) if isinstance(event, _CHANGING) else event, *NOTHING))
 
     def put(self, entry: tuple[Any, ...]) -> None:
-        """Append an entry, see `_SLOTS`, and say so."""
-        (self._lost if len(self._entries) >= self._most else self._entries).extend(entry)
+        """Append an entry, see `SLOTS`, and say so."""
+        entries = self._entries
+        entries.extend(entry)
+        if len(entries) >= self._full:
+            self._thin()
         if self.quiet:
             self.ring()
 
     def room(self) -> tuple[Iterator[None], Callable[[tuple[Any, ...]], object]]:
         """Return how often to append before asking again, and what to append with."""
-        free = (self._most - len(self._entries)) // _SLOTS
-        if free > 0:
-            return repeat(None, min(free, _ROUNDS)), self._entries.extend
-        with self._lock:
-            self._count_lost()
-        return repeat(None, _ROUNDS), self._lost.extend
+        if self._full <= len(self._entries):
+            self._thin()
+        free = (self._full - len(self._entries)) // SLOTS
+        return repeat(None, max(1, min(free, _ROUNDS))), self._entries.extend
+
+    def _thin(self) -> None:
+        """Drop what can be missed of what came after the limit."""
+        with self._cut:
+            tail = self._entries[self._most :]
+            if self._most + len(tail) < self._full:
+                return  # somebody else has made room
+            thinned, dropped = thin(tail)
+            self._entries[self._most : self._most + len(tail)] = thinned
+            self.dropped += dropped
+            self._full = self._most + len(thinned) + max(SLACK * SLOTS, len(thinned))
 
     def ring(self) -> None:
         """Say that there is something to read."""
@@ -170,7 +166,7 @@ class Tape:
         self._clock = clock
         if path != self.path:
             self.path = path
-            self._entries.extend((None, _Begin(path), *_NOTHING))
+            self._entries.extend((None, Begin(path), *NOTHING))
 
     # -- reading -------------------------------------------------------------------------------
 
@@ -190,25 +186,21 @@ class Tape:
         return self._last_ns if 0 < self._last_ns - stamp < _SAME_NS else stamp
 
     def _take_all(self) -> list[Any]:
-        entries = self._entries
-        found = entries[:]
-        del entries[: len(found)]
-        return found
-
-    def _count_lost(self) -> None:
-        """Count the events that there was no room for; with the lock held."""
-        lost = self._lost
-        found = lost[:]
-        del lost[: len(found)]
-        ended, begun = found[2::_SLOTS], found[4::_SLOTS]
-        events = found[0::_SLOTS].count(None)
-        self.dropped += len(ended) - ended.count(None) + len(begun) - begun.count(None) + events
+        with self._cut:
+            entries = self._entries
+            found = entries[:]
+            del entries[: len(found)]
+            self._full = self._most + SLACK * SLOTS
+            return found
 
     def _records(self, found: list[Any], at: int) -> Iterator[dict[str, Any]]:
-        t, what, left, outcome, entered = found[at : at + _SLOTS]
+        t, what, left, outcome, entered = found[at : at + SLOTS]
         if t is None:
-            if isinstance(what, _Begin):
+            if isinstance(what, Begin):
                 self._read_path = what.path
+            elif isinstance(what, Dropped):
+                self._seq += what.count
+                self._missing += what.count
             else:
                 yield what if type(what) is dict else to_record(what)
             return
@@ -223,6 +215,8 @@ class Tape:
     def _number(self, record: dict[str, Any]) -> dict[str, Any]:
         self._seq += 1
         record["seq"] = self._seq
+        if self._missing:
+            record["dropped"], self._missing = self._missing, 0
         self._last_ns = record["stamp_ns"]
         if self._name:
             record["path"] = self._name + record["path"].removeprefix(self._read_path)
@@ -244,7 +238,7 @@ class EventTape(Tape):
 
     def take(self, event: Event) -> None:
         """Take an event down."""
-        self._entries.extend((None, event, *_NOTHING))
+        self._entries.extend((None, event, *NOTHING))
 
     def events(self) -> list[Event]:
         """Return the events since the last call, in order."""
@@ -254,9 +248,9 @@ class EventTape(Tape):
             events: list[Event] = []
             last, stamp = None, 0
             base = step = path = None  # what began last is mostly what ends next
-            for t, what, left, outcome, entered in zip(*[found] * _SLOTS, strict=True):
+            for t, what, left, outcome, entered in zip(*[found] * SLOTS, strict=True):
                 if t is None:
-                    if type(what) is not _Begin:
+                    if type(what) is not Begin:
                         events.append(what)
                     continue
                 if t != last:

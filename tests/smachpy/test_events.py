@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 
 import pytest
@@ -195,3 +196,55 @@ def test_records_of_nothing_are_told(record):
 
 def test_iterated_counts_from_zero():
     assert Iterated("/P", 0.0, 0, 3).number == 3
+
+
+def written(value):
+    return to_record(events.UserdataWritten("/P/A", 0.0, 0, "k", value))
+
+
+def test_a_grid_is_not_taken_down_cell_by_cell():
+    record = written({"name": "hall", "grid": [[0] * 900 for _ in range(900)], "after": "word"})
+    shown = record["value"]
+    assert shown["name"] == "hall"
+    assert shown["grid"][0] == [0] * 900
+    assert shown["grid"][-1] == "<list of 900 elements>"
+    assert shown["after"] == "word"
+    assert len(json.dumps(record)) < 200_000
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        {1: [[0] * 900] * 900},
+        {(0, 0): [["x" * 3000] * 900] * 900},
+        ["x" * 3_000] * 1_000,
+        [[["x"] * 90] * 90] * 90,
+    ],
+)
+def test_a_record_is_short_whatever_the_value(value):
+    assert len(json.dumps(written(value))) < 400_000
+
+
+def test_a_number_of_many_digits_is_named_by_its_size():
+    record = written([7, 10**5000, -(10**5000)])
+    assert record["value"] == [7, "<int of 16610 bits>", "<int of 16610 bits>"]
+    assert written(2**64)["value"] == 2**64
+
+
+def test_a_value_that_cannot_be_looked_at_hurts_nobody():
+    class Proxy:
+        def __getattr__(self, name):
+            raise ConnectionError("gone")
+
+    assert written([Proxy()])["value"] == ["<Proxy: looking at it raised ConnectionError>"]
+
+
+def test_a_record_becomes_text_whatever_is_in_it():
+    text = events.record_text({"kind": "Left", "path": "/A", "outcome": 10**5000, "x": object})
+    assert json.loads(text)["outcome"] == "<int of 16610 bits>"
+    assert json.loads(text)["path"] == "/A"
+
+
+def test_the_numbers_of_a_tape_are_no_fields_of_an_event():
+    record = to_record(Iterated("/P", 0.0, 0, 3))
+    assert from_record({**record, "seq": 7, "dropped": 2}) == Iterated("/P", 0.0, 0, 3)

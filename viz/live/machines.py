@@ -9,6 +9,7 @@ import uuid
 from collections import deque
 from typing import TYPE_CHECKING, Any
 
+from smachpy.events import record_text
 from smachpy.introspection import StateRecord
 from smachpy.run_state import RunState
 from viz.live.progress import annotate
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
 
 KEPT_EVENTS = 20_000
 """So many events of one machine can be wound back; older ones only count."""
+
+KEPT_BYTES = 64_000_000
+"""So much text of them at most."""
 
 
 class Machine:
@@ -52,7 +56,9 @@ class Machine:
         self._base = RunState()
         self._now = RunState()
         self._events: deque[tuple[int, dict[str, Any], str]] = deque()
+        self._bytes = 0
         self._seq = 0
+        self._folded = 0  # number of the newest event that is in the base
 
     @property
     def seq(self) -> int:
@@ -72,7 +78,7 @@ class Machine:
             self._base = RunState(json.loads(json.dumps(base)) if base else None)
             self._now = RunState(json.loads(json.dumps(base)) if base else None)
             self._events.clear()
-            self._seq = 0
+            self._bytes = self._seq = self._folded = 0
             for event in history["events"]:
                 self._append(event, limit)
         self._on_change(self)
@@ -86,12 +92,15 @@ class Machine:
             self._on_change(self)
 
     def add(self, records: Iterable[dict[str, Any]]) -> bool:
-        """Take events in, each with its `seq`; False when some are missing before them."""
+        """Take events in, each with its `seq`; False when some are missing before them.
+
+        Those that the machine itself has dropped (`smachpy.tape`) are not missed.
+        """
         with self._lock:
             for record in records:
                 if record["seq"] <= self._seq:
                     continue
-                if record["seq"] != self._seq + 1:
+                if record["seq"] - record.get("dropped", 0) > self._seq + 1:
                     return False
                 self._append(record, KEPT_EVENTS)
         self._on_change(self)
@@ -108,14 +117,14 @@ class Machine:
         self._on_change(self)
 
     def since(self, seq: int) -> list[str] | None:
-        """Return the events after number `seq` as JSON texts; None when they are gone."""
+        """Return the events after number `seq` as JSON texts; None when some of them are gone."""
         with self._lock:
-            missing = self._seq - seq
-            if missing < 0 or missing > len(self._events):
+            if not self._folded <= seq <= self._seq:
                 return None
-            newest = [text for _, _, text in itertools.islice(reversed(self._events), missing)]
-        newest.reverse()
-        return newest
+            newer = itertools.takewhile(lambda one: one[0] > seq, reversed(self._events))
+            texts = [text for _, _, text in newer]
+        texts.reverse()
+        return texts
 
     def snapshot(self, *, short: bool = False) -> tuple[int, str]:
         """Return the newest number and all that a page needs to begin, as JSON.
@@ -126,8 +135,9 @@ class Machine:
         with self._lock:
             base = json.dumps((self._now if short else self._base).data)
             texts = [] if short else [text for _, _, text in self._events]
-            head = json.dumps({**self._facts(), "seq": self._seq, "problems": self.problems})
-        return self._seq, f'{head[:-1]}, "base": {base}, "events": [{", ".join(texts)}]}}'
+            seq = self._seq
+            head = json.dumps({**self._facts(), "seq": seq, "problems": self.problems})
+        return seq, f'{head[:-1]}, "base": {base}, "events": [{", ".join(texts)}]}}'
 
     def events(self) -> list[dict[str, Any]]:
         """Return the kept events."""
@@ -185,9 +195,13 @@ class Machine:
         record = annotate(record, self._now.data["goals"])
         self._now.fold(record)
         self._seq = record["seq"]
-        self._events.append((self._seq, record, json.dumps(record)))
-        if len(self._events) > limit:
-            self._base.fold(self._events.popleft()[1])
+        text = record_text(record)
+        self._events.append((self._seq, record, text))
+        self._bytes += len(text)
+        while len(self._events) > limit or (self._bytes > KEPT_BYTES and not self.recorded):
+            self._folded, old, text = self._events.popleft()
+            self._bytes -= len(text)
+            self._base.fold(old)
 
 
 class Machines:

@@ -102,7 +102,9 @@ def _line(recording: Recording) -> tuple[str, ...]:
         began.strftime("%Y-%m-%d %H:%M:%S"),
         f"{took:.1f} s",
         ends[-1] if ends else "not finished",
-        str(len(events)),
+        f"{len(events)} of {len(events) + lost}"
+        if (lost := recording.dropped)
+        else str(len(events)),
     )
 
 
@@ -127,6 +129,8 @@ def _show(args: argparse.Namespace) -> int:
         record, statistics = group[-1].record, count(group)
         ended = ", ".join(f"{outcome} x{n}" for outcome, n in statistics.outcomes.items())
         console.print(f"{label}: {statistics.runs} run(s); {ended or 'none has ended'}")
+        if lost := sum(one.dropped for one in group):
+            console.print(f"{lost} events are missing: visits and outcomes are at least these")
         table = Table(box=None, pad_edge=False)
         for title in ("state", "visits", "median", "95 %", "failed", "outcomes"):
             table.add_column(title, justify="left" if title in {"state", "outcomes"} else "right")
@@ -228,7 +232,7 @@ def _export(args: argparse.Namespace) -> int:
 
         history = History()
         for event in recording.events:
-            history.on_event(from_record({k: v for k, v in event.items() if k != "seq"}))
+            history.on_event(from_record(event))
         render(recording.record, output, run=history)
     print(output)
     return 0

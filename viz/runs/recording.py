@@ -3,12 +3,13 @@
 The first line is the header: `format` "smachpy-run", `version`, `machine` (a
 `smachpy.introspection.StateRecord`), `stamp_ns` and `base`, the `smachpy.run_state.RunState` before
 the first event, or null. Every further line is an event (`smachpy.events.to_record`) with a number
-`seq` without gaps. A last line that was cut off by a crash is left out when reading.
+`seq`. Where events are missing it jumps, and the next event has their number, `dropped`; what goes
+on in the end is told all the same (`smachpy.tape`). A last line that was cut off by a crash is left
+out when reading.
 """
 
 from __future__ import annotations
 
-import itertools
 import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -16,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.clock import SerialExecutor, current_clock
 from smachpy import log
+from smachpy.events import record_text
 from smachpy.exceptions import SmachError
 from smachpy.introspection import StateRecord, describe
 
@@ -28,7 +30,8 @@ if TYPE_CHECKING:
 FORMAT = "smachpy-run"
 VERSION = 1
 WAITING_EVENTS = 100_000
-"""When the disk hangs, so many events wait for it; further ones are dropped and counted."""
+"""So many entries of a tape wait to be written: when the disk hangs, or the machine is faster than
+its events become text. Further ones are thinned out and counted."""
 
 CLOSE_S = 2.0
 
@@ -65,6 +68,11 @@ class Recording:
     events: list[dict[str, Any]] = field(default_factory=list)
     cut: bool = False
 
+    @property
+    def dropped(self) -> int:
+        """So many events are missing between those that are there."""
+        return sum(event.get("dropped", 0) for event in self.events)
+
     def history(self) -> dict[str, Any]:
         """Return it in the shape in which servers tell their history (`smachpy.feed`)."""
         return {
@@ -94,7 +102,6 @@ class Recorder:
         self._path = Path(path)
         clock = current_clock()
         self._executor = SerialExecutor(clock, f"recording {self._path.name}")
-        self._numbers = itertools.count(1)
         self._failed = False
         self._unwritten = 0
         try:
@@ -123,24 +130,30 @@ class Recorder:
         """
         self._tape.close()
         self._on_news()
-        if not self._executor.join(CLOSE_S):
+        in_time = self._executor.join(CLOSE_S)
+        if in_time and self._file.closed:
+            return
+        if not in_time:
             log.logwarn(
-                f"recording {str(self._path)!r}: the disk is behind; the end of the run is lost if "
-                "the program ends now."
+                f"recording {str(self._path)!r}: still being written after {CLOSE_S:g} s; the end "
+                "of the run is lost if the program ends now."
             )
-            return
-        if self._file.closed:
-            return
-        try:
-            self._file.close()
-        except OSError as error:
-            self._fail(error)
-        if self.dropped:
-            log.logwarn(f"recording {str(self._path)!r}: {self.dropped} events were dropped.")
+        else:
+            try:
+                self._file.close()
+            except OSError as error:
+                self._fail(error)
+        if self._tape.dropped:
+            log.logwarn(
+                f"recording {str(self._path)!r}: {self._tape.dropped} events are missing; more "
+                "came than could be written. Every state's last visit is there."
+            )
+        if self._unwritten:
+            log.logwarn(f"recording {str(self._path)!r}: {self._unwritten} events are not in it.")
 
     @property
     def dropped(self) -> int:
-        """So many events were not written: the disk hung, or failed."""
+        """So many events were not written: there were too many at once, or the disk failed."""
         return self._tape.dropped + self._unwritten
 
     def _on_news(self) -> None:
@@ -152,9 +165,8 @@ class Recorder:
             if self._failed:
                 self._unwritten += len(records)
                 continue
-            lines = [event_line(one | {"seq": next(self._numbers)}) for one in records]
             try:
-                self._file.write("".join(lines))
+                self._file.write("".join(map(event_line, records)))
                 self._file.flush()
             except OSError as error:
                 self._unwritten += len(records)
@@ -180,7 +192,7 @@ def header_line(record: StateRecord, stamp_ns: int, base: dict[str, Any] | None 
 
 def event_line(record: dict[str, Any]) -> str:
     """Return the line of an event."""
-    return json.dumps(record) + "\n"
+    return record_text(record) + "\n"
 
 
 def recording_lines(
@@ -189,7 +201,15 @@ def recording_lines(
     """Yield the lines of a file that holds these events."""
     stamp_ns = events[0]["stamp_ns"] if events else 0
     yield header_line(record, stamp_ns, base)
-    yield from (event_line({**event, "seq": i}) for i, event in enumerate(events, 1))
+    yield from map(event_line, _numbered(events))
+
+
+def _numbered(events: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """The events with numbers from 1, which count those that are missing too."""
+    seq = 0
+    for event in events:
+        seq += 1 + event.get("dropped", 0)
+        yield {**event, "seq": seq}
 
 
 def read_recording(path: str | Path) -> Recording:
@@ -206,10 +226,8 @@ def read_recording(path: str | Path) -> Recording:
     recording = _read_header(path, lines[0])
     whole = lines[1:-1]  # what follows the last line's end was cut off, or is empty
     recording.cut = bool(lines[-1]) and len(lines) > 1
-    for number, line in enumerate(whole, 2):
-        recording.events.append(_read_event(path, number, line))
-    for seq, event in enumerate(recording.events, 1):
-        event["seq"] = seq
+    events = [_read_event(path, number, line) for number, line in enumerate(whole, 2)]
+    recording.events = list(_numbered(events))
     return recording
 
 
@@ -230,6 +248,7 @@ def _read_event(path: Path, number: int, line: str) -> dict[str, Any]:
     try:
         event: dict[str, Any] = json.loads(line)
         str(event["kind"]), str(event["path"]), int(event["stamp_ns"])
+        int(event.get("dropped", 0))
     except (ValueError, KeyError, TypeError) as error:
         raise RecordingError(
             path, f"line {number}: got {line[:60]!r} ({error}); expected an event."

@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import json
+import threading
+from dataclasses import asdict
 from types import SimpleNamespace
 
 import pytest
 
-from smachpy import CBState, StateMachine, describe
+from smachpy import CBState, State, StateMachine, describe, tape
+from viz.live import machines
 from viz.live.machines import Machine, Machines
+from viz.runs import recording as recording_module
 from viz.runs.html import standalone_page
-from viz.runs.recording import Recorder, RecordingError, find_recordings, read_recording
+from viz.runs.recording import (
+    Recorder,
+    RecordingError,
+    find_recordings,
+    read_recording,
+    recording_lines,
+)
 from viz.runs.statistics import count, never_taken, quantile
 
 
@@ -127,6 +137,70 @@ def test_a_disk_that_fails_ends_the_recording_and_not_the_run(tmp_path, clock):
     assert recorder.dropped == 7
 
 
+def test_more_events_than_can_be_written_end_as_the_run_did(
+    tmp_path, clock, monkeypatch, caplog, capsys
+):
+    monkeypatch.setattr(recording_module, "WAITING_EVENTS", 20)
+    monkeypatch.setattr(tape, "SLACK", 20)
+
+    class Again(State):
+        left = 3000
+
+        def execute(self, userdata):
+            self.left -= 1
+            return "again" if self.left else "succeeded"
+
+    sm = StateMachine(outcomes=["succeeded"], name="JOB")
+    with sm:
+        StateMachine.add("SPIN", Again(outcomes=["again", "succeeded"]), {"again": "SPIN"})
+    with Recorder(tmp_path / "run.jsonl", sm) as recorder:
+        sm.execute()
+    recording = read_recording(tmp_path / "run.jsonl")
+    assert recording.dropped == recorder.dropped > 5000
+    assert recording.events[-1]["kind"] == "Finished"
+    assert recording.events[-1]["seq"] == 2 + 2 * 3000
+    assert f"{recorder.dropped} events are missing" in caplog.text
+    assert "disk" not in caplog.text
+    from smachpy.cli import main
+
+    assert main(["runs", "list", str(tmp_path / "run.jsonl")]) == 0
+    assert "of 6002" in capsys.readouterr().out
+    assert main(["runs", "show", str(tmp_path / "run.jsonl")]) == 0
+    assert "events are missing" in capsys.readouterr().out
+    again = tmp_path / "again.jsonl"
+    again.write_text("".join(recording_lines(recording.record, recording.events, None)))
+    assert read_recording(again).events == recording.events
+
+
+def test_a_recorder_that_is_late_tells_what_is_missing_too(tmp_path, clock, caplog, monkeypatch):
+    machine = make_machine()
+    recorder = Recorder(tmp_path / "run.jsonl", machine)
+    monkeypatch.setattr(recorder._executor, "join", lambda _seconds: False)
+    recorder._tape.dropped = 17
+    recorder.close()
+    assert "still being written" in caplog.text
+    assert "17 events are missing" in caplog.text
+    monkeypatch.undo()
+    recorder.close()
+
+
+def test_a_value_that_json_does_not_take_costs_no_other_event(tmp_path, clock):
+    sm = StateMachine(outcomes=["succeeded"], name="JOB")
+
+    def work(userdata):
+        userdata.count = 10**5000
+        return "succeeded"
+
+    with sm:
+        StateMachine.add("A", CBState(work, outcomes=["succeeded"], output_keys=["count"]))
+    with Recorder(tmp_path / "run.jsonl", sm) as recorder:
+        sm.execute()
+    events = read_recording(tmp_path / "run.jsonl").events
+    assert [e["kind"] for e in events][-1] == "Finished"
+    assert [e["value"] for e in events if "value" in e] == ["<int of 16610 bits>"]
+    assert recorder.dropped == 0
+
+
 def test_statistics_over_runs(record):
     runs = [read_recording(record(f"{i}.jsonl", failing=i == 2)) for i in range(3)]
     statistics = count(runs)
@@ -149,6 +223,7 @@ def test_a_machine_tells_who_comes_late_and_drops_who_is_too_far_behind(record):
     assert machine.since(4) == []
     assert [json.loads(text)["seq"] for text in machine.since(1)] == [2, 3, 4]
     assert machine.since(0) is None
+    assert machine.since(5) is None
     assert machine.add([{**recording.events[5], "seq": 6}]) is False
     assert machine.add(recording.events[:6]) is True
     seq, text = machine.snapshot(short=True)
@@ -156,6 +231,67 @@ def test_a_machine_tells_who_comes_late_and_drops_who_is_too_far_behind(record):
     assert json.loads(text)["events"] == []
     assert json.loads(text)["base"]["states"]["/JOB"]["visits"] == 1
     assert changes
+
+
+def a_machine(events, **how):
+    machine = Machine("x", lambda _machine: None)
+    record = describe(make_machine())
+    history = {"epoch": "e", "description": asdict(record), "base": None, "events": events}
+    machine.reset(history, **how)
+    return machine
+
+
+def visits(numbers, **more):
+    return [
+        {"kind": "Entered", "path": "/JOB/FIRST", "t": 0.0, "stamp_ns": n, "seq": n, **more}
+        for n in numbers
+    ]
+
+
+def test_after_a_gap_a_page_gets_the_events_by_their_numbers(clock):
+    machine = a_machine(visits([*range(1, 101), *range(201, 301)]))
+    assert [json.loads(text)["seq"] for text in machine.since(100)] == list(range(201, 301))
+    assert [json.loads(text)["seq"] for text in machine.since(150)] == list(range(201, 301))
+    machine = a_machine(visits([1, 2, 3, 9, 10]), limit=2)
+    assert machine.since(3) == machine.since(5) != []
+    assert machine.since(2) is None
+
+
+def test_events_that_a_machine_dropped_are_not_asked_for(clock):
+    machine = a_machine(visits([1, 2]))
+    assert machine.add(visits([7], dropped=4))
+    assert not machine.add(visits([9]))
+    assert machine.active() == ["/JOB/FIRST"]
+    assert json.loads(machine.snapshot(short=True)[1])["base"]["dropped"] == 4
+
+
+def test_a_snapshot_is_of_one_instant(clock, monkeypatch):
+    """An event that comes while its text is made is not counted as one that it has."""
+    machine = a_machine(visits([1]))
+
+    class Slow:
+        def __enter__(self):
+            self.lock.acquire()
+
+        def __exit__(self, *_error):
+            self.lock.release()
+            machine._seq = 2  # as another thread's `add` would, at once
+
+        lock = threading.Lock()
+
+    monkeypatch.setattr(machine, "_lock", Slow())
+    number, text = machine.snapshot()
+    assert number == json.loads(text)["seq"] == len(json.loads(text)["events"]) == 1
+
+
+def test_so_much_text_of_events_is_kept(clock, monkeypatch):
+    monkeypatch.setattr(machines, "KEPT_BYTES", 1000)
+    machine = a_machine(visits(range(1, 101)))
+    assert sum(len(text) for text in machine.since(100 - 5)) < 1000
+    assert machine.since(1) is None
+    assert (
+        json.loads(machine.snapshot(short=True)[1])["base"]["states"]["/JOB/FIRST"]["visits"] == 100
+    )
 
 
 def test_machines_are_listed_when_they_are_known(record):

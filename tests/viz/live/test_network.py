@@ -1,0 +1,101 @@
+"""What a viewer knows of machines on the network, without a browser."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from actionlib_core.node import Node
+from actionlib_core.transport.memory import MemoryNetwork
+from smachpy import IntrospectionServer, State, StateMachine, feed, tape
+from viz.live.machines import Machines
+from viz.live.network import Network
+
+
+class Spin(State):
+    """Ends at once, so often that nobody can follow."""
+
+    def __init__(self, rounds):
+        super().__init__(outcomes=["again", "done"])
+        self.rounds = rounds
+
+    def execute(self, userdata):
+        self.rounds -= 1
+        return "again" if self.rounds > 0 else "done"
+
+
+class Wait(State):
+    def __init__(self):
+        super().__init__(outcomes=["done", "preempted"])
+
+    def execute(self, userdata):
+        return "preempted" if self.sleep(2.0) else "done"
+
+
+def spinning(rounds):
+    machine = StateMachine(outcomes=["done", "preempted"], name="JOB")
+    with machine:
+        StateMachine.add("A", Spin(rounds), {"again": "A", "done": "B"})
+        StateMachine.add("B", Wait())
+    return machine
+
+
+@pytest.fixture
+def watch(clock):
+    """`watch(machine)` shows a machine and returns what a viewer elsewhere makes of it."""
+    network = MemoryNetwork(clock)
+    robot = Node("robot", transport=network.session(), clock=clock)
+    desk = Node("desk", transport=network.session(), clock=clock)
+    machines = Machines()
+    viewer = Network(desk, machines, control=True)
+    servers = []
+
+    def watch(machine):
+        servers.append(IntrospectionServer("robot", machine, "/JOB", node=robot, control=True))
+        servers[-1].start()
+        clock.sleep(2.0)
+        return machines.get("robot")
+
+    watch.viewer = viewer
+    yield watch
+    for server in servers:
+        server.stop()
+    viewer.close()
+    desk.close()
+    robot.close()
+
+
+def test_a_flood_ends_as_the_mission_does(clock, watch, monkeypatch):
+    monkeypatch.setattr(feed, "QUEUED_EVENTS", 50)
+    monkeypatch.setattr(tape, "SLACK", 50)
+    job = spinning(2000)
+    seen = watch(job)
+    mission = clock.spawn(job.execute, name="mission")
+    clock.sleep(1.0)
+    assert seen.summary()["active"] == ["/JOB/B"]
+    assert mission.join(60.0)
+    clock.sleep(1.0)
+    told = seen.summary()
+    assert told["active"] == []
+    assert told["outcome"] == "done"
+    state = json.loads(seen.snapshot(short=True)[1])["base"]
+    assert state["dropped"] + sum(one["visits"] for one in state["states"].values()) > 1000
+    assert seen.seq == 2 + 2 * 2000 + 2
+
+
+def test_who_comes_late_is_told_what_the_kept_events_do_not_tell(clock, watch, monkeypatch):
+    monkeypatch.setattr(feed, "KEPT_BYTES", 1000)
+    job = spinning(500)
+    seen = watch(job)
+    assert job.execute() == "done"
+    clock.sleep(1.0)
+    other = Machines()
+    late = Network(watch.viewer._node, other)
+    clock.sleep(2.0)
+    late.close()
+    assert other.get("robot").summary()["outcome"] == "done"
+    assert 0 < len(other.get("robot").events()) < 20
+    told = json.loads(other.get("robot").snapshot(short=True)[1])["base"]
+    assert told["states"]["/JOB/A"]["visits"] == 500
+    assert seen.summary()["outcome"] == "done"
