@@ -429,3 +429,57 @@ def test_without_a_look_at_the_network_no_server_is_missed(served, look):
     page = look(served.start())
     page.wait_for_selector('g.active[data-path="/JOB/A"]')
     assert page.query_selector("g.waiting") is None
+
+
+def test_lists_that_are_cut_say_so(served, look):
+    written = [("UserdataWritten", "/JOB/A", {"key": f"k{n:03}", "value": n}) for n in range(70)]
+    done = [("Left", "/JOB/A", {"outcome": "ok"}), ("Entered", "/JOB/B")]
+    served.add("one", events=[*run()[:2], *written, *done])
+    page = look(served.start())
+    page.wait_for_selector(".userdata")
+    assert len(page.query_selector_all(".userdata tr")) == 60
+    page.click("button:text-is('and 10 more')")
+    wait_for(page, "document.querySelectorAll('.userdata tr').length === 70")
+    page.keyboard.press(",")
+    page.keyboard.press(",")
+    wait_for(page, "document.querySelectorAll('.diff').length === 8")
+    page.click("button:text-is('and 62 more')")
+    wait_for(page, "document.querySelectorAll('.diff').length === 70")
+
+
+def test_a_log_that_is_cut_goes_further_back_when_it_is_asked_to(served, look):
+    turn = [("Left", "/JOB/A", {"outcome": "ok"}), ("Entered", "/JOB/A")]
+    events = [event for _ in range(3_100) for event in turn]
+    served.add("one", events=[*run()[:2], *events])
+    page = look(served.start())
+    wait_for(page, "document.querySelectorAll('.log li').length === 70")
+    page.fill("[aria-label='filter the log']", "started")
+    wait_for(page, "document.querySelectorAll('.log li').length === 0")
+    assert "last 6,000 of 6,202 events" in page.text_content(".log ~ button")
+    page.click(".log ~ button")
+    wait_for(page, "document.querySelectorAll('.log li').length === 1")
+    assert page.query_selector(".log ~ button") is None
+    page.fill("[aria-label='filter the log']", "")
+    wait_for(page, "document.querySelectorAll('.log li').length === 140")
+    page.click("button:text-is('older')")
+    wait_for(page, "document.querySelectorAll('.log li').length === 210")
+
+
+def test_the_arrows_of_the_search_stay_on_what_it_shows(served, look):
+    from smachpy.introspection import StateRecord
+
+    leaves = tuple(
+        StateRecord(f"/JOB/STEP_{n:02}", f"STEP_{n:02}", "state", "State", ("done",))
+        for n in range(20)
+    )
+    root = StateRecord("/JOB", "JOB", "machine", "StateMachine", ("done",), children=leaves)
+    served.add("one").describe(root)
+    page = look(served.start())
+    wait_for(page, "smachpy.store.model.value.order.length === 21")
+    page.fill("#search", "step")
+    assert "and 8 more" in page.text_content(".results")
+    for _ in range(16):
+        page.press("#search", "ArrowDown")
+    assert page.text_content(".results .at b") == "STEP_11"
+    page.press("#search", "Enter")
+    assert page.evaluate("() => smachpy.store.selected.value") == "/JOB/STEP_11"

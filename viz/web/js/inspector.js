@@ -14,7 +14,8 @@ import { coverage } from "viewer/statistics";
 
 const html = htm.bind(h);
 const FLASH_MS = 900;
-const LOG_LINES = 70;
+const LOG_LINES = 70, LOOKED_THROUGH = 6000; // lines, events; so many more at each "older"
+const MOST_VALUES = 60, MOST_CHANGES = 8;
 const SHORT = 160, LINE = 200; // characters; the browser takes minutes to break lines of thousands
 const RECENT_MS = 30_000; // a preempt that is over is shown so long while the mission goes on
 const MOST_ROWS = 24;
@@ -175,11 +176,12 @@ function Userdata({ page, data, now }) {
   const all = Object.entries(data.userdata).sort(([a, x], [b, y]) =>
     rank.get(y.container) - rank.get(x.container) || (a < b ? -1 : 1));
   const [open, setOpen] = useState(null);
+  const [most, setMost] = useState(MOST_VALUES);
   const several = new Set(all.map(([, entry]) => entry.container)).size > 1;
   let container = null;
   return html`<${Section} title="Userdata" count=${all.length || null}>
     ${!all.length && html`<p class="hint">nothing written yet</p>`}
-    <div class="scroller"><table class="userdata"><tbody>${all.slice(0, 60).map(([id, entry]) => {
+    <div class="scroller"><table class="userdata"><tbody>${all.slice(0, most).map(([id, entry]) => {
       const text = brief(entry.value);
       const fresh = now - ms(entry.at) < FLASH_MS;
       const first = several && entry.container !== container;
@@ -189,8 +191,11 @@ function Userdata({ page, data, now }) {
         <td><code>${open === id ? html`<pre>${pretty(entry.value)}</pre>` : text.slice(0, SHORT)}${open !== id && text.length > SHORT ? "\u2026" : ""}</code>
           ${open === id && wasShortened(text) && html`<${Whole} entry=${entry} />`}
           <small>by <${State} path=${entry.writer} page=${page} /> ${clock(entry.at, data)}</small></td></tr>`;
-    })}</tbody></table></div><//>`;
+    })}</tbody></table></div><${Cut} left=${all.length - most} onMore=${() => setMost(most + 4 * MOST_VALUES)} /><//>`;
 }
+
+// Says that a list is cut, and goes on.
+const Cut = ({ left, onMore }) => (left > 0 ? html`<button class="small" onClick=${onMore}>and ${left.toLocaleString("en")} more</button>` : null);
 
 // Events tell only the beginning of long values; the mission has the rest.
 const wasShortened = (text) => /\u2026$|\u2026"|<\S+ of \d+ elements>/.test(text);
@@ -219,21 +224,23 @@ const clock = (ns, data) => {
 
 // What the transition at the cursor changed.
 function Difference({ page }) {
+  const [whole, setWhole] = useState(false);
   if (store.cursor.value === null) return null;
   const run = store.run, at = store.happened();
   let from = at - 1;
   while (from > 0 && !["Left", "Failed", "Finished", "Started"].includes(run.events[from]?.kind)) from--;
   let before = from - 1;
   while (before > 0 && !["Left", "Failed", "Started"].includes(run.events[before]?.kind)) before--;
-  const changes = run.events.slice(Math.max(0, before), at).filter((e) => e.kind === "UserdataWritten").slice(-8);
+  const changes = run.events.slice(Math.max(0, before), at).filter((e) => e.kind === "UserdataWritten");
+  const shown = whole ? changes : changes.slice(-MOST_CHANGES);
   const old = run.after(Math.max(0, before)).userdata;
   return html`<${Section} title="Changed by this transition">
     ${!changes.length && html`<p class="hint">no userdata was written</p>`}
-    ${changes.map((e) => {
+    ${shown.map((e) => {
       const container = e.path.slice(0, e.path.lastIndexOf("/"));
       const was = old[`${container} ${e.key}`];
       return html`<div class="diff"><b>${e.key}</b> <del>${was ? brief(was.value).slice(0, 60) : "unset"}</del> <ins>${brief(e.value).slice(0, 60)}</ins> <small>by <${State} path=${e.path} page=${page} /></small></div>`;
-    })}<//>`;
+    })}<${Cut} left=${changes.length - shown.length} onMore=${() => setWhole(true)} /><//>`;
 }
 
 function Numbers() {
@@ -274,25 +281,30 @@ const GROUPS = { all: null, transitions: ["Started", "Finished", "Left", "Failed
 function Log({ page }) {
   store.slowTick.value; // components that read signals are drawn again only when those change
   const [text, setText] = useState("");
+  const [reach, setReach] = useState(1);
   const run = store.run, kinds = GROUPS[store.logFilter.value];
   const end = store.happened();
   const begun = ms(store.shown().started) ?? run.first();
   const lines = [];
   const wanted = text.toLowerCase();
-  for (let i = end - 1; i >= 0 && lines.length < LOG_LINES && end - i < 6000; i--) {
+  const most = reach * LOG_LINES, last = Math.max(0, end - reach * LOOKED_THROUGH);
+  let i = end - 1;
+  for (; i >= last && lines.length < most; i--) {
     const e = run.events[i], missing = i + 1 < end && run.events[i + 1].dropped;
     if (missing) lines.push(html`<li key=${-e.seq} class="hint">${count(missing)} missing here</li>`);
     if (!(e.kind in LINES) || (kinds && !kinds.includes(e.kind)) || (!kinds && e.kind === "UserdataWritten")) continue;
+    const at = i + 1;
     const [words, kind] = LINES[e.kind](e);
     if (wanted && !`${e.path} ${words}`.toLowerCase().includes(wanted)) continue;
     const edge = e.kind === "Left" ? target(e) : "";
-    lines.push(html`<li key=${e.seq} onClick=${() => { if (store.cursor.value !== null) store.seekTo(i + 1); }}>
+    lines.push(html`<li key=${e.seq} onClick=${() => { if (store.cursor.value !== null) store.seekTo(at); }}>
       <time>${((ms(e.stamp_ns) - begun) / 1000).toFixed(2)}</time><${State} path=${e.path} page=${page} /> <span class=${`word ${kind}`}>${shorten(words, LINE)}</span>${edge}</li>`);
   }
   return html`<${Section} title="Log"><div class="filter">
     <select aria-label="kinds" value=${store.logFilter.value} onChange=${(e) => { store.logFilter.value = e.target.value; }}>${Object.keys(GROUPS).map((g) => html`<option value=${g}>${g}</option>`)}</select>
     <input aria-label="filter the log" placeholder="filter" value=${text} onInput=${(e) => setText(e.target.value)} /></div>
-    <ol class="log">${lines}</ol><//>`;
+    <ol class="log">${lines}</ol>${i >= 0 && html`<button class="small" onClick=${() => setReach(reach + 1)}>${lines.length < most
+      ? `nothing more in the last ${(end - last).toLocaleString("en")} of ${end.toLocaleString("en")} events; look at older ones` : "older"}</button>`}<//>`;
 }
 
 function target(e) {

@@ -12,7 +12,7 @@ import { KIND_NAMES, SIGNS, outcomeClass, shorten } from "viewer/model";
 
 export const html = htm.bind(h);
 const ROW = 24;
-const MOST_NAMES = 12;
+const MOST_NAMES = 12, MOST_FOUND = 12;
 const MOST_ACTIVE = 200; // in an address
 const GLYPH = { action: "\u25b6", service: "\u21c4", monitor: "\u25c9", condition: "?", machine: "\u25a3",
   sequence: "\u2192", concurrence: "\u2016", iterator: "\u21bb", missing: "\u2715" };
@@ -68,10 +68,11 @@ function Search({ page }) {
   const [at, setAt] = useState(0);
   const text = store.query.value;
   const found = text ? store.model.value?.search(text) ?? [] : [];
+  const shown = found.slice(0, MOST_FOUND);
   const pick = (node) => { if (node) { page.goTo(node.path); store.query.value = ""; document.activeElement?.blur(); } };
   const onKeyDown = (e) => {
-    if (e.key === "Enter") pick(found[Math.min(at, found.length - 1)]);
-    else if (e.key === "ArrowDown") { setAt(Math.min(at + 1, found.length - 1)); e.preventDefault(); }
+    if (e.key === "Enter") pick(shown[Math.min(at, shown.length - 1)]);
+    else if (e.key === "ArrowDown") { setAt(Math.min(at + 1, shown.length - 1)); e.preventDefault(); }
     else if (e.key === "ArrowUp") { setAt(Math.max(at - 1, 0)); e.preventDefault(); }
     else if (e.key === "Escape") { store.query.value = ""; e.target.blur(); }
     else return;
@@ -83,10 +84,10 @@ function Search({ page }) {
       onInput=${(e) => { store.query.value = e.target.value; setAt(0); }} onKeyDown=${onKeyDown} />
     ${!text && html`<kbd>/</kbd>`}
     ${text && html`<ul class="results" role="listbox">
-      ${found.slice(0, 12).map((n, i) => html`<li role="option" aria-selected=${i === at} class=${i === at ? "at" : ""}
+      ${shown.map((n, i) => html`<li role="option" aria-selected=${i === at} class=${i === at ? "at" : ""}
         onPointerDown=${() => pick(n)}><b>${n.name}</b><small>${n.parent ? n.parent.path : KIND_NAMES[n.kind]}</small></li>`)}
       ${!found.length && html`<li class="none">nothing is called that</li>`}
-      ${found.length > 12 && html`<li class="none">and ${found.length - 12} more</li>`}
+      ${found.length > shown.length && html`<li class="none">and ${found.length - shown.length} more</li>`}
     </ul>`}
   </div>`;
 }
