@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from smachpy.testing.exploration import replay as replay
     from smachpy.testing.kit import MissionKit as MissionKit
     from smachpy.testing.kit import TimeLimitError as TimeLimitError
+    from smachpy.testing.kit import UnfiredWarning as UnfiredWarning
     from smachpy.testing.kit import mission_kit as mission_kit
     from smachpy.testing.runs import Run as Run
     from smachpy.testing.runs import UnknownStateError as UnknownStateError
@@ -34,6 +35,7 @@ __all__ = [
     "MissionTestCase",
     "Run",
     "TimeLimitError",
+    "UnfiredWarning",
     "UnknownStateError",
     "explore",
     "mission_kit",
@@ -48,6 +50,7 @@ _HOMES = {
     "MissionTestCase": "cases",
     "Run": "runs",
     "TimeLimitError": "kit",
+    "UnfiredWarning": "kit",
     "UnknownStateError": "runs",
     "explore": "exploration",
     "mission_kit": "kit",

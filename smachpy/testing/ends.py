@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 LOST: Fate = DROPPED
 TWICE: Fate = (0.0, 0.0)
+MOST_ERRORS = 5  # so many are told
 
 
 class ScriptedEnd:
@@ -60,11 +61,17 @@ class ScriptedEnd:
         """Die as a process does that gets SIGKILL."""
         self._session.kill()
 
+    def take_errors(self) -> list[str]:
+        """Return what went otherwise than the script says, and forget it."""
+        errors, self.errors = self.errors, []
+        more = len(errors) - MOST_ERRORS
+        return [*errors[:MOST_ERRORS], *([f"{self.name}: and {more} more"] if more > 0 else [])]
+
     def verify(self) -> None:
         """Fail if something went otherwise than the script says."""
         __tracebackhide__ = True
-        if self.errors:
-            errors, self.errors = self.errors, []
+        errors = self.take_errors()
+        if errors:
             raise AssertionError("\n".join(errors))
 
     def close(self) -> None:

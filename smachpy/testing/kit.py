@@ -5,8 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import tempfile
-from dataclasses import dataclass
-from functools import partial
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -15,12 +14,11 @@ from actionlib_core.node import Node, use_node
 from actionlib_core.shutdown import Shutdown, use_shutdown
 from actionlib_core.transport.memory import MemoryNetwork
 from smachpy._runtime.asker import asking
-from smachpy.events import Entered, Event
 from smachpy.exceptions import SmachError
 from smachpy.introspection import describe
-from smachpy.tape import EventTape
 from smachpy.testing.doubles import Double, Places
-from smachpy.testing.runs import Run, find_path
+from smachpy.testing.runs import Run
+from smachpy.testing.watch import STEPS, TURN_STEPS, Stuck, Trigger, Watch
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -40,38 +38,27 @@ LIMIT_S = 6 * 3600.0
 
 
 class TimeLimitError(SmachError):
-    """A mission under test ran longer than the limit.
+    """A mission under test ran longer than the limit, or on and on while no time passed.
 
     Attributes:
         run: The run up to there.
     """
 
-    def __init__(self, run: Run, limit: float) -> None:
+    def __init__(self, run: Run, limit: float, steps: int = 0) -> None:
         self.run = run
         active = ", ".join(run.active) or "nothing"
-        super().__init__(
-            f"{run.record.path}: it still ran after {limit:g} s, in {active}; expected an end. "
-            f"Try mission(..., limit=...).\n{run.explain()}"
-        )
+        what = f"it still ran after {limit:g} s, in {active}; expected an end. Try"
+        if steps:
+            what = (
+                f"it took {steps} steps at {run.duration:g} s, in {active}; expected time to pass, "
+                "or an end. Let a state or a server take time, or try"
+            )
+        word = "steps" if steps else "limit"
+        super().__init__(f"{run.record.path}: {what} mission(..., {word}=...).\n{run.explain()}")
 
 
-@dataclass(frozen=True, slots=True)
-class _Trigger:
-    """Something to do during the next run.
-
-    Attributes:
-        act: What.
-        at: When [s after the start], or None.
-        on: When the state at this path begins, or None.
-        after: So long after that [s].
-        visit: At the how many-th time.
-    """
-
-    act: Callable[[Container], object]
-    at: float | None
-    on: str | None
-    after: float
-    visit: int
+class UnfiredWarning(UserWarning):
+    """A preempt or interrupt that the test asked for never came: the run ended before."""
 
 
 class MissionKit:
@@ -114,7 +101,7 @@ class MissionKit:
         self._folder = folder or _temporary_folder
         self.on_run = on_run
         self._places = Places()
-        self._triggers: list[_Trigger] = []
+        self._triggers: list[Trigger] = []
         self._replacements: list[Replacement] = []
         self._servers: list[ScriptedEnd] = []
         self._stack = contextlib.ExitStack()
@@ -148,6 +135,7 @@ class MissionKit:
         userdata: Mapping[str, Any] | None = None,
         *,
         limit: float = LIMIT_S,
+        steps: int = STEPS,
     ) -> Run:
         """Run `machine` to its end.
 
@@ -155,13 +143,20 @@ class MissionKit:
             machine: Any container.
             userdata: Values put into its userdata before.
             limit: Longest run on the test's clock [s].
+            steps: Most steps while no time passes: transitions, and a fifth of it turns of waiting
+                threads.
 
         Raises:
             Deadlock: everything waits and nothing can ever go on.
-            TimeLimitError: it did not end in time.
+            TimeLimitError: it did not end in time, or with so many steps.
             SmachError: a state raised, or the machine does not hold together; as `execute`.
-            AssertionError: a scripted server got a goal that the script does not provide for.
+            AssertionError: a scripted server got a goal that the script does not provide for. When
+                something else is raised, this is among its notes.
+
+        Warns:
+            UnfiredWarning: a preempt or interrupt of the test never came.
         """
+        __tracebackhide__ = True
         for name, make, made in self._replacements:
             made.append(self._places.put(machine, name, make))  # type: ignore[arg-type]
         self._replacements.clear()
@@ -169,18 +164,21 @@ class MissionKit:
             machine.userdata[key] = value
         record = describe(machine)
         triggers, self._triggers = self._triggers, []
-        watch = _Watch(self, machine, record, triggers)
-        self.clock.limit = self.clock.now() + limit
+        watch = Watch(self.clock, machine, record, triggers, steps)
+        self.clock.limit, self.clock.most_turns = self.clock.now() + limit, steps // TURN_STEPS
         try:
             with self.clock.patched(), watch.installed():
                 outcome, error = self._execute(machine)
         finally:
-            self.clock.limit = None
+            self.clock.limit = self.clock.most_turns = None
         run = self._finish(machine, record, watch, outcome)
+        errors = [text for server in self._servers for text in server.take_errors()]
         if error is not None:
-            _reraise(error, run, limit, draws=self.draws)
-        for server in self._servers:
-            server.verify()
+            _reraise(error, run, limit, steps, errors, draws=self.draws)
+        if errors:
+            raise AssertionError("\n".join(errors))
+        for text in run.unfired:
+            warnings.warn(UnfiredWarning(f"{record.path}: {text}"), stacklevel=2)
         return run
 
     def _execute(self, machine: Container) -> tuple[str | None, BaseException | None]:
@@ -189,7 +187,7 @@ class MissionKit:
         def execute() -> tuple[str | None, BaseException | None]:
             try:
                 return machine.execute(), None
-            except Exception as error:  # noqa: BLE001  raised again, with what the run did
+            except (Exception, Stuck) as error:  # noqa: BLE001  raised again, with what the run did
                 return None, error
 
         try:
@@ -204,11 +202,20 @@ class MissionKit:
         return found[0]
 
     def _finish(
-        self, machine: Container, record: StateRecord, watch: _Watch, outcome: str | None
+        self, machine: Container, record: StateRecord, watch: Watch, outcome: str | None
     ) -> Run:
         data = {key: machine.userdata[key] for key in machine.userdata.keys()}  # noqa: SIM118
         duration = self.clock.now() - watch.started
-        run = Run(record, outcome, tuple(watch.events), data, duration, self.seed, self._folder)
+        run = Run(
+            record,
+            outcome,
+            tuple(watch.events),
+            data,
+            duration,
+            self.seed,
+            self._folder,
+            watch.unfired(),
+        )
         if self.on_run is not None:
             self.on_run(run)
         return run
@@ -274,7 +281,7 @@ class MissionKit:
             with asking("test"):
                 machine.request_preempt()
 
-        self._add(preempt, at, on, after, visit)
+        self._add("preempt", preempt, at, on, after, visit)
 
     def interrupt(
         self,
@@ -294,10 +301,13 @@ class MissionKit:
             with asking("test", "", "interrupt"):
                 machine.request_preempt()
 
-        self._add(interrupt, 0.0 if at is None and on is None else at, on, after, visit)
+        self._add(
+            "interrupt", interrupt, 0.0 if at is None and on is None else at, on, after, visit
+        )
 
     def _add(
         self,
+        what: str,
         act: Callable[[Container], object],
         at: float | None,
         on: str | None,
@@ -305,8 +315,8 @@ class MissionKit:
         visit: int,
     ) -> None:
         if (at is None) == (on is None):
-            raise ValueError(f"preempt: got at={at!r} and on={on!r}; expected one of them.")
-        self._triggers.append(_Trigger(act, at, on, after, visit))
+            raise ValueError(f"{what}: got at={at!r} and on={on!r}; expected one of them.")
+        self._triggers.append(Trigger(what, act, at, on, after, visit))
 
     # -- the world around ----------------------------------------------------------------------
 
@@ -375,75 +385,32 @@ class MissionKit:
             )
 
 
-class _Watch:
-    """Sees one run: takes its events down and pulls the triggers."""
-
-    def __init__(
-        self,
-        kit: MissionKit,
-        machine: Container,
-        record: StateRecord,
-        triggers: list[_Trigger],
-    ) -> None:
-        self._clock = kit.clock
-        self._machine = machine
-        self._timed = [trigger for trigger in triggers if trigger.on is None]
-        self._waiting = [(t, find_path(record, t.on)) for t in triggers if t.on is not None]
-        self._visits: dict[str, int] = {}
-        self._unsubscribe: Callable[[], object] = _nothing
-        self.events: list[Event] = []
-        self.started = self._clock.now()
-
-    @contextlib.contextmanager
-    def installed(self) -> Iterator[None]:
-        timers = [
-            self._clock.call_later(trigger.at or 0.0, partial(trigger.act, self._machine))
-            for trigger in self._timed
-        ]
-        tape = EventTape(self._machine)
-        if self._waiting:
-            self._unsubscribe = self._machine.subscribe(self._on_event)
-        try:
-            yield
-        finally:
-            self._unsubscribe()
-            tape.close()
-            self.events = tape.events()
-            for timer in timers:
-                timer.cancel()
-
-    def _on_event(self, event: Event) -> None:
-        """Pull triggers; a listener slows the machine down, so it goes with the last of them."""
-        if not isinstance(event, Entered):
-            return
-        count = self._visits[event.path] = self._visits.get(event.path, 0) + 1
-        for trigger, path in list(self._waiting):
-            if path == event.path and trigger.visit == count:
-                self._clock.call_later(trigger.after, partial(trigger.act, self._machine))
-                self._waiting.remove((trigger, path))
-        if not self._waiting:
-            self._unsubscribe()
-
-
-def _nothing() -> None:
-    pass
-
-
-def _reraise(error: BaseException, run: Run, limit: float, *, draws: bool) -> NoReturn:
-    """Raise what ended a run, a deadlock as itself, with the run as a note."""
+def _reraise(
+    error: BaseException, run: Run, limit: float, steps: int, errors: list[str], *, draws: bool
+) -> NoReturn:
+    """Raise what ended a run, a deadlock as itself, with the run and `errors` as notes."""
     cause: BaseException | None = error
-    while cause is not None and not isinstance(cause, Deadlock | TimeLimit):
+    while cause is not None and not isinstance(cause, Deadlock | TimeLimit | Stuck):
         cause = cause.__cause__
-    if isinstance(cause, TimeLimit):
-        raise TimeLimitError(run, limit) from cause
+    if isinstance(cause, TimeLimit | Stuck):
+        stuck = isinstance(cause, Stuck) or cause.turns > 0
+        over = TimeLimitError(run, limit, steps if stuck else 0)
+        _note(over, errors)
+        raise over from cause
     chosen = error if cause is None else cause
     picture = run.draw() if draws else None
+    _note(chosen, errors)
     if run.active:
         chosen.add_note("active: " + ", ".join(run.active))
     chosen.add_note(run.explain())
     if picture is not None:
         chosen.add_note(f"picture: {picture}")
     raise chosen
+
+
+def _note(error: BaseException, errors: list[str]) -> None:
+    for text in errors:
+        error.add_note(text)
 
 
 def _temporary_folder() -> Path:

@@ -8,7 +8,17 @@ from pathlib import Path
 from types import EllipsisType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from smachpy.events import Abandoned, Entered, Failed, Finished, GoalDone, GoalSent, Left, TimedOut
+from smachpy.events import (
+    Abandoned,
+    Entered,
+    Failed,
+    Finished,
+    GoalDone,
+    GoalSent,
+    Left,
+    Started,
+    TimedOut,
+)
 from smachpy.exceptions import SmachError, did_you_mean
 from smachpy.pictures import draw_run
 
@@ -57,6 +67,7 @@ class Run:
         duration: How long it took on the test's clock [s].
         seed: The interleaving it had; None: in turn.
         folder: Gives the folder for pictures.
+        unfired: The preempts and interrupts of the test that never came, and why.
     """
 
     record: StateRecord
@@ -66,6 +77,7 @@ class Run:
     duration: float
     seed: int | None = None
     folder: Callable[[], Path] = field(default=Path.cwd, repr=False)
+    unfired: tuple[str, ...] = ()
 
     # -- what happened -------------------------------------------------------------------------
 
@@ -103,12 +115,16 @@ class Run:
 
     def visits(self, state: str) -> int:
         """Return how often a state was entered; `state` is a path or the end of one."""
-        return self.states.count(find_path(self.record, state))
+        path = find_path(self.record, state)
+        begun = Started if path == self.record.path else Entered
+        return sum(isinstance(event, begun) and event.path == path for event in self.events)
 
     def outcomes(self, state: str) -> tuple[str, ...]:
         """Return the outcomes of a state, in order."""
         path = find_path(self.record, state)
-        return tuple(e.outcome for e in self.events if isinstance(e, Left) and e.path == path)
+        ended = Finished if path == self.record.path else Left
+        found = (e for e in self.events if isinstance(e, ended) and e.path == path)
+        return tuple(event.outcome for event in found if event.outcome is not None)
 
     def timed_out(self, state: str) -> bool:
         """Tell whether a state ran into its timeout."""
@@ -211,6 +227,7 @@ class Run:
         """Return the run in a few lines."""
         lines = [f"run of {self.record.path}: {self.outcome!r} after {self.duration:g} s"]
         lines += [f"  {line}" for line in _summary(self.events)]
+        lines += [f"  never came: {text}" for text in self.unfired]
         if self.seed is not None:
             lines.append(f"  seed {self.seed}")
         return "\n".join(lines)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
+import warnings
 
 import pytest
 
@@ -27,6 +28,7 @@ from smachpy.testing import (
     DoubleError,
     MissionTestCase,
     TimeLimitError,
+    UnfiredWarning,
     UnknownStateError,
     mission_kit,
 )
@@ -234,7 +236,8 @@ def test_a_trigger_changes_nothing_before_it_acts(mission):
     mission.preempt(on="A", after=100)
     mission.preempt(on="B", after=15)
     sm = machine()
-    preempted = mission(sm)
+    with pytest.warns(UnfiredWarning):
+        preempted = mission(sm)
     assert hearing[3:] == [1, 0, 0]
     assert preempted.path == plain.path
     assert preempted.duration == 25
@@ -245,6 +248,47 @@ def test_a_trigger_changes_nothing_before_it_acts(mission):
         return events[: next(i for i, e in enumerate(events) if e.path == "/M/C") + 1]
 
     assert until_c(preempted) == until_c(plain)
+
+
+def test_a_preempt_is_for_one_run_even_when_its_time_comes_later(mission):
+    sm = two_waits()
+    mission.preempt(on="B", after=25)
+    with pytest.warns(UnfiredWarning):
+        assert mission(sm).outcome == "done"
+    other = mission(two_waits())  # lets the time pass
+    assert (other.outcome, mission(sm).outcome) == ("done", "done")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"at": 500}, r"preempt\(at=500\): the run ended after 30 s"),
+        ({"on": "A", "visit": 2}, r"preempt\(on='A', visit=2\): /M/A began 1 times, and the run"),
+        ({"on": "B", "after": 50.0}, r"preempt\(on='B', after=50\): the run ended after 30 s"),
+    ],
+)
+def test_a_preempt_that_never_came_is_told(mission, arguments, said):
+    mission.preempt(**arguments)
+    with pytest.warns(UnfiredWarning, match=said):
+        run = mission(two_waits())
+    assert run.outcome == "done"
+    assert f"never came: {run.unfired[0]}" in run.explain()
+
+
+def test_a_preempt_that_came_is_no_warning(mission):
+    mission.preempt(on="B", after=1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run = mission(two_waits())
+    assert run.unfired == ()
+
+
+def test_the_root_is_a_state_like_the_others(mission):
+    mission.preempt(on="/M", after=3)
+    run = mission(two_waits())
+    assert (run.outcome, run.duration) == ("preempted", 3)
+    assert (run.visits("M"), run.outcomes("M")) == (1, ("preempted",))
+    run.assert_visited("/M")
 
 
 def test_interrupt_is_a_shutdown_and_a_preempt(mission):
@@ -291,6 +335,55 @@ def test_a_run_that_never_ends_is_told_from_a_long_one(mission):
     with pytest.raises(TimeLimitError, match="still ran after 95 s, in /M/A") as caught:
         mission(sm, limit=95)
     assert caught.value.run.visits("A") == 10
+
+
+def loop(name="M", **options):
+    sm = StateMachine(["done"], name=name, **options)
+    with sm:
+        sm.add("A", CBState(lambda ud: "again", outcomes=["again", "done"]), {"again": "A"})
+    return sm
+
+
+def test_a_run_in_which_no_time_passes_is_no_endless_test(mission):
+    with pytest.raises(TimeLimitError, match="took 1000 steps at 0 s, in /M/A; expected") as caught:
+        mission(loop(), steps=1000)
+    assert 1000 <= caught.value.run.visits("A") < 2000
+    mission.preempt(on="A", visit=10**6)  # with a listener
+    with pytest.raises(TimeLimitError, match="took 1000 steps"):
+        mission(loop(), steps=1000)
+
+
+def test_time_that_passes_now_and_then_is_enough(mission):
+    count = [0]
+
+    def step(ud):
+        count[0] += 1
+        if count[0] % 300 == 0:
+            time.sleep(1)
+        return "again" if count[0] < 3000 else "done"
+
+    sm = StateMachine(["done"], name="M")
+    with sm:
+        sm.add("A", CBState(step, outcomes=["again", "done"]), {"again": "A"})
+    assert mission(sm, steps=1000).duration == 10
+
+
+def test_no_handler_of_the_mission_keeps_a_run_without_time_going(mission):
+    sm = StateMachine(["done"], name="M")
+    with sm:
+        inner = loop(on_exception={Exception: "done"}, retry=(3, 0.0, Exception))
+        sm.add("INNER", inner, {"done": "INNER"})
+    with pytest.raises(TimeLimitError, match="/M/INNER/A"):
+        mission(sm, steps=1000)
+
+
+def test_a_child_of_a_concurrence_in_which_no_time_passes(mission):
+    both = Concurrence(["done"], "done", name="C")
+    with both:
+        both.add("LOOP", loop())
+        both.add("B", Wait())
+    with pytest.raises(TimeLimitError, match="took 1000 steps at 0 s"):
+        mission(both, steps=1000)
 
 
 def test_a_state_that_raises(mission):

@@ -11,8 +11,16 @@ from actionlib_core.interfaces.move_base_msgs.msg import (
 )
 from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import Trigger, TriggerResponse
-from smachpy import MonitorState, ServiceState, SimpleActionState, StateMachine
+from smachpy import (
+    CBState,
+    InvalidUserCodeError,
+    MonitorState,
+    ServiceState,
+    SimpleActionState,
+    StateMachine,
+)
 from smachpy.events import GoalDone, GoalFeedback
+from smachpy.testing import TimeLimitError
 
 
 def drive(**options):
@@ -52,6 +60,49 @@ def test_replies_in_order_then_the_default(mission, server):
     assert mission(drive_twice()).outcome == "aborted"
     run = mission(drive_twice())
     assert (run.outcome, run.duration) == ("succeeded", 2)
+
+
+def drive_again_and_again():
+    sm = StateMachine(["succeeded", "aborted", "preempted"], name="M")
+    with sm:
+        sm.add("DRIVE", SimpleActionState("move_base", MoveBaseAction), {"aborted": "DRIVE"})
+    return sm
+
+
+def test_goals_without_end_at_one_moment_are_told_with_what_the_server_missed(mission, server):
+    server.reply(status="aborted")
+    with pytest.raises(TimeLimitError, match="took 2000 steps at 0 s") as caught:
+        mission(drive_again_and_again(), steps=2000)
+    notes = caught.value.__notes__
+    assert notes[0].startswith("move_base: goal number 2 came; expected 1")
+    assert notes[5].startswith("move_base: and ")
+    server.default_result(duration=1)
+    assert mission(drive()).outcome == "succeeded"
+
+
+def test_the_errors_of_all_servers_are_told_and_of_their_own_run(mission, server, action_server):
+    other = action_server("dock", MoveBaseAction)
+    server.reply(status="aborted")
+    other.reply(status="aborted")
+
+    def twice(end):
+        sm = StateMachine(["succeeded", "aborted", "preempted"], name="M")
+        with sm:
+            for label, action in (("A", "move_base"), ("B", "move_base"), ("C", "dock")):
+                following = {"aborted": chr(ord(label) + 1)}
+                sm.add(label, SimpleActionState(action, MoveBaseAction), following)
+            sm.add("D", SimpleActionState("dock", MoveBaseAction), {"aborted": "END"})
+            sm.add("END", CBState(end, outcomes=["aborted"]))
+        return sm
+
+    with pytest.raises(InvalidUserCodeError) as raised:
+        mission(twice(lambda ud: 1 / 0))
+    assert [note.partition(" came")[0] for note in raised.value.__notes__[:2]] == [
+        "move_base: goal number 2",
+        "dock: goal number 2",
+    ]
+    with pytest.raises(AssertionError, match=r"goal number 3(.|\n)*dock: goal number 3"):
+        mission(twice(lambda ud: "aborted"))
 
 
 def test_feedback_is_spread_over_the_duration(mission, server):
