@@ -18,6 +18,7 @@ import traceback
 from importlib.metadata import version
 from typing import TYPE_CHECKING, NoReturn
 
+from actionlib_core.cli._output import while_read
 from actionlib_core.exceptions import ActionlibError
 from actionlib_core.names import parse_arguments
 
@@ -64,21 +65,21 @@ def main(argv: Sequence[str] | None = None, *, node: Node | None = None) -> int:
         names = parse_arguments([word for word in given if word != "--debug"])
         args = _parser().parse_args(names.rest)
         args.node, args.names = node, names
-        with _terminable():
-            return int(args.run(args))
+        code = 0  # `actionlib list | head`: the reader has seen enough
+        with _terminable(), while_read():
+            code = int(args.run(args))
+            sys.stdout.flush()
     except Terminated:
         return EXIT_TERMINATED
     except KeyboardInterrupt:
         return EXIT_INTERRUPTED
-    except BrokenPipeError:  # `actionlib list | head`: the reader has seen enough
-        sys.stderr.close()
-        return 0
     except ActionlibError as error:
         if debug:
             traceback.print_exception(error)
         else:
             print(f"actionlib: {error}", file=sys.stderr)
         return EXIT_ERROR
+    return code
 
 
 @contextlib.contextmanager

@@ -242,7 +242,7 @@ def ask(node: Node, name: str, goal_id: str, about: Literal["result", "goal"] = 
         if not reply.error:
             return Answer(reply.encoding, reply.payload)
     if replies:
-        raise UsageError(replies[0].error)
+        raise UsageError(replies[0].payload.decode(errors="replace"))
     raise UsageError(
         f"action '/{full}': got no answer within {ASK_S:g} s; expected one. Try 'actionlib info'."
     )

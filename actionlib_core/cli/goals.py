@@ -25,7 +25,8 @@ def register(subparsers: Any) -> None:
         "cancel",
         help="cancel goals of an action",
         description="With an ID: that goal. With --before: those with a stamp at or before it. "
-        "With both: either. With --all: all, of all clients.",
+        "With both: either. With --all: all, of all clients. Exit code 1 when no goal with the ID "
+        "runs.",
     )
     parser.add_argument("name", metavar="NAME", help="the action")
     parser.add_argument("id", metavar="ID", nargs="?", default="", help="a goal's id")
@@ -58,9 +59,12 @@ def register(subparsers: Any) -> None:
 
 
 def _goals(node: Node, name: str) -> list[StatusEntry]:
+    """Return the goals that a server tracks, without cancels whose goals never came."""
     from actionlib_core._action_wire import unpack_statuses
+    from actionlib_core._core.states import Status
 
-    return unpack_statuses(ask(node, name, "").payload)
+    entries = unpack_statuses(ask(node, name, "").payload)
+    return [entry for entry in entries if entry.stamp_ns or entry.status != Status.RECALLING]
 
 
 def _describe(entry: StatusEntry) -> dict[str, Any]:
@@ -163,15 +167,13 @@ def _cancel(args: argparse.Namespace) -> int:
     stamp_ns = _stamp(args.before)
     from actionlib_core._action_wire import pack_goal_id
     from actionlib_core._client_port import GOAL
-    from actionlib_core._core.states import TERMINAL, Status
+    from actionlib_core._core.states import TERMINAL
     from actionlib_core.interfaces.actionlib_msgs.msg import GoalID
     from actionlib_core.wire import encoding_of
 
     with open_node(args) as node:
         name = find_server(node, args.name).name
-        # A cancel that waits for its goal is listed as RECALLING; it was cancelled already.
-        done = {*TERMINAL, Status.RECALLING}
-        goals = [entry for entry in _goals(node, f"/{name}") if entry.status not in done]
+        goals = [entry for entry in _goals(node, f"/{name}") if entry.status not in TERMINAL]
         asked = [
             entry.id
             for entry in goals
@@ -181,14 +183,22 @@ def _cancel(args: argparse.Namespace) -> int:
         publisher.put(pack_goal_id(args.id, stamp_ns))
         ask(node, f"/{name}", "")  # the answer comes after the cancel was taken
         publisher.close()
+    missed = bool(args.id) and args.id not in asked
     if args.json:
         print(json.dumps({"cancelled": asked}))
-        return 0
-    for goal_id in asked:
-        print(f"Cancel requested for goal {goal_id}")
-    if not asked:
-        print("No running goal is meant; the server remembers the cancel for a goal to come.")
-    return 0
+    else:
+        for goal_id in asked:
+            print(f"Cancel requested for goal {goal_id}")
+        if missed:
+            running = [entry.id for entry in goals]
+            print(
+                f"actionlib: cancel: got goal {args.id!r}; expected one of {running}. The server "
+                "remembers the cancel, should the goal come yet.",
+                file=sys.stderr,
+            )
+        elif not asked:
+            print("No running goal is meant.")
+    return EXIT_FAILED if missed else 0
 
 
 def _stamp(text: str | None) -> int:

@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Any
 from actionlib_core.cli import EXIT_FAILED, UsageError
 from actionlib_core.cli._network import action_class, open_node, wait_for_server
 from actionlib_core.cli._numbers import seconds
-from actionlib_core.cli._output import add_json, print_json, print_message
+from actionlib_core.cli._output import (
+    add_json,
+    discard_output,
+    print_json,
+    print_message,
+    while_read,
+)
 
 if TYPE_CHECKING:
     import argparse
@@ -19,6 +25,7 @@ if TYPE_CHECKING:
 
 _TYPE = re.compile(r"\w+(/\w+){1,2}")
 CANCEL_S = 10.0  # how long the answer to a cancel is awaited
+CANCELED = {"PREEMPTED", "RECALLED"}
 
 
 def register(subparsers: Any) -> None:
@@ -26,7 +33,8 @@ def register(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "send_goal",
         help="send a goal, wait for its result",
-        description="Exit code 0 when the goal SUCCEEDED. Ctrl-C and SIGTERM cancel it first.",
+        description="Exit code 0 when the goal SUCCEEDED. Ctrl-C and SIGTERM cancel it first, and "
+        "so does a reader of the output that leaves (... | head).",
     )
     parser.add_argument("name", metavar="NAME", help="the action")
     parser.add_argument(
@@ -46,6 +54,14 @@ def register(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Send the goal that the arguments describe."""
+    try:
+        return _run(args)
+    except BrokenPipeError:
+        discard_output()
+        return EXIT_FAILED
+
+
+def _run(args: argparse.Namespace) -> int:
     type_name, text = _split(args.words, stdin=args.stdin)
     with open_node(args, settle=0.0) as node:
         if not args.json:
@@ -89,15 +105,20 @@ def _drive(
     handle: SentGoal[Any, Any] = client.send(goal, timeout=timeout)
     interrupted: KeyboardInterrupt | None = None
     timed_out = False
-    try:
-        _follow(handle, args)
-    except KeyboardInterrupt as error:  # Ctrl-C, or a signal that asks the same
-        interrupted = error
-        _cancel(handle, args)
-    except TimeoutError:
-        timed_out = True
-        _cancel(handle, args)
-    _print_end(handle, args)
+    with while_read():
+        try:
+            _follow(handle, args)
+        except KeyboardInterrupt as error:  # Ctrl-C, or a signal that asks the same
+            interrupted = error
+            _cancel(handle, args)
+        except TimeoutError:
+            timed_out = True
+            _cancel(handle, args)
+        except BaseException:  # the reader has gone, say: nobody looks after the goal any more
+            handle.cancel()
+            handle.wait(CANCEL_S)
+            raise
+        _print_end(handle, args)
     if timed_out:
         print(f"actionlib: send_goal: not over within {args.timeout:g} s", file=sys.stderr)
     if interrupted is not None:
@@ -123,10 +144,12 @@ def _follow(handle: SentGoal[Any, Any], args: argparse.Namespace) -> None:
 
 
 def _cancel(handle: SentGoal[Any, Any], args: argparse.Namespace) -> None:
-    if not args.json:
-        print("Canceling goal...", flush=True)
     handle.cancel()
-    if handle.wait(CANCEL_S) and not args.json:
+    if not args.json:
+        with while_read():
+            print("Canceling goal...", flush=True)
+    handle.wait(CANCEL_S)
+    if handle.status.name in CANCELED and not args.json:
         print("Goal canceled.", flush=True)
 
 
@@ -147,4 +170,5 @@ def _print_end(handle: SentGoal[Any, Any], args: argparse.Namespace) -> None:
         return
     if message is not None:
         print_message("Result:", message)
-    print(f"Goal finished with status: {status}{f' ({handle.text})' if handle.text else ''}")
+    what = "finished with" if handle.over else "not finished; last"
+    print(f"Goal {what} status: {status}{f' ({handle.text})' if handle.text else ''}")

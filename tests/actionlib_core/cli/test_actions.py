@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import signal
 import threading
 
@@ -15,6 +16,7 @@ from actionlib_core.cli import main
 from actionlib_core.clock import RealClock
 from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.node import Node
+from actionlib_core.simple_action_server import SimpleActionServer
 from actionlib_core.transport.memory import MemoryNetwork
 
 
@@ -150,6 +152,64 @@ def test_a_signal_cancels_the_goal_first(shell, counting, monkeypatch, number, c
     assert out.endswith("Goal finished with status: PREEMPTED (stopped)\n")
 
 
+def test_goal_that_ends_in_spite_of_the_cancel_is_not_called_canceled(shell, network, clock):
+    node = Node("deaf", transport=network.session(), clock=clock)
+    server = SimpleActionServer(
+        "deaf",
+        msg.TestAction,
+        lambda goal: (clock.sleep(goal.goal), server.set_succeeded()),
+        auto_start=False,
+        node=node,
+    )
+    server.start()
+    out = shell("send_goal", "deaf", "{goal: 5}", "--timeout", "3", code=1)
+    assert "Canceling goal..." in out
+    assert "Goal canceled." not in out
+    assert "Goal finished with status: SUCCEEDED" in out
+    out = shell("send_goal", "deaf", "{goal: 50}", "--timeout", "3", code=1)
+    assert "Goal not finished; last status: PREEMPTING" in out
+    node.close()
+
+
+class Head(io.TextIOWrapper):
+    """An output whose reader leaves before so many writes."""
+
+    def __init__(self, writes):
+        self._writes = writes
+        self._reader, writer = os.pipe()
+        super().__init__(os.fdopen(writer, "wb"))
+
+    def write(self, text):
+        if self._writes == 0:
+            os.close(self._reader)
+        self._writes -= 1
+        return super().write(text)
+
+
+@pytest.mark.parametrize("writes", [0, 2, 4, 8])
+def test_goal_is_cancelled_when_nobody_reads_any_more(shell, counting, monkeypatch, writes):
+    """`actionlib send_goal ... -f | head` ended with code 0, and the robot drove on."""
+    with Head(writes) as output, monkeypatch.context() as patch:
+        patch.setattr("sys.stdout", output)
+        assert main(["send_goal", "robot/count", "{goal: 1000}", "-f"], node=shell.node) == 1
+        assert output._writes < 0
+    assert shell.json("goal", "list", "robot/count") == []
+
+
+@pytest.mark.parametrize("writes", [6, 8])
+def test_goal_that_succeeded_unread_has_succeeded(shell, counting, monkeypatch, writes):
+    with Head(writes) as output, monkeypatch.context() as patch:
+        patch.setattr("sys.stdout", output)
+        assert main(["send_goal", "robot/count", "{goal: 1}"], node=shell.node) == 0
+        assert output._writes < 0
+
+
+def test_reader_of_a_list_may_leave(shell, counting, monkeypatch):
+    with Head(0) as output, monkeypatch.context() as patch:
+        patch.setattr("sys.stdout", output)
+        assert main(["list"], node=shell.node) == 0
+
+
 @pytest.mark.parametrize(
     ("argv", "text"),
     [
@@ -219,8 +279,12 @@ def test_goals_are_listed_shown_and_cancelled(shell, network, clock):
     assert first.wait(1.0)
     assert shell.json("cancel", "keep", "--all") == {"cancelled": [ids[1]]}
     assert second.wait(1.0)
-    assert "remembers the cancel" in shell("cancel", "keep", "unknown-1")
+    wrong = shell("cancel", "keep", "unknown-1", code=1)
+    assert "got goal 'unknown-1'; expected one of []. The server remembers the cancel" in wrong
+    assert shell.json("cancel", "keep", "unknown-1", code=1) == {"cancelled": []}
+    assert "unknown-1" not in shell("goal", "list", "keep")
     assert shell.json("cancel", "keep", "--all") == {"cancelled": []}
+    assert shell("cancel", "keep", "--all") == "No running goal is meant.\n"
     clock.sleep(1.0)
     shown = shell("goal", "info", "keep", ids[0], code=0)
     assert "Status: PREEMPTED" in shown

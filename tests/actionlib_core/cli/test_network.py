@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from actionlib_core.cli import _network
+from actionlib_core.cli import UsageError, _network
 from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.node import Node
 from actionlib_core.presence import Kind
@@ -64,3 +64,15 @@ def test_a_name_is_waited_for_and_ends_of_other_kinds_are_not_it(nodes, clock):
 )
 def test_what_there_is_instead(names, text):
     assert _network.which_there_are("move_bse", names).endswith(text)
+
+
+def test_error_that_a_server_answers_with_is_told(nodes):
+    cli, robot = nodes
+
+    def answer(query):
+        query.reply_error("action 'dock': out of order")
+        query.finish()
+
+    robot.transport.queryable("dock/result", answer)
+    with pytest.raises(UsageError, match=r"^action 'dock': out of order$"):
+        _network.ask(cli, "dock", "/nobody-1")
