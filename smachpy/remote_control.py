@@ -2,16 +2,19 @@
 
     <server>/smach/control          commands, JSON in std_msgs/String
     <server>/smach/control_result   the answers, JSON in std_msgs/String
+    <server>/smach/control_state    `paused` and `breakpoints`, latched, whenever they change,
+                                    whoever changes them; JSON in std_msgs/String
 
 A command is an object: `id` (comes back with the answer), `by` (who sends it, for those who watch;
 may be left out), `command`, and what that needs:
 
-    pause  resume  step
+    pause [running]  resume  step
     preempt path          jump path          force path outcome
     break path [outcome]  unbreak path [outcome]
     initial path states
 
-An answer is `id`, `ok`, `text` (why not), `paused` and `breakpoints` (pairs path, outcome).
+`running` is "keep" or "cancel", as for `Control.pause`. An answer is `id`, `ok`, `text` (why not),
+`paused` and `breakpoints` (pairs path, outcome).
 """
 
 from __future__ import annotations
@@ -36,6 +39,7 @@ if TYPE_CHECKING:
 
 CONTROL_TOPIC = "/smach/control"
 RESULT_TOPIC = "/smach/control_result"
+STATE_TOPIC = "/smach/control_state"
 
 COMMANDS: dict[str, tuple[str, ...]] = {
     "pause": (),
@@ -49,6 +53,8 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "initial": ("path", "states"),
 }
 """What every command needs."""
+
+RUNNING = (None, "keep", "cancel")
 
 ANSWER_S = 3.0
 
@@ -74,13 +80,25 @@ class ControlServer:
         self._path = path
         self._executor = SerialExecutor(node.clock, f"control of {server_name}")
         self._results = Publisher(server_name + RESULT_TOPIC, String, node=node)
+        self._states = Publisher(server_name + STATE_TOPIC, String, latch=True, node=node)
+        self._told: dict[str, Any] = {}
+        self._forget = machine.control.on_change(lambda: self._executor.submit(self._tell_state))
+        self._executor.submit(self._tell_state)
         self._commands = Subscriber(server_name + CONTROL_TOPIC, String, self._take, node=node)
 
     def close(self) -> None:
         """Obey no more; a second call does nothing."""
+        self._forget()
         self._commands.unregister()
         self._executor.join(ANSWER_S)
         self._results.unregister()
+        self._states.unregister()
+
+    def _tell_state(self) -> None:
+        state = self.state()
+        if state != self._told:
+            self._told = state
+            self._states.publish(json.dumps(state))
 
     def state(self) -> dict[str, Any]:
         """Return whether the machine is paused, and its breakpoints."""
@@ -113,7 +131,7 @@ class ControlServer:
         path = self._own(str(command.get("path", "")))
         outcome = command.get("outcome")
         actions: dict[str, Callable[[], object]] = {
-            "pause": control.pause,
+            "pause": lambda: control.pause(running=command.get("running") or "keep"),
             "resume": control.resume,
             "step": control.step,
             "preempt": lambda: control.preempt(path),
@@ -225,6 +243,9 @@ def parse_command(text: str) -> dict[str, Any]:
         if not isinstance(command.get(field), kind):
             got = command.get(field)
             raise CommandError(f"command {name!r}: {field}: got {got!r}; expected {kind.__name__}.")
+    if command.get("running") not in RUNNING:
+        got = command["running"]
+        raise CommandError(f"command {name!r}: running: got {got!r}; expected 'keep' or 'cancel'.")
     for field in ("outcome", "by"):
         value = command.get(field)
         if value is not None and not isinstance(value, str):

@@ -66,6 +66,29 @@ def test_pause_step_resume_and_breakpoints(world):
     assert client.send({"command": "unbreak", "path": "/JOB/B"})["breakpoints"] == []
 
 
+def test_a_pause_that_stops_what_runs(world):
+    machine, client, clock, _ = world
+    events = []
+    machine.subscribe(events.append)
+    assert client.send({"command": "pause", "running": "cancel"})["paused"]
+    clock.sleep(5.0)
+    assert machine.control.waiting() == ("/JOB/A",)  # it runs again
+    client.send({"command": "resume"})
+    clock.sleep(0.1)
+    assert machine.get_active_states() == ["A"]
+    asked = [to_record(e) for e in events if isinstance(e, PreemptRequested)]
+    assert [(one["path"], one["source"]) for one in asked] == [("/JOB/A", "operator")]
+
+
+def test_a_breakpoint_after_an_outcome(world):
+    machine, client, clock, _ = world
+    command = {"command": "break", "path": "/JOB/A", "outcome": "done"}
+    assert client.send(command)["breakpoints"] == [["/JOB/A", "done"]]
+    clock.sleep(3.0)
+    assert machine.control.is_paused()
+    assert client.send({**command, "command": "unbreak"})["breakpoints"] == []
+
+
 def test_force_jump_preempt_and_the_next_start(world):
     machine, client, clock, _ = world
     assert client.send({"command": "force", "path": "/JOB/A", "outcome": "done"})["ok"]
@@ -97,6 +120,8 @@ def test_what_cannot_be_done_is_told_to_who_asked(world):
         ('{"command": "jump", "path": 3}', "path"),
         ('{"command": "initial", "path": "/A", "states": "B"}', "states"),
         ('{"command": "break", "path": "/A", "outcome": 5}', "outcome"),
+        ('{"command": "pause", "running": "stop"}', "'keep' or 'cancel'"),
+        ('{"command": "pause", "running": ["keep"]}', "'keep' or 'cancel'"),
     ],
 )
 def test_wrong_commands_are_refused(text, words):
