@@ -483,3 +483,44 @@ def test_the_arrows_of_the_search_stay_on_what_it_shows(served, look):
     assert page.text_content(".results .at b") == "STEP_11"
     page.press("#search", "Enter")
     assert page.evaluate("() => smachpy.store.selected.value") == "/JOB/STEP_11"
+
+
+def test_breakpoints_after_an_outcome_and_a_pause_that_stops_what_runs(served, look):
+    machine = served.add("one", events=run()[:2], control={"paused": False, "breakpoints": []})
+    page = look(f"{served.start(token='t')}#token=t")
+    wait_for(page, "document.querySelector('#pause')")
+    page.evaluate("() => smachpy.page.select('/JOB/A')")
+    page.click("[aria-label='breakpoint after ok']")
+    page.wait_for_selector(".notice")
+    assert {"command": "break", "path": "/JOB/A", "outcome": "ok"}.items() <= served.commands[
+        -1
+    ].items()
+    machine.set_control({"paused": False, "breakpoints": [["/JOB/A", "ok"]]})
+    page.wait_for_selector("[aria-label='breakpoint after ok'][aria-pressed=true]")
+    page.wait_for_selector('g.stopped[data-path="/JOB/A"]')
+    assert page.text_content(".actions button").strip() == "Breakpoint"  # before it there is none
+    page.click("[aria-label='breakpoint after ok']")
+    wait_for(page, "document.querySelector('.notice')?.textContent.includes('unbreak')")
+    assert {"command": "unbreak", "path": "/JOB/A", "outcome": "ok"}.items() <= served.commands[
+        -1
+    ].items()
+    page.click("#pause-now")
+    assert len(served.commands) == 2  # it asks first
+    page.click(".confirm >> text=Yes")
+    wait_for(page, "document.querySelector('.notice')?.textContent.includes('pause')")
+    assert {"command": "pause", "running": "cancel"}.items() <= served.commands[-1].items()
+
+
+def test_who_pauses_elsewhere_is_seen_here(served, look):
+    machine = served.add("one", events=run()[:2], control={"paused": False, "breakpoints": []})
+    page = look(f"{served.start(token='t')}#token=t")
+    page.wait_for_selector("#pause:text-is('Pause')")
+    machine.set_control({"paused": True, "breakpoints": [["/JOB/B", None]]})
+    page.wait_for_selector("#pause:text-is('Resume')")
+    assert page.is_enabled("#step")
+    assert page.text_content("[data-testid=status]") == "paused"
+    page.wait_for_selector('g.stopped[data-path="/JOB/B"]')
+    page.evaluate("() => document.activeElement.blur()")
+    page.keyboard.press("Space")
+    page.wait_for_selector(".notice")
+    assert served.commands[-1]["command"] == "resume"

@@ -8,7 +8,7 @@ import { askerText, ms } from "viewer/fold";
 import { KIND_NAMES, outcomeClass, shorten } from "viewer/model";
 import { span } from "viewer/diagram";
 import { ask, isFile, link } from "viewer/source";
-import { StateControls } from "viewer/controls";
+import { StateControls, StopAfter } from "viewer/controls";
 import { Differences } from "viewer/comparison";
 import { coverage } from "viewer/statistics";
 
@@ -74,7 +74,7 @@ function Selected({ page, data, now, model }) {
     ${state?.error && html`<p class="error">${shorten(state.error, 2000)}</p>`}
     <ul class="outcomes">${node.outcomes.map((o) => {
       const edge = node.parent?.links.find((l) => l.source === node.label && l.outcomes.includes(o));
-      return html`<li><span class=${`pill-text ${outcomeClass(o)}`}>${shorten(o, 60)}</span><span>${edge ? ` \u2192 ${shorten(edge.target)}` : ""}</span>
+      return html`<li><${StopAfter} node=${node} outcome=${o} /><span class=${`pill-text ${outcomeClass(o)}`}>${shorten(o, 60)}</span><span>${edge ? ` \u2192 ${shorten(edge.target)}` : ""}</span>
         <span class="times">${state?.outcomes?.[o] ? `\u00d7${state.outcomes[o]}` : ""}</span></li>`;
     })}</ul>
     <${StateControls} node=${node} state=${state} />
