@@ -104,7 +104,10 @@ const RULES = {
   },
 };
 
-export const foldOne = (data, e) => RULES[e.kind]?.(data, e);
+export function foldOne(data, e) {
+  if (e.dropped) data.dropped = (data.dropped ?? 0) + e.dropped; // so many are missing before it
+  RULES[e.kind]?.(data, e);
+}
 export const ms = (ns) => (ns == null ? null : ns / 1e6);
 
 // One machine's run: the newest state, and every earlier one that the events still tell.
@@ -118,7 +121,6 @@ export class Run {
     this.open = new Map();
     this.preempts = []; // each: from, and a row for every state that was asked
     this.begun = null;
-    this.dropped = 0; // so many events were not told
     this.#resume();
     this.push(events);
   }
@@ -127,7 +129,6 @@ export class Run {
     for (const e of events) {
       if (this.events.length % KEYFRAME === 0) this.frames.push(JSON.stringify(this.now));
       this.events.push(e);
-      this.dropped += e.dropped ?? 0;
       this.#span(e);
       foldOne(this.now, e);
     }

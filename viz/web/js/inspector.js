@@ -35,7 +35,7 @@ export function Inspector({ page }) {
   const data = store.shown(), now = store.nowMs();
   return html`<aside class="inspector" aria-label="details">
     ${store.gap.value !== null && html`<p class="hint gap" role="status">This page could not follow: ${count(store.gap.value)} and what was before are counted, but are not in the timeline.</p>`}
-    ${store.run.dropped > 0 && html`<p class="hint gap" role="status">The mission was faster than it can be told: ${count(store.run.dropped)} are missing.</p>`}
+    ${data.dropped > 0 && html`<p class="hint gap" role="status">The mission was faster than it can be told: ${count(data.dropped)} are missing, and what is counted is too low.</p>`}
     <${Selected} page=${page} data=${data} now=${now} model=${model} />
     <${Differences} page=${page} State=${State} />
     <${Preempts} page=${page} data=${data} now=${now} />
