@@ -107,6 +107,7 @@ class Explorer:
         self.mismatch = ""
         self._visits: dict[str, int] = {}
         self._steps = 0
+        self._past: list[tuple[str, int]] = []
         self._preempts = self._options.preempts
         self._active: dict[str, float] = {}
         self._ended: dict[str, str] = {}
@@ -135,12 +136,17 @@ class Explorer:
         return total
 
     def choose(self, where: str, options: Sequence[str], situation: Hashable = None) -> int:
-        """Choose, as told or the first, and note it."""
+        """Choose, as told or the first, and note it.
+
+        What is chosen in no situation, as by a server, belongs to all situations after it.
+        """
         number = len(self.choices)
         picked = 0
         if number < len(self._told):
             picked = self._follow(self._told[number], where, options)
         self.choices.append(Choice(where, tuple(options), picked, situation))
+        if situation is None and self._options.merges:
+            self._past.append((where, picked))
         return picked
 
     def _follow(self, told: int | str, where: str, options: Sequence[str]) -> int:
@@ -214,6 +220,7 @@ class Explorer:
                 )
             ),
             tuple(sorted((p, i) for p, i in self._items.items() if p in running)),
+            tuple(self._past),
             _userdata(self._root, self._values),
         )
 

@@ -693,6 +693,27 @@ def test_preempts_come_while_a_server_works():
     assert "preempted" in outcomes
 
 
+def test_what_servers_did_before_makes_two_situations_differ():
+    def machine():
+        sm = drive()
+        with sm:
+            sm.add("NOTE", CBState(lambda _: "noted", outcomes=["noted"]), {"noted": "DRIVE"})
+            state = SimpleActionState("move_base", MoveBaseAction, exec_timeout=60.0)
+            sm.add("FIRST", state, {"aborted": "NOTE"})
+        sm.set_initial_state(["FIRST"])
+        return sm
+
+    ends = set()
+
+    def note(run):
+        ends.add(tuple(e.status for e in run.events if type(e).__name__ == "GoalDone"))
+
+    found = explore(machine, real_actions=True, interleavings=False, on_run=note)
+    assert found.exhaustive
+    both = {"ABORTED", "REJECTED", "LOST"}
+    assert ends >= {(first, second) for first in both for second in {*both, "SUCCEEDED"}}
+
+
 def test_a_server_that_ignores_the_cancel_of_a_preempt_for_too_long():
     found = explore(drive, real_actions=True, interleavings=False, grace=1.5)
     assert "a preempt takes 2 s" in reason(found)
