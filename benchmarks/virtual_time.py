@@ -57,14 +57,16 @@ TRANSITION_BUDGET = 5.0  # times the real clock's
 class Meter:
     """Gives every moment to a kind of work; the kinds follow each other, whatever the thread.
 
-    Measuring costs time itself, which is found beforehand and taken off: what a measured call adds
-    to its own kind and to the kind that calls it.
+    Measuring costs time itself. How it falls on a call's own kind and on the kind that calls it is
+    found beforehand; how much it is in the run, where nothing is as warm as in a loop, comes from
+    what the run takes without it (`weigh`), and is taken off.
     """
 
     def __init__(self, clock):
         self.clock = clock
         self.calls = Counter()
         self._inner = self._outer = 0.0
+        self._weight = 1.0
         self.start()
         self._calibrate()
         self.start()
@@ -98,10 +100,17 @@ class Meter:
         before, self._kind, self._since = self._kind, kind, now
         return before
 
+    def weigh(self, bare):
+        """Learn what the run takes without a meter [s]: the kinds add up to that."""
+        cost = sum(self._cost(kind) for kind in KINDS)
+        self._weight = (sum(self.spent[kind] for kind in KINDS) - bare) / cost
+
     def seconds(self, kind):
         """Return what was spent on a kind, without the measuring."""
-        cost = self._inside[kind] * self._inner + self._around[kind] * self._outer
-        return self.spent[kind] - cost
+        return self.spent[kind] - self._weight * self._cost(kind)
+
+    def _cost(self, kind):
+        return self._inside[kind] * self._inner + self._around[kind] * self._outer
 
     def wrap(self, function, kind, then=None):
         """Return `function` as work of a kind; what calls it goes on as before, or as `then`."""
@@ -309,28 +318,39 @@ def transitions(rounds):
 # -- figures -----------------------------------------------------------------------------------
 
 
-def shares(seconds, seed, rounds, clock):
-    """Return kind -> seconds for an hour of patrol, of the best run, and name -> calls."""
+def shares(seconds, seed, rounds, clock, bare):
+    """Return kind -> seconds for an hour of patrol, of the quickest run, and name -> calls.
+
+    `bare` is what the quickest run takes without a meter [s].
+    """
     meter = Meter(clock)
-    found = []
+    quickest = None
     for _ in range(rounds):
         virtual = hour(seconds, seed, meter)[0]
-        found.append({kind: meter.seconds(kind) * 3600 / virtual for kind in KINDS})
+        spent = sum(meter.spent[kind] for kind in KINDS)
+        if quickest is None or spent < quickest:
+            quickest = spent
+            meter.weigh(bare)
+            found = {kind: meter.seconds(kind) * 3600 / virtual for kind in KINDS}
         calls = {name: meter.calls[name] * 3600 / virtual for name in COUNTED}
         meter.calls.clear()
-    return min(found, key=lambda share: share["clock"] + share["network"]), calls
+    return found, calls
 
 
 def figures(seconds, seed, rounds):
     """Return name -> figure; those of the patrol are for one hour, of the quickest run."""
-    virtual, wall, cpu = min((hour(seconds, seed) for _ in range(rounds)), key=lambda run: run[1])
+    runs = [hour(seconds, seed) for _ in range(rounds)]
+    virtual, wall, cpu = (min(values) for values in zip(*runs, strict=True))
     found = {
         "patrol: virtual s": virtual,
         "patrol: wall s": wall * 3600 / virtual,
         "patrol: processor s": cpu * 3600 / virtual,
     }
-    for name, clock in (("wall", time.perf_counter), ("processor", time.process_time)):
-        best, calls = shares(seconds, seed, rounds, clock)
+    for name, clock, bare in (
+        ("wall", time.perf_counter, wall),
+        ("processor", time.process_time, cpu),
+    ):
+        best, calls = shares(seconds, seed, rounds, clock, bare)
         found |= {f"patrol: {kind} {name} s": best[kind] for kind in KINDS}
         found[f"patrol: clock + network {name} s"] = best["clock"] + best["network"]
     found |= {f"patrol: calls of {name}": count for name, count in calls.items()}
