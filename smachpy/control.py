@@ -14,13 +14,14 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
+from smachpy import log
 from smachpy._runtime.asker import asking
 from smachpy._runtime.frame import HEARING, Override
 from smachpy.events import Paused, Resumed
 from smachpy.exceptions import SmachError, did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from actionlib_core.clock import Event
     from smachpy._runtime.frame import Frame, Run
@@ -62,6 +63,23 @@ class Control:
         self._breakpoints: set[tuple[str, str | None]] = set()
         self._waiting: dict[str, Event] = {}
         self._run: Run | None = None
+        self._listeners: tuple[Callable[[], object], ...] = ()
+
+    def on_change(self, listener: Callable[[], object]) -> Callable[[], None]:
+        """Call `listener` after every change of `is_paused()` or `breakpoints()`.
+
+        Returns:
+            A function that ends it.
+
+        Threads: called in the thread of the change, the machine's own at a breakpoint, which it
+            holds up: let it wake a thread that works. What it raises is logged.
+        """
+        self._listeners = (*self._listeners, listener)
+
+        def forget() -> None:
+            self._listeners = tuple(item for item in self._listeners if item is not listener)
+
+        return forget
 
     # -- commands ------------------------------------------------------------------------------
 
@@ -73,8 +91,7 @@ class Control:
                 end; "cancel" preempts them, and they run again from their start after `resume`.
         """
         self._watch()
-        with self._lock:
-            self._paused = True
+        self._pause()
         if running == "cancel":
             with asking("operator", "", "pause"):
                 for frame, step in self._active():
@@ -84,21 +101,25 @@ class Control:
     def resume(self) -> None:
         """Let the machine go on."""
         with self._lock:
-            self._paused = False
+            changed, self._paused = self._paused, False
             self._steps = 0
             waiting = list(self._waiting.values())
         for event in waiting:
             event.set()
+        if changed:
+            self._tell()
 
     def step(self) -> None:
         """Let one state run, then pause again."""
         self._watch()
         with self._lock:
-            self._paused = True
+            changed, self._paused = not self._paused, True
             self._steps += 1
             waiting = list(self._waiting.values())[:1]
         for event in waiting:
             event.set()
+        if changed:
+            self._tell()
 
     def is_paused(self) -> bool:
         """Tell whether the machine is held, or will be before its next state."""
@@ -114,11 +135,13 @@ class Control:
         self._watch()
         with self._lock:
             self._breakpoints.add((path, outcome))
+        self._tell()
 
     def remove_breakpoint(self, path: str, outcome: str | None = None) -> None:
         """Forget a breakpoint."""
         with self._lock:
             self._breakpoints.discard((path, outcome))
+        self._tell()
 
     def breakpoints(self) -> tuple[tuple[str, str | None], ...]:
         """Return the breakpoints as pairs (path, outcome)."""
@@ -191,9 +214,8 @@ class Control:
         """
         path = f"{frame.path}/{step.label}"
         if (path, None) in self._breakpoints:
-            with self._lock:
-                self._paused = True
-                reason = "breakpoint"
+            self._pause()
+            reason = "breakpoint"
         else:
             reason = "step" if self._steps else "pause"
         if not self._paused or self._take_step():
@@ -203,8 +225,20 @@ class Control:
     def note_outcome(self, frame: Frame, step: Step, outcome: object) -> None:
         """Pause after `step` if there is a breakpoint on this outcome of it."""
         if (f"{frame.path}/{step.label}", outcome) in self._breakpoints:
-            with self._lock:
-                self._paused = True
+            self._pause()
+
+    def _pause(self) -> None:
+        with self._lock:
+            changed, self._paused = not self._paused, True
+        if changed:
+            self._tell()
+
+    def _tell(self) -> None:
+        for listener in self._listeners:
+            try:
+                listener()
+            except Exception as error:  # noqa: BLE001  a border: reported, the machine goes on
+                log.log_exception(f"{self._path()}: on_change raised {error!r}", error)
 
     def _take_step(self) -> bool:
         with self._lock:

@@ -349,3 +349,25 @@ def test_a_preempted_state_without_that_outcome_ends_its_container_preempted(clo
     at(clock, (2.0, lambda: sm.control.preempt("/P/IN/FIRE")))
     assert sm.execute() == "ok"
     assert entered(sm)[-1] == "/P/SAFE"
+
+
+def test_who_wants_to_know_hears_of_every_change_and_of_nothing_else(clock, caplog):
+    sm = mission()
+    heard = []
+    control = sm.control
+    control.on_change(lambda: 1 / 0)
+    forget = control.on_change(lambda: heard.append((control.is_paused(), control.breakpoints())))
+    control.pause()
+    control.pause()
+    control.resume()
+    control.resume()
+    assert heard == [(True, ()), (False, ())]
+    control.add_breakpoint("/P/INNER")
+    clock.call_later(9.0, control.resume)
+    sm.execute()
+    stop = ("/P/INNER", None)
+    assert heard[2:] == [(False, (stop,)), (True, (stop,)), (False, (stop,))]
+    assert "on_change" in caplog.text
+    forget()
+    control.remove_breakpoint("/P/INNER")
+    assert len(heard) == 5

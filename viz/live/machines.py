@@ -112,7 +112,7 @@ class Machine:
         self._on_change(self)
 
     def set_control(self, state: dict[str, Any]) -> None:
-        """Take the answer to a command."""
+        """Take the answer to a command, or what the machine tells of itself."""
         self.control = {"paused": state["paused"], "breakpoints": state["breakpoints"]}
         self._on_change(self)
 
@@ -146,9 +146,13 @@ class Machine:
 
     def base(self) -> dict[str, Any]:
         """Return a copy of what happened before the kept events."""
+        return self.told()[0]
+
+    def told(self) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+        """Return a copy of what happened before the kept events, and those, of one instant."""
         with self._lock:
             copy: dict[str, Any] = json.loads(json.dumps(self._base.data))
-            return copy
+            return copy, [record for _, record, _ in self._events]
 
     def active(self) -> list[str]:
         """Return the paths of what runs."""

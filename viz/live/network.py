@@ -22,7 +22,7 @@ from actionlib_core.service import ServiceProxy
 from actionlib_core.wire import encoding_of
 from smachpy.feed import DESCRIPTION_TOPIC, EVENTS_TOPIC, HISTORY_SERVICE
 from smachpy.introspection import StateRecord
-from smachpy.remote_control import CommandError, ControlClient
+from smachpy.remote_control import STATE_TOPIC, CommandError, ControlClient
 from smachpy.value_server import VALUE_SERVICE, ReadValue
 
 if TYPE_CHECKING:
@@ -154,7 +154,7 @@ class _Ear:
     def __init__(self, server: str, node: Node, on_sample: Callable[[str, Sample], None]) -> None:
         transport = node.transport
         self._parts: list[Closable] = []
-        for topic in (EVENTS_TOPIC, DESCRIPTION_TOPIC):
+        for topic in (EVENTS_TOPIC, DESCRIPTION_TOPIC, STATE_TOPIC):
             name = server + topic
             end = node.endpoint(Kind.SUBSCRIBER, name, String._type, String._md5sum)
             self._parts += [
@@ -239,6 +239,9 @@ class Link:
         """Take what the server has sent."""
         if sample.key.endswith(DESCRIPTION_TOPIC):
             self._executor.submit(lambda: self._describe(_text(sample)))
+            return
+        if sample.key.endswith(STATE_TOPIC):
+            self._executor.submit(lambda: self._machine.set_control(json.loads(_text(sample))))
             return
         self._heard.append(_text(sample))
         if len(self._heard) == 1:  # the others go with the first

@@ -57,7 +57,7 @@ def watch(clock):
         clock.sleep(2.0)
         return machines.get("robot")
 
-    watch.viewer = viewer
+    watch.viewer, watch.machines = viewer, machines
     yield watch
     for server in servers:
         server.stop()
@@ -99,3 +99,44 @@ def test_who_comes_late_is_told_what_the_kept_events_do_not_tell(clock, watch, m
     told = json.loads(other.get("robot").snapshot(short=True)[1])["base"]
     assert told["states"]["/JOB/A"]["visits"] == 500
     assert seen.summary()["outcome"] == "done"
+
+
+def test_who_pauses_does_not_matter(clock, watch):
+    """The program, a breakpoint or another viewer: all viewers know it, those that only look too."""
+    job = spinning(1)
+    seen = watch(job)
+    looks = Machines()
+    other = Network(watch.viewer._node, looks)
+    clock.sleep(2.0)
+    paused = {"paused": True, "breakpoints": []}
+    going = {"paused": False, "breakpoints": []}
+    stopping = {"paused": False, "breakpoints": [["/JOB/B", None]]}
+    steps = (
+        (lambda: job.control.pause(), paused),
+        (lambda: job.control.resume(), going),
+        (lambda: job.control.step(), paused),
+        (lambda: watch.viewer.send("robot", {"command": "resume"}), going),
+        (lambda: job.control.add_breakpoint("/JOB/B"), stopping),
+        (lambda: clock.spawn(job.execute, name="mission"), stopping | {"paused": True}),
+        (lambda: job.control.remove_breakpoint("/JOB/B"), paused),
+        (lambda: job.control.resume(), going),
+    )
+    for number, (act, expected) in enumerate(steps):
+        act()
+        clock.sleep(1.0)
+        assert seen.facts()["control"] == expected, number
+        assert looks.get("robot").facts()["control"] == expected, number
+    clock.sleep(5.0)
+    other.close()
+
+
+def test_a_machine_that_obeys_nobody_tells_nobody(clock, watch):
+    job = spinning(1)
+    server = IntrospectionServer("free", job, "/FREE", node=watch.viewer._node)
+    server.start()
+    watch(spinning(1))
+    job.control.pause()
+    clock.sleep(1.0)
+    assert watch.machines.get("free").facts()["control"] is None
+    server.stop()
+    job.control.resume()
