@@ -202,7 +202,7 @@ class _Function:
         except ValueError:
             return True  # not bound yet
         helper = helper or self._function.__globals__.get(name)
-        if not inspect.isfunction(helper):
+        if helper is None or inspect.isbuiltin(helper) or inspect.isclass(helper):
             return False
         parsed = _parse(helper)
         return parsed is None or any(_asks_for_state(n) or _looks(n) for n in ast.walk(parsed[0]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 import os
 import threading
 import time
@@ -51,6 +52,15 @@ def asks_a_helper(ud):
     return "done"
 
 
+stopped_too = functools.partial(stopped)
+
+
+def asks_a_helper_of_another_kind(ud):
+    while not stopped_too():
+        time.sleep(1)
+    return "done"
+
+
 def calls_what_it_is_given(ud):
     ready = ud.ready
     while not ready():
@@ -90,6 +100,7 @@ def blinks_all(ud):
     [
         polls,
         asks_a_helper,
+        asks_a_helper_of_another_kind,
         calls_what_it_is_given,
         joins_paths,
         takes_a_lock,
