@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
 FRAME_S = 0.2
 BAR = 20
+MOST_GOALS = 4
+MOST_VALUES = 100
+LOGGED_LINES = 500
 LOGGED = {
     *("Started", "Finished", "Left", "Failed", "GoalDone", "Retried"),
     *("PreemptRequested", "PreemptServiced", "Abandoned"),
@@ -58,6 +61,9 @@ class MissionApp(App[None]):
         ("slash", "search", "Search"),
         Binding("space", "pause", "Pause", priority=True),  # else the tree takes it
         ("s", "step", "Step"),
+        ("comma", "go_by(-1)", "Event back"),
+        ("full_stop", "go_by(1)", "Event on"),
+        ("l", "live", "Now"),
         ("escape", "leave", "Back"),
     ]
 
@@ -72,6 +78,7 @@ class MissionApp(App[None]):
         self._machine: Machine | None = None
         self._shown: tuple[str, int] = ("", 0)
         self._seq = 0
+        self._until: int | None = None  # number of the event that is looked back at
         self._state = RunState()
         self._places: dict[str, TreeNode[StateRecord]] = {}
         self._follow = True
@@ -87,7 +94,7 @@ class MissionApp(App[None]):
             with Vertical():
                 yield Static(id="goals")
                 yield DataTable(id="userdata", cursor_type="row")
-                yield RichLog(id="log", max_lines=500, wrap=True, min_width=20)
+                yield RichLog(id="log", max_lines=LOGGED_LINES, wrap=True, min_width=20)
         yield Footer()
 
     def on_mount(self) -> None:
@@ -110,6 +117,9 @@ class MissionApp(App[None]):
         self._draw_status(machine)
         events = machine.events()
         ended = (machine.stale is not None or machine.recorded) and events
+        if self._until is not None:
+            events = [event for event in events if event["seq"] <= self._until]
+            ended = events
         now = events[-1]["stamp_ns"] if ended else time.time_ns()
         self._draw_preempt(now)
         self._draw_tree(now)
@@ -122,13 +132,22 @@ class MissionApp(App[None]):
 
     def _begin(self, machine: Machine, record: StateRecord) -> None:
         self._shown = (machine.epoch, machine.revision)
-        self._state, self._seq = RunState(machine.base()), 0
+        self._until = None
         tree = self.query_one(Tree)
         tree.reset(Text(record.label), record)
         self._places = {record.path: tree.root}
         self._grow(tree.root, record)
         tree.root.expand()
+        self._fold_anew(machine)
+
+    def _fold_anew(self, machine: Machine) -> None:
+        """Fold what is known of the machine, as far as it is looked at."""
+        base, events = machine.told()
+        self._state, self._seq = RunState(base), 0
         self.query_one(RichLog).clear()
+        self.query_one(DataTable).clear()
+        self._fold([e for e in events if self._until is None or e["seq"] <= self._until])
+        self._draw_userdata()
 
     def _grow(self, node: TreeNode[Any], record: StateRecord) -> None:
         for child in record.children:
@@ -137,24 +156,40 @@ class MissionApp(App[None]):
             self._grow(added, child)
 
     def _catch_up(self, machine: Machine) -> None:
+        if self._until is not None:
+            return
         events = [event for event in machine.events() if event["seq"] > self._seq]
-        wrote = False
+        first = events[0]["seq"] - events[0].get("dropped", 0) if events else machine.seq + 1
+        if first != self._seq + 1:  # some are gone, or it was all told anew
+            self._fold_anew(machine)
+        elif self._fold(events):
+            self._draw_userdata()
+
+    def _fold(self, events: list[dict[str, Any]]) -> bool:
+        """Take events in; whether userdata was written."""
+        log = self.query_one(RichLog)
         for event in events:
             self._state.fold(event)
             self._seq = event["seq"]
-            wrote = wrote or event["kind"] == "UserdataWritten"
-            if event["kind"] in LOGGED:
-                self.query_one(RichLog).write(_line(event))
-        if wrote:
-            table = self.query_one(DataTable)
-            table.clear()
-            for entry in list(self._state.data["userdata"].values())[:100]:
-                value = shorten(str(entry["value"]), 34)
-                table.add_row(entry["key"], value, entry["writer"].rpartition("/")[2])
+        for event in [one for one in events if one["kind"] in LOGGED][-LOGGED_LINES:]:
+            log.write(_line(event))
+        return any(event["kind"] == "UserdataWritten" for event in events)
+
+    def _draw_userdata(self) -> None:
+        table = self.query_one(DataTable)
+        table.clear()
+        entries = list(self._state.data["userdata"].values())
+        for entry in entries[:MOST_VALUES]:
+            words = entry["key"], shorten(str(entry["value"]), 34), _name(entry["writer"])
+            table.add_row(*map(Text, words))
+        if len(entries) > MOST_VALUES:
+            table.add_row(Text(f"and {len(entries) - MOST_VALUES} more", "dim"))
 
     def _draw_status(self, machine: Machine) -> None:
         data = self._state.data
-        if machine.stale is not None and data["ended"] is None:
+        if self._until is not None:
+            word, style = f"event {self._until} of {machine.seq}", "yellow"
+        elif machine.stale is not None and data["ended"] is None:
             word, style = "stale", "magenta"
         elif data["ended"] is not None:
             word, style = f"ended: {data['outcome']}", STYLES[outcome_class(data["outcome"])]
@@ -170,6 +205,8 @@ class MissionApp(App[None]):
         text = Text.assemble(
             (f" {machine.name} ", "bold"), (f" {word} ", f"{style} reverse"), f"  {trail}"
         )
+        if lost := data.get("dropped"):
+            text.append(f"  {lost} events missing", "yellow")
         self.query_one("#status", Static).update(text)
 
     def _draw_preempt(self, now: int) -> None:
@@ -206,7 +243,11 @@ class MissionApp(App[None]):
 
     def _draw_goals(self) -> None:
         lines = Text()
-        for goal in list(self._state.data["goals"].values())[-4:]:
+        goals = list(self._state.data["goals"].values())
+        goals.sort(key=lambda goal: goal["ended"] is None)  # those that run come last
+        if len(goals) > MOST_GOALS and (hidden := _running(goals[:-MOST_GOALS])):
+            lines.append(f"{hidden} more under way\n", "dim")
+        for goal in goals[-MOST_GOALS:]:
             progress = goal.get("progress") or {}
             part = 1.0 if goal["status"] == "SUCCEEDED" else progress.get("fraction") or 0.0
             filled = round(part * BAR)
@@ -216,9 +257,9 @@ class MissionApp(App[None]):
             lines.append("\u2501" * (BAR - filled), "dim")
             words = goal["text"] or progress.get("text") or ""
             lines.append(f" {part:4.0%} {goal['status'].lower()} {shorten(words, 40)}\n")
-        goals = self.query_one("#goals", Static)
-        goals.display = bool(lines)
-        goals.update(lines)
+        widget = self.query_one("#goals", Static)
+        widget.display = bool(lines)
+        widget.update(lines)
 
     # -- keys ----------------------------------------------------------------------------------
 
@@ -233,6 +274,28 @@ class MissionApp(App[None]):
         if names and self._machine is not None:
             after = (names.index(self._machine.name) + 1) % len(names)
             self._machine = self._machines.get(names[after])
+
+    def action_go_by(self, step: int) -> None:
+        """Look at the instant one event back or on."""
+        machine = self._machine
+        if machine is None or machine.record is None:
+            return
+        here = self._seq if self._until is None else self._until
+        numbers = [event["seq"] for event in machine.events()]
+        to = (
+            [n for n in numbers if n < here][-1:]
+            if step < 0
+            else [n for n in numbers if n > here][:1]
+        )
+        if to:
+            self._until = None if to[0] == numbers[-1] else to[0]
+            self._fold_anew(machine)
+
+    def action_live(self) -> None:
+        """Show what goes on now."""
+        if self._machine is not None and self._until is not None:
+            self._until = None
+            self._fold_anew(self._machine)
 
     def action_follow(self) -> None:
         """Open what runs, or not."""
@@ -277,14 +340,17 @@ class MissionApp(App[None]):
     @work(thread=True)
     def _command(self, name: str, command: str) -> None:
         if self._send is None:
-            self.call_from_thread(self.notify, "this viewer only looks; try --control")
+            self.call_from_thread(self._say, "this viewer only looks; try --control")
             return
         try:
             answer = self._send(name, {"command": command, "by": f"terminal of {_user()}"})
             text = answer["text"] or f"{command}: done"
         except SmachError as error:
             text = str(error)
-        self.call_from_thread(self.notify, text)
+        self.call_from_thread(self._say, text)
+
+    def _say(self, text: str) -> None:
+        self.notify(text, markup=False)
 
 
 def _user() -> str:
@@ -295,6 +361,14 @@ def _user() -> str:
         return f"{getpass.getuser()}@{socket.gethostname()}"
     except (KeyError, OSError):  # a user without a name, in a container
         return socket.gethostname()
+
+
+def _name(path: str) -> str:
+    return path.rpartition("/")[2]
+
+
+def _running(goals: list[dict[str, Any]]) -> int:
+    return sum(goal["ended"] is None for goal in goals)
 
 
 def _asked(state: dict[str, Any]) -> bool:

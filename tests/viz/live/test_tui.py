@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 
-from textual.widgets import RichLog, Static, Tree
+from textual.widgets import DataTable, RichLog, Static, Tree
 
 from smachpy import CBState, StateMachine
-from viz.live.machines import Machines
+from smachpy.run_state import RunState
+from viz.live.machines import Machine, Machines
 from viz.live.tui import MissionApp
 from viz.runs.recording import Recorder, read_recording
 
@@ -117,3 +118,114 @@ def test_a_frame_that_comes_after_the_widgets_have_gone_is_none(tmp_path, clock)
             app.refresh_view()
 
     asyncio.run(leave())
+
+
+def seen(machine, keys=(), *, then=None):
+    """What the terminal shows of a machine, after some keys."""
+    machines = Machines()
+    machines.get = {"job": machine}.get
+    machines.summaries = lambda: [machine.summary()]
+    found = {}
+
+    async def look():
+        app = MissionApp(machines, None)
+        async with app.run_test(size=(140, 50)) as pilot:
+            app.refresh_view()
+            await pilot.pause()
+            for key in keys:
+                await pilot.press(key)
+            if then is not None:
+                then()
+            app.refresh_view()
+            await pilot.pause()
+            for name in ("status", "goals"):
+                found[name] = str(app.query_one(f"#{name}", Static).render())
+            table = app.query_one(DataTable)
+            found["values"] = [list(map(str, table.get_row_at(i))) for i in range(table.row_count)]
+            found["active"] = app._state.active()
+
+    asyncio.run(look())
+    return found
+
+
+def watched(tmp_path, events=None):
+    machine = Machine("job", lambda _machine: None)
+    history = recorded(tmp_path).history()
+    machine.recorded = True
+    machine.reset({**history, "events": history["events"] if events is None else events})
+    return machine
+
+
+def event(seq, kind="Entered", path="/JOB/FIRST", **more):
+    return {"kind": kind, "path": path, "t": 0.0, "stamp_ns": seq, "seq": seq, **more}
+
+
+def test_values_are_shown_whatever_they_spell(tmp_path, clock):
+    wrote = event(
+        1, "UserdataWritten", path="/JOB/IN/DEEP[b]", key="k[/x]", value="goal [/red] done"
+    )
+    machine = watched(tmp_path, [wrote])
+    assert seen(machine)["values"] == [["k[/x]", "goal [/red] done", "DEEP[b]"]]
+
+
+def test_what_is_told_anew_is_shown_anew(tmp_path, clock):
+    """The same machine, after a time in which nobody could hear it."""
+    machine = watched(tmp_path, [event(1), event(2, path="/JOB/IN")])
+    base = {**RunState().data, "states": {}}
+    later = RunState(base)
+    later.fold(event(90, path="/JOB/IN/DEEP"))
+
+    def hear():
+        history = recorded(tmp_path / "again").history()
+        new = {**history, "epoch": machine.epoch, "base": later.data}
+        machine.reset({**new, "events": [event(91, path="/JOB/FIRST")]})
+
+    assert sorted(seen(machine, then=hear)["active"]) == ["/JOB/FIRST", "/JOB/IN/DEEP"]
+
+
+def test_a_goal_under_way_is_shown_though_newer_ones_have_ended(tmp_path, clock):
+    sent = {"kind": "GoalSent", "goal": None}
+    events = [event(1, **sent, action="oldest", goal_id="old")]
+    for n in range(2, 20, 2):
+        events.append(event(n, **sent, action="quick", goal_id=f"g{n}"))
+        ended = {"status": "SUCCEEDED", "text": "", "result": None}
+        events.append(event(n + 1, "GoalDone", action="quick", goal_id=f"g{n}", **ended))
+    goals = seen(watched(tmp_path, events))["goals"]
+    assert "oldest" in goals
+    assert goals.count("\n") <= 4
+    many = [event(n, **sent, action=f"a{n}", goal_id=f"g{n}") for n in range(1, 8)]
+    assert "3 more under way" in seen(watched(tmp_path / "2", many))["goals"]
+
+
+def test_values_that_are_left_out_are_counted(tmp_path, clock):
+    wrote = [event(n, "UserdataWritten", key=f"k{n}", value=n) for n in range(1, 111)]
+    assert seen(watched(tmp_path, wrote))["values"][-1][0] == "and 10 more"
+
+
+def test_one_event_back_one_on_and_back_to_now(tmp_path, clock):
+    machine = watched(tmp_path)
+    last = machine.seq
+    shown = []
+    keys = ["comma", "comma", "full_stop", "full_stop", "comma", "comma", "l"]
+
+    async def look():
+        machines = Machines()
+        machines.get, machines.summaries = {"job": machine}.get, lambda: [machine.summary()]
+        app = MissionApp(machines, None)
+        async with app.run_test(size=(140, 50)) as pilot:
+            app.refresh_view()
+            for key in keys:
+                await pilot.press(key)
+                app.refresh_view()
+                shown.append((str(app.query_one("#status", Static).render()), app._state.active()))
+
+    asyncio.run(look())
+    for (status, _), number in zip(shown, [1, 2, 1, 0, 1, 2, 0], strict=True):
+        assert (f"event {last - number} of {last}" if number else "ended: succeeded") in status
+    assert shown[1][1] == ["/JOB", "/JOB/IN"]
+    assert shown[3][1] == []
+
+
+def test_events_that_are_missing_are_counted(tmp_path, clock):
+    machine = watched(tmp_path, [event(1), event(9, "Left", outcome="ok", dropped=7)])
+    assert "7 events missing" in seen(machine)["status"]
