@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 Status: TypeAlias = Literal["succeeded", "aborted", "preempted", "rejected"]
 STATUSES = ("succeeded", "aborted", "preempted", "rejected")
 _UNASKED = (GoalStatus.PENDING, GoalStatus.ACTIVE)
+_WAITING = (GoalStatus.PENDING, GoalStatus.RECALLING)
+_UNENDED = (*_WAITING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING)
 
 
 @dataclass(slots=True)
@@ -126,13 +128,19 @@ class ScriptedActionServer(ScriptedEnd):
         *,
         text: str = "",
     ) -> Reply:
-        """Answer every goal for which `predicate(goal)` holds; else as `reply`."""
+        """Answer every goal for which `predicate(goal)` holds; else as `reply`.
+
+        What the predicate raises fails the run, and the goal is aborted.
+        """
         reply = self._make(result, status, duration, feedback, text)
         self._conditional.append((predicate, reply))
         return reply
 
     def custom_reply(self, function: Callable[[ServerGoalHandle], object]) -> None:
-        """Give the next goal to `function(goal_handle)`, which accepts and ends it; it may wait."""
+        """Give the next goal to `function(goal_handle)`, which accepts and ends it; it may wait.
+
+        What it raises fails the run, and the goal is aborted.
+        """
         self._forget_default()
         self._replies.append(function)
 
@@ -216,7 +224,7 @@ class ScriptedActionServer(ScriptedEnd):
         """Return the next goal, waiting for it; each goal is given once.
 
         Raises:
-            AssertionError: none came in time.
+            AssertionError: none came in time; beside the mission it fails the run.
 
         Blocks: until then; for functions that run beside the mission (`clock.spawn`).
         """
@@ -269,24 +277,46 @@ class ScriptedActionServer(ScriptedEnd):
         reply = self._choose(goal)
         if isinstance(reply, Reply):
             self._clock.spawn(lambda: self._play(handle, reply), name=f"{self.name} server")
+        elif isinstance(reply, str):
+            self._give_up(handle, reply)
         elif reply is not None:
-            self._clock.spawn(lambda: reply(handle), name=f"{self.name} server")
+            self._clock.spawn(lambda: self._hand_over(handle, reply), name=f"{self.name} server")
         else:
             count = len(self.goals)
             self.errors.append(
                 f"{self.name}: goal number {count} came; expected {count - 1}, as there are no "
                 "more replies. Try reply(...) or default_result(...)."
             )
-            handle.set_accepted()
-            handle.set_aborted(text="the test has no reply for this goal")
+            self._give_up(handle, "the test has no reply for this goal")
 
-    def _choose(self, goal: Any) -> Reply | Callable[[ServerGoalHandle], object] | None:
+    def _choose(self, goal: Any) -> Reply | Callable[[ServerGoalHandle], object] | str | None:
+        """Return what is to be done with a goal; a text when a predicate raised."""
         if self._chooser is not None:
             return self._chooser()
         for predicate, reply in self._conditional:
-            if predicate(goal):
+            try:
+                holds = predicate(goal)
+            except Exception as error:  # noqa: BLE001  a border: the run fails with it
+                return self.note_raised(predicate, error)
+            if holds:
                 return reply
         return self._replies.popleft() if self._replies else self._default
+
+    def _hand_over(
+        self, handle: ServerGoalHandle, function: Callable[[ServerGoalHandle], object]
+    ) -> None:
+        try:
+            function(handle)
+        except Exception as error:  # noqa: BLE001  a border: the run fails with it
+            self._give_up(handle, self.note_raised(function, error))
+
+    def _give_up(self, handle: ServerGoalHandle, text: str) -> None:
+        """Abort a goal that the test has no right answer to, unless it has ended."""
+        status = handle.get_goal_status().status
+        if status in _WAITING:
+            handle.set_accepted()
+        if status in _UNENDED:
+            handle.set_aborted(text=text)
 
     def _on_cancel(self, handle: ServerGoalHandle) -> None:
         self.cancelled.append(handle.get_goal())

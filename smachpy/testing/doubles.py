@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections import deque
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ from smachpy.state import State
 from smachpy.testing.runs import find_path
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Awaitable, Callable, Iterable, Mapping
     from typing import TypeAlias
 
     # Name of a state, what makes its double, and the list that gets it.
@@ -31,7 +32,7 @@ class Double(State):
         outcomes: What it returns, run after run; the last one is repeated.
         duration: How long each run takes [s]; a preempt ends it early.
         writes: Userdata that it writes.
-        execute: Does the work in place of the script; called with the userdata.
+        execute: Does the work in place of the script; called with the userdata. It may be async.
 
     Attributes:
         runs: How often it ran.
@@ -44,7 +45,7 @@ class Double(State):
         *,
         duration: float = 0.0,
         writes: Mapping[str, Any] | None = None,
-        execute: Callable[[Any], str] | None = None,
+        execute: Callable[[Any], str | Awaitable[str]] | None = None,
     ) -> None:
         known = state.get_registered_outcomes()
         super().__init__(
@@ -61,6 +62,15 @@ class Double(State):
         for option in ("on_exception", "on_enter", "on_exit"):
             setattr(self, option, getattr(state, option))
         self._check(known)
+        if inspect.iscoroutinefunction(execute):
+            self.execute = self._execute_async  # type: ignore[method-assign, assignment]
+
+    async def _execute_async(self, ud: Any) -> str:
+        self.runs += 1
+        assert self._work is not None
+        work: Any = self._work(ud)
+        outcome: str = await work
+        return outcome
 
     def _check(self, known: tuple[str, ...]) -> None:
         name = type(self._stands_for).__name__
@@ -82,7 +92,15 @@ class Double(State):
         """Follow the script."""
         self.runs += 1
         if self._work is not None:
-            return self._work(ud)
+            outcome = self._work(ud)
+            if not inspect.isawaitable(outcome):
+                return outcome
+            if inspect.iscoroutine(outcome):
+                outcome.close()
+            raise DoubleError(
+                f"double of {type(self._stands_for).__name__}: execute: got {outcome!r} from "
+                f"{self._work!r}; expected an outcome. Try a function made with `async def`."
+            )
         if self._duration > 0 and self.sleep(self._duration) and "preempted" in self._outcomes:
             self.service_preempt()
             return "preempted"

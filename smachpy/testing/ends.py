@@ -23,11 +23,13 @@ class ScriptedEnd:
     Attributes:
         name: Its name on the network.
         errors: What went otherwise than the script says; the run fails with it.
+        causes: What the test's own functions raised.
     """
 
     def __init__(self, kit: MissionKit, name: str) -> None:
         self.name = name
         self.errors: list[str] = []
+        self.causes: list[BaseException] = []
         self._kit = kit
         self._clock = kit.clock
         self._fates: dict[str, deque[Fate]] = {}
@@ -61,23 +63,45 @@ class ScriptedEnd:
         """Die as a process does that gets SIGKILL."""
         self._session.kill()
 
+    def note_raised(self, function: object, error: BaseException) -> str:
+        """Note what a function of the test raised, and return it as a text."""
+        name = getattr(function, "__qualname__", None) or repr(function)
+        text = f"{self.name}: {name} of the test raised {type(error).__name__}: {error}"
+        self.errors.append(text)
+        self.causes.append(error)
+        return text
+
     def take_errors(self) -> list[str]:
         """Return what went otherwise than the script says, and forget it."""
         errors, self.errors = self.errors, []
         more = len(errors) - MOST_ERRORS
         return [*errors[:MOST_ERRORS], *([f"{self.name}: and {more} more"] if more > 0 else [])]
 
+    def take_causes(self) -> list[BaseException]:
+        """Return what the test's own functions raised, and forget it."""
+        causes, self.causes = self.causes, []
+        return causes
+
     def verify(self) -> None:
         """Fail if something went otherwise than the script says."""
         __tracebackhide__ = True
-        errors = self.take_errors()
-        if errors:
-            raise AssertionError("\n".join(errors))
+        raise_errors(self.take_errors(), self.take_causes())
 
     def close(self) -> None:
         """Leave the network."""
         if not self._session.killed:
             self.node.close()
+
+
+def raise_errors(errors: list[str], causes: list[BaseException]) -> None:
+    """Fail with what went otherwise than the test says, if anything did.
+
+    Raises:
+        AssertionError: from the first of `causes`.
+    """
+    __tracebackhide__ = True
+    if errors:
+        raise AssertionError("\n".join(errors)) from (causes[0] if causes else None)
 
 
 def as_message(kind: Any, value: Any, what: str) -> Any:

@@ -9,7 +9,7 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from actionlib_core.clock import Deadlock, TimeLimit, VirtualClock, use_clock
+from actionlib_core.clock import Deadlock, TimeLimit, use_clock
 from actionlib_core.node import Node, use_node
 from actionlib_core.shutdown import Shutdown, use_shutdown
 from actionlib_core.transport.memory import MemoryNetwork
@@ -17,11 +17,12 @@ from smachpy._runtime.asker import asking
 from smachpy.exceptions import SmachError
 from smachpy.introspection import describe
 from smachpy.testing.doubles import Double, Places
+from smachpy.testing.ends import raise_errors
 from smachpy.testing.runs import Run
-from smachpy.testing.watch import STEPS, TURN_STEPS, Stuck, Trigger, Watch
+from smachpy.testing.watch import STEPS, TURN_STEPS, MissionClock, Stuck, Trigger, Watch
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping, Sequence
     from types import TracebackType
     from typing import Self
 
@@ -92,7 +93,7 @@ class MissionKit:
         on_run: Callable[[Run], object] | None = None,
     ) -> None:
         self.seed = seed
-        self.clock = VirtualClock(seed, rate=rate, choose=choose)
+        self.clock = MissionClock(seed, rate=rate, choose=choose)
         self.network = MemoryNetwork(self.clock)
         self.transport = self.network.session()
         self.node = Node("mission", transport=self.transport, clock=self.clock)
@@ -119,6 +120,7 @@ class MissionKit:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
+        errors, causes = self._take_errors()
         self._places.restore()
         try:
             for server in reversed(self._servers):
@@ -126,6 +128,10 @@ class MissionKit:
             self.node.close()
         finally:
             self._stack.close()
+        if error is None:
+            raise_errors(errors, causes)
+        else:
+            _note(error, errors)
 
     # -- running -------------------------------------------------------------------------------
 
@@ -150,8 +156,9 @@ class MissionKit:
             Deadlock: everything waits and nothing can ever go on.
             TimeLimitError: it did not end in time, or with so many steps.
             SmachError: a state raised, or the machine does not hold together; as `execute`.
-            AssertionError: a scripted server got a goal that the script does not provide for. When
-                something else is raised, this is among its notes.
+            AssertionError: a scripted server got a goal that the script does not provide for, or a
+                function of the test beside the mission (`clock.spawn`, `custom_reply`) raised.
+                When something else is raised, this is among its notes.
 
         Warns:
             UnfiredWarning: a preempt or interrupt of the test never came.
@@ -172,14 +179,23 @@ class MissionKit:
         finally:
             self.clock.limit = self.clock.most_turns = None
         run = self._finish(machine, record, watch, outcome)
-        errors = [text for server in self._servers for text in server.take_errors()]
+        errors, causes = self._take_errors()
         if error is not None:
             _reraise(error, run, limit, steps, errors, draws=self.draws)
-        if errors:
-            raise AssertionError("\n".join(errors))
+        raise_errors(errors, causes)
         for text in run.unfired:
             warnings.warn(UnfiredWarning(f"{record.path}: {text}"), stacklevel=2)
         return run
+
+    def _take_errors(self) -> tuple[list[str], list[BaseException]]:
+        """Return what went otherwise than the test says beside the mission, and forget it."""
+        failures, self.clock.failures = self.clock.failures, []
+        errors = [f"{name}: {type(error).__name__}: {error}" for name, error in failures]
+        causes = [error for _, error in failures]
+        for server in self._servers:
+            errors += server.take_errors()
+            causes += server.take_causes()
+        return errors, causes
 
     def _execute(self, machine: Container) -> tuple[str | None, BaseException | None]:
         """Run the machine here, or beside a running event loop, which cannot be entered twice."""
@@ -229,7 +245,7 @@ class MissionKit:
         *,
         duration: float = 0.0,
         writes: Mapping[str, Any] | None = None,
-        execute: Callable[[Any], str] | None = None,
+        execute: Callable[[Any], str | Awaitable[str]] | None = None,
     ) -> list[Double]:
         """Put a double in the place of a state, from the next run to the end of the test.
 
@@ -238,7 +254,7 @@ class MissionKit:
             outcomes: What it returns, run after run; the last one is repeated.
             duration: How long each run takes [s]; a preempt ends it early with 'preempted'.
             writes: Userdata that it writes.
-            execute: A function of the userdata in place of all this.
+            execute: A function of the userdata in place of all this; it may be async.
 
         Returns:
             A list that holds the double once the run has begun.

@@ -73,7 +73,10 @@ class ScriptedService(ScriptedEnd):
         return self._queue(Answer(self._message(response), duration))
 
     def custom_reply(self, function: Callable[[Any], Any]) -> Answer:
-        """Answer the next request with what `function(request)` returns; it may wait or raise."""
+        """Answer the next request with what `function(request)` returns; it may wait or raise.
+
+        An AssertionError of it fails the run, too.
+        """
         return self._queue(Answer(function=function))
 
     def default_response(self, response: Any = None, duration: float = 0.0) -> Answer:
@@ -125,5 +128,12 @@ class ScriptedService(ScriptedEnd):
         if answer.error is not None:
             raise RuntimeError(answer.error)
         if answer.function is not None:
-            return answer.function(request)
+            return self._call(answer.function, request)
         return self._service.response_class() if answer.response is None else answer.response
+
+    def _call(self, function: Callable[[Any], Any], request: Any) -> Any:
+        try:
+            return function(request)
+        except AssertionError as error:  # whatever else it raises is what the service does
+            self.note_raised(function, error)
+            raise

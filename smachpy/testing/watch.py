@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.clock import VirtualClock
+from actionlib_core.clock._virtual_parts import Stopped
 from smachpy.events import Entered, Event
 from smachpy.tape import EventTape
 from smachpy.testing.runs import find_path
@@ -15,12 +17,45 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from actionlib_core.clock import Clock, Timer
+    from actionlib_core.clock._virtual_parts import VirtualTask
     from smachpy.container import Container
     from smachpy.introspection import StateRecord
 
 ENTRY = 5  # elements of a tape's list for one event or transition
 STEPS = 100_000
 TURN_STEPS = 5  # a turn of the clock takes the computer that much longer than a transition
+
+
+class MissionClock(VirtualClock):
+    """A virtual clock that keeps what the threads it started were ended by.
+
+    Attributes:
+        failures: Name of the thread, and what it raised.
+    """
+
+    def __init__(
+        self,
+        seed: int | None = None,
+        *,
+        rate: float | None = None,
+        choose: Callable[[list[str]], int] | None = None,
+    ) -> None:
+        super().__init__(seed, rate=rate, choose=choose)
+        self.failures: list[tuple[str, BaseException]] = []
+
+    def spawn(self, target: Callable[[], object], *, name: str) -> VirtualTask:
+        """Start a thread, as a clock does."""
+
+        def run() -> None:
+            try:
+                target()
+            except (Stopped, SystemExit):
+                raise
+            except BaseException as error:
+                self.failures.append((name, error))
+                raise
+
+        return super().spawn(run, name=name)
 
 
 class Stuck(BaseException):

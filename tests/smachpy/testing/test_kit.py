@@ -158,6 +158,22 @@ def test_a_double_with_a_function(mission):
     assert mission(two_waits()).outcome == "preempted"
 
 
+def test_a_double_with_an_async_function(mission):
+    async def work(ud):
+        await asyncio.sleep(3)
+        ud.waited = 3
+        return "done"
+
+    mission.replace("A", execute=work)
+    run = mission(two_waits())
+    assert (run.outcomes("A"), run.duration) == (("done",), 23)
+    mission.replace("B", execute=lambda ud: work(ud))
+    with pytest.raises(
+        DoubleError, match=r"coroutine .*; expected an outcome. Try a function made"
+    ):
+        mission(two_waits())
+
+
 def test_a_double_keeps_options_and_details_of_its_state(mission):
     sm = StateMachine(["done", "late"], name="M")
     with sm:

@@ -20,7 +20,7 @@ from smachpy import (
     StateMachine,
 )
 from smachpy.events import GoalDone, GoalFeedback
-from smachpy.testing import TimeLimitError
+from smachpy.testing import TimeLimitError, mission_kit
 
 
 def drive(**options):
@@ -103,6 +103,73 @@ def test_the_errors_of_all_servers_are_told_and_of_their_own_run(mission, server
     ]
     with pytest.raises(AssertionError, match=r"goal number 3(.|\n)*dock: goal number 3"):
         mission(twice(lambda ud: "aborted"))
+
+
+def test_what_the_functions_of_a_test_raise_fails_the_run(mission, server):
+    def wrong(_):
+        raise AssertionError("the goal is no good")
+
+    server.custom_reply(wrong)
+    begun = mission.clock.now()
+    with pytest.raises(AssertionError, match=r"wrong of the test raised .*: the goal is no") as got:
+        mission(drive())
+    assert mission.clock.now() - begun < 1
+    assert str(got.value.__cause__).startswith("the goal is no good")
+    server.reply_conditionally(wrong)
+    with pytest.raises(AssertionError, match="the goal is no good"):
+        mission(drive())
+    assert len(server.goals) == 2
+
+
+def test_a_goal_that_its_function_has_ended_stays_so(mission, server):
+    def late(handle):
+        handle.set_accepted()
+        handle.set_succeeded()
+        raise ValueError("too late")
+
+    server.custom_reply(late)
+    with pytest.raises(AssertionError, match="ValueError: too late"):
+        mission(drive())
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_what_runs_beside_the_mission_fails_it_too(mission, server):
+    server.reply(duration=10)
+    mission.clock.spawn(lambda: [server.await_goal(5) for _ in range(2)], name="beside")
+    with pytest.raises(AssertionError, match="beside: AssertionError: move_base: no goal came wit"):
+        mission(drive())
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_what_went_wrong_after_the_last_run_is_told_at_the_end():
+    with pytest.raises(AssertionError, match="beside: ZeroDivisionError"), mission_kit() as mission:
+        mission.clock.spawn(lambda: 1 / 0, name="beside").join()
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_what_went_wrong_beside_a_failing_test_is_noted():
+    def test():
+        with mission_kit() as mission:
+            mission.clock.spawn(lambda: 1 / 0, name="beside").join()
+            raise KeyError
+
+    with pytest.raises(KeyError) as caught:
+        test()
+    assert caught.value.__notes__ == ["beside: ZeroDivisionError: division by zero"]
+
+
+def test_an_assertion_in_a_service_s_function_fails_the_run(mission, service_server):
+    service = service_server("ask", Trigger)
+
+    def wrong(_):
+        raise AssertionError("what a request")
+
+    service.custom_reply(wrong)
+    sm = StateMachine(["succeeded", "aborted", "preempted"], name="M")
+    with sm:
+        sm.add("ASK", ServiceState("ask", Trigger))
+    with pytest.raises(AssertionError, match="wrong of the test raised AssertionError: what a req"):
+        mission(sm)
 
 
 def test_feedback_is_spread_over_the_duration(mission, server):
