@@ -209,7 +209,8 @@ class ActionClient(Generic[A_co]):
             timeout: Longest wait [s]; 0 and None wait for ever, as in actionlib.
 
         Returns:
-            Whether there is one; False also when the client was stopped.
+            Whether there is one; False also when the client was stopped or, without a limit, when
+            the program is to end (`actionlib_core.shutdown`).
 
         Raises:
             TypeMismatchError: there is one, but of another type.

@@ -15,6 +15,7 @@ from actionlib_core._core.client_goal import UNLISTED_S, ClientGoal, Duty, Path
 from actionlib_core._core.states import TERMINAL, CommState, Status
 from actionlib_core.comm_state_machine import CommStateMachine
 from actionlib_core.exceptions import ActionlibError, TransportError
+from actionlib_core.shutdown import current_shutdown
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -143,30 +144,39 @@ class GoalManager:
             self._foreign_until = now + UNLISTED_S
 
     def wait_for_server(self, timeout: float | None) -> bool:
-        """Wait for a server; return whether there is one, False also when the client was stopped.
+        """Wait for a server; return whether there is one.
 
         Raises:
             TypeMismatchError: there is one of another type.
 
-        Blocks: until then, `timeout` [s] at most; None: no limit.
+        Blocks: until then or until the client is stopped, `timeout` [s] at most; None: no limit,
+            but until the program is to end.
         """
         deadline = None if timeout is None else self._clock.now() + timeout
         changed = self._clock.event()
-        while True:
-            with self._lock:
-                if self._closed:
-                    return False
-                if self._current is not None:
-                    return True
-                self._check_types()
-                changed.clear()
-                self._waiters.append(changed)
-            left = None if deadline is None else deadline - self._clock.now()
-            if not changed.wait(left) and left is not None:
+        ending = current_shutdown()
+        forget = ending.on_shutdown(changed.set) if timeout is None else None
+        try:
+            while True:
                 with self._lock:
-                    if changed in self._waiters:
-                        self._waiters.remove(changed)
-                    return self._current is not None
+                    if self._closed:
+                        return False
+                    if self._current is not None:
+                        return True
+                    self._check_types()
+                    changed.clear()
+                    if changed not in self._waiters:
+                        self._waiters.append(changed)
+                left = None if deadline is None else deadline - self._clock.now()
+                over = ending.requested() if left is None else left <= 0
+                if over or (not changed.wait(left) and left is not None):
+                    with self._lock:
+                        if changed in self._waiters:
+                            self._waiters.remove(changed)
+                        return self._current is not None
+        finally:
+            if forget is not None:
+                forget()
 
     def _check_types(self) -> None:
         for error in self._servers.values():

@@ -165,7 +165,8 @@ class SimpleActionClient(Generic[A]):
             timeout: Longest wait [s]; 0 and None wait for ever, as in actionlib.
 
         Returns:
-            Whether there is one; False also when the client was stopped.
+            Whether there is one; False also when the client was stopped or, without a limit, when
+            the program is to end (`actionlib_core.shutdown`).
 
         Raises:
             TypeMismatchError: there is one, but of another type.
@@ -291,7 +292,8 @@ class SimpleActionClient(Generic[A]):
 
         Args:
             timeout: Longest wait [s]; 0 and None wait as long as it takes, as in actionlib: until
-                the goal is over, or its server dies, or the client is stopped.
+                the goal is over, or its server dies, or the client is stopped. That the program is
+                to end does not end it, as the goal runs on: `shutdown.on_shutdown(cancel_goal)`.
 
         Returns:
             Whether the goal is over; False also when no goal was sent.

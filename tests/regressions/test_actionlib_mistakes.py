@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from actionlib_core import goal_manager
+from actionlib_core import goal_manager, shutdown
 from actionlib_core._core.client_goal import ClientGoal
 from actionlib_core.action_client import ActionClient, CommState
 from actionlib_core.action_server import ActionServer
@@ -291,6 +291,39 @@ def test_stopped_client_waits_for_no_server(nodes):
     client.stop()
     assert not client.wait_for_server()
     server.stop()
+
+
+def test_wait_for_a_server_ends_with_the_program(nodes, clock):
+    """The first Ctrl-C left it waiting."""
+    client = SimpleActionClient("demo", msg.TestAction, node=nodes[1])
+    with shutdown.use_shutdown(shutdown.Shutdown()) as end:
+        clock.call_later(4.0, end.request)
+        assert not client.wait_for_server()
+        assert clock.now() == pytest.approx(4.0)
+        assert not client.wait_for_server()
+        assert clock.now() == pytest.approx(4.0)
+        ActionServer("demo", msg.TestAction, node=nodes[0])
+        assert client.wait_for_server(LONG_S)
+        assert client.wait_for_server()
+    assert client.action_client.manager._waiters == []
+
+
+def test_goal_that_the_end_of_the_program_cancels_is_waited_for(nodes, clock):
+    def execute(_goal):
+        assert server.wait_preempt(LONG_S)
+        clock.sleep(1.0)
+        server.set_preempted()
+
+    server = SimpleActionServer("demo", msg.TestAction, execute, auto_start=False, node=nodes[0])
+    server.start()
+    client = SimpleActionClient("demo", msg.TestAction, node=nodes[1])
+    with shutdown.use_shutdown(shutdown.Shutdown()) as end:
+        shutdown.on_shutdown(client.cancel_goal)
+        clock.call_later(4.0, end.request)
+        client.send_goal(msg.TestGoal(1))
+        assert client.wait_for_result()
+    assert client.get_state() == GoalStatus.PREEMPTED
+    assert clock.now() == pytest.approx(5.0, abs=0.1)
 
 
 def test_server_whose_session_is_closed_stops(nodes, clock):
