@@ -3,7 +3,8 @@
 A package adds a subcommand with an entry point in the group `smachpy.commands` whose object is a
 function `register(subparsers)`. It adds one parser and sets `run=function(args) -> int`. With
 `words=()` set as well it gets what stands after the first `--` there, and renaming in the style of
-ROS (`a:=b`, `--ros-args`) in `names`.
+ROS (`a:=b`, `--ros-args`) in `names`. With `all_words=()` it gets all words there, except a `--help`
+that stands alone: they are another program's.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 GROUP = "smachpy.commands"
 EXIT_ERROR = 2
+_HELP = (["-h"], ["--help"])
 EXIT_INTERRUPTED = 128 + signal.SIGINT
 
 
@@ -40,6 +42,10 @@ class _Parser(argparse.ArgumentParser):
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Put aside what is not for this command but for what it runs, if it has `words`."""
+        if args and self.get_default("all_words") is not None and args not in _HELP:
+            found, _ = super().parse_known_args([], namespace)
+            found.all_words = tuple(args)
+            return found, []
         if args is None or self.get_default("words") is None:
             return super().parse_known_args(args, namespace)
         end = args.index("--") if "--" in args else len(args)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    import argparse
     from collections.abc import Sequence
 
 
@@ -13,21 +13,17 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     """Add the command."""
     parser = subparsers.add_parser(
         "test",
-        help="test missions: pytest on PATH",
-        epilog="What comes after PATH goes to pytest: smachpy test tests -k patrol -n 2",
+        help="test missions: pytest by another name",
+        usage="%(prog)s [WORD ...]",
+        epilog="All words go to pytest: smachpy test tests -k patrol --mission-coverage. For the "
+        "options of missions see 'robot missions' in pytest --help.",
     )
-    parser.add_argument("path", nargs="?", default=".", help="file or folder; default: here")
-    parser.add_argument(
-        "options",
-        nargs=argparse.REMAINDER,
-        help="options of pytest, such as --mission-coverage",
-    )
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, all_words=())
 
 
 def run(args: argparse.Namespace) -> int:
     """Run pytest and return its exit code."""
-    return run_pytest([args.path, *args.options])
+    return run_pytest(args.all_words)
 
 
 def run_pytest(arguments: Sequence[str]) -> int:

@@ -9,6 +9,9 @@ import sys
 
 import pytest
 
+from smachpy.cli import main
+from smachpy.testing import cli as testing_cli
+
 pytest_plugins = ["pytester"]
 
 TESTS = """
@@ -151,6 +154,31 @@ def test_the_command_line_alias(pytester):
         check=False,
     )
     assert "1 passed" in done.stdout, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "got"),
+    [
+        (["-k", "x", "f.py"], ["-k", "x", "f.py"]),
+        (["-q", "f.py", "--debug"], ["-q", "f.py", "--debug"]),
+        (["--mission-coverage"], ["--mission-coverage"]),
+        (["f.py", "--", "-g.py"], ["f.py", "--", "-g.py"]),
+        (["f.py", "--help"], ["f.py", "--help"]),
+        ([], []),
+    ],
+)
+def test_the_alias_hands_every_word_to_pytest(monkeypatch, words, got):
+    seen = []
+    monkeypatch.setattr(testing_cli, "run_pytest", lambda words: seen.append(list(words)) or 5)
+    assert main(["test", *words]) == 5
+    assert seen == [got]
+
+
+def test_the_help_of_the_alias_is_short(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["test", "--help"])
+    assert ended.value.code == 0
+    assert "All words go to pytest" in capsys.readouterr().out
 
 
 def test_loading_the_plugin_loads_neither_network_nor_numbers():
