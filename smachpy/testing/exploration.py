@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from smachpy.testing.verdicts import Verdict
 
 LIMIT_S = 3600.0
+STEPS = 10_000  # while no time passes; more of them never end
 _COMPUTER = RealClock()  # for the time of the computer: `time` is a mission's while it runs
 SHRINKING_RUNS = 300
 _OUTSIDE = frozenset({"monitor", "condition", "service"})
@@ -133,7 +134,7 @@ def explore(
     Args:
         machine: A container, or a function that makes one; needed when its items run out.
         max_runs: Most runs.
-        max_time: Longest time [s of the computer].
+        max_time: Longest time [s of the computer]; to shorten what it found as long again.
         max_depth: Choices of a run after this many are not varied.
         max_steps: Leaves in a run; with more it counts as one that never ends.
         invariants: Called with each run. Anything false but None, or an exception, is a
@@ -173,7 +174,7 @@ def explore(
     with _Runner(
         machine, options, tuple(keep), userdata, doubles, real_actions=real_actions
     ) as runner:
-        shrinker = _Shrinker(runner, own, grace)
+        shrinker = _Shrinker(runner, own, grace, max_time)
         runs = 0
         stopped_by = ""
         found: tuple[Verdict, Run] | None = None
@@ -343,7 +344,7 @@ class _Runner:
             if self.real_actions:
                 servers = serve_actions(kit, machine, self.explorer)
             try:
-                kit(machine, copy.deepcopy(self.userdata), limit=LIMIT_S)
+                kit(machine, copy.deepcopy(self.userdata), limit=LIMIT_S, steps=STEPS)
             except Exception as caught:  # noqa: BLE001  judged by the caller
                 error = caught
             finally:
@@ -380,6 +381,7 @@ class _Shrinker:
     runner: _Runner
     own: tuple[Callable[[Run], object], ...]
     grace: float
+    max_time: float
 
     def verdict(self, run: Run, error: Exception | None) -> Verdict | None:
         """Return what is wrong with the runner's last run."""
@@ -396,12 +398,13 @@ class _Shrinker:
         """Return the shortest run that can be found that is wrong in the same way."""
         best = run, verdict, list(self.runner.explorer.choices)
         tries = 0
+        end = _COMPUTER.now() + self.max_time
         better = True
         while better and tries < SHRINKING_RUNS:
             better = False
             for told in _simpler(best[2]):
                 tries += 1
-                if tries >= SHRINKING_RUNS:
+                if tries >= SHRINKING_RUNS or _COMPUTER.now() > end:
                     break
                 try:
                     found, error = self.runner.run(told)

@@ -135,6 +135,17 @@ def test_a_loop_with_no_way_out():
     assert found.counterexample.choices[0] == "/M/A: odd"
 
 
+@pytest.mark.parametrize("outcomes", [["done"], ["done", "preempted"]])
+def test_a_loop_in_which_no_time_passes(outcomes):
+    sm = StateMachine(outcomes, name="M")
+    with sm.opened(check=False):
+        sm.add("A", CBState(lambda _: "again", outcomes=["again"]), {"again": "A"})
+    begun = time.monotonic()
+    found = explore(sm, keep=["A"], max_time=0.5)
+    assert reason(found).startswith("it never ends: /M: it took 10000 steps at 0 s, in /M/A")
+    assert time.monotonic() - begun < 30
+
+
 def test_a_watcher_that_nobody_calls_off():
     both = Concurrence(["done", "preempted"], "done", name="C")
     watcher = Leaf("heard", "preempted")
