@@ -66,10 +66,14 @@ class Branch(Frame):
                 continue
             return
 
+    def outcome_left(self) -> str:
+        """Return the child's outcome if it is left behind now."""
+        return self.step.state.timeout_outcome if self.timed_out else "preempted"
+
     def abandon(self) -> None:
         """Go on without the child; its thread is left behind."""
         self.dead = True
-        self.group.end(self, "preempted", None)
+        self.group.end(self, self.outcome_left(), None)
 
     def _execute(self) -> str:
         """Run the child, again when an operator wants it so, and check its outcome."""

@@ -58,6 +58,8 @@ def _run_root(
 ) -> str:
     run = Run(current_clock())
     frame = RootFrame(root, run, boundary)
+    if boundary is not None:
+        boundary.begin(frame)
     control = root._control  # noqa: SLF001  one machinery
     if control is not None:
         control.attach(run)
@@ -95,6 +97,7 @@ class _Boundary:
         self._userdata = parent_ud
         self._done: Event = current_clock().event(f"the end of /{root.name or 'SM_ROOT'}")
         self._lock = threading.Lock()
+        self._frame: RootFrame | None = None
         self._ended = False
         self._outcome = "preempted"
         self._error: BaseException | None = None
@@ -107,9 +110,19 @@ class _Boundary:
             raise self._error
         return self._outcome
 
+    def begin(self, frame: RootFrame) -> None:
+        """The root runs in `frame`."""
+        self._frame = frame
+
+    def outcome_left(self) -> str:
+        """Return the root's outcome if it is left behind now."""
+        frame = self._frame
+        late = frame is not None and frame.asked and not frame.called_off
+        return self._root.timeout_outcome if late else "preempted"
+
     def abandon(self) -> None:
         """Go on without the root's thread."""
-        self._end("preempted", None)
+        self._end(self.outcome_left(), None)
 
     def _work(self) -> None:
         outcome, failure = "preempted", None

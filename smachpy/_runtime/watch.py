@@ -158,7 +158,7 @@ def bury(frame: Frame, boundary: Any) -> None:
         container = above.container
         step = above.step
         if above.run.watched:
-            _publish_end(above)
+            _publish_end(above, boundary)
         above.dead = True
         above._ears = None  # noqa: SLF001  a dead frame finds none
         if step is not None:
@@ -174,14 +174,15 @@ def bury(frame: Frame, boundary: Any) -> None:
         above = above.parent
 
 
-def _publish_end(frame: Frame) -> None:
+def _publish_end(frame: Frame, boundary: Any) -> None:
     """Publish the end of the child that is left behind in `frame`, and of a root with it."""
     clock = frame.run.clock
     now = clock.now(), clock.time_ns()
     if frame.step is not None:
-        frame.publish(Left(frame.here(), *now, "preempted"))
+        outcome = boundary.outcome_left() if frame is boundary else "preempted"
+        frame.publish(Left(frame.here(), *now, outcome))
     if isinstance(frame, RootFrame):
-        frame.publish(Finished(frame.path, *now, "preempted"))
+        frame.publish(Finished(frame.path, *now, boundary.outcome_left()))
 
 
 def stack_of(ident: int) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import threading
 
@@ -10,7 +11,15 @@ import pytest
 
 import smachpy
 from actionlib_core.clock import RealClock, current_clock, use_clock
-from smachpy.events import Abandoned, PreemptRequested, PreemptServiced, Retried, TimedOut
+from smachpy.events import (
+    Abandoned,
+    Finished,
+    Left,
+    PreemptRequested,
+    PreemptServiced,
+    Retried,
+    TimedOut,
+)
 
 
 class Waits(smachpy.State):
@@ -87,6 +96,13 @@ def test_timeout_of_a_container_and_of_the_root(clock):
     assert clock.now() == 4.0
 
 
+def beside(*states, **options):
+    both = smachpy.Concurrence(["ok", "aborted", "preempted"], "ok", **options)
+    for i, state in enumerate(states):
+        both.add(f"C{i}", state)
+    return both
+
+
 def root_of(state, **options):
     sm = smachpy.StateMachine(["ok", "preempted"], name="ROOT", **options)
     sm.add("A", state)
@@ -159,6 +175,39 @@ def test_timeout_of_the_root_that_comes_too_late_does_not_end_the_next_run():
         assert sm.execute() == "ok"
 
 
+class Stone(smachpy.State):
+    """Cannot be broken into, in virtual time either; ends some day."""
+
+    def execute(self, userdata):
+        end = current_clock().now() + 500.0
+        while current_clock().now() < end:
+            with contextlib.suppress(BaseException):
+                current_clock().sleep(end - current_clock().now())
+        return "ok"
+
+
+@pytest.mark.parametrize("asked_at", [None, 2.5])
+@pytest.mark.parametrize("where", ["branch", "machine in a branch", "root in a task"])
+def test_timeout_of_what_must_be_left_behind(clock, where, asked_at):
+    """Its outcome, unless somebody asked it to stop meanwhile."""
+    limits = {"timeout": 2.0, "timeout_outcome": "late", "preempt_timeout": 1.0}
+    sm, _ = root_of(Stone(["ok"]), **limits)
+    if where == "branch":
+        sm = beside(Stone(["ok"], **limits), outcome_map={"aborted": {"C0": "late"}})
+    elif where == "machine in a branch":
+        sm = beside(sm, outcome_map={"aborted": {"C0": "late"}})
+    if asked_at is not None:
+        clock.call_later(asked_at, sm.request_preempt)
+    outcomes, events = [], []
+    sm.subscribe(events.append)
+    clock.spawn(lambda: outcomes.append(sm.execute()), name="mission").join()
+    clock.sleep(1000.0)
+    assert outcomes == (["late" if sm.name else "aborted"] if asked_at is None else ["preempted"])
+    ends = [e.outcome for e in events if isinstance(e, Left | Finished)]
+    assert ends[-1] == outcomes[0]
+    assert ends[-2] == ("preempted" if sm.name or asked_at else "late")
+
+
 def test_timeout_in_a_concurrence_ends_that_branch_only(clock):
     both = smachpy.Concurrence(["done", "mixed"], "done", outcome_map={"mixed": {"A": "aborted"}})
     both.add("A", Waits(10.0, timeout=1.0))
@@ -211,13 +260,6 @@ def test_exceptions_of_children_become_outcomes_of_the_container():
     inner = smachpy.StateMachine(["ok", "aborted"], on_exception={ValueError: "broken"})
     inner.add("F", Fails(1))
     assert run(inner)[0] == "broken"
-
-
-def beside(*states, **options):
-    both = smachpy.Concurrence(["ok", "aborted"], "ok", **options)
-    for i, state in enumerate(states):
-        both.add(f"C{i}", state)
-    return both
 
 
 def within(state, **options):
