@@ -178,11 +178,12 @@ def _publish_end(frame: Frame, boundary: Any) -> None:
     """Publish the end of the child that is left behind in `frame`, and of a root with it."""
     clock = frame.run.clock
     now = clock.now(), clock.time_ns()
+    last: str = boundary.outcome_left()
     if frame.step is not None:
-        outcome = boundary.outcome_left() if frame is boundary else "preempted"
+        outcome = last if frame is boundary else "preempted"
         frame.publish(Left(frame.here(), *now, outcome))
     if isinstance(frame, RootFrame):
-        frame.publish(Finished(frame.path, *now, boundary.outcome_left()))
+        frame.publish(Finished(frame.path, *now, last))
 
 
 def stack_of(ident: int) -> str:
