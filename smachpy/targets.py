@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from smachpy.container import Container
 from smachpy.exceptions import SmachError
+from smachpy.extras import advice
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -128,9 +129,8 @@ def _load_mission(name: str) -> Target:
     try:
         thing = point.load()
     except ModuleNotFoundError as error:
-        raise TargetError(
-            name, f"package {error.name!r} is missing. Try: pip install 'smachpy[sim]'"
-        ) from error
+        text = advice(error) or f"module {error.name!r} is missing; expected it to be installed."
+        raise TargetError(name, text) from error
     return _target(name, point.value, thing)
 
 

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 
     from starlette.requests import Request
 
+    from smachpy.introspection import StateRecord
     from viz.live.actions import Actions
     from viz.live.machines import Machine, Machines
 
@@ -72,6 +73,14 @@ PICTURES = {
 }
 
 
+class Json(JSONResponse):
+    """JSON in ASCII: names may hold half of a pair of UTF-16, which has no UTF-8."""
+
+    def render(self, content: Any) -> bytes:
+        """Return the text."""
+        return json.dumps(content, separators=(",", ":")).encode("ascii")
+
+
 class Viewer:
     """The page's server side.
 
@@ -80,7 +89,7 @@ class Viewer:
         token: What commands must carry; None obeys none.
         send: Sends a command to a machine and returns the answer; blocks.
         follow: Whether pages follow the active states from the start.
-        statistics: Of recorded runs, by machine label.
+        statistics: Of recorded runs of a machine; blocks.
         hosts: Names that the server goes by, besides addresses.
         actions: On the network, for the page that sends goals; None shows none.
         value: Asks a machine for a value of its userdata, by name, container and key; blocks.
@@ -93,7 +102,7 @@ class Viewer:
         token: str | None = None,
         send: Callable[[str, dict[str, Any]], dict[str, Any]] | None = None,
         follow: bool = False,
-        statistics: Callable[[str], dict[str, Any] | None] = lambda _label: None,
+        statistics: Callable[[StateRecord], dict[str, Any] | None] = lambda _record: None,
         hosts: tuple[str, ...] = (),
         actions: Actions | None = None,
         value: Callable[[str, str, str], str] | None = None,
@@ -186,20 +195,23 @@ class Viewer:
         return Response(content, media_type=media, headers=headers)
 
     async def _list(self, _request: Request) -> Response:
-        return JSONResponse(self._machines.summaries())
+        return Json(self._machines.summaries())
 
     async def _model(self, request: Request) -> Response:
         machine = self._asked(request)
         if machine is None or machine.record is None:
             return _unknown(request)
         shown = {"revision": machine.revision, **page.model(machine.record)}
-        return JSONResponse(shown)
+        return Json(shown)
 
     async def _runs(self, request: Request) -> Response:
         machine = self._asked(request)
         if machine is None or machine.record is None:
             return _unknown(request)
-        return JSONResponse(self._statistics(machine.record.label))
+        try:
+            return Json(await run_in_threadpool(self._statistics, machine.record))
+        except SmachError as error:
+            return PlainTextResponse(str(error), status_code=503)
 
     async def _compare(self, request: Request) -> Response:
         machine = self._asked(request)
@@ -209,7 +221,7 @@ class Viewer:
         sides = (other.name, other.record, other.events()), (
             machine.name, machine.record, machine.events(),
         )  # fmt: skip
-        return JSONResponse(await run_in_threadpool(_compared, *sides))
+        return Json(await run_in_threadpool(_compared, *sides))
 
     async def _whole_value(self, request: Request) -> Response:
         machine = self._asked(request)
@@ -217,15 +229,15 @@ class Viewer:
             return _unknown(request)
         if machine.recorded or machine.stale is not None:
             text = "The mission is gone; only what it told of the value is left."
-            return JSONResponse({"ok": False, "text": text}, status_code=409)
+            return Json({"ok": False, "text": text}, status_code=409)
         query = request.query_params
         try:
             text = await run_in_threadpool(
                 self._value, machine.name, query.get("container", ""), query.get("key", "")
             )
         except SmachError as error:
-            return JSONResponse({"ok": False, "text": str(error)}, status_code=409)
-        return JSONResponse({"ok": True, "text": text})
+            return Json({"ok": False, "text": str(error)}, status_code=409)
+        return Json({"ok": True, "text": text})
 
     async def _picture(self, request: Request) -> Response:
         machine = self._asked(request)
@@ -259,12 +271,14 @@ class Viewer:
             return _download("".join(lines).encode(), "application/jsonl", "run.jsonl")
         run = {"model": page.model(machine.record), "snap": json.loads(machine.snapshot()[1])}
         text = await run_in_threadpool(page.standalone, run, machine.record.label)
-        return _download(text.encode(), page.TYPES[".html"], f"{_file_name(machine)}.html")
+        return _download(
+            text.encode("utf-8", "replace"), page.TYPES[".html"], f"{_file_name(machine)}.html"
+        )
 
     async def _control(self, request: Request) -> Response:
         reason = refuse_command(request, self._token)
         if reason is not None or self._send is None:
-            return JSONResponse({"ok": False, "text": reason}, status_code=403)
+            return Json({"ok": False, "text": reason}, status_code=403)
         name = request.query_params.get("machine", "")
         command = await _read_command(request)
         if command is None:
@@ -272,23 +286,23 @@ class Viewer:
         client = request.client.host if request.client else "?"
         command = {"by": f"page at {client}", **command}
         try:
-            return JSONResponse(await run_in_threadpool(self._send, name, command))
+            return Json(await run_in_threadpool(self._send, name, command))
         except SmachError as error:
-            return JSONResponse({"ok": False, "text": str(error)}, status_code=409)
+            return Json({"ok": False, "text": str(error)}, status_code=409)
 
     async def _action(self, request: Request) -> Response:
         if self._actions is None:
             return _unknown(request)
         name = request.query_params.get("name", "")
         try:
-            return JSONResponse(await run_in_threadpool(self._actions.definition, name))
+            return Json(await run_in_threadpool(self._actions.definition, name))
         except GoalRefusedError as error:
-            return JSONResponse({"ok": False, "text": str(error)}, status_code=409)
+            return Json({"ok": False, "text": str(error)}, status_code=409)
 
     async def _command_action(self, request: Request) -> Response:
         reason = refuse_command(request, self._token)
         if reason is not None or self._actions is None:
-            return JSONResponse({"ok": False, "text": reason}, status_code=403)
+            return Json({"ok": False, "text": reason}, status_code=403)
         command = await _read_command(request)
         if command is None:
             return _no_command()
@@ -296,8 +310,8 @@ class Viewer:
             answer = await run_in_threadpool(_do, self._actions, command)
         except GoalRefusedError as error:
             told = {"ok": False, "text": str(error), "problems": error.problems}
-            return JSONResponse(told, status_code=409)
-        return JSONResponse({"ok": True, **answer})
+            return Json(told, status_code=409)
+        return Json({"ok": True, **answer})
 
     async def _events(self, request: Request) -> Response:
         if len(self._pages) >= MOST_PAGES:
@@ -440,7 +454,7 @@ async def _read_command(request: Request) -> dict[str, Any] | None:
 
 def _no_command() -> Response:
     text = f"command: got no JSON object of at most {LONGEST_COMMAND} bytes; expected one."
-    return JSONResponse({"ok": False, "text": text}, status_code=400)
+    return Json({"ok": False, "text": text}, status_code=400)
 
 
 def _compared(old: tuple[str, Any, Any], new: tuple[str, Any, Any]) -> dict[str, Any]:

@@ -5,13 +5,11 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING, Any
 
-from smachpy.cli import UsageError
-
 if TYPE_CHECKING:
     import argparse
 
-    from actionlib_core.node import Node
     from viz.live.machines import Machines
+    from viz.runs.statistics import StatisticsOfFiles
 
 EXAMPLES = """examples:
   smachpy view                         every machine that runs on this network
@@ -20,6 +18,7 @@ EXAMPLES = """examples:
   smachpy view --runs runs/            with the statistics of recorded runs on the graph
 """
 PORT = 8080
+HIGHEST_PORT = 65_535
 
 
 def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -38,7 +37,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "--host", default="127.0.0.1", help="where to listen (default: %(default)s)"
     )
     parser.add_argument(
-        "--port", type=int, default=PORT, help="0 takes any free port (default: %(default)s)"
+        "--port", type=_port, default=PORT, help="0 takes any free port (default: %(default)s)"
     )
     parser.add_argument(
         "--auto-focus", action="store_true", help="pages follow the active states from the start"
@@ -54,42 +53,50 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.set_defaults(run=_run)
 
 
+def _port(text: str) -> int:
+    import argparse
+
+    port = int(text)
+    if not 0 <= port <= HIGHEST_PORT:
+        raise argparse.ArgumentTypeError(f"got {text}; expected 0 to {HIGHEST_PORT}")
+    return port
+
+
 def _run(args: argparse.Namespace) -> int:
     from actionlib_core.node import get_node
     from viz.live.machines import Machines
     from viz.live.network import Network
+    from viz.runs.statistics import StatisticsOfFiles
 
     machines = Machines()
     _load(machines, args.files)
+    runs = StatisticsOfFiles(args.runs)
     network = Network(get_node(), machines, control=args.control)
     try:
         if args.tui:
             return _show_in_terminal(machines, network, control=args.control)
-        return _serve(args, machines, network, get_node())
+        return _serve(args, machines, runs, network)
     finally:
         network.close()
 
 
-def _serve(args: argparse.Namespace, machines: Machines, network: Any, node: Node) -> int:
-    try:
-        from viz.live.actions import Actions
-        from viz.live.app import Viewer
-        from viz.live.server import PageServer
-    except ModuleNotFoundError as error:
-        raise UsageError(
-            f"smachpy view: package {error.name!r} is missing. Try: pip install 'smachpy[web]'"
-        ) from error
+def _serve(
+    args: argparse.Namespace, machines: Machines, runs: StatisticsOfFiles, network: Any
+) -> int:
+    from actionlib_core.node import get_node
+    from viz.live.actions import Actions
+    from viz.live.app import Viewer
     from viz.live.security import make_token
-    from viz.runs.statistics import StatisticsOfFiles
+    from viz.live.server import PageServer
 
     token = make_token() if args.control else None
-    actions = Actions(node)
+    actions = Actions(get_node())
     viewer = Viewer(
         machines,
         token=token,
         send=network.send if token else None,
         follow=args.auto_focus,
-        statistics=StatisticsOfFiles(args.runs).of,
+        statistics=runs.of,
         hosts=(args.host,),
         actions=actions,
         value=network.value,
@@ -108,9 +115,11 @@ def _serve(args: argparse.Namespace, machines: Machines, network: Any, node: Nod
 def _load(machines: Machines, files: list[str]) -> None:
     from viz.runs.recording import find_recordings, read_recording
 
-    for path in find_recordings(files):
+    paths = list(dict.fromkeys(find_recordings(files)))
+    names = [path.name for path in paths]
+    for path in paths:
         recording = read_recording(path)
-        machine = machines.obtain(path.name)
+        machine = machines.obtain(path.name if names.count(path.name) == 1 else str(path))
         machine.recorded = True
         machine.reset(recording.history(), limit=len(recording.events) + 1)
 
@@ -128,12 +137,7 @@ def _end_with_parent(server: Any) -> None:
 
 
 def _show_in_terminal(machines: Machines, network: Any, *, control: bool) -> int:
-    try:
-        from viz.live.tui import MissionApp
-    except ModuleNotFoundError as error:
-        raise UsageError(
-            f"smachpy view --tui: package {error.name!r} is missing. "
-            "Try: pip install 'smachpy[tui]'"
-        ) from error
+    from viz.live.tui import MissionApp
+
     MissionApp(machines, network.send if control else None).run()
     return 0

@@ -52,6 +52,8 @@ TYPES = {
 
 def read(name: str) -> bytes | None:
     """Return a file of the page; None when there is no such file."""
+    if "\0" in name:
+        return None
     path = (WEB / name).resolve()
     if not path.is_relative_to(WEB) or path.suffix not in TYPES or not path.is_file():
         return None

@@ -51,6 +51,8 @@ class PageServer(uvicorn.Server):
             self._socket = socket.create_server((host, port), family=family)
         except OSError as error:
             raise AddressError(host, port, error.strerror or str(error)) from error
+        except (OverflowError, UnicodeError) as error:  # a port or a host that is none
+            raise AddressError(host, port, str(error)) from error
         self.host = host
         self.port: int = self._socket.getsockname()[1]
         config = uvicorn.Config(

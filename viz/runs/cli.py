@@ -77,14 +77,15 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def _list(args: argparse.Namespace) -> int:
     from rich.table import Table
+    from rich.text import Text
 
-    from viz.runs.recording import find_recordings, read_recording
+    from viz.runs.recording import read_recordings
 
     table = Table(box=None, pad_edge=False)
     for title in ("file", "machine", "began", "time", "outcome", "events"):
         table.add_column(title, no_wrap=True, justify="right" if title == "events" else "left")
-    for path in find_recordings(args.places):
-        table.add_row(*_line(read_recording(path)))
+    for recording in read_recordings(args.places):
+        table.add_row(*map(Text, _line(recording)))
     _console().print(table)
     return 0
 
@@ -109,9 +110,9 @@ def _line(recording: Recording) -> tuple[str, ...]:
 
 
 def _read(place: str) -> list[Recording]:
-    from viz.runs.recording import find_recordings, read_recording
+    from viz.runs.recording import read_recordings
 
-    found = [read_recording(path) for path in find_recordings([place])]
+    found = read_recordings([place])
     if not found:
         raise UsageError(f"smachpy runs: {place!r}: got no recordings; expected *.jsonl files.")
     return found
@@ -119,6 +120,7 @@ def _read(place: str) -> list[Recording]:
 
 def _show(args: argparse.Namespace) -> int:
     from rich.table import Table
+    from rich.text import Text
 
     from viz.runs.statistics import count, never_taken
 
@@ -128,7 +130,9 @@ def _show(args: argparse.Namespace) -> int:
         group = [one for one in recordings if one.record.label == label]
         record, statistics = group[-1].record, count(group)
         ended = ", ".join(f"{outcome} x{n}" for outcome, n in statistics.outcomes.items())
-        console.print(f"{label}: {statistics.runs} run(s); {ended or 'none has ended'}")
+        console.print(
+            f"{label}: {statistics.runs} run(s); {ended or 'none has ended'}", markup=False
+        )
         if lost := sum(one.dropped for one in group):
             console.print(f"{lost} events are missing: visits and outcomes are at least these")
         table = Table(box=None, pad_edge=False)
@@ -136,7 +140,7 @@ def _show(args: argparse.Namespace) -> int:
             table.add_column(title, justify="left" if title in {"state", "outcomes"} else "right")
         for state in record.walk():
             if state.path in statistics.states:
-                table.add_row(*_row(state.path, statistics.states[state.path].to_json()))
+                table.add_row(*map(Text, _row(state.path, statistics.states[state.path].to_json())))
         console.print(table)
         untaken = never_taken(record, statistics)
         if untaken:
@@ -217,10 +221,22 @@ def _export(args: argparse.Namespace) -> int:
 
     recording = read_recording(args.file)
     output = Path(args.output)
+    try:
+        _write(recording, output, args.runs)
+    except OSError as error:
+        raise UsageError(
+            f"smachpy runs export: {args.output!r}: cannot write: {error.strerror or error}."
+        ) from error
+    print(output)
+    return 0
+
+
+def _write(recording: Recording, output: Path, runs: list[str]) -> None:
     if output.suffix == ".html":
         from viz.runs.html import standalone_page
 
-        output.write_text(standalone_page(recording, args.runs), encoding="utf-8")
+        page = standalone_page(recording, runs)
+        output.write_text(page, encoding="utf-8", errors="replace")
     elif output.suffix == ".mcap":
         from viz.runs.mcap import write_mcap
 
@@ -234,8 +250,6 @@ def _export(args: argparse.Namespace) -> int:
         for event in recording.events:
             history.on_event(from_record(event))
         render(recording.record, output, run=history)
-    print(output)
-    return 0
 
 
 def _console() -> Console:

@@ -32,6 +32,6 @@ def standalone_page(recording: Recording, runs: Iterable[str | Path] = ()) -> st
     run = {
         "model": page.model(recording.record),
         "snap": json.loads(machine.snapshot()[1]),
-        "statistics": StatisticsOfFiles(runs).of(recording.record.label),
+        "statistics": StatisticsOfFiles(runs).of(recording.record),
     }
     return page.standalone(run, recording.record.label)

@@ -16,7 +16,6 @@ from actionlib_core.interfaces import get_message
 from actionlib_core.interfaces.smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 from actionlib_core.interfaces.std_msgs.msg import Header, String
 from actionlib_core.time import Time
-from smachpy.cli import UsageError
 from smachpy.run_state import RunState
 from smachpy.userdata_json import dumps
 
@@ -33,16 +32,11 @@ def write_mcap(recording: Recording, path: Path) -> None:
     """Write the file.
 
     Raises:
-        UsageError: the package `mcap` is missing.
+        ModuleNotFoundError: the package `mcap` is missing.
         OSError: the file cannot be written.
     """
-    try:
-        from mcap.writer import Writer
-    except ModuleNotFoundError as error:
-        raise UsageError(
-            f"smachpy runs export: package {error.name!r} is missing. "
-            "Try: pip install 'smachpy[mcap]'"
-        ) from error
+    from mcap.writer import Writer
+
     with path.open("wb") as file:
         writer = Writer(file)
         writer.start(profile="ros1", library="smachpy")

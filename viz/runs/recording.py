@@ -271,3 +271,23 @@ def find_recordings(places: Iterable[str | Path]) -> list[Path]:
         else:
             raise RecordingError(place, "no such file or folder; expected recorded runs.")
     return found
+
+
+def read_recordings(places: Iterable[str | Path]) -> list[Recording]:
+    """Read the files that are named, and those in the folders that are named, by time.
+
+    What is in a folder and is no recording is named in the log and left out.
+
+    Raises:
+        RecordingError: there is no such file or folder, or a file that is named cannot be read.
+    """
+    found: list[Recording] = []
+    for place in places:
+        for path in find_recordings([place]):
+            try:
+                found.append(read_recording(path))
+            except RecordingError as error:
+                if not Path(place).is_dir():
+                    raise
+                log.logwarn(f"{error} It is left out.")
+    return found

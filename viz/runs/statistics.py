@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+import threading
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from smachpy.run_state import RAISED
 from viz.model import Marks, outcome_class
-from viz.runs.recording import find_recordings, read_recording
+from viz.runs.recording import find_recordings, read_recordings
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -100,12 +102,16 @@ class Statistics:
         return self.states[path]
 
 
+ROUNDING = 1e-9  # 0.95 * 20 is a little more than 19
+
+
 def quantile(values: Sequence[float], share: float) -> float | None:
     """Return the smallest value that `share` of the values do not exceed; None of none."""
     if not values:
         return None
     ordered = sorted(values)
-    return ordered[min(int(share * len(ordered)), len(ordered) - 1)]
+    rank = math.ceil(share * len(ordered) - ROUNDING)
+    return ordered[max(rank, 1) - 1]
 
 
 def count(recordings: Iterable[Recording]) -> Statistics:
@@ -192,32 +198,66 @@ def moved_states(old: StateRecord, new: StateRecord) -> list[tuple[str, str]]:
     return moved
 
 
+def _states_below(record: StateRecord) -> set[tuple[str, str]]:
+    """Path from the root and kind of all states."""
+    return {(state.path.removeprefix(record.path), state.kind) for state in record.walk()}
+
+
 class StatisticsOfFiles:
     """Counts recorded runs by machine, when they are asked for.
 
     Args:
         places: Files and folders.
+
+    Raises:
+        RecordingError: there is no such file or folder.
+
+    Threads: every method may be called from any thread.
     """
 
     def __init__(self, places: Iterable[str | Path]) -> None:
         self._places = list(places)
-        self._found: dict[str, Statistics] | None = None
+        find_recordings(self._places)
+        self._lock = threading.Lock()
+        self._groups: dict[str, list[Recording]] | None = None
+        self._found: dict[str, Statistics] = {}
 
-    def of(self, label: str) -> dict[str, Any] | None:
-        """Return the statistics of the machine of that name; None when there are no runs of it.
+    def of(self, record: StateRecord) -> dict[str, Any] | None:
+        """Return the statistics of a machine; None when there are no runs of it.
+
+        Its runs are those of its name, else those of a machine with the same states, which may
+        be shown under another name ("/SM_ROOT"); paths are those of `record`.
 
         Raises:
             RecordingError: a file cannot be read.
         """
-        found = self.counted().get(label)
-        return None if found is None else found.to_json()
+        counted = self.counted()
+        if record.label in counted:
+            return counted[record.label].to_json()
+        states = _states_below(record)
+        for label, runs in self._grouped().items():
+            recorded = runs[-1].record
+            if _states_below(recorded) == states:
+                told = counted[label].to_json()
+                told["states"] = {
+                    record.path + path.removeprefix(recorded.path): numbers
+                    for path, numbers in told["states"].items()
+                }
+                return told
+        return None
 
     def counted(self) -> dict[str, Statistics]:
         """Return the statistics by machine; raises as `of`."""
-        if self._found is None:
-            groups: dict[str, list[Recording]] = {}
-            for path in find_recordings(self._places):
-                recording = read_recording(path)
-                groups.setdefault(recording.record.label, []).append(recording)
-            self._found = {name: count(runs) for name, runs in groups.items()}
-        return self._found
+        groups = self._grouped()
+        with self._lock:
+            if not self._found:
+                self._found = {name: count(runs) for name, runs in groups.items()}
+            return self._found
+
+    def _grouped(self) -> dict[str, list[Recording]]:
+        with self._lock:
+            if self._groups is None:
+                self._groups = {}
+                for recording in read_recordings(self._places):
+                    self._groups.setdefault(recording.record.label, []).append(recording)
+            return self._groups

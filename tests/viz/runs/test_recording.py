@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import threading
 from dataclasses import asdict
@@ -21,7 +22,7 @@ from viz.runs.recording import (
     read_recording,
     recording_lines,
 )
-from viz.runs.statistics import count, never_taken, quantile
+from viz.runs.statistics import StatisticsOfFiles, count, never_taken, quantile
 
 
 def make_machine(*, failing=False, extra=False):
@@ -376,3 +377,147 @@ def test_progress_of_goals_that_come_as_plain_data():
     }
     assert annotate(record, goals)["progress"]["fraction"] == pytest.approx(0.6)
     assert annotate({**record, "goal_id": "other"}, goals) == {**record, "goal_id": "other"}
+
+
+def test_a_folder_with_a_file_that_is_no_recording(record, tmp_path, capsys, caplog):
+    from smachpy.cli import main
+
+    record("a.jsonl")
+    (tmp_path / "empty.jsonl").write_text("")
+    assert main(["runs", "list", str(tmp_path)]) == 0
+    assert "a.jsonl" in capsys.readouterr().out
+    assert "empty.jsonl" in caplog.text
+    assert "left out" in caplog.text
+    assert StatisticsOfFiles([tmp_path]).of(describe(make_machine()))["runs"] == 1
+    assert main(["runs", "list", str(tmp_path / "empty.jsonl")]) == 2
+
+
+def test_names_with_brackets_are_shown_as_they_are(tmp_path, clock, capsys):
+    from smachpy.cli import main
+
+    sm = StateMachine(outcomes=["[/red]"], name="M[/x]")
+    with sm:
+        StateMachine.add("PICK[arm]", CBState(lambda _: "[/red]", outcomes=["[/red]"]))
+    with Recorder(tmp_path / "run.jsonl", sm):
+        sm.execute()
+    assert main(["runs", "show", str(tmp_path)]) == 0
+    out = capsys.readouterr().out
+    assert "M[/x]: 1 run(s); [/red] x1" in out
+    assert "/M[/x]/PICK[arm]" in out
+    assert main(["runs", "list", str(tmp_path)]) == 0
+    assert "M[/x]" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", ["x.html", "x.mcap"])
+def test_an_export_to_nowhere_is_told(record, tmp_path, capsys, name):
+    from smachpy.cli import main
+
+    path = str(record("run.jsonl"))
+    assert main(["runs", "export", path, "-o", str(tmp_path / "none" / name)]) == 2
+    assert "none" in capsys.readouterr().err
+
+
+def test_quantiles_are_those_of_their_definition():
+    assert quantile(range(1, 21), 0.95) == 19
+    assert quantile([1.0, 2.0], 0.5) == 1.0
+    assert quantile([7.0], 0.0) == quantile([7.0], 1.0) == 7.0
+    for n in range(1, 200):
+        for percent in (5, 50, 95, 100):
+            value = quantile(range(1, n + 1), percent / 100)
+            assert 100 * value >= percent * n > 100 * (value - 1)
+
+
+def test_statistics_of_a_machine_that_is_shown_under_another_name(record, tmp_path):
+    record("run.jsonl")
+    runs = StatisticsOfFiles([tmp_path])
+    shown = describe(make_machine(), name="SM_ROOT")
+    assert runs.of(shown)["states"]["/SM_ROOT/FIRST"]["visits"] == 1
+    assert runs.of(describe(make_machine(extra=True), name="SM_ROOT")) is None
+    with pytest.raises(RecordingError, match="no such"):
+        StatisticsOfFiles([tmp_path / "none"])
+
+
+def test_files_of_one_name_are_two_machines(record, tmp_path):
+    from viz.live.cli import _load
+
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        record("1.jsonl").rename(tmp_path / folder / "1.jsonl")
+    record("2.jsonl")
+    machines = Machines()
+    _load(machines, [str(tmp_path / "a"), str(tmp_path / "b/1.jsonl"), str(tmp_path / "2.jsonl")])
+    names = [one["name"] for one in machines.summaries()]
+    assert names == [str(tmp_path / "a/1.jsonl"), str(tmp_path / "b/1.jsonl"), "2.jsonl"]
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["--port", "99999"], "expected 0 to 65535"),
+        (["--runs", "/nonexistent"], "no such file or folder"),
+    ],
+)
+def test_a_viewer_that_cannot_be_started_says_why(words, text, capsys):
+    from smachpy.cli import main
+
+    try:
+        code = main(["view", *words])
+    except SystemExit as error:
+        code = error.code
+    assert code == 2
+    assert text in capsys.readouterr().err
+
+
+def ask(app, path, query=""):
+    """Status and body of the answer to a GET."""
+    sent = []
+
+    async def run():
+        done = asyncio.Event()
+
+        async def receive():
+            await done.wait()
+            return {"type": "http.disconnect"}
+
+        async def send(message):
+            sent.append(message)
+
+        await app(
+            {
+                "type": "http",
+                "method": "GET",
+                "path": path,
+                "query_string": query.encode(),
+                "headers": [(b"host", b"127.0.0.1")],
+                "scheme": "http",
+                "server": ("127.0.0.1", 80),
+            },
+            receive,
+            send,
+        )
+        done.set()
+
+    asyncio.run(run())
+    return sent[0]["status"], b"".join(message.get("body", b"") for message in sent).decode()
+
+
+def test_half_a_pair_of_utf16_in_a_name_and_odd_addresses(record, tmp_path):
+    from viz.live.app import Viewer
+
+    machines = Machines()
+    history = read_recording(record("run.jsonl")).history()
+    history["description"]["label"] = "JOB \udc80"
+    machines.obtain("x").reset(history)
+
+    def fails(record):
+        raise RecordingError("r.jsonl", "it is gone")
+
+    app = Viewer(machines, statistics=fails).app
+    status, text = ask(app, "/api/model", "machine=x")
+    assert status == 200
+    assert json.loads(text)["explicit"]["label"] == "JOB \udc80"
+    assert ask(app, "/api/export", "machine=x")[0] == 200
+    assert ask(app, "/\0")[0] == 404
+    status, text = ask(app, "/api/statistics", "machine=x")
+    assert status == 503
+    assert "it is gone" in text
