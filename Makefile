@@ -8,10 +8,10 @@ WORKERS := -n 3 --dist worksteal
 # The commands and the tests start many processes; each is quicker with cached bytecode.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help run test lint types format bench clean
+.PHONY: help run test contract-100 lint types format bench clean
 
 help:  ## Show the targets
-	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | expand -t 12
+	@sed -n 's/^\([a-z0-9-]*\):.*## /\1\t/p' Makefile | expand -t 14
 
 run:  ## Drive the simulated robot through the patrol mission
 	@.ci/venv dot,sim
@@ -19,6 +19,10 @@ run:  ## Drive the simulated robot through the patrol mission
 
 test: lint types  ## Check everything: ruff, mypy, import-linter, pytest
 	$(BIN)/python -m pytest -q $(WORKERS) $(TESTS)
+
+contract-100:  ## Run the contract tests a hundred times in a row, with other faults each time
+	@.ci/venv dot,sim,test
+	@.ci/contract 100 $(WORKERS) $(TESTS)
 
 lint:
 	@.ci/venv dot,sim,test

@@ -1,13 +1,16 @@
-"""One world, several networks: nodes that reach each other, on virtual time or on zenoh."""
+"""One world, several networks: nodes that reach each other, in memory, over bad links, on zenoh."""
 
 from __future__ import annotations
 
+import itertools
+import os
 from typing import TYPE_CHECKING
 
 import pytest
 
 from actionlib_core.clock import RealClock, VirtualClock, use_clock
 from actionlib_core.node import Node
+from actionlib_core.transport.faulty import DELIVERED, FaultyTransport, RandomFaults
 from actionlib_core.transport.memory import MemoryNetwork
 
 if TYPE_CHECKING:
@@ -15,14 +18,47 @@ if TYPE_CHECKING:
 
     from actionlib_core.clock import Clock
     from actionlib_core.transport import Transport
+    from actionlib_core.transport.faulty import Fate
+
+SEED = int(os.environ.get("CONTRACT_SEED", "11"))  # each run of `make contract-100` has its own
+LATE_S = 0.02
+REPEATED = {"goal", "cancel", "status", "result", "ack"}
+
+
+class SmallFaults:
+    """A network that is bad as the delivery contract allows; the session's seed says how.
+
+    What the protocol of actions repeats until it is answered comes late, out of order and twice;
+    feedback and what is not of an action arrives as it was sent. (Losses and long cuts are in
+    `test_delivery`.)
+    """
+
+    def __init__(self, seed: int) -> None:
+        self._faults = RandomFaults(seed, repeat=0.2, delay=0.3, longest=LATE_S)
+
+    def __call__(self, key: str, number: int) -> Fate:
+        if key.rpartition("/")[2] not in REPEATED:
+            return DELIVERED
+        fate = self._faults(key, number)
+        # A copy that outlives its server would be new to the next one.
+        return (fate[0],) * len(fate)
 
 
 class World:
-    """A clock and nodes on one network, each with a session of its own."""
+    """A clock and nodes on one network, each with a session of its own.
 
-    def __init__(self, clock: Clock, open_session: Callable[[], Transport]) -> None:
+    Args:
+        clock: The clock of all nodes.
+        open_session: Opens one of the sessions.
+        late: Longest time [s] that a message may be overtaken by others.
+    """
+
+    def __init__(
+        self, clock: Clock, open_session: Callable[[], Transport], *, late: float = 0.0
+    ) -> None:
         self.clock = clock
         self._open = open_session
+        self._late = late
         self.nodes: list[Node] = []
 
     def node(self, name: str, **kwargs: object) -> Node:
@@ -32,6 +68,11 @@ class World:
 
     def event(self):
         return self.clock.event()
+
+    def keep_order(self) -> None:
+        """Wait until what was sent cannot be overtaken by what comes next."""
+        if self._late:
+            self.clock.sleep(2 * self._late)
 
     def close(self) -> None:
         for node in reversed(self.nodes):
@@ -50,12 +91,23 @@ def _zenoh_session() -> Transport:
         "memory-virtual",
         "memory-seeded",
         "memory-real",
+        "faulty",
         pytest.param("zenoh", marks=pytest.mark.zenoh),
     ]
 )
 def world(request: pytest.FixtureRequest) -> Iterator[World]:
-    if request.param in {"memory-virtual", "memory-seeded"}:
-        seed = None if request.param == "memory-virtual" else 11
+    if request.param == "faulty":
+        with VirtualClock() as clock, use_clock(clock):
+            inner, seeds = MemoryNetwork(clock), itertools.count(SEED)
+            world = World(
+                clock,
+                lambda: FaultyTransport(inner.session(), SmallFaults(next(seeds))),
+                late=LATE_S,
+            )
+            yield world
+            world.close()
+    elif request.param in {"memory-virtual", "memory-seeded"}:
+        seed = None if request.param == "memory-virtual" else SEED
         with VirtualClock(seed) as clock, use_clock(clock):
             world = World(clock, MemoryNetwork(clock).session)
             yield world

@@ -63,6 +63,15 @@ def simple_client(world, **kwargs):
     return client
 
 
+def send_in_order(world, client, numbers):
+    """Send goals that arrive in the order in which they were sent, on every network."""
+    handles = []
+    for number in numbers:
+        handles.append(client.send_goal(msg.TestGoal(number)))
+        world.keep_order()
+    return handles
+
+
 def full_client(world):
     client = ActionClient("demo", msg.TestAction, node=world.node("client"))
     assert client.wait_for_server(LONG_S)
@@ -131,7 +140,7 @@ def test_three_goals_at_once_to_a_busy_server(world):
     client = full_client(world)
     running = client.send_goal(msg.TestGoal(-1))
     doubler.wait_started()
-    others = [client.send_goal(msg.TestGoal(n)) for n in (-2, -3, 7)]
+    others = send_in_order(world, client, (-2, -3, 7))
     for handle in (running, *others):
         assert handle.wait(LONG_S)
     states = [handle.get_terminal_state() for handle in (running, *others)]
@@ -147,7 +156,7 @@ def test_three_goals_at_once_to_a_busy_server(world):
 def test_queue_policy_runs_all(world):
     queueing = Doubler(world, policy="queue")
     client = full_client(world)
-    handles = [client.send_goal(msg.TestGoal(n)) for n in range(5)]
+    handles = send_in_order(world, client, range(5))
     assert all(handle.wait(LONG_S) for handle in handles)
     assert queueing.runs == list(range(5))
 
@@ -439,7 +448,7 @@ def test_many_goals_each_accepted_rejected_or_cancelled(world):
         node=world.node("server"),
     )
     client = full_client(world)
-    sent = [client.send_goal(msg.TestGoal(n)) for n in range(12)]
+    sent = send_in_order(world, client, range(12))
     for number, handle in enumerate(sent):
         if number % 3 != 2:
             assert handle.wait(LONG_S)
