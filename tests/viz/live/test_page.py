@@ -170,6 +170,25 @@ def test_control_with_the_token(delivery, look):
     wait_for(page, "!document.querySelector('g.waiting')")
 
 
+def test_who_pauses_at_another_viewer_is_seen_here(start, look):
+    start.robot("--name", "shared", "--rate", 10, "--control")
+    view, other = start.view("--control"), start.view("--control")
+    page = look(view.address.replace("/#", "/?machine=shared#"))
+    there = look(other.address.replace("/#", "/?machine=shared#"))
+    page.wait_for_selector("#pause:text-is('Pause')")
+    there.click("#pause")
+    page.wait_for_selector("#pause:text-is('Resume')")
+    wait_for(page, "smachpy.store.runStatus.value.word === 'paused'")
+    there.click("#pause")
+    page.wait_for_selector("#pause:text-is('Pause')")
+    # A machine that stands at a breakpoint is paused, though nobody has said so.
+    there.evaluate("() => smachpy.page.goTo('/DELIVER/PLACE')")
+    there.click("text=Breakpoint")
+    for one in (page, there):
+        one.wait_for_selector("#pause:text-is('Resume')")
+        one.wait_for_selector('g.waiting.stopped[data-path="/DELIVER/PLACE"]')
+
+
 def test_without_the_token_there_is_nothing_to_press(delivery, shared):
     page = shared()
     assert page.query_selector("#pause") is None

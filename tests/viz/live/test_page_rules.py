@@ -497,7 +497,7 @@ def test_breakpoints_after_an_outcome_and_a_pause_that_stops_what_runs(served, l
     ].items()
     machine.set_control({"paused": False, "breakpoints": [["/JOB/A", "ok"]]})
     page.wait_for_selector("[aria-label='breakpoint after ok'][aria-pressed=true]")
-    page.wait_for_selector('g.stopped[data-path="/JOB/A"]')
+    page.wait_for_selector('g.stopped-after[data-path="/JOB/A"]')
     assert page.text_content(".actions button").strip() == "Breakpoint"  # before it there is none
     page.click("[aria-label='breakpoint after ok']")
     wait_for(page, "document.querySelector('.notice')?.textContent.includes('unbreak')")

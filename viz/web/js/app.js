@@ -171,7 +171,8 @@ class Page {
     const data = store.shown(), now = store.nowMs(), goals = this.#goalOf(data);
     for (const path of this.diagram.boxes.keys()) this.diagram.paint(path, data.states[path], now, goals.get(path), store.unserved(goals.get(path)));
     const stops = store.facts.value?.control?.breakpoints ?? [];
-    this.diagram.mark(stops.map(([path]) => path), "stopped");
+    for (const [name, after] of [["stopped", false], ["stopped-after", true]])
+      this.diagram.mark(stops.filter(([, outcome]) => (outcome !== null) === after).map(([path]) => path), name);
     this.diagram.mark(store.selected.value ? [store.selected.value] : [], "selected");
     this.#heat();
   }

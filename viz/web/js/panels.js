@@ -223,7 +223,7 @@ export function Empty() {
   const word = missing ? `No machine is called \u201c${shorten(name, 80)}\u201d. It shows up here as soon as one runs.`
     : "No machine on the network yet. It shows up here as soon as one runs.";
   if (!missing && list.length) return null; // it comes
-  return html`<div class="empty"><p>${word}</p>${list.length ? html`<p>There ${list.length > 1 ? "are" : "is"}</p>
+  return html`<div class="empty"><p>${word}</p>${list.length ? html`<p>What there is:</p>
     <p class="others">${list.slice(0, MOST_NAMES).map((m) => html`<button onClick=${() => choose(m.name)}>${shorten(m.name, 60)}</button>`)}
       ${list.length > MOST_NAMES && `and ${list.length - MOST_NAMES} more, in the list above`}</p>` : html`<pre>smachpy run patrol --start-robot</pre>`}</div>`;
 }
