@@ -2,20 +2,26 @@
 
 Topics of the machine MACHINE: /MACHINE/smach/container_structure (of every container),
 /MACHINE/smach/container_status (whenever it changes) and /MACHINE/smach/events (std_msgs/String,
-every event as JSON); of its actions: /ACTION/goal, /feedback and /result, where their types are
-known.
+every event as JSON); of its actions: /ACTION/goal, /feedback and /result with the types that ROS's
+actionlib has for them (`MoveBaseActionGoal`, ...), and /ACTION/status. A recording keeps at most
+1,000 elements of a list and does not tell of cancels, so neither does the file: messages that
+cannot be made from it are counted.
 """
 
 from __future__ import annotations
 
+import ast
 import json
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.exceptions import ActionlibError
 from actionlib_core.interfaces import get_message
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from actionlib_core.interfaces.smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 from actionlib_core.interfaces.std_msgs.msg import Header, String
 from actionlib_core.time import Time
+from smachpy import log
 from smachpy.run_state import RunState
 from smachpy.userdata_json import dumps
 
@@ -26,10 +32,13 @@ if TYPE_CHECKING:
     from viz.runs.recording import Recording
 
 GOAL_PARTS = {"GoalSent": "goal", "GoalFeedback": "feedback", "GoalDone": "result"}
+_NO_NUMBERS = {"nan", "inf", "-inf"}
+_FLOATS = {"float32", "float64"}
+_OCTETS = {"uint8", "char"}
 
 
 def write_mcap(recording: Recording, path: Path) -> None:
-    """Write the file.
+    """Write the file; messages that are left out are counted in the log.
 
     Raises:
         ModuleNotFoundError: the package `mcap` is missing.
@@ -40,8 +49,11 @@ def write_mcap(recording: Recording, path: Path) -> None:
     with path.open("wb") as file:
         writer = Writer(file)
         writer.start(profile="ros1", library="smachpy")
-        _Export(recording, writer).run()
+        export = _Export(recording, writer)
+        export.run()
         writer.finish()  # type: ignore[no-untyped-call]
+    for (topic, why), number in export.left_out.items():
+        log.logwarn(f"{str(path)!r}: {number} message(s) of {topic} are left out: {why}.")
 
 
 class _Export:
@@ -52,6 +64,9 @@ class _Export:
         self._state = RunState(recording.base)
         self._containers = {s.path: s for s in recording.record.walk() if s.is_container}
         self._server = f"/{recording.record.label}"
+        self._ids: dict[str, Any] = {}
+        self._statuses: dict[str, dict[str, Any]] = {}  # action -> goal id -> GoalStatus
+        self.left_out: Counter[tuple[str, str]] = Counter()  # by topic and reason
 
     def run(self) -> None:
         for container in self._containers.values():
@@ -87,14 +102,33 @@ class _Export:
         )
 
     def _write_goal(self, event: dict[str, Any], part: str) -> None:
+        action, stamp = f"/{event['action'].strip('/')}", event["stamp_ns"]
+        header = Header(stamp=Time(0, stamp))
+        if part == "goal":
+            self._ids[event["goal_id"]] = GoalID(stamp=Time(0, stamp), id=event["goal_id"])
+        goal_id = self._ids.get(event["goal_id"], GoalID(id=event["goal_id"]))
+        status = GoalStatus(goal_id=goal_id, status=GoalStatus.ACTIVE)
+        if part == "result":
+            status.status = getattr(GoalStatus, event["status"], GoalStatus.LOST)
+            status.text = event["text"]
+        more = {"goal_id": goal_id} if part == "goal" else {"status": status}
         content = event.get(part)
-        if not isinstance(content, dict) or "$msg" not in content:
-            return
-        try:
-            message = get_message(content["$msg"]).from_dict(_plain(content))
-        except (ActionlibError, TypeError, ValueError):
-            return  # a type that this program does not know, or a value too long to be recorded
-        self._write(f"/{event['action'].strip('/')}/{part}", message, event["stamp_ns"])
+        if isinstance(content, dict) and "$msg" in content:
+            try:
+                wrapper = _action_type(content["$msg"], part)
+                inside = get_message(content["$msg"]).from_dict(_restored(content, ""))
+                self._write(f"{action}/{part}", wrapper(header, **more, **{part: inside}), stamp)
+            except (ActionlibError, TypeError, ValueError) as error:
+                self.left_out[f"{action}/{part}", str(error).partition("\n")[0]] += 1
+        elif content is not None:
+            self.left_out[f"{action}/{part}", "it was recorded as text"] += 1
+        known = self._statuses.setdefault(action, {})
+        known[event["goal_id"]] = status
+        if part != "feedback":
+            statuses = list(known.values())
+            self._write(f"{action}/status", GoalStatusArray(header, statuses), stamp)
+        if part == "result":
+            del known[event["goal_id"]]
 
     def _status(self, container: StateRecord, event: dict[str, Any]) -> Any:
         active = set(self._state.active())
@@ -126,11 +160,32 @@ def _structure(container: StateRecord, stamp_ns: int) -> Any:
     )
 
 
-def _plain(value: Any) -> Any:
-    """A recorded message as the plain data that `from_dict` takes."""
+def _action_type(name: str, part: str) -> type[Any]:
+    """The type in which actionlib sends a part: a/BGoal -> a/BActionGoal."""
+    word = part.capitalize()
+    if not name.endswith(word):
+        raise ValueError(f"got type {name!r}; expected one that ends with {word!r}")
+    return get_message(f"{name.removesuffix(word)}Action{word}")
+
+
+def _restored(value: Any, kind: str) -> Any:
+    """A recorded value as the plain data that `from_dict` takes; `kind` is its field's type."""
     if isinstance(value, dict):
-        inside = value["fields"] if "$msg" in value else value
-        return {name: _plain(item) for name, item in inside.items()}
+        if "$msg" not in value:
+            return value
+        message = get_message(value["$msg"])
+        kinds = dict(zip(message.__slots__, message._slot_types, strict=True))
+        return {
+            name: _restored(item, kinds.get(name, "")) for name, item in value["fields"].items()
+        }
+    element = kind.partition("[")[0]
     if isinstance(value, list):
-        return [_plain(item) for item in value]
+        return [_restored(item, element) for item in value]
+    if isinstance(value, str):
+        if element in _FLOATS and value in _NO_NUMBERS:
+            return float(value)
+        if element in _OCTETS and value.startswith(("b'", 'b"')):
+            return list(ast.literal_eval(value))
+        if "[" in kind:
+            raise ValueError(f"too long to be recorded: {value[:40]}")
     return value

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import threading
 from dataclasses import asdict
 from types import SimpleNamespace
 
 import pytest
 
+from actionlib_core.interfaces import define_action
 from smachpy import CBState, State, StateMachine, describe, tape
+from smachpy.events import GoalDone, GoalFeedback, GoalSent, to_record
 from viz.live import machines
 from viz.live.machines import Machine, Machines
 from viz.runs import recording as recording_module
@@ -336,26 +339,85 @@ def test_the_command_line(record, tmp_path, capsys):
     assert main(["runs", "show", str(tmp_path / "none")]) == 2
 
 
-def test_mcap_has_the_topics_of_smach_and_of_actions(record, tmp_path):
+def exported(recording, path):
+    """(topic, type, content) of all messages of the recording as MCAP."""
     from mcap.reader import make_reader
 
-    from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseGoal
-    from smachpy.events import GoalSent, to_record
+    from actionlib_core.interfaces import get_message
     from viz.runs.mcap import write_mcap
+
+    write_mcap(recording, path)
+    with path.open("rb") as file:
+        return [
+            (c.topic, s.name, get_message(s.name).from_bytes(m.data))
+            for s, c, m in make_reader(file).iter_messages()
+        ]
+
+
+def test_mcap_has_the_topics_of_smach_and_of_actions(record, tmp_path):
+    from actionlib_core.interfaces.move_base_msgs.msg import (
+        MoveBaseFeedback,
+        MoveBaseGoal,
+        MoveBaseResult,
+    )
 
     recording = read_recording(record("run.jsonl"))
     goal = MoveBaseGoal()
     goal.target_pose.pose.position.x = 2.5
-    sent = to_record(GoalSent("/JOB/FIRST", 0.0, 5, "robot/move_base", "id", goal))
-    recording.events.insert(2, {**sent, "seq": 3})
-    write_mcap(recording, tmp_path / "run.mcap")
-    with (tmp_path / "run.mcap").open("rb") as file:
-        found = {c.topic: (s.name, m.data) for s, c, m in make_reader(file).iter_messages()}
+    path, action = "/JOB/FIRST", "robot/move_base"
+    events = [
+        GoalSent(path, 0.0, 10**9, action, "id", goal),
+        GoalFeedback(path, 0.0, 2 * 10**9, action, "id", MoveBaseFeedback()),
+        GoalDone(path, 0.0, 3 * 10**9, action, "id", "SUCCEEDED", "there", MoveBaseResult()),
+    ]
+    recording.events[2:2] = [{**to_record(e), "seq": 0} for e in events]
+    messages = exported(recording, tmp_path / "run.mcap")
+    found = {topic: (kind, message) for topic, kind, message in messages}
     assert found["/JOB/smach/container_structure"][0] == "smach_msgs/SmachContainerStructure"
     assert "/JOB/smach/container_status" in found
-    name, data = found["/robot/move_base/goal"]
-    assert name == "move_base_msgs/MoveBaseGoal"
-    assert MoveBaseGoal.from_bytes(data) == goal
+    kind, sent = found["/robot/move_base/goal"]
+    assert kind == "move_base_msgs/MoveBaseActionGoal"
+    assert sent.goal == goal
+    assert (sent.goal_id.id, sent.header.stamp.secs, sent.goal_id.stamp.secs) == ("id", 1, 1)
+    kind, told = found["/robot/move_base/feedback"]
+    assert kind == "move_base_msgs/MoveBaseActionFeedback"
+    assert told.status.status == 1
+    kind, told = found["/robot/move_base/result"]
+    assert kind == "move_base_msgs/MoveBaseActionResult"
+    assert (told.status.status, told.status.text, told.status.goal_id.id) == (3, "there", "id")
+    statuses = [m.status_list for topic, _, m in messages if topic == "/robot/move_base/status"]
+    assert [[one.status for one in several] for several in statuses] == [[1], [3]]
+
+
+def test_mcap_has_what_json_has_no_word_for_and_names_what_is_left_out(record, tmp_path, caplog):
+    define_action("mcap_test_msgs/Scan", "float32[] ranges\nuint8[] data\nfloat64 x\n---\n---\n")
+    from actionlib_core.interfaces import get_message
+
+    goal_type = get_message("mcap_test_msgs/ScanGoal")
+    goals = [
+        goal_type(ranges=[math.inf, -math.inf, 1.5], data=b"a\x00'\xff", x=math.nan),
+        goal_type(ranges=[1.0] * 1001),
+        goal_type(data=b"x" * 5000),
+        "not a message",
+    ]
+    recording = read_recording(record("run.jsonl"))
+    recording.events += [
+        {**to_record(GoalSent("/JOB/FIRST", 0.0, n, "scan", f"g{n}", goal)), "seq": n}
+        for n, goal in enumerate(goals, 100)
+    ]
+    (sent,) = [
+        m.goal
+        for topic, _, m in exported(recording, tmp_path / "run.mcap")
+        if topic == "/scan/goal"
+    ]
+    assert list(sent.ranges) == [math.inf, -math.inf, 1.5]
+    assert bytes(sent.data) == b"a\x00'\xff"
+    assert math.isnan(sent.x)
+    assert (
+        "1 message(s) of /scan/goal are left out: too long to be recorded: <list of" in caplog.text
+    )
+    assert "too long to be recorded: <bytes of 5000" in caplog.text
+    assert "it was recorded as text" in caplog.text
 
 
 def test_progress_of_goals_that_come_as_plain_data():
