@@ -137,24 +137,40 @@ class ControlServer:
             "preempt": lambda: control.preempt(path),
             "jump": lambda: control.jump(path),
             "force": lambda: control.force_outcome(path, str(outcome)),
-            "break": lambda: control.add_breakpoint(path, outcome),
+            "break": lambda: self._break(path, outcome),
             "unbreak": lambda: control.remove_breakpoint(path, outcome),
             "initial": lambda: self._begin_at(path, command["states"]),
         }
         actions[command["command"]]()
 
+    def _break(self, path: str, outcome: str | None) -> None:
+        state = self._find(path)
+        if state is None or state is self._machine:
+            raise CommandError(
+                f"command 'break': path: got {self._shown(path)!r}; expected that of a state below "
+                f"{self._path!r}."
+            )
+        outcomes = state.get_registered_outcomes()
+        if outcome is not None and outcome not in outcomes:
+            raise CommandError(
+                f"command 'break': outcome: got {outcome!r}; expected one of {sorted(outcomes)}."
+            )
+        self._machine.control.add_breakpoint(path, outcome)
+
     def _begin_at(self, path: str, states: list[str]) -> None:
-        container: Any = self._machine
-        for label in path.removeprefix(self._root()).strip("/").split("/"):
-            if label:
-                container = (
-                    container.get_children().get(label)
-                    if hasattr(container, "get_children")
-                    else None
-                )
+        container = self._find(path)
         if not hasattr(container, "set_initial_state"):
-            raise CommandError(f"command 'initial': path: got {path!r}; expected a container's.")
+            raise CommandError(
+                f"command 'initial': path: got {self._shown(path)!r}; expected a container's."
+            )
         container.set_initial_state([str(state) for state in states], UserData())
+
+    def _find(self, path: str) -> Any:
+        """The state at a path, whose labels may have slashes in them; None when there is none."""
+        root = self._root()
+        if path != root and not path.startswith(root + "/"):
+            return None
+        return _below(self._machine, path.removeprefix(root))
 
     def _root(self) -> str:
         return f"/{self._machine.name or 'SM_ROOT'}"
@@ -167,6 +183,19 @@ class ControlServer:
 
     def _shown(self, path: str) -> str:
         return self._path + path.removeprefix(self._root())
+
+
+def _below(state: Any, rest: str) -> Any:
+    """The state at `rest` ("/A/B"; "" is `state` itself), None when there is none."""
+    if not rest:
+        return state
+    children = state.get_children() if hasattr(state, "get_children") else {}
+    for label, child in children.items():
+        if rest == f"/{label}" or rest.startswith(f"/{label}/"):
+            found = _below(child, rest.removeprefix(f"/{label}"))
+            if found is not None:
+                return found
+    return None
 
 
 class ControlClient:

@@ -164,3 +164,53 @@ def test_state_of_a_run_notes_preempts_while_they_last():
     state.fold({"kind": "Left", "path": "/J/A", "stamp_ns": 4, "outcome": "preempted"})
     assert state.data["states"]["/J/A"]["preempt"] is None
     assert to_record(PreemptRequested("/J", 0.0, 1))["kind"] == "PreemptRequested"
+
+
+@pytest.fixture
+def slashes(clock):
+    """A machine whose labels have slashes in them, and who commands it."""
+    network = MemoryNetwork(clock)
+    robot = Node("robot", transport=network.session(), clock=clock)
+    desk = Node("desk", transport=network.session(), clock=clock)
+    inner = StateMachine(outcomes=["done", "preempted"])
+    with inner:
+        StateMachine.add("B", Wait(), {"done": "C/D"})
+        StateMachine.add("C/D", Wait())
+    machine = StateMachine(outcomes=["done", "preempted"], name="JOB")
+    with machine:
+        StateMachine.add("A", Wait(), {"done": "A/1"})
+        StateMachine.add("A/1", inner)
+    server = IntrospectionServer("robot", machine, "/SHOWN", node=robot, control=True)
+    server.start()
+    client = ControlClient("/robot", desk)
+    yield machine, client
+    client.close()
+    server.stop()
+    desk.close()
+    robot.close()
+
+
+def test_labels_may_have_slashes(slashes):
+    machine, client = slashes
+    assert client.send({"command": "initial", "path": "/SHOWN/A/1", "states": ["C/D"]})["ok"]
+    answer = client.send({"command": "break", "path": "/SHOWN/A/1/C/D", "outcome": "done"})
+    assert answer["breakpoints"] == [["/SHOWN/A/1/C/D", "done"]]
+    assert machine.control.breakpoints() == (("/JOB/A/1/C/D", "done"),)
+
+
+@pytest.mark.parametrize(
+    ("path", "outcome", "words"),
+    [
+        ("/SHOWN/NONE", None, "got '/SHOWN/NONE'; expected that of a state below '/SHOWN'"),
+        ("/SHOWN/A/2", None, "expected that of a state"),
+        ("/SHOWN", None, "expected that of a state below"),
+        ("/OTHER/A", None, "expected that of a state"),
+        ("/SHOWN/A", "nope", "got 'nope'; expected one of ['done', 'preempted']"),
+    ],
+)
+def test_a_breakpoint_that_nothing_can_reach_is_refused(slashes, path, outcome, words):
+    machine, client = slashes
+    answer = client.send({"command": "break", "path": path, "outcome": outcome})
+    assert not answer["ok"]
+    assert words in answer["text"]
+    assert machine.control.breakpoints() == ()

@@ -84,7 +84,9 @@ class Network:
         Blocks: until the answer, some seconds at most.
         """
         link = self._link(name)
-        twins = [one for one in self._links.values() if one.server == link.server and one.alive]
+        with self._lock:
+            links = list(self._links.values())
+        twins = [one for one in links if one.server == link.server and one.alive]
         if len(twins) > 1:
             raise CommandError(
                 f"{name}: {len(twins)} machines are called {link.server!r}, and a command would "
@@ -103,9 +105,10 @@ class Network:
         return self._link(name).value(container, key)
 
     def _link(self, name: str) -> Link:
-        link = self._links.get(name)
+        with self._lock:
+            link, known = self._links.get(name), sorted(self._links)
         if link is None:
-            raise CommandError(f"{name}: no such machine; expected one of {sorted(self._links)}.")
+            raise CommandError(f"{name}: no such machine; expected one of {known}.")
         return link
 
     def _on_presence(self, presence: Presence) -> None:
