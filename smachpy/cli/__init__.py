@@ -3,7 +3,7 @@
 A package adds a subcommand with an entry point in the group `smachpy.commands` whose object is a
 function `register(subparsers)`. It adds one parser and sets `run=function(args) -> int`. With
 `words=()` set as well it gets what stands after the first `--` there, and renaming in the style of
-ROS (`a:=b`, `--ros-args`) in `names`. With `all_words=()` it gets all words there, except a `--help`
+ROS (`a:=b`, `--ros-args`) in `names`. With `all_words=()` it gets all words there, but a `--help`
 that stands alone: they are another program's.
 """
 

@@ -77,10 +77,11 @@ class Coverage:
 
     def add(self, run: Run) -> None:
         """Take a run in."""
-        measured = self._of(run.record)
+        record = run.whole or run.record  # a container counts as one whatever stands in for it
+        measured = self._of(record)
         measured.runs += 1
         active: dict[str, None] = {}
-        leaves = {state.path for state in run.record.walk() if not state.is_container}
+        leaves = {state.path for state in record.walk() if not state.is_container}
         for path in run.timeouts():
             measured.count("timeouts", path)
         for event in run.events:

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterable, Mapping
     from typing import TypeAlias
 
+    from smachpy.introspection import StateRecord
+
     # Name of a state, what makes its double, and the list that gets it.
     Replacement: TypeAlias = tuple[str, Callable[[Any], "Double"], list["Double"]]
 
@@ -153,6 +155,19 @@ class Places:
         self._before.append((container, label, state))
         _place(container, label, double)
         return double
+
+    def describe_whole(self, root: Container) -> StateRecord | None:
+        """Return what `root` is when everything is back in its place; None: it is."""
+        if not self._before:
+            return None
+        doubles = [(container, label, container[label]) for container, label, _ in self._before]
+        try:
+            for place in reversed(self._before):
+                _place(*place)
+            return describe(root)
+        finally:
+            for place in doubles:
+                _place(*place)
 
     def restore(self) -> None:
         """Put the states back."""

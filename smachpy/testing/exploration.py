@@ -6,13 +6,14 @@ import contextlib
 import copy
 import inspect
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.clock import RealClock, VirtualClock
 from smachpy.container import Container
 from smachpy.exceptions import SmachError
 from smachpy.introspection import describe
+from smachpy.testing import session
 from smachpy.testing._core.search import Choice, Search
 from smachpy.testing._core.values import Snapshot
 from smachpy.testing.action_choices import serve_actions
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import Self
 
+    from smachpy.introspection import StateRecord
     from smachpy.testing.action_servers import ScriptedActionServer
     from smachpy.testing.doubles import Replacement
     from smachpy.testing.runs import Run
@@ -153,7 +155,7 @@ def explore(
             lose the result, deliver twice, ignore a cancel; preempts come while one works.
         userdata: Put into the machine's userdata before each run.
         folder: Gives the folder for the picture.
-        on_run: Called with each run, for coverage.
+        on_run: Called with each run, for coverage; without it that of the session, if it measures.
         doubles: Those of the test, from `mission.replace`; kept as they are, from the beginning of
             their scripts in each run.
 
@@ -169,6 +171,7 @@ def explore(
     options = Options(
         frozenset(faults), preempts, interleavings, max_steps, dict(writes or {}), merges=not own
     )
+    on_run = on_run or session.current().on_run
     begun = _COMPUTER.now()
     search = Search(max_depth)
     with _Runner(
@@ -263,6 +266,7 @@ class _Runner:
         self.real_actions = real_actions
         self._places = Places()
         self._machine: Container | None = None
+        self._whole: StateRecord | None = None
         self.goals_left: list[str] = []
         self._snapshot: list[tuple[Container, Snapshot]] = []
         self._scripts: list[tuple[Double, tuple[str, ...]]] = []
@@ -289,6 +293,7 @@ class _Runner:
         self._places.restore()  # and forget the machine before
         machine = source if isinstance(source, Container) else source()
         self._machine = machine
+        self._whole = describe(machine) if self.doubles else None
         for path, make, made in self.doubles:
             made[:] = [self._places.put(machine, path, make)]  # type: ignore[list-item]
         record = describe(machine)
@@ -353,7 +358,8 @@ class _Runner:
             self.goals_left = [goal for server in servers for goal in server.left]
         if self.explorer.mismatch:
             raise ReplayError(self.explorer.mismatch) from error
-        return runs[0], error
+        run = runs[0]
+        return (run if self._whole is None else replace(run, whole=self._whole)), error
 
 
 @contextlib.contextmanager

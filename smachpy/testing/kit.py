@@ -16,6 +16,7 @@ from actionlib_core.transport.memory import MemoryNetwork
 from smachpy._runtime.asker import asking
 from smachpy.exceptions import SmachError
 from smachpy.introspection import describe
+from smachpy.testing import session
 from smachpy.testing.doubles import Double, Places
 from smachpy.testing.ends import raise_errors
 from smachpy.testing.runs import Run
@@ -169,7 +170,7 @@ class MissionKit:
         self._replacements.clear()
         for key, value in (userdata or {}).items():
             machine.userdata[key] = value
-        record = describe(machine)
+        record, whole = describe(machine), self._places.describe_whole(machine)
         triggers, self._triggers = self._triggers, []
         watch = Watch(self.clock, machine, record, triggers, steps)
         self.clock.limit, self.clock.most_turns = self.clock.now() + limit, steps // TURN_STEPS
@@ -178,7 +179,7 @@ class MissionKit:
                 outcome, error = self._execute(machine)
         finally:
             self.clock.limit = self.clock.most_turns = None
-        run = self._finish(machine, record, watch, outcome)
+        run = self._finish(machine, record, whole, watch, outcome)
         errors, causes = self._take_errors()
         if error is not None:
             _reraise(error, run, limit, steps, errors, draws=self.draws)
@@ -218,7 +219,12 @@ class MissionKit:
         return found[0]
 
     def _finish(
-        self, machine: Container, record: StateRecord, watch: Watch, outcome: str | None
+        self,
+        machine: Container,
+        record: StateRecord,
+        whole: StateRecord | None,
+        watch: Watch,
+        outcome: str | None,
     ) -> Run:
         data = {key: machine.userdata[key] for key in machine.userdata.keys()}  # noqa: SIM118
         duration = self.clock.now() - watch.started
@@ -231,6 +237,7 @@ class MissionKit:
             self.seed,
             self._folder,
             watch.unfired(),
+            whole,
         )
         if self.on_run is not None:
             self.on_run(run)
@@ -441,10 +448,18 @@ def mission_kit(
 
     `with mission_kit() as mission: run = mission(machine)`
 
+    Under pytest its options hold: coverage, and the seed and the rate that are not given here.
+
     Args:
         seed: Picks the interleaving.
         rate: Virtual seconds per real second.
         folder: For pictures of failed runs.
     """
-    with MissionKit(seed=seed, rate=rate, folder=None if folder is None else lambda: folder) as kit:
+    around = session.current()
+    with MissionKit(
+        seed=around.seeds[0] if seed is None else seed,
+        rate=around.rate if rate is None else rate,
+        folder=None if folder is None else lambda: folder,
+        on_run=around.on_run,
+    ) as kit:
         yield kit

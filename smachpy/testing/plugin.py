@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from smachpy.testing import session
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
@@ -59,10 +61,25 @@ def pytest_configure(config: pytest.Config) -> None:
         "mission_coverage_json",
         "mission_coverage_html",
     )
+    measuring: _Measuring | None = None
     if any(config.getoption(name) for name in wanted):
         from smachpy.testing.coverage import Coverage
 
-        config.pluginmanager.register(_Measuring(config, Coverage()), "mission-coverage")
+        measuring = _Measuring(config, Coverage())
+        config.pluginmanager.register(measuring, "mission-coverage")
+    made = session.Session(
+        _seeds(config) or (config.getoption("mission_seed"),),
+        config.getoption("mission_rate"),
+        None if measuring is None else measuring.coverage.add,
+    )
+    session.begin(made)
+    config.add_cleanup(lambda: session.end(made))
+
+
+def _seeds(config: pytest.Config) -> tuple[int, ...]:
+    """Return the seeds of `--mission-seeds`."""
+    first: int = config.getoption("mission_seed") or 0
+    return tuple(range(first, first + (config.getoption("mission_seeds") or 0)))
 
 
 class _Measuring:
@@ -95,12 +112,12 @@ class _Measuring:
     def _write(self) -> None:
         file = self._config.getoption("mission_coverage_json")
         if file:
-            Path(file).write_text(json.dumps(self.coverage.summary(), indent=2) + "\n", "utf-8")
+            _open(file).write_text(json.dumps(self.coverage.summary(), indent=2) + "\n", "utf-8")
         file = self._config.getoption("mission_coverage_html")
         if file:
             from smachpy.testing.coverage_page import write_page
 
-            write_page(self.coverage, Path(file))
+            write_page(self.coverage, _open(file))
 
     def _below(self) -> list[str]:
         least = self._config.getoption("mission_coverage_fail_under")
@@ -125,14 +142,20 @@ class _Measuring:
             terminalreporter.write_line(f"FAIL {line}", red=True)
 
 
+def _open(file: str) -> Path:
+    """Return a file's path, with its folder made."""
+    path = Path(file)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return path
+
+
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Repeat the tests that use a mission with many seeds, if it is wanted."""
     count = metafunc.config.getoption("mission_seeds")
     if count is not None and "mission_seed" in metafunc.fixturenames:
         if count < 1:
             raise pytest.UsageError(f"--mission-seeds: got {count}; expected 1 or more.")
-        first = metafunc.config.getoption("mission_seed") or 0
-        seeds = range(first, first + count)
+        seeds = _seeds(metafunc.config)
         metafunc.parametrize("mission_seed", seeds, ids=[f"seed{seed}" for seed in seeds])
 
 
@@ -145,20 +168,18 @@ def mission_seed(request: pytest.FixtureRequest) -> int | None:
 
 @pytest.fixture
 def mission(
-    request: pytest.FixtureRequest,
     tmp_path_factory: pytest.TempPathFactory,
     mission_seed: int | None,
 ) -> Iterator[MissionKit]:
     """Run machines in virtual time, on a network in memory, beside scripted servers."""
     from smachpy.testing.kit import MissionKit
 
-    option: Callable[[str], Any] = request.config.getoption
-    measuring = request.config.pluginmanager.get_plugin("mission-coverage")
+    around = session.current()
     with MissionKit(
         seed=mission_seed,
-        rate=option("mission_rate"),
+        rate=around.rate,
         folder=lambda: tmp_path_factory.mktemp("mission"),
-        on_run=None if measuring is None else measuring.coverage.add,
+        on_run=around.on_run,
     ) as kit:
         yield kit
 

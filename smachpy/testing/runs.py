@@ -68,6 +68,7 @@ class Run:
         seed: The interleaving it had; None: in turn.
         folder: Gives the folder for pictures.
         unfired: The preempts and interrupts of the test that never came, and why.
+        whole: The machine as it is without the test's doubles; None: without any, as `record`.
     """
 
     record: StateRecord
@@ -78,6 +79,7 @@ class Run:
     seed: int | None = None
     folder: Callable[[], Path] = field(default=Path.cwd, repr=False)
     unfired: tuple[str, ...] = ()
+    whole: StateRecord | None = field(default=None, repr=False)
 
     # -- what happened -------------------------------------------------------------------------
 

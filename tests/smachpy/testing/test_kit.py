@@ -527,6 +527,31 @@ def test_the_timeouts_of_calls_waits_and_goals_are_told_and_covered(mission):
     assert coverage.machines[0].counts("timeouts") == (3, 3)
 
 
+def test_a_double_of_a_sub_machine_is_no_machine_of_its_own_in_the_coverage():
+    sm = StateMachine(["done", "failed", "preempted"], name="TWO")
+    with sm:
+        sm.add("IN", two_waits())
+    coverage = Coverage()
+    with mission_kit() as mission:
+        mission.on_run = coverage.add
+        mission(sm)
+        mission.replace("IN", outcomes=["failed"])
+        mission(sm)
+        mission.replace("IN", outcomes=["preempted"])
+        mission(sm)
+    (machine,) = coverage.machines
+    assert machine.runs == 3
+    with mission_kit() as mission:
+        explored = Coverage()
+        mission.on_run = explored.add
+        mission.replace("IN", outcomes=["failed"])
+        assert mission.explore(sm)
+    assert [m.record for m in explored.machines] == [machine.record]
+    assert machine.taken["states"] == {"/TWO": 3, "/TWO/IN": 3, "/TWO/IN/A": 1, "/TWO/IN/B": 1}
+    assert machine.missed("states") == []
+    assert "/TWO/IN -failed->" in machine.taken["outcomes"]
+
+
 def test_the_same_seed_gives_the_same_run_to_the_last_event():
     def events(seed):
         with mission_kit(seed=seed) as mission:

@@ -143,6 +143,49 @@ def test_unittest_runs_it(pytester):
     assert "Ran 1 test" in done.stderr
 
 
+OUTSIDE = """
+from smachpy.testing import MissionTestCase, mission_kit
+from test_machine import machine
+
+class Test(MissionTestCase):
+    def test(self):
+        print("case", self.mission.seed)
+        self.assertEqual(self.mission(machine()).duration, 20)
+
+    def test_seed(self):
+        self.assertNotEqual(self.mission.seed, 9)
+
+class TestOwn(MissionTestCase):
+    seed = 5
+
+    def test(self):
+        self.assertEqual(self.mission.seed, 5)
+
+def test_kit():
+    with mission_kit() as mission:
+        print("kit", mission.seed)
+        mission(machine())
+"""
+
+
+def test_the_options_hold_without_the_fixtures_too(pytester):
+    pytester.makepyfile(test_machine=TESTS.partition("def test_done")[0], test_outside=OUTSIDE)
+    result = pytester.runpytest_inprocess(
+        *OPTIONS, "--mission-coverage-json=no/such/c.json", "--mission-seed=3", "-s"
+    )
+    result.assert_outcomes(passed=4)
+    result.stdout.fnmatch_lines(["*case 3*", "*kit 3*", "/M *2 *"])
+    (machine,) = json.loads((pytester.path / "no/such/c.json").read_text())["machines"]
+    assert machine["runs"] == 2
+    again = pytester.runpytest_inprocess(*OPTIONS, "--mission-seed=8", "--mission-seeds=3", "-s")
+    again.assert_outcomes(passed=3, failed=1)
+    out = again.stdout.str()
+    assert re.findall(r"case (\d+)", out) == ["8", "9", "10"]
+    assert re.findall(r"Test.test_seed: mission seed (\d+)", out) == ["9"]
+    plain = pytester.runpytest_inprocess(*OPTIONS, "-s")
+    plain.stdout.fnmatch_lines(["*case None*"])
+
+
 def test_the_command_line_alias(pytester):
     pytester.makepyfile(test_m=TESTS)
     done = subprocess.run(

@@ -1,0 +1,45 @@
+"""What the test session around says of every mission under test: the plugin's options."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from smachpy.testing.runs import Run
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Session:
+    """A test session.
+
+    Attributes:
+        seeds: Of the missions; each test runs with all of them, None takes turns.
+        rate: Virtual seconds per real second; None: as fast as it goes.
+        on_run: Called with every run, for coverage.
+    """
+
+    seeds: tuple[int | None, ...] = (None,)
+    rate: float | None = None
+    on_run: Callable[[Run], object] | None = None
+
+
+_sessions = [Session()]
+
+
+def current() -> Session:
+    """Return the session that began last and has not ended; outside of any one without wishes."""
+    return _sessions[-1]
+
+
+def begin(session: Session) -> None:
+    """Begin a session."""
+    _sessions.append(session)
+
+
+def end(session: Session) -> None:
+    """End a session; without effect when it has not begun."""
+    if session in _sessions[1:]:
+        _sessions.remove(session)
