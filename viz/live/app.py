@@ -267,7 +267,8 @@ class Viewer:
         from viz.runs.recording import recording_lines
 
         if form == "jsonl":
-            lines = recording_lines(machine.record, machine.events(), machine.base())
+            base, events = machine.told()
+            lines = recording_lines(machine.record, events, base)
             return _download("".join(lines).encode(), "application/jsonl", "run.jsonl")
         run = {"model": page.model(machine.record), "snap": json.loads(machine.snapshot()[1])}
         text = await run_in_threadpool(page.standalone, run, machine.record.label)

@@ -524,3 +524,28 @@ def test_who_pauses_elsewhere_is_seen_here(served, look):
     page.keyboard.press("Space")
     page.wait_for_selector(".notice")
     assert served.commands[-1]["command"] == "resume"
+
+
+def test_half_a_character_in_a_name_breaks_nothing(served, look):
+    served.add(
+        "one", labels=["A\ud800", "B"], events=[("Started", "/JOB"), ("Entered", "/JOB/A\ud800")]
+    )
+    page = look(served.start())
+    wait_for(page, "smachpy.store.activeLeaves.value.length === 1")
+    page.click(".menu > button")
+    page.wait_for_selector(".sheet a:text-is('svg')")
+    with page.expect_download():
+        page.click(".sheet a:text-is('svg')")
+    with page.expect_download():
+        page.click(".sheet a:text-is('recording')")
+
+
+def test_recorded_runs_that_cannot_be_read_are_told(served, look):
+    from smachpy.exceptions import SmachError
+
+    def statistics(_record):
+        raise SmachError("runs/x.jsonl: no recording")
+
+    served.add("one")
+    page = look(served.start(statistics=statistics))
+    wait_for(page, "document.querySelector('.notice.error')?.textContent.includes('no recording')")

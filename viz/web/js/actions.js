@@ -3,7 +3,7 @@ import { h } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
 import htm from "htm";
 import * as store from "viewer/store";
-import { ask, askAction, hasToken, isFile, showActions } from "viewer/source";
+import { ask, askAction, encoded, hasToken, isFile, showActions } from "viewer/source";
 import { Fields, homeless, toState, toYaml } from "viewer/goalform";
 import { outcomeClass } from "viewer/model";
 import { span } from "viewer/diagram";
@@ -62,7 +62,7 @@ function GoalForm({ name, there }) {
   useEffect(() => {
     if (!there || about?.type === type) return;
     setFailure(null);
-    ask(`/api/action?name=${encodeURIComponent(name)}`).then((found) => {
+    ask(`/api/action?name=${encoded(name)}`).then((found) => {
       if (!found.fields) { setFailure(found.text); return; }
       setAbout(found);
       begin(found);

@@ -4,7 +4,7 @@ import { useState } from "preact/hooks";
 import htm from "htm";
 import * as store from "viewer/store";
 import { SIGNS, shorten } from "viewer/model";
-import { ask, isFile, link } from "viewer/source";
+import { ask, encoded, isFile, link } from "viewer/source";
 
 const html = htm.bind(h);
 const MOST = 60;
@@ -19,7 +19,7 @@ export async function compare(page, name) {
     return;
   }
   const asked = store.facts.value?.name;
-  const found = await ask(link("compare", `&with=${encodeURIComponent(name)}`));
+  const found = await ask(link("compare", `&with=${encoded(name)}`));
   if (asked !== store.facts.value?.name) return; // another machine has been chosen
   if (!found.model) { store.say(found.text ?? "cannot be compared", "error"); return; }
   const alone = store.comparison.value?.alone ?? store.model.value.payload;

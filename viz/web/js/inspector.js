@@ -7,7 +7,7 @@ import * as store from "viewer/store";
 import { askerText, ms } from "viewer/fold";
 import { KIND_NAMES, outcomeClass, shorten } from "viewer/model";
 import { span } from "viewer/diagram";
-import { ask, isFile, link } from "viewer/source";
+import { ask, encoded, isFile, link } from "viewer/source";
 import { StateControls, StopAfter } from "viewer/controls";
 import { Differences } from "viewer/comparison";
 import { coverage } from "viewer/statistics";
@@ -210,7 +210,7 @@ function Whole({ entry }) {
   const fetchIt = async (e) => {
     e.stopPropagation();
     put({ text: "Asking the mission\u2026" });
-    put(await ask(link("value", `&container=${encodeURIComponent(container)}&key=${encodeURIComponent(entry.key)}`)));
+    put(await ask(link("value", `&container=${encoded(container)}&key=${encoded(entry.key)}`)));
   };
   if (!found) return html`<button class="small whole" onClick=${fetchIt}>Fetch the whole value</button>`;
   return html`<div class="whole-value" onClick=${(e) => e.stopPropagation()}>${found.ok ? html`<small>as it was when it was asked for, ${found.text.length.toLocaleString("en")} characters

@@ -3,7 +3,7 @@ import { h } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
 import htm from "htm";
 import * as store from "viewer/store";
-import { choose, isFile, link } from "viewer/source";
+import { choose, encoded, isFile, link } from "viewer/source";
 import { MODES } from "viewer/statistics";
 import { Controls } from "viewer/controls";
 import { CompareChip, CompareLine } from "viewer/comparison";
@@ -125,7 +125,7 @@ function View({ page }) {
 
 // The whole machine in the page's colours, with what is active at the instant shown.
 function SavePicture() {
-  const active = store.activePaths.value.slice(0, MOST_ACTIVE).map((path) => `&active=${encodeURIComponent(path)}`).join("");
+  const active = store.activePaths.value.slice(0, MOST_ACTIVE).map((path) => `&active=${encoded(path)}`).join("");
   const looks = `&theme=${store.isDark() ? "dark" : "light"}${active}`;
   return html`<div class="line"><span>Save picture</span><span class="group">${["svg", "png", "pdf", "dot"].map((f) =>
     html`<a class="button" href=${link("picture", `&format=${f}${looks}`)} download>${f}</a>`)}</span></div>`;

@@ -72,8 +72,9 @@ export function choose(name) {
   open();
 }
 
-const named = (name) => encodeURIComponent(name ?? store.facts.value?.name ?? "");
-export const link = (what, more = "") => `/api/${what}?machine=${named()}${more}`;
+// For an address; half of a pair of UTF-16, which a name may hold, has no place in one.
+export const encoded = (text) => encodeURIComponent(String(text).replace(/\p{Surrogate}/gu, "\ufffd"));
+export const link = (what, more = "") => `/api/${what}?machine=${encoded(store.facts.value?.name ?? "")}${more}`;
 
 function open() {
   stream?.close();
@@ -147,22 +148,25 @@ async function takeSnap(snap, payload) {
 async function load(facts) {
   const mine = loads += 1;
   const wait = (time) => new Promise((done) => { setTimeout(done, time); });
-  const fetched = async (what) => {
+  const fetched = async () => {
     try {
-      const answer = await fetch(`/api/${what}?machine=${named(facts.name)}`);
+      const answer = await fetch(`/api/model?machine=${encoded(facts.name)}`);
       return answer.ok ? await answer.json() : null;
     } catch { return null; } // the connection tells that the server is gone
   };
   let found = null;
   for (let pause = AGAIN_MS; !found; pause = Math.min(2 * pause, LATEST_MS)) {
-    found = await fetched("model");
+    found = await fetched();
     if (!found) await wait(pause);
     if (mine !== loads) return;
   }
   store.setModel(found);
   onMachine();
-  const statistics = await fetched("statistics");
-  if (mine === loads) store.statistics.value = statistics;
+  const statistics = await ask(link("statistics"));
+  if (mine !== loads) return;
+  const wrong = statistics?.ok === false;
+  store.statistics.value = wrong ? null : statistics;
+  if (wrong) store.say(`Recorded runs: ${statistics.text}`, "error");
 }
 
 // The JSON answer of the server; when it gives none, the same shape.
