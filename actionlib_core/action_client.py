@@ -239,7 +239,7 @@ class ActionClient(Generic[A_co]):
         Raises:
             ActionException: `goal` is not of the action's type.
             ActionlibError: `ack_timeout` is no time, or negative.
-            MessageError: a field of `goal` has a wrong type.
+            FieldError: a field of `goal` has a wrong type.
             TypeMismatchError: the action's server has another type.
             TransportError: the client is stopped.
         """
@@ -286,7 +286,7 @@ class ActionClient(Generic[A_co]):
 
         Raises:
             ActionException: `goal` is not of the action's type.
-            MessageError: a field of `goal` has a wrong type.
+            FieldError: a field of `goal` has a wrong type.
             TypeMismatchError: the action's server has another type.
             TransportError: the client is stopped.
         """
@@ -330,7 +330,7 @@ class ActionClient(Generic[A_co]):
 
         Raises:
             ActionException: `goal` is not of the action's type.
-            MessageError: a field of it has a wrong type.
+            FieldError: a field of it has a wrong type.
         """
         if not isinstance(goal, self.types.goal):
             raise ActionException(

@@ -208,7 +208,7 @@ class SimpleActionClient(Generic[A]):
         Raises:
             ActionException: `goal` is not of the action's type.
             ActionlibError: `ack_timeout` is no time, or negative.
-            MessageError: a field of `goal` has a wrong type.
+            FieldError: a field of `goal` has a wrong type.
             TypeMismatchError: the action's server has another type.
             TransportError: the client is stopped.
         """

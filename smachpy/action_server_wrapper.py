@@ -291,7 +291,7 @@ class ActionServerWrapper:
 
         Raises:
             ActionException: its value is no XFeedback.
-            MessageError: a field of it has a wrong type.
+            FieldError: a field of it has a wrong type.
         """
         feedback = self._make_feedback(userdata)
         self._action_server.publish_feedback(feedback)

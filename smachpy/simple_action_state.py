@@ -190,7 +190,7 @@ class SimpleActionState(State):
         What a callback raises goes through, once the goal has ended.
 
         Raises:
-            MessageError: a field of the goal has a wrong type.
+            FieldError: a field of the goal has a wrong type.
             TypeMismatchError: the action's server is of another type.
 
         Blocks: until the goal has ended: all three timeouts together at most; a preempt

@@ -77,7 +77,7 @@ class GoalExchange:
         """Send `goal`; when no server takes it within `ack_timeout` [s] it is LOST.
 
         Raises:
-            ActionException, MessageError: the goal is not of the action's type.
+            ActionException, FieldError: the goal is not of the action's type.
             TypeMismatchError: the server is of another type.
             TransportError: the node is closed.
         """

@@ -114,7 +114,7 @@ class ScriptedActionServer(ScriptedEnd):
 
         Raises:
             ValueError: there is no such status.
-            TypeError, MessageError: a message does not fit the action.
+            TypeError, FieldError: a message does not fit the action.
         """
         return self._queue(self._make(result, status, duration, feedback, text))
 
