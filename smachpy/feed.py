@@ -9,7 +9,7 @@ The history is JSON: `epoch` (which machine this is: another one after a restart
 the network session: another one of the same name has another), `description`,
 `problems` (what a check found), `base` (a `smachpy.run_state.RunState` of what is too long ago),
 `events` (the newest, as they were sent), `control` (paused and breakpoints, null where
-no commands are obeyed).
+no commands are obeyed), `now` (the time here, nanoseconds since the epoch).
 """
 
 from __future__ import annotations
@@ -97,6 +97,7 @@ class Feed:
         )
         self._describe()
         self._session = node.transport.session_id
+        self._node = node
         self._values = ValueServer(server_name, machine, path, node)
         self._history = Service(
             server_name + HISTORY_SERVICE, Trigger, self._tell, node=node, alone=False
@@ -170,6 +171,7 @@ class Feed:
             "description": json.loads(self._description),
             "problems": self._problems,
             "control": None if self._control is None else self._control.state(),
+            "now": self._node.clock.time_ns(),
         }
         with self._lock:
             base = json.dumps(self._base.data)

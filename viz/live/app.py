@@ -2,8 +2,8 @@
 
     GET  /                    the page
     GET  /api/events          everything about one machine as server-sent events:
-                              snap, gap, facts, machines, actions, beat, and unnamed batches of
-                              events
+                              snap, gap, facts, machines, actions, beat (the time here [ms]),
+                              and unnamed batches of events
     GET  /api/model           structure of a machine
     GET  /api/picture         svg, png, pdf or dot; `theme` and the paths that are `active`
     GET  /api/export          the run as .html or .jsonl
@@ -23,6 +23,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import time
 from typing import TYPE_CHECKING, Any
 
 from starlette.applications import Starlette
@@ -390,7 +391,7 @@ class _Page:
                 due = BEAT_S
             if self._beaten + BEAT_S <= loop.time():
                 self._beaten = loop.time()
-                yield "event: beat\ndata: null\n\n"
+                yield f"event: beat\ndata: {time.time_ns() // 1_000_000}\n\n"
             due = min(due, self._beaten + BEAT_S - loop.time())
             if self._actions is not None and self._told != self._actions.revision:
                 wait = self._told_at + ACTIONS_S - loop.time()

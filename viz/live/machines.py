@@ -37,6 +37,7 @@ class Machine:
         stale: Since when nobody speaks for it [ns since the epoch]; None while somebody does.
         control: Pause and breakpoints; None when it obeys no commands.
         node: Name of the node that it runs in.
+        behind: How far its clock is behind this process's [ns]; None while nobody knows.
 
     Threads: every method may be called from any thread.
     """
@@ -50,6 +51,7 @@ class Machine:
         self.stale: int | None = None
         self.recorded = False
         self.node = ""
+        self.behind: int | None = None
         self.epoch = uuid.uuid4().hex
         self._on_change = on_change
         self._lock = threading.Lock()
@@ -188,6 +190,7 @@ class Machine:
             "control": self.control,
             "recorded": self.recorded,
             "node": self.node,
+            "behind": self.behind,
         }
 
     def _set_record(self, record: StateRecord) -> None:

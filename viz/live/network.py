@@ -292,6 +292,7 @@ class Link:
         """The answer of this link's own server, should there be several of the name."""
         replies: list[Reply] = []
         done = self._node.clock.event(f"history of {self.server}")
+        asked = self._node.clock.time_ns()
         query = self._node.transport.query(
             self.server + HISTORY_SERVICE,
             Trigger._request_class().to_bytes(),
@@ -301,11 +302,14 @@ class Link:
             on_done=done.set,
         )
         done.wait(HISTORY_S + 1.0)
+        middle = (asked + self._node.clock.time_ns()) // 2
         query.close()
         answers = [Trigger._response_class.from_bytes(r.payload) for r in replies if not r.error]
         for answer in answers:
             history: dict[str, Any] = json.loads(answer.message)
             if history.get("session", self.session) == self.session:
+                if "now" in history:
+                    self._machine.behind = middle - history["now"]
                 return history
         return None
 

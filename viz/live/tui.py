@@ -120,7 +120,7 @@ class MissionApp(App[None]):
         if self._until is not None:
             events = [event for event in events if event["seq"] <= self._until]
             ended = events
-        now = events[-1]["stamp_ns"] if ended else time.time_ns()
+        now = events[-1]["stamp_ns"] if ended else time.time_ns() - (machine.behind or 0)
         self._draw_preempt(now)
         self._draw_tree(now)
         self._draw_goals()

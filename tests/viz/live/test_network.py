@@ -57,7 +57,7 @@ def watch(clock):
         clock.sleep(2.0)
         return machines.get("robot")
 
-    watch.viewer, watch.machines = viewer, machines
+    watch.viewer, watch.machines, watch.robot = viewer, machines, robot
     yield watch
     for server in servers:
         server.stop()
@@ -82,6 +82,25 @@ def test_a_flood_ends_as_the_mission_does(clock, watch, monkeypatch):
     state = json.loads(seen.snapshot(short=True)[1])["base"]
     assert state["dropped"] + sum(one["visits"] for one in state["states"].values()) > 1000
     assert seen.seq == 2 + 2 * 2000 + 2
+
+
+class Behind:
+    """A clock that was set wrongly."""
+
+    def __init__(self, clock, seconds):
+        self._clock, self._ns = clock, int(seconds * 1e9)
+
+    def __getattr__(self, name):
+        return getattr(self._clock, name)
+
+    def time_ns(self):
+        return self._clock.time_ns() - self._ns
+
+
+def test_a_viewer_knows_how_far_a_robots_clock_is_off(clock, watch):
+    watch.robot.clock = Behind(clock, 300.0)
+    seen = watch(spinning(1))
+    assert seen.facts()["behind"] == pytest.approx(300e9, abs=1e9)
 
 
 def test_who_comes_late_is_told_what_the_kept_events_do_not_tell(clock, watch, monkeypatch):

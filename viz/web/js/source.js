@@ -86,14 +86,14 @@ function open() {
     take(JSON.parse(message.data));
   });
   on("settings", (s) => { begun = performance.now(); store.settings.value = s; store.connection.value = "live"; watch(s.beat * 1000); });
-  on("beat", () => { store.connection.value = "live"; });
+  on("beat", (t) => { store.connection.value = "live"; store.viewerLag.hear(t); });
   on("machines", (list) => { store.machines.value = list; });
   on("actions", (found) => { store.actions.value = { ...found, known: true }; });
   on("facts", takeFacts);
   on("snap", takeSnap);
   on("gap", (count) => { store.gap.value = count; });
   on("message", (events) => {
-    if (performance.now() - begun > CAUGHT_UP_MS) store.hearClock(events.at(-1).stamp_ns);
+    if (performance.now() - begun > CAUGHT_UP_MS) store.robotLag.hear(events.at(-1).stamp_ns / 1e6);
     onEvents(events);
   });
   stream.onopen = () => { store.connection.value = "live"; };
@@ -129,7 +129,7 @@ async function takeFacts(facts) {
 async function takeSnap(snap, payload) {
   store.wanted.value ||= snap.name;
   const known = store.facts.value;
-  if (known?.name !== snap.name || known.epoch !== snap.epoch) store.forgetClock();
+  if (known?.name !== snap.name || known.epoch !== snap.epoch) store.robotLag.forget();
   batch(() => {
     store.facts.value = snap;
     store.problems.value = snap.problems;

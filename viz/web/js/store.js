@@ -56,25 +56,25 @@ export const shown = () => (cursor.value === null ? run.now : past ?? run.now);
 export const nowMs = () => {
   if (cursor.value !== null) return cursor.value;
   const ended = run.now.ended != null || facts.value?.stale != null || connection.value === "file";
-  const robot = Date.now() - behind;
+  const robot = Date.now() - behind();
   return ended ? run.last() ?? robot : Math.max(robot, run.last() ?? 0);
 };
 
-// How far the robot's clock is behind this one's [ms], ways included: the least of the newest lags.
-let behind = 0;
-let lags = { since: 0, least: Infinity, before: Infinity };
-
-export function forgetClock() {
-  behind = 0;
-  lags = { since: performance.now(), least: Infinity, before: Infinity };
+// How far another clock is behind this one [ms], ways included: the least of the newest lags.
+class Lag {
+  forget() { this.since = performance.now(); this.least = this.before = Infinity; }
+  hear(t) {
+    if (performance.now() - this.since > LAGS_MS) { this.since = performance.now(); this.before = this.least; this.least = Infinity; }
+    this.least = Math.min(this.least, Date.now() - t);
+  }
+  get value() { const least = Math.min(this.least, this.before); return least === Infinity ? null : least; }
 }
+export const robotLag = new Lag(), viewerLag = new Lag();
+robotLag.forget();
+viewerLag.forget();
 
-export function hearClock(stamp_ns) {
-  if (performance.now() - lags.since > LAGS_MS)
-    lags = { since: performance.now(), least: Infinity, before: lags.least };
-  lags.least = Math.min(lags.least, Date.now() - ms(stamp_ns));
-  behind = Math.min(lags.least, lags.before);
-}
+// Of the robot: as its events tell, else as its viewer knows.
+const behind = () => robotLag.value ?? (viewerLag.value ?? 0) + (ms(facts.value?.behind) ?? 0);
 
 // So many of the kept events have happened by what is shown.
 export const happened = () => position.value ?? run.events.length;
