@@ -93,6 +93,10 @@ def _list(args: argparse.Namespace) -> int:
 
 
 def _info(args: argparse.Namespace) -> int:
+    if not args.id:  # which the server would take for all of them
+        raise UsageError(
+            "goal info: ID: got ''; expected a goal's id. Try 'actionlib goal list NAME'."
+        )
     with open_node(args) as node:
         spec = action_class(find_server(node, args.name).type)
         entry, result = _status(node, args, spec)

@@ -288,6 +288,7 @@ def test_goals_are_listed_shown_and_cancelled(shell, network, clock):
     clock.sleep(1.0)
     shown = shell("goal", "info", "keep", ids[0], code=0)
     assert "Status: PREEMPTED" in shown
+    assert "expected a goal's id" in shell("goal", "info", "keep", "", code=2)
     assert "Status: LOST" in shell("goal", "info", "keep", "never-1-1.1", code=1)
     node.close()
 
