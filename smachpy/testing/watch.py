@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.clock import VirtualClock
 from actionlib_core.clock._virtual_parts import Stopped
+from smachpy._runtime.thinning import SLOTS
 from smachpy.events import Entered, Event
 from smachpy.tape import EventTape
 from smachpy.testing.runs import find_path
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from smachpy.container import Container
     from smachpy.introspection import StateRecord
 
-ENTRY = 5  # elements of a tape's list for one event or transition
 STEPS = 100_000
 TURN_STEPS = 5  # a turn of the clock takes the computer that much longer than a transition
 
@@ -192,7 +192,7 @@ class _StepTape(EventTape):
         self._time = clock
         self._moment = clock.now()
         self._begun = 0
-        self._size = most * ENTRY
+        self._size = most * SLOTS
         super().__init__(machine)
 
     def take(self, event: Event) -> None:
