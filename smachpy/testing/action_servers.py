@@ -331,6 +331,8 @@ class ScriptedActionServer(ScriptedEnd):
         if reply.accept_after and cancel.wait(reply.accept_after) and not reply.ignore_cancel:
             handle.set_canceled(text="cancelled before it was accepted")
             return
+        if handle.get_goal_status().status not in _WAITING:
+            return  # the test has ended, and the server with it
         if reply.status == "rejected":
             handle.set_rejected(reply.result, reply.text)
             return

@@ -80,6 +80,17 @@ def test_goals_without_end_at_one_moment_are_told_with_what_the_server_missed(mi
     assert mission(drive()).outcome == "succeeded"
 
 
+def test_a_goal_that_comes_as_the_test_ends_is_nobody_s_error():
+    sm = StateMachine(["aborted", "preempted"], name="M")
+    with sm:
+        sm.add("DRIVE", SimpleActionState("move_base", MoveBaseAction), {"succeeded": "DRIVE"})
+    for steps in range(500, 525):  # the run breaks off anywhere; a thread that raises is a warning
+        with mission_kit() as mission:
+            mission.action_server("move_base", MoveBaseAction)
+            with pytest.raises(TimeLimitError):
+                mission(sm, steps=steps)
+
+
 def test_the_errors_of_all_servers_are_told_and_of_their_own_run(mission, server, action_server):
     other = action_server("dock", MoveBaseAction)
     server.reply(status="aborted")
