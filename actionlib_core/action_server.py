@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-DRAIN_S = 0.3  # how long `stop` waits for acknowledgements; less as one of many on a node
+DRAIN_S = 0.7  # how long `stop` waits for acknowledgements; less as one of many on a node
 FAREWELL_S = 0.1  # it says farewell again after so long
 
 ACCEPTED = frozenset({Status.ACTIVE, Status.PREEMPTING})
