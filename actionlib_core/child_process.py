@@ -12,7 +12,6 @@ from actionlib_core.clock import RealClock
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-    from types import TracebackType
     from typing import IO, Self
 
     from actionlib_core.shutdown import Shutdown
@@ -75,12 +74,7 @@ class ChildProcess:
         self._clock.spawn(lambda: self._watch(stderr, listening.join), name=self.module)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
 
     @property

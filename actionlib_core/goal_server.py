@@ -27,7 +27,6 @@ from actionlib_core.simple_action_server import TEXT_ACCEPTED, SimpleActionServe
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from types import TracebackType
     from typing import Self
 
     from actionlib_core._action_spec import ActionSpec
@@ -181,12 +180,7 @@ class RunningServer:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
 
 

@@ -39,7 +39,6 @@ from actionlib_core.wire import check_encoding, encoding_of, parse_encoding
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from types import TracebackType
     from typing import Self
 
     from actionlib_core.clock import Event
@@ -86,12 +85,7 @@ class _ServiceEnd:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def __repr__(self) -> str:

@@ -27,7 +27,6 @@ from actionlib_core.wire import check_encoding, encoding_of, parse_encoding
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from types import TracebackType
     from typing import Self
 
     from actionlib_core.interfaces import Message
@@ -112,12 +111,7 @@ class _TopicEnd:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.unregister()
 
     def __repr__(self) -> str:

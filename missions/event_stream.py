@@ -12,7 +12,6 @@ from viz.history import History
 from viz.runs.recording import event_line, header_line
 
 if TYPE_CHECKING:
-    from types import TracebackType
     from typing import TextIO
 
     from smachpy import events as ev
@@ -53,12 +52,7 @@ class EventStream:
         self._put(self._header)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

@@ -40,8 +40,6 @@ from viz.narration import Narrator
 from viz.words import GLYPHS, shorten
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
     from rich.console import RenderableType
 
     from actionlib_core.clock import Clock, Task
@@ -120,12 +118,7 @@ class TerminalView:
         self._task = self._drawing.spawn(self._draw, name="terminal view")
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

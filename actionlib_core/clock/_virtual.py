@@ -34,7 +34,6 @@ from actionlib_core.clock._virtual_parts import (
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Iterator
-    from types import TracebackType
     from typing import Self
 
 T = TypeVar("T")
@@ -204,12 +203,7 @@ class VirtualClock:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     # -- for `patched()` ------------------------------------------------------------------------

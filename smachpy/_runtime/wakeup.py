@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from types import TracebackType
     from typing import Self
 
     from smachpy.state import State
@@ -31,12 +30,7 @@ class Wakeup:
         self._forget = self._state._on_preempt(self._event.set)  # noqa: SLF001  as above
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._forget()
 
     def set(self) -> None:
