@@ -42,13 +42,13 @@ DESCRIPTION_TOPIC = "/smach/description"
 HISTORY_SERVICE = "/smach/history"
 
 QUEUED_EVENTS = 20_000
-"""When more wait for the network, those that come then are thinned out, which shows in `seq`."""
+"""When more wait to become text, those that come then are thinned out, which shows in `seq`."""
 
 KEPT_EVENTS = 5_000
-"""So many events are kept for viewers that come late."""
+"""So many events are kept for viewers that come late, and as many wait for the network."""
 
 KEPT_BYTES = 8_000_000
-"""So much text of events is kept for them at most, and as much waits for the network."""
+"""So much text of events at most is kept, and waits."""
 
 STOP_S = 1.0
 
@@ -108,11 +108,14 @@ class Feed:
     def close(self) -> None:
         """Send what waits, leave the topics.
 
-        Blocks: 1 s at most.
+        Blocks: 2 s at most.
         """
         self._tape.close()
         self._on_news()
-        self._executor.join(STOP_S)
+        if not self._executor.join(STOP_S):
+            with self._lock:
+                self._queue.clear()  # nobody takes it
+            self._executor.join(STOP_S)
         self._descriptions.unregister()
         self._history.close()
         self._values.close()
@@ -153,10 +156,10 @@ class Feed:
             self._base.fold(old)
 
     def _enqueue(self, text: str) -> None:
-        """Let it wait for the network; the newest say what goes on, so the oldest make room."""
+        """Let it wait for the network; a viewer that misses the oldest asks for the history."""
         self._queue.append(text)
         self._queued_bytes += len(text)
-        while len(self._queue) > 2 * QUEUED_EVENTS or self._queued_bytes > KEPT_BYTES:
+        while len(self._queue) > KEPT_EVENTS or self._queued_bytes > KEPT_BYTES:
             self._queued_bytes -= len(self._queue.popleft())
 
     def _tell(self, _request: object) -> tuple[bool, str]:

@@ -58,6 +58,7 @@ def watch(clock):
         return machines.get("robot")
 
     watch.viewer, watch.machines, watch.robot = viewer, machines, robot
+    watch.servers = servers
     yield watch
     for server in servers:
         server.stop()
@@ -159,3 +160,26 @@ def test_a_machine_that_obeys_nobody_tells_nobody(clock, watch):
     assert watch.machines.get("free").facts()["control"] is None
     server.stop()
     job.control.resume()
+
+
+def test_a_network_that_takes_nothing_does_not_hold_up_the_end(clock, watch, monkeypatch):
+    monkeypatch.setattr(feed, "KEPT_EVENTS", 300)
+    job = spinning(2000)
+    seen = watch(job)
+    sent = []
+    publisher = watch.servers[0]._feed._events
+    publish = publisher.publish
+
+    def slowly(text):
+        clock.sleep(0.05)
+        sent.append(text)
+        publish(text)
+
+    monkeypatch.setattr(publisher, "publish", slowly)
+    mission = clock.spawn(job.execute, name="mission")
+    assert mission.join(60.0)
+    begun = clock.now()
+    watch.servers[0].stop()
+    assert clock.now() - begun < 10.0
+    assert 0 < len(sent) < 300
+    assert seen.epoch
