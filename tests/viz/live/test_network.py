@@ -165,7 +165,7 @@ def test_a_machine_that_obeys_nobody_tells_nobody(clock, watch):
 def test_a_network_that_takes_nothing_does_not_hold_up_the_end(clock, watch, monkeypatch):
     monkeypatch.setattr(feed, "KEPT_EVENTS", 300)
     job = spinning(2000)
-    seen = watch(job)
+    watch(job)
     sent = []
     publisher = watch.servers[0]._feed._events
     publish = publisher.publish
@@ -181,5 +181,5 @@ def test_a_network_that_takes_nothing_does_not_hold_up_the_end(clock, watch, mon
     begun = clock.now()
     watch.servers[0].stop()
     assert clock.now() - begun < 10.0
-    assert 0 < len(sent) < 300
-    assert seen.epoch
+    clock.sleep(300.0)
+    assert 0 < len(sent) < 100  # those of the time until then, and none later
