@@ -284,6 +284,8 @@ class Link:
         known = machine.record is not None and machine.problems == history["problems"]
         if known and machine.epoch == history["epoch"]:
             machine.set_stale(None)
+            if history.get("control") is not None:
+                machine.set_control(history["control"])
             if machine.add(history["events"]):
                 return
         machine.reset(history)

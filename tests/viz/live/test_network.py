@@ -183,3 +183,13 @@ def test_a_network_that_takes_nothing_does_not_hold_up_the_end(clock, watch, mon
     assert clock.now() - begun < 10.0
     clock.sleep(300.0)
     assert 0 < len(sent) < 100  # those of the time until then, and none later
+
+
+def test_a_history_tells_of_a_pause_too(clock, watch):
+    """What was said while nobody could hear it."""
+    seen = watch(spinning(1))
+    seen.set_control({"paused": True, "breakpoints": [["/JOB/B", None]]})
+    link = watch.viewer._links["robot"]
+    link._executor.submit(link._read_history)
+    clock.sleep(1.0)
+    assert seen.facts()["control"] == {"paused": False, "breakpoints": []}
