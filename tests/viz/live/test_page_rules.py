@@ -469,7 +469,7 @@ def test_a_log_that_is_cut_goes_further_back_when_it_is_asked_to(served, look):
     assert page.query_selector(".log ~ button") is None
     page.fill("[aria-label='filter the log']", "")
     wait_for(page, "document.querySelectorAll('.log li').length === 140")
-    page.click("button:text-is('older')")
+    page.press("button:text-is('older')", "Enter")
     wait_for(page, "document.querySelectorAll('.log li').length === 210")
 
 

@@ -107,6 +107,7 @@ function open() {
 function watch(beat) {
   clearInterval(watchdog);
   silence = 0;
+  if (!(beat > 0)) return; // a server of an older version
   watchdog = setInterval(() => {
     silence += 1;
     if (silence > 2 * SILENT_BEATS) reconnect();
