@@ -56,10 +56,9 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 def _port(text: str) -> int:
     import argparse
 
-    port = int(text)
-    if not 0 <= port <= HIGHEST_PORT:
-        raise argparse.ArgumentTypeError(f"got {text}; expected 0 to {HIGHEST_PORT}")
-    return port
+    if not (text.isdecimal() and int(text) <= HIGHEST_PORT):
+        raise argparse.ArgumentTypeError(f"got {text!r}; expected 0 to {HIGHEST_PORT}")
+    return int(text)
 
 
 def _run(args: argparse.Namespace) -> int:

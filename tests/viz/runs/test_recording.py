@@ -515,7 +515,8 @@ def test_files_of_one_name_are_two_machines(record, tmp_path):
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (["--port", "99999"], "expected 0 to 65535"),
+        (["--port", "99999"], "got '99999'; expected 0 to 65535"),
+        (["--port", "http"], "got 'http'; expected 0 to 65535"),
         (["--runs", "/nonexistent"], "no such file or folder"),
     ],
 )
