@@ -119,9 +119,13 @@ def _reads(what: str) -> Callable[[Callable[[bytes], T]], Callable[[bytes], T]]:
 # without making objects of it.
 
 
-def pack_goal(sent_ns: int, goal_id: str, goal_stamp_ns: int, goal: bytes) -> bytes:
-    """Write an XActionGoal: header, goal id, goal."""
-    return _pack_front(sent_ns, goal_id, goal_stamp_ns) + goal
+def pack_goal(
+    sent_ns: int, goal_id: str, goal_stamp_ns: int, goal: bytes, server: str = ""
+) -> bytes:
+    """Write an XActionGoal: header, goal id, goal; `server` is the token of the one it is for."""
+    if not server:
+        return _pack_front(sent_ns, goal_id, goal_stamp_ns) + goal
+    return b"".join((_pack_header(sent_ns, server), pack_goal_id(goal_id, goal_stamp_ns), goal))
 
 
 def unpack_goal(payload: bytes) -> tuple[str, int, bytes]:

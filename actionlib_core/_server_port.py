@@ -110,6 +110,7 @@ class ServerPort:
             types.action._md5sum,
         )
         self.endpoint = with_age(endpoint, node.clock.time_ns())
+        self._own_key = token_key(self.endpoint)
 
     def open(self) -> None:
         """Declare everything; the token comes last, so who sees it can be heard.
@@ -141,7 +142,7 @@ class ServerPort:
             transport.queryable(self.keys.result, self._on_query),
             transport.queryable(self.keys.goal, self._on_goal_query),
         ]
-        self._token = transport.declare_alive(token_key(self.endpoint))
+        self._token = transport.declare_alive(self._own_key)
         self._declared += [
             self._token,
             transport.watch_alive(token_pattern(None, self.name), self._on_presence),
@@ -184,7 +185,7 @@ class ServerPort:
 
     def send_farewell(self, now_ns: int, taken: list[StatusEntry]) -> None:
         """Say that the server leaves and which goals it has taken, and so which it has not."""
-        payload = pack_statuses(now_ns, taken, token_key(self.endpoint))
+        payload = pack_statuses(now_ns, taken, self._own_key)
         self._publisher(self.keys.status, GoalStatusArray, FAREWELL).put(payload)
 
     @property
@@ -226,6 +227,9 @@ class ServerPort:
         if not self._readable.check(sample, self._types.action_goal):
             return
         try:
+            server = unpack_frame(sample.payload)
+            if server and server != self._own_key:
+                return  # a late copy of a goal for a server before this one
             goal_id, stamp_ns, body = unpack_goal(sample.payload)
             content = self._types.goal.from_bytes(body)
         except (ValueError, ActionlibError) as error:

@@ -20,7 +20,7 @@ class CommStateMachine:
     Args:
         goal: Its life cycle.
         manager: The client's goals.
-        payload: The XActionGoal as it is sent.
+        body: The bytes of the XGoal.
         on_transition: Called under the manager's lock for each state passed; must only note it.
         on_feedback: The same, with each XFeedback message; None when nobody wants them.
 
@@ -33,12 +33,12 @@ class CommStateMachine:
         "_shown",
         "_shown_to",
         "asking",
+        "body",
         "ended",
         "goal",
         "manager",
         "on_feedback",
         "on_transition",
-        "payload",
         "settled",
     )
 
@@ -46,13 +46,13 @@ class CommStateMachine:
         self,
         goal: ClientGoal,
         manager: GoalManager,
-        payload: bytes,
+        body: bytes,
         on_transition: Callable[[CommStateMachine, CommState], None] | None,
         on_feedback: Callable[[CommStateMachine, Any], None] | None,
     ) -> None:
         self.goal = goal
         self.manager = manager
-        self.payload = payload
+        self.body = body
         self.on_transition = on_transition
         self.on_feedback = on_feedback
         self.asking = False

@@ -15,6 +15,7 @@ from actionlib_core._core.client_goal import UNLISTED_S, ClientGoal, Duty, Path
 from actionlib_core._core.states import TERMINAL, CommState, Status
 from actionlib_core.comm_state_machine import CommStateMachine
 from actionlib_core.exceptions import ActionlibError, TransportError
+from actionlib_core.presence import token_key
 from actionlib_core.shutdown import current_shutdown
 
 if TYPE_CHECKING:
@@ -84,6 +85,7 @@ class GoalManager:
         self._away: dict[Endpoint, float] = {}
         self._leaving: set[Endpoint] = set()
         self._current: Endpoint | None = None
+        self._token = ""
         self._met: dict[str, None] = {}
         self._foreign_until = 0.0
         self._waiters: list[Event] = []
@@ -120,6 +122,7 @@ class GoalManager:
         """Find the server after a change. Needs the lock."""
         ends = (end for end, error in self._servers.items() if error is None)
         self._current = next((end for end in ends if end not in self._leaving), None)
+        self._token = "" if self._current is None else token_key(self._current)
 
     def _meet(self, server: Endpoint) -> None:
         """Note that a server is one of ours: it shows a token. Needs the lock."""
@@ -287,8 +290,7 @@ class GoalManager:
             TransportError: the client is stopped.
         """
         goal = ClientGoal(goal_id, stamp_ns, ack_timeout=ack_timeout)
-        payload = pack_goal(stamp_ns, goal_id, stamp_ns, body)
-        machine = CommStateMachine(goal, self, payload, on_transition, on_feedback)
+        machine = CommStateMachine(goal, self, body, on_transition, on_feedback)
         return self._begin(machine, created)
 
     def attach(
@@ -606,7 +608,7 @@ class GoalManager:
             self._port.ask(goal.id, machine.on_answered)
 
     def _offer(self, machine: CommStateMachine) -> None:
-        """Send a goal if a server listens: one that was not sent cannot run twice.
+        """Send a goal if a server listens, to that one: then it cannot run twice.
 
         Others may listen, too, so that it is heard is not enough; and before its subscription is
         known, the token alone is not either.
@@ -621,7 +623,9 @@ class GoalManager:
             if server is None and self._foreign_until <= self._clock.now():
                 return
             goal.on_offered(server.session if server is not None else "")
-        self._port.send_goal(machine.payload)
+            token = self._token
+        stamp_ns = goal.stamp_ns
+        self._port.send_goal(pack_goal(stamp_ns, goal.id, stamp_ns, machine.body, token))
         if not goal.offered:  # a farewell came in between: another server may have heard it
             with self._lock:
                 goal.on_offered("")

@@ -26,15 +26,18 @@ def status(entry):
     return GoalStatus(goal_id=goal_id, status=entry.status, text=entry.text)
 
 
-@given(stamps, texts, stamps, st.integers(-(2**31), 2**31 - 1))
-def test_goal(sent, goal_id, stamp, number):
+@given(stamps, texts, stamps, st.integers(-(2**31), 2**31 - 1), texts)
+def test_goal(sent, goal_id, stamp, number, server):
     goal = msg.TestGoal(number)
-    payload = wire.pack_goal(sent, goal_id, stamp, goal.to_bytes())
+    payload = wire.pack_goal(sent, goal_id, stamp, goal.to_bytes(), server)
     message = msg.TestActionGoal(
-        header=header(sent), goal_id=GoalID(stamp=Time(0, stamp), id=goal_id), goal=goal
+        header=Header(stamp=Time(0, sent), frame_id=server),
+        goal_id=GoalID(stamp=Time(0, stamp), id=goal_id),
+        goal=goal,
     )
     assert payload == message.to_bytes()
     assert wire.unpack_goal(payload) == (goal_id, stamp, goal.to_bytes())
+    assert wire.unpack_frame(payload) == server
 
 
 @given(texts, stamps)

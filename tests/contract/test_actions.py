@@ -19,7 +19,7 @@ from actionlib_core.exceptions import (
     TypeMismatchError,
 )
 from actionlib_core.interfaces.actionlib import msg
-from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from actionlib_core.simple_action_client import SimpleActionClient, SimpleGoalState
 from actionlib_core.simple_action_server import SimpleActionServer
 from actionlib_core.time import Duration
@@ -294,6 +294,27 @@ def test_goals_sent_as_servers_come_and_go_run_once_and_none_is_lost(world):
             assert state is TerminalState.SUCCEEDED, handle.get_goal_status_text()
             assert ran[number] == 1
     assert doublers[-1].runs
+
+
+def test_copy_of_a_goal_that_outlives_its_server_does_not_run_at_the_next(world):
+    onlooker, copies, seen = world.node("onlooker").transport, [], world.event()
+    onlooker.subscribe("demo/goal", lambda sample: (copies.append(sample), seen.set()))
+    first = Doubler(world)
+    client = simple_client(world)
+    client.send_goal(msg.TestGoal(1))
+    assert client.wait_for_result(LONG_S)
+    assert seen.wait(LONG_S)
+    first.server.stop()
+    second = Doubler(world)
+    assert client.wait_for_server(LONG_S)
+    sender = onlooker.publisher("demo/goal", copies[0].encoding)
+    sender.put(copies[0].payload)
+    world.keep_order()
+    anybody = msg.TestActionGoal(goal_id=GoalID(id="by hand"), goal=msg.TestGoal(2))
+    sender.put(anybody.to_bytes())  # names no server
+    second.wait_started()
+    assert second.runs == [2]
+    assert first.runs == [1]
 
 
 def test_goal_sent_before_the_server_exists_runs_when_it_appears(world):
