@@ -19,8 +19,8 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from actionlib_core.clock import RealClock, current_clock
+from actionlib_core.clock._ending import ending
 from actionlib_core.clock._serial import report_thread_exception
-from actionlib_core.clock._threads import hasten_switching
 from actionlib_core.config import load_config
 from actionlib_core.exceptions import NodeError
 from actionlib_core.names import check_base_name, clean_namespace, parse_arguments, resolve_name
@@ -294,7 +294,7 @@ def _leave(node: Node, pid: int) -> None:
     """
     if os.getpid() != pid:
         return
-    hasten_switching()
+    ending.begin()
     current_shutdown().leave()
     node.close()
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import _thread
-import sys
 import threading
 from typing import Protocol
 
 IDLE_S = 5.0  # a cached thread without work ends after this
 IDLE_NAME = "idle"  # what a cached thread is called between two jobs
-LAST_SWITCH_S = 1e-4
 
 
 class Job(Protocol):
@@ -20,15 +18,6 @@ class Job(Protocol):
     def run(self) -> None:
         """Do the work; lets nothing through and ends with `mark_idle`."""
         ...
-
-
-def hasten_switching() -> None:
-    """Let threads take turns every `LAST_SWITCH_S`, as the interpreter ends.
-
-    Threads that work on meanwhile would have every step of the end wait for 5 ms each, and those
-    that must come out of their calls in time as well.
-    """
-    sys.setswitchinterval(LAST_SWITCH_S)
 
 
 def mark_idle() -> None:

@@ -51,11 +51,15 @@ class Inside:
     def wait_idle(self, timeout: float) -> None:
         """Wait until no other thread is in a call.
 
-        Blocks: `timeout` [s] at most.
+        Blocks: `timeout` [s] at most after the last of them that came out of one.
         """
         me, deadline = get_ident(), RealClock.now() + timeout
-        while self.depths.keys() - {me} and RealClock.now() < deadline:
+        others = self.depths.keys() - {me}
+        while others and RealClock.now() < deadline:
             RealClock().sleep(POLL_S)
+            left = self.depths.keys() & others
+            if len(left) < len(others):
+                others, deadline = left, RealClock.now() + timeout
 
 
 inside = Inside()

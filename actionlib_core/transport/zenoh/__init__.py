@@ -26,7 +26,7 @@ import zenoh
 from zenoh import handlers
 
 from actionlib_core.clock import RealClock, SerialExecutor, current_clock
-from actionlib_core.clock._threads import hasten_switching
+from actionlib_core.clock._ending import ending
 from actionlib_core.config import Config, load_config
 from actionlib_core.exceptions import AccessDeniedError, TransportError
 from actionlib_core.transport import Presence, Quality, Reply, Sample
@@ -288,6 +288,7 @@ class ZenohTransport:
     def _check_open(self, key: str) -> None:
         process.check(key)
         if self._closed:
+            ending.slow_down()
             raise TransportError(
                 f"{key}: the session is closed. Try using a node that is still open."
             )
@@ -342,7 +343,7 @@ def _close_all() -> None:
     """
     if process.forked:  # they are the other process's, and nothing here would answer
         return
-    hasten_switching()
+    ending.begin()
     for transport in list(_open_transports):
         transport.close()
     held.wait(LET_GO_S)

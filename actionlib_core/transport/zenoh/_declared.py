@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import zenoh
 
+from actionlib_core.clock._ending import ending
 from actionlib_core.exceptions import TransportError
 from actionlib_core.transport import Presence, Quality, Reply, Sample
 from actionlib_core.transport._inlet import Inlet, inside
@@ -89,6 +90,7 @@ class Publisher(Declared):
     def _check_open(self) -> None:
         process.check(self._key)
         if self._inlet.closed:
+            ending.slow_down()
             raise TransportError(
                 f"{self._key}: the publisher is closed. Try sending before the node is closed."
             )
