@@ -8,7 +8,7 @@ from contextvars import copy_context
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.clock import RealClock
-from smachpy._runtime.failures import unknown_outcome
+from smachpy._runtime.failures import ChildErrors, unknown_outcome
 from smachpy._runtime.frame import FRAME, Frame
 from smachpy._runtime.interrupt import Interruption
 from smachpy._runtime.step import run_watched
@@ -274,4 +274,4 @@ class Group:
         raise InvalidUserCodeError(
             f"{self.frame.path}: {len(failed)} of {len(self.branches)} children raised: {raised}",
             path=getattr(first.error, "path", "") or first.here(),
-        ) from ExceptionGroup(f"children of {self.frame.path}", errors)
+        ) from ChildErrors(f"children of {self.frame.path}", errors)

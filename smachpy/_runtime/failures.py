@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from smachpy.state import State
 
 
+class ChildErrors(ExceptionGroup[Exception]):
+    """What the children of a concurrence raised; not a group that one of them raised itself."""
+
+
 def user_error(path: str, state: State, error: BaseException) -> InvalidUserCodeError:
     """Return the error for code of a state that raised; raise it `from error`."""
     return InvalidUserCodeError(

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import inspect
 import threading
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from smachpy._runtime.asker import asking
+from smachpy._runtime.failures import ChildErrors
 from smachpy._runtime.frame import FRAME
 from smachpy._runtime.interrupt import Interruption
 from smachpy._runtime.watch import disarm, note_answer
@@ -15,7 +17,7 @@ from smachpy.exceptions import InvalidUserCodeError
 
 if TYPE_CHECKING:
     import asyncio
-    from collections.abc import Callable, Coroutine, Iterator
+    from collections.abc import Callable, Coroutine
 
     from smachpy._core.retry import Retry
     from smachpy._runtime.frame import Frame, RootFrame
@@ -145,18 +147,16 @@ class _Guarded:
 
     def _wants(self, retry: Retry, attempt: int, result: Any) -> bool:
         """Tell whether to run again after `result`, or after what a container's children raised."""
-        if retry.wants(attempt, result):
-            return True
-        return isinstance(result, Exception) and all(
-            retry.wants(attempt, error) for error in _raised(result)
-        )
+        if not isinstance(result, Exception):
+            return retry.wants(attempt, result)
+        return _applies(partial(retry.wants, attempt), result)
 
     def _conclude(self, result: Any) -> Any:
         """Return the outcome, or raise what no `on_exception` entry wants."""
         if not isinstance(result, Exception):
             return result
         for kind, outcome in (self._state.on_exception or {}).items():
-            if isinstance(result, kind) or all(isinstance(e, kind) for e in _raised(result)):
+            if _applies(partial(_is_a, kind), result):
                 return outcome
         raise result
 
@@ -269,17 +269,22 @@ def _reason(result: Any) -> str:
     return f"{type(result).__name__}: {result}" if isinstance(result, Exception) else str(result)
 
 
-def _raised(error: BaseException) -> Iterator[BaseException]:
-    """Yield what the code of states raised: `error`, or what a container made it from.
+def _is_a(kind: type[BaseException], error: BaseException) -> bool:
+    return isinstance(error, kind)
+
+
+def _applies(wanted: Callable[[BaseException], bool], error: BaseException) -> bool:
+    """Tell whether `wanted` is true of `error`, or of what a container made it from.
 
     Several children of a concurrence may have raised; an error that nobody wants must not
-    disappear beside one that somebody does, so all count.
+    disappear beside one that somebody does, so it must be true of all. A group that a state
+    itself has raised is one error.
     """
+    if wanted(error):
+        return True
     cause = error.__cause__ if isinstance(error, InvalidUserCodeError) else None
-    if isinstance(cause, BaseExceptionGroup):
-        for one in cause.exceptions:
-            yield from _raised(one)
-    elif cause is not None:
-        yield from _raised(cause)
-    else:
-        yield error
+    if cause is None:
+        return False
+    if isinstance(cause, ChildErrors):
+        return wanted(cause) or all(_applies(wanted, one) for one in cause.exceptions)
+    return _applies(wanted, cause)

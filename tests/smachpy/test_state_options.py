@@ -263,7 +263,7 @@ def test_exceptions_of_children_become_outcomes_of_the_container():
 
 
 def within(state, **options):
-    sm = smachpy.StateMachine(["ok", "aborted"], **options)
+    sm = smachpy.StateMachine(["ok", "aborted", "preempted"], **options)
     sm.add("IN", state)
     return sm
 
@@ -295,6 +295,26 @@ def test_of_several_children_that_raise_none_is_lost(clock):
     with pytest.raises(smachpy.InvalidUserCodeError, match="motor"):
         run(both(ValueError("motor"), retry=(3, 0.0, OSError)))
     assert run(both(ValueError("motor"), retry=(3, 0.0, [OSError, ValueError])))[0] == "ok"
+
+
+@pytest.mark.parametrize("around", [within, beside, lambda s, **o: beside(within(s), **o)])
+def test_a_group_that_a_child_itself_raises_is_one_error(around):
+    def fails():
+        return Fails(1, ExceptionGroup("both wheels", [OSError("left"), ValueError("right")]))
+
+    assert run(around(fails(), on_exception={ExceptionGroup: "broken"}))[0] == "broken"
+    assert run(around(fails(), retry=(2, 0.0, ExceptionGroup)))[0] == "ok"
+    with pytest.raises(smachpy.InvalidUserCodeError, match="both wheels"):
+        run(around(fails(), on_exception={OSError: "broken", ValueError: "broken"}))
+
+
+def test_the_group_that_a_concurrence_makes_of_errors_can_be_asked_for():
+    def fails(**options):
+        return beside(Fails(1, OSError("busy")), Fails(1), **options)
+
+    assert run(fails(on_exception={ExceptionGroup: "broken"}))[0] == "broken"
+    assert run(within(fails(), on_exception={ExceptionGroup: "broken"}))[0] == "broken"
+    assert run(fails(retry=(2, 0.0, ExceptionGroup)))[0] == "ok"
 
 
 def test_hooks_run_around_the_state():
