@@ -180,8 +180,9 @@ class Explorer:
         elif isinstance(event, Left | Failed):
             self._active.pop(event.path, None)
             self._hanging.discard(event.path)
-            if isinstance(event, Left):
-                self._ended[event.path] = event.outcome
+            # Not only the kind: an error from deeper down has it in its text.
+            left = event.outcome if isinstance(event, Left) else f"raised {event.error}"
+            self._ended[event.path] = left
             if event.path in self._leaves:
                 self._outlasting.clear()  # another one may be the next to end
         elif isinstance(event, Iterated):

@@ -581,6 +581,31 @@ def test_leaves_raise_what_they_and_their_containers_expect():
     assert "RuntimeError: raised by the test" in reason(found)  # which nobody expects
 
 
+@pytest.mark.parametrize("deep", [False, True])
+@pytest.mark.parametrize("interleavings", [False, True])
+def test_what_a_leaf_raised_is_part_of_the_situation_beside_it(deep, interleavings):
+    """Beside a leaf that raised a ValueError not all is seen that was after a RuntimeError."""
+    broken = StateMachine(["done"])
+    with broken:
+        broken.add("RAISES", Leaf("done"))
+    beside = StateMachine(["done", "other"], on_exception={Exception: "other"})
+    with beside:
+        beside.add("LONG", Leaf("on"), {"on": "END"})
+        beside.add("END", Leaf("done", "other"))
+    kinds = {RuntimeError: "runtime", ValueError: "value"}
+    both = Concurrence(["done", "runtime", "value"], "done", on_exception=kinds)
+    with both:
+        both.add("A", broken if deep else Leaf("done"))
+        both.add("B", beside)
+    sm = StateMachine(["done"], name="M")
+    with sm:
+        sm.add("BOTH", both, {"runtime": "done", "value": "VALUE"})
+        sm.add("VALUE", Leaf("ok", "odd"), {"ok": "done", "odd": "TRAP"})
+        sm.add("TRAP", CBState(lambda _: 1 / 0, outcomes=["done"]))
+    found = explore(sm, faults=["raise"], keep=["TRAP"], preempts=0, interleavings=interleavings)
+    assert "ZeroDivisionError" in reason(found)
+
+
 def test_a_value_that_no_double_has_written_is_told_with_the_way_out():
     def machine():
         each = Iterator(
