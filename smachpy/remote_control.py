@@ -14,7 +14,8 @@ may be left out), `command`, and what that needs:
     initial path states
 
 `running` is "keep" or "cancel", as for `Control.pause`. An answer is `id`, `ok`, `text` (why not),
-`paused` and `breakpoints` (pairs path, outcome).
+`paused` and `breakpoints` (pairs path, outcome) as they were then: what they are now is what
+`control_state` has told last.
 """
 
 from __future__ import annotations
@@ -81,7 +82,6 @@ class ControlServer:
         self._executor = SerialExecutor(node.clock, f"control of {server_name}")
         self._results = Publisher(server_name + RESULT_TOPIC, String, node=node)
         self._states = Publisher(server_name + STATE_TOPIC, String, latch=True, node=node)
-        self._told: dict[str, Any] = {}
         self._forget = machine.control.on_change(lambda: self._executor.submit(self._tell_state))
         self._executor.submit(self._tell_state)
         self._commands = Subscriber(server_name + CONTROL_TOPIC, String, self._take, node=node)
@@ -95,10 +95,8 @@ class ControlServer:
         self._states.unregister()
 
     def _tell_state(self) -> None:
-        state = self.state()
-        if state != self._told:
-            self._told = state
-            self._states.publish(json.dumps(state))
+        """Tell after each change, even as before: an answer may have told what was in between."""
+        self._states.publish(json.dumps(self.state()))
 
     def state(self) -> dict[str, Any]:
         """Return whether the machine is paused, and its breakpoints."""

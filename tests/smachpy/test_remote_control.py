@@ -6,13 +6,15 @@ import json
 
 import pytest
 
+from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import Trigger
 from actionlib_core.node import Node
 from actionlib_core.service import ServiceProxy
+from actionlib_core.topic import Subscriber
 from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import IntrospectionServer, State, StateMachine
 from smachpy.events import PreemptRequested, to_record
-from smachpy.remote_control import CommandError, ControlClient, parse_command
+from smachpy.remote_control import STATE_TOPIC, CommandError, ControlClient, parse_command
 from smachpy.run_state import RunState
 
 
@@ -64,6 +66,22 @@ def test_pause_step_resume_and_breakpoints(world):
     clock.sleep(5.0)
     assert machine.control.waiting() == ("/JOB/B",)
     assert client.send({"command": "unbreak", "path": "/JOB/B"})["breakpoints"] == []
+
+
+def test_every_change_is_told_though_it_is_undone_at_once(world):
+    """An answer may have told what was in between: a resume into the next breakpoint."""
+    machine, _, clock, desk = world
+    told = []
+    with Subscriber("/robot" + STATE_TOPIC, String, lambda m: told.append(m.data), node=desk):
+        clock.sleep(0.5)
+        machine.control.pause()
+        clock.sleep(0.5)
+        told.clear()
+        machine.control.resume()
+        machine.control.pause()
+        clock.sleep(0.5)
+    assert told
+    assert json.loads(told[-1]) == {"paused": True, "breakpoints": []}
 
 
 def test_a_pause_that_stops_what_runs(world):

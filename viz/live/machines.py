@@ -114,7 +114,7 @@ class Machine:
         self._on_change(self)
 
     def set_control(self, state: dict[str, Any]) -> None:
-        """Take the answer to a command, or what the machine tells of itself."""
+        """Take what the machine tells of itself."""
         self.control = {"paused": state["paused"], "breakpoints": state["breakpoints"]}
         self._on_change(self)
 

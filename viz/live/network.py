@@ -211,12 +211,10 @@ class Link:
         self._executor.join(HISTORY_S)
 
     def send(self, command: dict[str, Any]) -> dict[str, Any]:
-        """Send a command and return the answer."""
+        """Send a command and return the answer; the machine tells what has become of it."""
         if self._client is None:
             raise CommandError(f"{self.server}: this viewer only looks. Try --control.")
-        answer = self._client.send(command)
-        self._machine.set_control(answer)
-        return answer
+        return self._client.send(command)
 
     def value(self, container: str, key: str) -> str:
         """Return a value of the machine's userdata, whole."""

@@ -193,3 +193,29 @@ def test_a_history_tells_of_a_pause_too(clock, watch):
     link._executor.submit(link._read_history)
     clock.sleep(1.0)
     assert seen.facts()["control"] == {"paused": False, "breakpoints": []}
+
+
+def test_an_answer_that_is_read_late_does_not_undo_what_was_told_since(clock, watch, monkeypatch):
+    """Resume, into the next breakpoint."""
+    job = spinning(1)
+    seen = watch(job)
+    job.control.add_breakpoint("/JOB/A")
+    job.control.add_breakpoint("/JOB/B")
+    mission = clock.spawn(job.execute, name="mission")
+    clock.sleep(1.0)
+    assert seen.facts()["control"]["paused"]
+    client = watch.viewer._links["robot"]._client
+    send = client.send
+
+    def slowly(command):
+        answer = send(command)
+        clock.sleep(1.0)
+        return {**answer, "paused": False}  # as it was when the command had been obeyed
+
+    monkeypatch.setattr(client, "send", slowly)
+    watch.viewer.send("robot", {"command": "resume"})
+    clock.sleep(1.0)
+    assert job.control.waiting() == ("/JOB/B",)
+    assert seen.facts()["control"]["paused"]
+    job.control.resume()
+    assert mission.join(60.0)
