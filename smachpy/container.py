@@ -289,6 +289,9 @@ class Container(Openable, Callbacks, State):
         with self._lock:
             if frame.dead:
                 return
+            if self._preempt_requested and not frame.asked:  # by a hook, or between two attempts
+                asker = self._asker
+                frame.called_off = asker is None or asker.source != "timeout"
             if self._frame is None:
                 self._preempt_requested = False
                 for ended in self._end_waiters:

@@ -65,12 +65,14 @@ def _run_root(
         control.attach(run)
     if root._listeners or root._tapes:  # noqa: SLF001  one machinery
         run.watched = True
+    if run.watched:
+        frame.emit_own(Started, tuple(root.get_initial_states()))
+    asker, root._asker = root._asker, None  # noqa: SLF001  one machinery
+    if root.preempt_requested():
+        frame.asked = frame.called_off = True
     if not run.watched:
         return _run_in(root, frame, parent_ud)
-    frame.emit_own(Started, tuple(root.get_initial_states()))
-    asker, root._asker = root._asker, None  # noqa: SLF001  one machinery
-    if asker is not None and root.preempt_requested():
-        frame.asked = True
+    if asker is not None and frame.asked:
         frame.emit_own(PreemptRequested, *asker)
     outcome: str | None = None
     try:

@@ -11,6 +11,7 @@ import pytest
 
 import smachpy
 from actionlib_core.clock import RealClock, current_clock, use_clock
+from actionlib_core.shutdown import Shutdown, use_shutdown
 from smachpy.events import (
     Abandoned,
     Finished,
@@ -149,6 +150,40 @@ def test_a_root_that_is_asked_to_stop_makes_no_further_attempt(clock, asked_at):
     assert [e.path for e in events if isinstance(e, PreemptServiced)] == ["/ROOT/A", "/ROOT"]
     state.seconds = [0.0]
     assert sm.execute() == "ok"
+
+
+@pytest.mark.parametrize("watched", [True, False])
+@pytest.mark.parametrize("asks", ["program", "shutdown", "hook"])
+def test_a_root_that_was_asked_before_it_began_makes_no_attempt(clock, asks, watched):
+    state = Fails(9, "preempted")
+    sm = smachpy.StateMachine(["ok", "aborted", "preempted"], retry=(3, 0.0, "preempted"))
+    sm.add("A", state)
+    events = []
+    if watched:
+        sm.subscribe(events.append)
+    if asks == "hook":
+        sm.on_enter = lambda _userdata: sm.request_preempt()
+    with use_shutdown(Shutdown()) as shutdown:
+        if asks == "shutdown":
+            shutdown.request()
+        elif asks == "program":
+            sm.request_preempt()
+        assert sm.execute() == "preempted"
+    assert state.runs == 0
+    assert not [e for e in events if isinstance(e, Retried)]
+    sm.on_enter, state.left = None, 0
+    assert sm.execute() == "ok"
+
+
+def test_a_root_that_is_asked_between_two_attempts_makes_no_third_one(clock):
+    state = Fails(9, "aborted")
+    again = smachpy.Retry(5, 0, ["aborted", "preempted"])
+    sm, events = root_of(state, retry=again)
+    sm.register_outcomes(["aborted"])
+    sm.subscribe(lambda event: sm.request_preempt() if isinstance(event, Retried) else None)
+    assert sm.execute() == "preempted"
+    assert state.runs == 1
+    assert len([e for e in events if isinstance(e, Retried)]) == 1
 
 
 def test_timeout_of_the_root_that_comes_too_late_does_not_end_the_next_run():
