@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from actionlib_core.clock._gates import make_gate
 from actionlib_core.clock._real import RealEvent
-from actionlib_core.clock._serial import report_thread_exception
+from actionlib_core.clock._serial import report_exit, report_thread_exception
 from actionlib_core.clock._virtual_parts import (
     Deadlock,
     Participant,
@@ -446,7 +446,12 @@ class VirtualClock:
         self._in_callback = True
         try:
             contextvars.Context().run(callback)
-        except Exception:  # noqa: BLE001  a border: reported, the run goes on
+        except SystemExit as error:
+            report_exit("clock-timers", error)
+        except BaseException as error:  # a border: reported, the run goes on
+            main = threading.current_thread() is threading.main_thread()
+            if main and isinstance(error, KeyboardInterrupt):  # Ctrl-C came, whoever was running
+                raise
             report_thread_exception()
         finally:
             self._in_callback = False

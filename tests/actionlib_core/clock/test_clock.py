@@ -131,18 +131,31 @@ def test_call_later_reports_an_error_and_runs_the_next(any_clock, monkeypatch):
     assert reported == [ZeroDivisionError]
 
 
-def test_timers_go_on_after_one_that_ends_its_thread(caplog):
-    """No timer of this clock ever ran again."""
-    clock = RealClock()
-    done = clock.event()
+@pytest.mark.parametrize("ends", [False, True], ids=["waits", "ends"])
+@pytest.mark.parametrize("raised", [SystemExit, asyncio.CancelledError])
+def test_timers_go_on_after_one_that_ends_its_thread(any_clock, monkeypatch, caplog, raised, ends):
+    """In real time no timer ever ran again; in virtual time it ended whoever waited or had ended.
+
+    `ends`: the thread that made the timer has ended when it is due.
+    """
+    reported = []
+    monkeypatch.setattr(threading, "excepthook", lambda args: reported.append(args.exc_type))
+    done = any_clock.event()
 
     def leave():
-        raise SystemExit("enough")
+        raise raised("enough")
 
-    clock.call_later(0.001, leave)
-    clock.call_later(0.002, done.set)
+    def start():
+        any_clock.call_later(0, leave)
+        any_clock.call_later(0.002, done.set)
+
+    task = any_clock.spawn(start, name="t") if ends else start()
     assert done.wait(5)
-    assert "clock-timers: a callback raised SystemExit: enough" in caplog.text
+    assert task is None or task.join(5)
+    if raised is SystemExit:
+        assert "clock-timers: a callback raised SystemExit: enough" in caplog.text
+    else:
+        assert reported == [raised]
 
 
 def test_run_async_returns_the_result_and_uses_the_clock(any_clock):

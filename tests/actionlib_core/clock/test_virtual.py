@@ -128,6 +128,14 @@ def test_a_callback_may_not_wait(clock, monkeypatch):
     assert "a callback may not wait" in reported[0]
 
 
+def test_ctrl_c_in_a_callback_is_the_main_thread_s(clock):
+    clock.call_later(1, lambda: signal.raise_signal(signal.SIGINT))
+    with pytest.raises(KeyboardInterrupt):
+        clock.sleep(2)
+    clock.sleep(2)
+    assert clock.now() == pytest.approx(3)
+
+
 class Interrupt(Exception):
     pass
 
