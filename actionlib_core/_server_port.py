@@ -227,15 +227,21 @@ class ServerPort:
         if not self._readable.check(sample, self._types.action_goal):
             return
         try:
-            server = unpack_frame(sample.payload)
-            if server and server != self._own_key:
-                return  # a late copy of a goal for a server before this one
+            if self._is_of_another(unpack_frame(sample.payload)):
+                return
             goal_id, stamp_ns, body = unpack_goal(sample.payload)
             content = self._types.goal.from_bytes(body)
         except (ValueError, ActionlibError) as error:
             self._report_unreadable("a goal", sample, error)
             return
         self._listener.on_goal(goal_id, stamp_ns, content, sample.source)
+
+    def _is_of_another(self, frame: str) -> bool:
+        """Tell whether a goal is a late copy of one for another server of this name."""
+        if not frame or frame == self._own_key:
+            return False
+        server = parse_token(frame)
+        return server is not None and server.kind is Kind.ACTION_SERVER and server.name == self.name
 
     def _on_cancel(self, sample: Sample) -> None:
         if not self._readable.check(sample, GoalID):

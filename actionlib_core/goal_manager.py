@@ -15,7 +15,7 @@ from actionlib_core._core.client_goal import UNLISTED_S, ClientGoal, Duty, Path
 from actionlib_core._core.states import TERMINAL, CommState, Status
 from actionlib_core.comm_state_machine import CommStateMachine
 from actionlib_core.exceptions import ActionlibError, TransportError
-from actionlib_core.presence import token_key
+from actionlib_core.presence import age_of, token_key
 from actionlib_core.shutdown import current_shutdown
 
 if TYPE_CHECKING:
@@ -119,9 +119,13 @@ class GoalManager:
         return self._current
 
     def _choose_server(self) -> None:
-        """Find the server after a change. Needs the lock."""
-        ends = (end for end, error in self._servers.items() if error is None)
-        self._current = next((end for end in ends if end not in self._leaving), None)
+        """Find the server after a change, the youngest of several. Needs the lock.
+
+        A token may outlast its server, until the lease of a link is over that was lost.
+        """
+        ends = [end for end, error in self._servers.items() if error is None]
+        there = [end for end in ends if end not in self._leaving]
+        self._current = max(there, key=age_of, default=None)
         self._token = "" if self._current is None else token_key(self._current)
 
     def _meet(self, server: Endpoint) -> None:
@@ -484,7 +488,7 @@ class GoalManager:
                 goal.on_sign_of_life(self._clock.now())
             else:
                 self._hear(machine, entry, server, self._clock.now())
-            if machine.on_feedback is not None:
+            if machine.on_feedback is not None and feedback is not None:  # else just taken up
                 machine.on_feedback(machine, feedback)
 
     def on_result(self, entry: StatusEntry, body: bytes, server: str) -> None:

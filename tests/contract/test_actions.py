@@ -19,7 +19,8 @@ from actionlib_core.exceptions import (
     TypeMismatchError,
 )
 from actionlib_core.interfaces.actionlib import msg
-from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from actionlib_core.presence import Endpoint, Kind
 from actionlib_core.simple_action_client import SimpleActionClient, SimpleGoalState
 from actionlib_core.simple_action_server import SimpleActionServer
 from actionlib_core.time import Duration
@@ -297,24 +298,46 @@ def test_goals_sent_as_servers_come_and_go_run_once_and_none_is_lost(world):
 
 
 def test_copy_of_a_goal_that_outlives_its_server_does_not_run_at_the_next(world):
-    onlooker, copies, seen = world.node("onlooker").transport, [], world.event()
-    onlooker.subscribe("demo/goal", lambda sample: (copies.append(sample), seen.set()))
+    copies, seen = [], world.event()
+    client = SimpleActionClient("demo", msg.TestAction, node=world.node("client"))
+    wire = client.action_client.node.transport
+    wire.subscribe("demo/goal", lambda sample: (copies.append(sample), seen.set()))
     first = Doubler(world)
-    client = simple_client(world)
     client.send_goal(msg.TestGoal(1))
     assert client.wait_for_result(LONG_S)
     assert seen.wait(LONG_S)
     first.server.stop()
     second = Doubler(world)
     assert client.wait_for_server(LONG_S)
-    sender = onlooker.publisher("demo/goal", copies[0].encoding)
+    sender = wire.publisher("demo/goal", copies[0].encoding)
     sender.put(copies[0].payload)
     world.keep_order()
-    anybody = msg.TestActionGoal(goal_id=GoalID(id="by hand"), goal=msg.TestGoal(2))
-    sender.put(anybody.to_bytes())  # names no server
-    second.wait_started()
-    assert second.runs == [2]
+    for number, frame in enumerate(("", "map"), 2):  # which name no server
+        by_hand = msg.TestActionGoal(goal=msg.TestGoal(number))
+        by_hand.header.frame_id, by_hand.goal_id.id = frame, f"by hand {number}"
+        sender.put(by_hand.to_bytes())
+        second.wait_started()
+        world.keep_order()
+    assert second.runs == [2, 3]
     assert first.runs == [1]
+
+
+def test_goal_goes_to_the_youngest_server_that_shows_a_token(world):
+    """A token may outlast its server, until the lease of a lost link is over."""
+    client = SimpleActionClient("demo", msg.TestAction, node=world.node("client"))
+    words = msg.TestAction._type, msg.TestAction._md5sum, "0" * 32, "/dead", 1
+    dead = Endpoint(Kind.ACTION_SERVER, "demo", *words)
+    manager = client.action_client.manager
+    manager.on_server(dead, None)
+    client.send_goal(msg.TestGoal(3))
+    doubler = Doubler(world)
+    doubler.wait_started()
+    client.send_goal(msg.TestGoal(4))
+    doubler.wait_started()
+    manager.on_server_gone(dead)
+    assert client.wait_for_result(LONG_S)
+    assert client.get_result().result == 8
+    assert doubler.runs == [3, 4]
 
 
 def test_goal_sent_before_the_server_exists_runs_when_it_appears(world):
