@@ -7,7 +7,7 @@ import copy
 import inspect
 import logging
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from actionlib_core.clock import RealClock, VirtualClock
 from smachpy.container import Container
@@ -22,6 +22,7 @@ from smachpy.testing.explorers import Explorer, Options, kept_by
 from smachpy.testing.kit import MissionKit
 from smachpy.testing.runs import find_path
 from smachpy.testing.verdicts import judge
+from smachpy.testing.watch import STEPS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from smachpy.testing.verdicts import Verdict
 
 LIMIT_S = 3600.0
-STEPS = 10_000  # while no time passes; more of them never end
 _COMPUTER = RealClock()  # for the time of the computer: `time` is a mission's while it runs
 SHRINKING_RUNS = 300
 _OUTSIDE = frozenset({"monitor", "condition", "service"})
@@ -107,6 +107,8 @@ def explore(
     max_time: float = 10.0,
     max_depth: int = 60,
     max_steps: int = 200,
+    limit: float = LIMIT_S,
+    steps: int = STEPS,
     invariants: Iterable[Callable[[Run], object]] = (),
     faults: Iterable[str] = (),
     preempts: int = 1,
@@ -138,7 +140,9 @@ def explore(
         max_runs: Most runs.
         max_time: Longest time [s of the computer]; to shorten what it found as long again.
         max_depth: Choices of a run after this many are not varied.
-        max_steps: Leaves in a run; with more it counts as one that never ends.
+        max_steps: Leaves with doubles in a run; with more it counts as one that never ends.
+        limit: Longest run [s of its own clock, without what outlasts others]; so, too.
+        steps: Most steps while no time passes, as in `mission(...)`; so, too.
         invariants: Called with each run. Anything false but None, or an exception, is a
             counterexample.
         faults: "hang": any leaf may never finish; "raise": may raise, a RuntimeError and whatever
@@ -171,11 +175,12 @@ def explore(
     options = Options(
         frozenset(faults), preempts, interleavings, max_steps, dict(writes or {}), merges=not own
     )
+    times = _Times(limit, steps)
     on_run = on_run or session.current().on_run
     begun = _COMPUTER.now()
     search = Search(max_depth)
     with _Runner(
-        machine, options, tuple(keep), userdata, doubles, real_actions=real_actions
+        machine, options, times, tuple(keep), userdata, doubles, real_actions=real_actions
     ) as runner:
         shrinker = _Shrinker(runner, own, grace, max_time)
         runs = 0
@@ -210,6 +215,8 @@ def replay(
     preempts: int = 1,
     interleavings: bool = True,
     max_steps: int = 200,
+    limit: float = LIMIT_S,
+    steps: int = STEPS,
     keep: Iterable[str] = (),
     writes: Mapping[str, Mapping[str, Any]] | None = None,
     real_actions: bool = False,
@@ -225,6 +232,8 @@ def replay(
         preempts: See there.
         interleavings: See there.
         max_steps: See there.
+        limit: See there.
+        steps: See there.
         keep: See there.
         writes: See there.
         real_actions: See there.
@@ -236,13 +245,28 @@ def replay(
         Exception: what the run raised.
     """
     options = Options(frozenset(faults), preempts, interleavings, max_steps, dict(writes or {}))
+    times = _Times(limit, steps, "replay")
     with _Runner(
-        machine, options, tuple(keep), userdata, doubles, real_actions=real_actions
+        machine, options, times, tuple(keep), userdata, doubles, real_actions=real_actions
     ) as runner:
         run, error = runner.run(choices)
     if error is not None:
         raise error
     return run
+
+
+class _Times(NamedTuple):
+    """How long a run may take.
+
+    Attributes:
+        limit_s: On its own clock [s].
+        steps: While no time passes.
+        call: Who takes other ones.
+    """
+
+    limit_s: float = LIMIT_S
+    steps: int = STEPS
+    call: str = "explore"
 
 
 class _Runner:
@@ -252,6 +276,7 @@ class _Runner:
         self,
         machine: Container | Callable[[], Container],
         options: Options,
+        times: _Times,
         keep: tuple[str, ...],
         userdata: Mapping[str, Any] | None,
         doubles: Iterable[Replacement] = (),
@@ -260,6 +285,7 @@ class _Runner:
     ) -> None:
         self.source = machine
         self.options = options
+        self.times = times
         self.keep = keep
         self.userdata = dict(userdata or {})
         self.doubles = tuple(doubles)
@@ -343,13 +369,14 @@ class _Runner:
         error: Exception | None = None
         # A kit for each run: what still waits in one must not reach into the next.
         with MissionKit(choose=self.explorer.turn, on_run=runs.append) as kit:
-            kit.draws = False
+            kit.draws, kit.call = False, self.times.call
             self.explorer.clock = kit.clock
             servers: list[ScriptedActionServer] = []
             if self.real_actions:
                 servers = serve_actions(kit, machine, self.explorer)
             try:
-                kit(machine, copy.deepcopy(self.userdata), limit=LIMIT_S, steps=STEPS)
+                limit_s, steps, _ = self.times
+                kit(machine, copy.deepcopy(self.userdata), limit=limit_s, steps=steps)
             except Exception as caught:  # noqa: BLE001  judged by the caller
                 error = caught
             finally:
@@ -461,12 +488,14 @@ def _script(runner: _Runner, choices: tuple[str, ...], reason: str) -> str:
     if runner.doubles:
         names = ", ".join(path for path, _, _ in runner.doubles)
         call, note = "mission.replay", f"# in the test, after its mission.replace(...) of {names}\n"
-    options = runner.options
+    options, times = runner.options, runner.times
     arguments = [
         f"faults={sorted(options.faults)!r}" if options.faults else "",
         f"preempts={options.preempts}" if options.preempts != 1 else "",
         "" if options.interleavings else "interleavings=False",
         f"max_steps={options.most_steps}" if options.most_steps != Options().most_steps else "",
+        f"limit={times.limit_s!r}" if times.limit_s != LIMIT_S else "",
+        f"steps={times.steps}" if times.steps != STEPS else "",
         f"keep={list(runner.keep)!r}" if runner.keep else "",
         f"writes={dict(options.writes)!r}" if options.writes else "",
         "real_actions=True" if runner.real_actions else "",

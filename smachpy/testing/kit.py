@@ -42,21 +42,27 @@ LIMIT_S = 6 * 3600.0
 class TimeLimitError(SmachError):
     """A mission under test ran longer than the limit, or on and on while no time passed.
 
-    Attributes:
+    Args:
         run: The run up to there.
+        limit: Its limit [s].
+        steps: What it did while no time passed, in words; "" if its time was over.
+        call: Who takes other limits.
+
+    Attributes:
+        run: See above.
     """
 
-    def __init__(self, run: Run, limit: float, steps: int = 0) -> None:
+    def __init__(self, run: Run, limit: float, steps: str = "", call: str = "mission") -> None:
         self.run = run
         active = ", ".join(run.active) or "nothing"
         what = f"it still ran after {limit:g} s, in {active}; expected an end. Try"
         if steps:
             what = (
-                f"it took {steps} steps at {run.duration:g} s, in {active}; expected time to pass, "
+                f"{steps} at {run.duration:g} s, in {active}; expected time to pass, "
                 "or an end. Let a state or a server take time, or try"
             )
         word = "steps" if steps else "limit"
-        super().__init__(f"{run.record.path}: {what} mission(..., {word}=...).\n{run.explain()}")
+        super().__init__(f"{run.record.path}: {what} {call}(..., {word}=...).\n{run.explain()}")
 
 
 class UnfiredWarning(UserWarning):
@@ -81,6 +87,7 @@ class MissionKit:
         node: The mission's node.
         shutdown: The end of the program, requested by `interrupt`.
         draws: Whether runs that raise are drawn.
+        call: Who takes other limits, for the errors' texts.
         on_run: See above.
     """
 
@@ -100,6 +107,7 @@ class MissionKit:
         self.node = Node("mission", transport=self.transport, clock=self.clock)
         self.shutdown = Shutdown()
         self.draws = True
+        self.call = "mission"
         self._folder = folder or _temporary_folder
         self.on_run = on_run
         self._places = Places()
@@ -182,7 +190,7 @@ class MissionKit:
         run = self._finish(machine, record, whole, watch, outcome)
         errors, causes = self._take_errors()
         if error is not None:
-            _reraise(error, run, limit, steps, errors, draws=self.draws)
+            _reraise(self, error, run, limit, steps, errors)
         raise_errors(errors, causes)
         for text in run.unfired:
             warnings.warn(UnfiredWarning(f"{record.path}: {text}"), stacklevel=2)
@@ -409,19 +417,18 @@ class MissionKit:
 
 
 def _reraise(
-    error: BaseException, run: Run, limit: float, steps: int, errors: list[str], *, draws: bool
+    kit: MissionKit, error: BaseException, run: Run, limit: float, steps: int, errors: list[str]
 ) -> NoReturn:
     """Raise what ended a run, a deadlock as itself, with the run and `errors` as notes."""
     cause: BaseException | None = error
     while cause is not None and not isinstance(cause, Deadlock | TimeLimit | Stuck):
         cause = cause.__cause__
     if isinstance(cause, TimeLimit | Stuck):
-        stuck = isinstance(cause, Stuck) or cause.turns > 0
-        over = TimeLimitError(run, limit, steps if stuck else 0)
+        over = TimeLimitError(run, limit, _untimed(cause, steps), kit.call)
         _note(over, errors)
         raise over from cause
     chosen = error if cause is None else cause
-    picture = run.draw() if draws else None
+    picture = run.draw() if kit.draws else None
     _note(chosen, errors)
     if run.active:
         chosen.add_note("active: " + ", ".join(run.active))
@@ -429,6 +436,13 @@ def _reraise(
     if picture is not None:
         chosen.add_note(f"picture: {picture}")
     raise chosen
+
+
+def _untimed(cause: TimeLimit | Stuck, steps: int) -> str:
+    """Return what a run did while no time passed; "" if its time was over."""
+    if isinstance(cause, Stuck):
+        return f"it took {steps} steps"
+    return f"its threads took {cause.turns} turns ({TURN_STEPS} steps each)" if cause.turns else ""
 
 
 def _note(error: BaseException, errors: list[str]) -> None:

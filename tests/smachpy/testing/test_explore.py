@@ -11,7 +11,7 @@ import pytest
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from actionlib_core.simple_action_client import SimpleActionClient
 from smachpy import CBState, Concurrence, Iterator, SimpleActionState, State, StateMachine
-from smachpy.testing import UnknownStateError, explore, mission_kit, replay
+from smachpy.testing import TimeLimitError, UnknownStateError, explore, mission_kit, replay
 from smachpy.testing.explorers import Explorer
 
 
@@ -141,9 +141,51 @@ def test_a_loop_in_which_no_time_passes(outcomes):
     with sm.opened(check=False):
         sm.add("A", CBState(lambda _: "again", outcomes=["again"]), {"again": "A"})
     begun = time.monotonic()
-    found = explore(sm, keep=["A"], max_time=0.5)
+    found = explore(sm, keep=["A"], max_time=0.5, steps=10_000)
     assert reason(found).startswith("it never ends: /M: it took 10000 steps at 0 s, in /M/A")
+    assert "or try explore(..., steps=...)" in reason(found)
     assert time.monotonic() - begun < 30
+
+
+def through(item, count):
+    each = Iterator(
+        ["done", "preempted"], [], [], it=range(count), it_label="n", exhausted_outcome="done"
+    )
+    with each:
+        Iterator.set_contained_state("DO", item, ["done"])
+    return each
+
+
+def test_many_items_in_no_time_are_no_run_that_never_ends():
+    each = through(CBState(lambda _: "done", outcomes=["done"]), 4000)
+    assert explore(each, keep=["DO"], preempts=0).ok
+    found = explore(each, keep=["DO"], preempts=0, steps=3000, max_time=0.1)
+    assert "it took 3000 steps at 0 s" in reason(found)
+    assert "    steps=3000,\n" in found.counterexample.script
+    with pytest.raises(TimeLimitError, match=r"took 3000 steps .* or try replay\(..., steps="):
+        replay(each, [], keep=["DO"], preempts=0, steps=3000)
+
+
+def test_turns_in_no_time_are_told_as_turns():
+    both = Concurrence(["done"], "done")
+    with both:
+        for name in "ABC":
+            both.add(name, CBState(lambda _: "done", outcomes=["done"]))
+    each = through(both, 30)
+    assert explore(each, keep=["DO"], preempts=0, max_runs=1).ok
+    found = explore(each, keep=["DO"], preempts=0, steps=300, max_time=0.1)
+    assert "its threads took 60 turns (5 steps each) at 0 s" in reason(found)
+
+
+def test_a_kept_leaf_may_take_hours_if_the_test_says_so():
+    sm = StateMachine(["done", "preempted"], name="M")
+    with sm:
+        sm.add("A", CBState(lambda _: time.sleep(5000) or "done", outcomes=["done"]))
+    found = explore(sm, keep=["A"], preempts=0)
+    assert "it still ran after 3600 s, in /M/A" in reason(found)
+    assert "Try explore(..., limit=...)" in reason(found)
+    assert explore(sm, keep=["A"], preempts=0, limit=6000.0).ok
+    assert replay(sm, [], keep=["A"], preempts=0, limit=6000.0).duration == 5000
 
 
 def test_a_watcher_that_nobody_calls_off():
