@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import signal
 import time
@@ -9,6 +10,8 @@ import urllib.request
 from dataclasses import asdict
 
 import pytest
+
+from viz.live import app
 
 pytestmark = pytest.mark.browser
 
@@ -142,6 +145,29 @@ def test_a_server_that_says_nothing_is_lost_and_found_again(start, look):
     finally:
         os.kill(view.pid, signal.SIGCONT)
     wait_for(page, "smachpy.store.connection.value === 'live'")
+
+
+def test_a_message_that_comes_slowly_is_waited_for(served, look, monkeypatch):
+    """What a slow link brings is no message before its end, and looks as if nothing came."""
+    beat, slow = 0.05, 0.6
+    opened = []
+    stream = app.Viewer._stream
+
+    async def slowly(viewer, one):
+        opened.append(one)
+        async for text in stream(viewer, one):
+            if text.startswith("event: snap"):
+                yield text[:40]
+                await asyncio.sleep(slow)
+                text = text[40:]
+            yield text
+
+    monkeypatch.setattr(app, "BEAT_S", beat)
+    monkeypatch.setattr(app.Viewer, "_stream", slowly)
+    served.add("one", events=run())
+    page = look(served.start())
+    assert len(opened) > 1  # it was cut at first
+    page.wait_for_function("smachpy.store.connection.value === 'live'")
 
 
 def test_a_page_that_was_cut_off_goes_on_where_it_was(served, look):

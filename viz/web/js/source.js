@@ -9,6 +9,7 @@ const AGAIN_MS = 250, LATEST_MS = 4000; // between two tries to fetch a structur
 let stream = null;
 let lastId = ""; // of the newest message of events
 let silence = 0; // half beats without a word
+let patience = SILENT_BEATS; // with a stream that is open; longer when one was cut before a beat came
 let watchdog = 0;
 let begun = 0; // when the stream began [ms]
 let loads = 0; // the newest one counts
@@ -86,7 +87,7 @@ function open() {
     take(JSON.parse(message.data));
   });
   on("settings", (s) => { begun = performance.now(); store.settings.value = s; store.connection.value = "live"; watch(s.beat * 1000); });
-  on("beat", (t) => { store.connection.value = "live"; store.viewerLag.hear(t); });
+  on("beat", (t) => { patience = SILENT_BEATS; store.connection.value = "live"; store.viewerLag.hear(t); });
   on("machines", (list) => { store.machines.value = list; });
   on("actions", (found) => { store.actions.value = { ...found, known: true }; });
   on("facts", takeFacts);
@@ -104,13 +105,17 @@ function open() {
 }
 
 // A connection that was cut shows no error for minutes: it is lost when the beats [ms] stay away.
+// So they do while a long message comes over a slow link: the next time it is given twice as long.
 function watch(beat) {
   clearInterval(watchdog);
   silence = 0;
   if (!(beat > 0)) return; // a server of an older version
   watchdog = setInterval(() => {
+    const comes = stream.readyState === EventSource.OPEN;
     silence += 1;
-    if (silence > 2 * SILENT_BEATS) reconnect();
+    if (silence <= 2 * (comes ? patience : SILENT_BEATS)) return;
+    if (comes) patience *= 2;
+    reconnect();
   }, beat / 2);
 }
 
