@@ -80,6 +80,8 @@ class Exploration:
         stopped_by: Why it is not: "max_runs", "max_time", "max_depth" or "counterexample".
         counterexample: A shortest run that breaks an invariant.
         seconds: How long it took.
+        not_raised: Exceptions that `on_exception` or `retry` name and no run raised, since they
+            cannot be made from a text alone.
     """
 
     ok: bool
@@ -88,6 +90,7 @@ class Exploration:
     stopped_by: str
     counterexample: Counterexample | None
     seconds: float
+    not_raised: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
         return self.ok
@@ -95,9 +98,11 @@ class Exploration:
     def __str__(self) -> str:
         extent = "all there are" if self.exhaustive else f"stopped by {self.stopped_by}"
         head = f"{self.runs} runs in {self.seconds:.1f} s, {extent}"
+        names = ", ".join(self.not_raised)
+        left_out = f" (not raised, as they want arguments: {names})" if names else ""
         if self.counterexample is None:
-            return f"{head}: no counterexample"
-        return f"{head}: {self.counterexample}"
+            return f"{head}: no counterexample{left_out}"
+        return f"{head}{left_out}: {self.counterexample}"
 
 
 def explore(
@@ -146,8 +151,9 @@ def explore(
         invariants: Called with each run. Anything false but None, or an exception, is a
             counterexample.
         faults: "hang": any leaf may never finish; "raise": may raise, a RuntimeError and whatever
-            `on_exception` and `retry` of it and of its containers name; "deaf": may ignore a
-            preempt. Leaves with a timeout, and watchers beside others, hang anyway.
+            `on_exception` and `retry` of it and of its containers name, if it can be made from a
+            text alone; "deaf": may ignore a preempt. Leaves with a timeout, and watchers beside
+            others, hang anyway.
         preempts: Preempts per run, at most.
         interleavings: Whether to vary who goes on first, and who outlasts whom.
         grace: Longest time from a preempt to the end [s].
@@ -200,11 +206,14 @@ def explore(
             else:
                 search.took(told, runner.explorer.choices)
         example = None if found is None else shrinker.shrink(*found)
+        left_out = runner.explorer.not_raised
     stopped_by = "counterexample" if example else stopped_by or ("max_depth" * search.is_cut)
     if example is not None:
         example = _drawn(example, folder)
     seconds = _COMPUTER.now() - begun
-    return Exploration(example is None, runs, not stopped_by, stopped_by, example, seconds)
+    return Exploration(
+        example is None, runs, not stopped_by, stopped_by, example, seconds, left_out
+    )
 
 
 def replay(

@@ -75,6 +75,7 @@ class Explorer:
         choices: What was chosen in the run, in order.
         too_long: It had too many leaves.
         mismatch: Why it could not go on as told.
+        not_raised: Names of the exceptions that should be raised and cannot be made.
     """
 
     def __init__(self, root: Container, options: Options) -> None:
@@ -86,7 +87,13 @@ class Explorer:
             s.path for s in record.walk() if s.is_container and "timeout" not in dict(s.details)
         }
         self._leaves = {s.path for s in record.walk() if not s.is_container}
-        self._raised = dict(_raised_in(root, record.path))
+        raised = dict(_raised_in(root, record.path)) if "raise" in options.faults else {}
+        kinds = {kind: _can_be_made(kind) for of in raised.values() for kind in of.values()}
+        self.not_raised = tuple(sorted({kind.__name__ for kind, can in kinds.items() if not can}))
+        self._raised = {
+            path: {text: kind for text, kind in of.items() if kinds[kind]}
+            for path, of in raised.items()
+        }
         self._root_path = record.path
         self._options = options
         # Longer than all the leaves of a run one after the other.
@@ -405,6 +412,14 @@ def _made(kind: type[BaseException]) -> BaseException:
         return kind(RAISED)
     except Exception:  # noqa: BLE001  it wants other arguments: nobody looks at them
         return kind.__new__(kind, RAISED)
+
+
+def _can_be_made(kind: type[BaseException]) -> bool:
+    try:
+        str(_made(kind))
+    except Exception:  # noqa: BLE001  whatever it misses
+        return False
+    return True
 
 
 def _userdata(container: Container, values: Values) -> Hashable:

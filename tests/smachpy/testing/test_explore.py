@@ -648,6 +648,42 @@ def test_what_a_leaf_raised_is_part_of_the_situation_beside_it(deep, interleavin
     assert "ZeroDivisionError" in reason(found)
 
 
+class NewError(Exception):
+    def __new__(cls, one, two):
+        return super().__new__(cls, one, two)
+
+
+class TextError(Exception):
+    def __init__(self, one, two):
+        self.text = f"{one}, {two}"
+
+    def __str__(self):
+        return self.text
+
+
+@pytest.mark.parametrize("kind", [ExceptionGroup, NewError, TextError])
+def test_exceptions_that_cannot_be_made_are_left_out_and_told(kind):
+    def machine(**options):
+        sm = StateMachine(["done"], name="M")
+        with sm:
+            sm.add("A", Leaf("done", **options), {"done": "B"})
+            sm.add("B", Leaf("done", **options))
+        return sm
+
+    kinds = {RuntimeError: "done", kind: "done", ValueError: "done"}
+    found = explore(machine(on_exception=kinds), faults=["raise"], preempts=0)
+    assert (found.ok, found.exhaustive) == (True, True)
+    assert found.not_raised == (kind.__name__,)
+    told = f"all there are: no counterexample (not raised, as they want arguments: {kind.__name__})"
+    assert told in str(found)
+    found = explore(machine(retry=(1, 0.0, kind)), faults=["raise"], preempts=0)
+    assert "RuntimeError: raised by the test" in reason(found)  # and no TypeError
+    assert f"stopped by counterexample (not raised, as they want arguments: {kind.__name__})" in (
+        str(found)
+    )
+    assert explore(machine(on_exception=kinds), preempts=0).not_raised == ()
+
+
 def test_a_value_that_no_double_has_written_is_told_with_the_way_out():
     def machine():
         each = Iterator(
