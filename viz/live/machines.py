@@ -60,7 +60,7 @@ class Machine:
         self._events: deque[tuple[int, dict[str, Any], str]] = deque()
         self._bytes = 0
         self._seq = 0
-        self._folded = 0  # number of the newest event that is in the base
+        self._folded = 0  # number of the newest event that went before the kept ones
 
     @property
     def seq(self) -> int:
@@ -81,7 +81,10 @@ class Machine:
             self._now = RunState(json.loads(json.dumps(base)) if base else None)
             self._events.clear()
             self._bytes = self._seq = self._folded = 0
-            for event in history["events"]:
+            events = history["events"]
+            if events:
+                self._folded = events[0]["seq"] - events[0].get("dropped", 0) - 1
+            for event in events:
                 self._append(event, limit)
         self._on_change(self)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -158,11 +159,10 @@ class MissionApp(App[None]):
     def _catch_up(self, machine: Machine) -> None:
         if self._until is not None:
             return
-        events = [event for event in machine.events() if event["seq"] > self._seq]
-        first = events[0]["seq"] - events[0].get("dropped", 0) if events else machine.seq + 1
-        if first != self._seq + 1:  # some are gone, or it was all told anew
+        texts = machine.since(self._seq)
+        if texts is None:  # some are gone, or it was all told anew
             self._fold_anew(machine)
-        elif self._fold(events):
+        elif self._fold([json.loads(text) for text in texts]):
             self._draw_userdata()
 
     def _fold(self, events: list[dict[str, Any]]) -> bool:

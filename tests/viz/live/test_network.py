@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 
 import pytest
 
 from actionlib_core.node import Node
 from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import IntrospectionServer, State, StateMachine, feed, tape
-from viz.live.machines import Machines
+from smachpy.introspection import describe
+from viz.live.machines import Machine, Machines
 from viz.live.network import Network
 
 
@@ -193,6 +195,30 @@ def test_a_history_tells_of_a_pause_too(clock, watch):
     link._executor.submit(link._read_history)
     clock.sleep(1.0)
     assert seen.facts()["control"] == {"paused": False, "breakpoints": []}
+
+
+def test_what_went_before_a_history_is_missing_for_who_was_there_earlier():
+    """Between two histories of one machine more went by than its server keeps."""
+    described = asdict(describe(spinning(1)))
+
+    def told(first, last, **facts):
+        events = [
+            {"kind": "Started", "path": "/JOB", "t": 0.0, "stamp_ns": seq, "seq": seq}
+            for seq in range(first, last + 1)
+        ]
+        events[0].update(facts)
+        return {"epoch": "e", "description": described, "base": None, "events": events}
+
+    machine = Machine("robot", lambda _machine: None)
+    machine.reset(told(1, 40))
+    assert machine.since(0) is not None
+    machine.reset(told(5001, 5080))
+    assert machine.since(40) is None
+    assert len(machine.since(5000)) == 80
+    assert len(machine.since(5030)) == 50
+    machine.reset(told(5081, 5090, dropped=10))  # which no history has
+    assert machine.since(5069) is None
+    assert len(machine.since(5070)) == 10
 
 
 def test_an_answer_that_is_read_late_does_not_undo_what_was_told_since(clock, watch, monkeypatch):
