@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import json
 import logging
+import math
 import threading
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -51,6 +52,7 @@ logger = logging.getLogger("actionlib_core")
 
 NAME_KIND = "service name"
 CALLS_AT_ONCE = 500  # of one service; each has a thread
+BUSY_LOG_S = 10.0  # shortest time between two words in the log that calls are refused
 LIST_TIMEOUT_S = 1.0
 CALL_TIMEOUT_S = 60.0  # default limit of a call
 APPEAR_S = 2.0  # how much of it a call gives a server to appear
@@ -116,7 +118,8 @@ class Service(_ServiceEnd):
 
     Threads: each call of the handler has a thread of the node's clock, so calls may overlap, block,
         and call services themselves. An exception goes to the caller, and to the log. A caller that
-        finds `CALLS_AT_ONCE` under way gets a `ServiceBusyError`.
+        finds `CALLS_AT_ONCE` under way, or no thread left, gets a `ServiceBusyError`, which the log
+        tells of every `BUSY_LOG_S` at most.
     """
 
     def __init__(
@@ -136,6 +139,7 @@ class Service(_ServiceEnd):
         self._alone = alone
         self._lock = threading.Lock()
         self._running = 0
+        self._busy_logged = -math.inf  # clock time [s]
         self._shown = False
         self._refuse_second()
         self._servers = self._watch()
@@ -238,15 +242,36 @@ class Service(_ServiceEnd):
             return
         if not self._admit():
             # Without an end, handlers that call themselves would take all threads there are.
-            busy = ServiceBusyError(self.resolved_name, _BUSY.format(CALLS_AT_ONCE))
-            logger.error("%s", busy)
-            _fail(query, busy)
+            self._refuse(query, _BUSY.format(CALLS_AT_ONCE))
             return
         try:
             self._calls.spawn(partial(self._answer, query), f"service /{self.resolved_name}")
-        except BaseException:
+        except BaseException as error:
             self._leave()
-            raise
+            if not isinstance(error, RuntimeError):
+                raise
+            self._refuse(query, f"no thread is left: {error}.")
+
+    def _refuse(self, query: Query, reason: str) -> None:
+        error = ServiceBusyError(self.resolved_name, reason)
+        self._log_busy(error)
+        _fail(query, error)
+
+    def _pass_on(self, query: Query, text: str) -> None:
+        """Answer with the very words of a busy service: handlers that call each other add none."""
+        kind = ServiceBusyError.__name__
+        if not _is_from(self.resolved_name, text):  # else it was logged when it came up
+            self._log_busy(_raised(self.resolved_name, kind, text))
+        _send_error(query, kind, text)
+
+    def _log_busy(self, error: ServiceException) -> None:
+        """Log that calls fail because a service is busy: once in a while, as there may be many."""
+        now = self.node.clock.now()
+        with self._lock:
+            if now < self._busy_logged + BUSY_LOG_S:
+                return
+            self._busy_logged = now
+        logger.error("%s", error)
 
     def _admit(self) -> bool:
         with self._lock:
@@ -269,11 +294,13 @@ class Service(_ServiceEnd):
         try:
             response = self._respond(self.handler(self.request_class.from_bytes(query.payload)))
             query.reply(response.to_bytes(), encoding_of(self.service_class))
-        except ServiceBusyError as error:  # logged where it came from
-            _fail(query, error)
         except BaseException as error:  # sys.exit() too: the caller waits for an answer
-            logger.exception("service /%s: the handler raised", self.resolved_name)
-            _fail(query, error)
+            busy = _find_busy(error)
+            if busy:
+                self._pass_on(query, busy)
+            else:
+                logger.exception("service /%s: the handler raised", self.resolved_name)
+                _fail(query, error)
             if not isinstance(error, Exception):
                 raise
         finally:
@@ -307,9 +334,36 @@ def _show(seconds: float | None) -> str:
 
 
 def _fail(query: Query, error: BaseException) -> None:
-    text = json.dumps({"type": type(error).__name__, "text": str(error)})
-    query.reply_error(text)
+    _send_error(query, type(error).__name__, str(error))
+
+
+def _send_error(query: Query, kind: str, text: str) -> None:
+    query.reply_error(json.dumps({"type": kind, "text": text}))
     query.finish()
+
+
+def _find_busy(error: BaseException) -> str:
+    """Return what a busy service has said, this one or one that the handler called, or ""."""
+    if isinstance(error, ServiceBusyError):
+        return str(error)
+    if isinstance(error, ServiceException) and error.remote_type == ServiceBusyError.__name__:
+        return error.remote_text
+    return ""
+
+
+def _is_from(name: str, text: str) -> bool:
+    """Tell whether `text` is that of an error of the service `name`."""
+    return text.startswith(f"service /{name}: ")
+
+
+def _raised(name: str, remote_type: str, remote_text: str) -> ServiceException:
+    """Return the error for a handler that raised."""
+    return ServiceException(
+        name,
+        f"the handler raised {remote_type or 'an error'}: {remote_text}",
+        remote_type=remote_type,
+        remote_text=remote_text,
+    )
 
 
 def _caller_of(query: Query) -> Endpoint:
@@ -378,7 +432,8 @@ class ServiceProxy(_ServiceEnd):
             ServiceUnavailableError: there is no server.
             ServiceTimeoutError: the server did not answer in time.
             ServiceLostError: the server died or left during the call.
-            ServiceBusyError: too many calls are under way there, or its handler calls itself.
+            ServiceBusyError: too many calls are under way there, its handler calls itself, or no
+                thread is left.
             TypeMismatchError: the server has another type.
             NodeError: the node is closed, or the program is to end.
 
@@ -527,15 +582,11 @@ class ServiceProxy(_ServiceEnd):
             remote_type, remote_text = "", text
         if remote_type == TypeMismatchError.__name__:
             self._raise_mismatch(remote_text)
-        if remote_type == ServiceBusyError.__name__:
+        busy = remote_type == ServiceBusyError.__name__
+        if busy and _is_from(self.resolved_name, remote_text):  # else it is one that it called
             _, _, reason = remote_text.partition(": ")
             raise ServiceBusyError(self.resolved_name, reason)
-        raise ServiceException(
-            self.resolved_name,
-            f"the handler raised {remote_type or 'an error'}: {remote_text}",
-            remote_type=remote_type,
-            remote_text=remote_text,
-        )
+        raise _raised(self.resolved_name, remote_type, remote_text)
 
     def _raise_mismatch(self, remote_text: str) -> None:
         """Raise the mismatch that the tokens show, rather than the server's words."""

@@ -316,10 +316,70 @@ def test_handlers_that_call_each_other_for_ever_end_in_an_error(nodes, caplog, m
         "its own service, directly or through another, or ending calls sooner."
     )
     assert len(runs) == 20 * len(names)
-    assert caplog.text.count("calls are under way") == 1
+    assert caplog.text.count("calls are under way") == len(names)
     # The service has not suffered.
     with pytest.raises(ServiceBusyError):
         ServiceProxy("a", Trigger, node=caller)()
+
+
+@pytest.fixture
+def busy(nodes, clock, monkeypatch):
+    """The service `b` runs all the calls it takes, for 100 s."""
+    monkeypatch.setattr("actionlib_core.service.CALLS_AT_ONCE", 1)
+    server, caller = nodes
+
+    def handler(_):
+        clock.sleep(100.0)
+        return True, ""
+
+    Service("b", Trigger, handler, node=server)
+    clock.spawn(lambda: ServiceProxy("b", Trigger, timeout=None, node=caller)(), name="first")
+    clock.sleep(1.0)
+
+
+def test_the_caller_of_a_handler_that_calls_a_busy_service_is_told_which_one(nodes, busy, caplog):
+    server, caller = nodes
+    for name, other in (("a", "b"), ("outer", "a")):
+        proxy = ServiceProxy(other, Trigger, node=server)
+        Service(name, Trigger, lambda _, p=proxy: p(), node=server)
+    for name in ("a", "outer"):
+        with pytest.raises(ServiceException) as caught:
+            ServiceProxy(name, Trigger, node=caller)()
+        error = caught.value
+        assert not isinstance(error, ServiceBusyError)
+        assert (error.name, error.remote_type) == (name, "ServiceBusyError")
+        assert error.remote_text.startswith("service /b: 1 calls are under way")
+        assert f"service /{name}: the handler raised ServiceBusyError: service /b" in str(error)
+        assert str(error) in caplog.messages
+
+
+def test_refused_calls_are_logged_once_in_a_while(nodes, clock, busy, caplog):
+    proxy = ServiceProxy("b", Trigger, node=nodes[1])
+    for logged in (1, 1, 2, 2):
+        if len(caplog.messages) < logged:
+            clock.sleep(10.0)
+        with pytest.raises(ServiceBusyError, match="service /b: 1 calls are under way"):
+            proxy()
+        assert caplog.text.count("calls are under way") == logged
+
+
+def test_a_call_that_no_thread_is_left_for_is_answered(nodes, clock, caplog, monkeypatch):
+    server, caller = nodes
+    add = ServiceProxy("add", AddTwoInts, node=caller)
+    Service("add", AddTwoInts, lambda q: q.a + q.b, node=server)
+    assert add(1, 2).sum == 3
+    spawn = clock.spawn
+
+    def no_thread(target, *, name):
+        if name == "service /add":
+            raise RuntimeError("can't start new thread")
+        return spawn(target, name=name)
+
+    monkeypatch.setattr(clock, "spawn", no_thread)
+    with pytest.raises(ServiceBusyError, match="service /add: no thread is left: can't start new"):
+        add(1, 2)
+    monkeypatch.undo()
+    assert add(1, 2).sum == 3
 
 
 def test_answer_of_a_foreign_server_with_a_plain_error(nodes, clock):
