@@ -16,6 +16,8 @@ import json
 import math
 from typing import Any, NamedTuple, TypeAlias
 
+from smachpy._core.shown import DEEPEST, LONGEST_LIST, LONGEST_TEXT, WIDEST_INT, Room, text_of
+
 
 class Started(NamedTuple):
     """A root container began to run."""
@@ -287,18 +289,6 @@ concurrence: the end of a child. action: a client's cancel, a newer goal or the 
 else; `by` is the thread, or what `request_preempt(by=...)` said.
 """
 
-LONGEST_TEXT = 4_000
-LONGEST_LIST = 1_000
-DEEPEST = 20
-MOST_ITEMS = 10_000
-MOST_TEXT = 100_000
-WIDEST_INT = 1_024  # bits
-"""What of a value is put into a record; it is to be looked at, not to be computed with.
-
-The first three are for each part, the next two for all that is in a record: making it takes the
-machine some milliseconds at most.
-"""
-
 NUMBERS = frozenset({"seq", "dropped"})
 """What a tape adds to a record: the event's number, and how many are missing before it."""
 
@@ -318,7 +308,7 @@ def to_record(event: Event) -> dict[str, Any]:
     replaced by their `repr`, and those that are too long to look at are cut or named by their size.
     """
     record: dict[str, Any] = {"kind": type(event).__name__}
-    room = _Room()
+    room = Room()
     for key, value in event._asdict().items():
         record[key] = _plain(value, room)
     return record
@@ -329,7 +319,7 @@ def record_text(record: dict[str, Any]) -> str:
     try:
         return json.dumps(record)
     except (TypeError, ValueError, RecursionError):
-        return json.dumps({key: _plain(value, _Room()) for key, value in record.items()})
+        return json.dumps({key: _plain(value, Room()) for key, value in record.items()})
 
 
 def from_record(record: dict[str, Any]) -> Event:
@@ -352,17 +342,7 @@ def from_record(record: dict[str, Any]) -> Event:
         ) from error
 
 
-class _Room:
-    """How much may still be put into a record."""
-
-    __slots__ = ("items", "text")
-
-    def __init__(self) -> None:
-        self.items = MOST_ITEMS
-        self.text = MOST_TEXT
-
-
-def _plain(value: Any, room: _Room, depth: int = 0) -> Any:
+def _plain(value: Any, room: Room, depth: int = 0) -> Any:
     if value is None or isinstance(value, bool):
         return value
     if isinstance(value, int):
@@ -376,16 +356,16 @@ def _plain(value: Any, room: _Room, depth: int = 0) -> Any:
         shown = _container(value, room, depth) if depth < DEEPEST else None
     except Exception as error:  # noqa: BLE001  foreign code: its failure is what there is to show
         return f"<{type(value).__name__}: looking at it raised {type(error).__name__}>"
-    return _cut(_text_of(value, room), room) if shown is None else shown
+    return _cut(text_of(value, room), room) if shown is None else shown
 
 
-def _cut(text: str, room: _Room) -> str:
+def _cut(text: str, room: Room) -> str:
     most = min(LONGEST_TEXT, max(room.text, 0))
     room.text -= min(len(text), most)
     return text if len(text) <= most else text[:most] + "\u2026"
 
 
-def _container(value: Any, room: _Room, depth: int) -> Any:
+def _container(value: Any, room: Room, depth: int) -> Any:
     """What is inside, None when it is no container or too long."""
     if isinstance(value, (list, tuple, dict)):
         if len(value) > min(LONGEST_LIST, room.items):
@@ -401,7 +381,7 @@ def _container(value: Any, room: _Room, depth: int) -> Any:
     return _fields_of(value, room, depth)
 
 
-def _fields_of(value: Any, room: _Room, depth: int) -> Any:
+def _fields_of(value: Any, room: Room, depth: int) -> Any:
     """A message, or a ROS time or duration, by its fields; None when it is none."""
     if hasattr(value, "_md5sum") and hasattr(value, "__slots__"):
         fields = {name: getattr(value, name, None) for name in value.__slots__}
@@ -409,27 +389,3 @@ def _fields_of(value: Any, room: _Room, depth: int) -> Any:
     if hasattr(value, "to_nsec") and hasattr(value, "nsecs"):
         return {"secs": value.secs, "nsecs": value.nsecs}
     return None
-
-
-def _text_of(value: Any, room: _Room) -> str:
-    if isinstance(value, (list, tuple, dict, set, frozenset, bytes, bytearray)):
-        size = len(value)
-        if size > LONGEST_LIST or not _is_short(value, room.items):
-            return f"<{type(value).__name__} of {size} elements>"
-    try:
-        return repr(value)
-    except Exception as error:  # noqa: BLE001  foreign code: its failure is what there is to show
-        return f"<{type(value).__name__}: its repr raised {type(error).__name__}>"
-
-
-def _is_short(value: Any, most: int) -> bool:
-    """Whether at most so many things are in a container and in those inside it."""
-    waiting, seen = [value], 0
-    while waiting:
-        one = waiting.pop()
-        if isinstance(one, (list, tuple, dict, set, frozenset)):
-            seen += len(one)
-            if seen > most:
-                return False
-            waiting += [*one, *one.values()] if isinstance(one, dict) else one
-    return True

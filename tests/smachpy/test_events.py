@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import logging
+from collections import Counter, OrderedDict, defaultdict, deque
+from dataclasses import dataclass, field
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
@@ -223,6 +226,108 @@ def test_a_grid_is_not_taken_down_cell_by_cell():
 )
 def test_a_record_is_short_whatever_the_value(value):
     assert len(json.dumps(written(value))) < 400_000
+
+
+class Cell:
+    """Counts how often it is looked at."""
+
+    looks = 0
+
+    def __repr__(self):
+        Cell.looks += 1
+        return "."
+
+
+class Text(str):
+    __slots__ = ()
+
+    def __repr__(self):
+        Cell.looks += len(self)
+        return str.__repr__(self)
+
+
+@dataclass
+class Map:
+    name: str
+    cells: object
+    above: object = field(default=None, repr=False)
+
+
+class Route:
+    def __len__(self):
+        return 5_000
+
+    def __repr__(self):
+        Cell.looks += len(self)
+        return "route"
+
+
+cells = [Cell()] * 100_000
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (deque(cells), "<deque of 100000 elements>"),
+        (Map("hall", cells), "Map(name='hall', cells=<list of 100000 elements>)"),
+        (Map("hall", [deque(cells)]), "Map(name='hall', cells=<list of 1 elements>)"),
+        (SimpleNamespace(a=1, b=cells), "SimpleNamespace(a=1, b=<list of 100000 elements>)"),
+        (ValueError("no", cells), "ValueError('no', <list of 100000 elements>)"),
+        ({1: cells}, "{1: <list of 100000 elements>}"),
+        ({1: Map("hall", [[Cell()] * 900] * 900)}, "{1: Map(name='hall', cells=<list of 900 "),
+        (defaultdict(list, {1: cells}), "<defaultdict of 1 elements>"),
+        ({1: dict.fromkeys(range(900), [Cell()] * 900)}, "{1: {0: [., ., "),
+        ({1: {"grid": [[Cell()] * 900] * 900, "n": 3}}, "{1: {'grid': <list of 900 elements>, 'n'"),
+        ({1: {2: Text("x" * 200_000)}}, "{1: {2: 'xxx"),
+        ({1: ["x" * 200_000]}, "{1: <list of 1 elements>}"),
+        ({b"x" * 200_000}, "<set of 1 elements>"),
+        ({1: b"x" * 200_000}, "{1: <bytes of 200000 elements>}"),
+        (Route(), "<Route of 5000 elements>"),
+    ],
+)
+def test_a_value_is_not_looked_at_as_a_whole_when_it_is_large(value, text):
+    Cell.looks = 0
+    assert written(value)["value"].startswith(text)
+    assert Cell.looks <= 20_000
+
+
+def test_many_large_values_share_what_is_looked_at():
+    Cell.looks = 0
+    shown = written([{1: [Cell()] * 900} for _ in range(500)])["value"]
+    assert shown[0].startswith("{1: [., ., ")
+    assert shown[-1] == "<dict of 1 elements>"
+    assert Cell.looks <= 10_000
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        {1, 2},
+        {1: [2, (3, None)], (0, 1): {2: b"x"}},
+        deque([1.5, "a"], maxlen=3),
+        Counter({1: 3}),
+        OrderedDict({1: 2}),
+        defaultdict(list, {1: [2]}),
+        Map("hall", [[0] * 9] * 9),
+        SimpleNamespace(a=1),
+        ValueError("x", 3),
+        {1: 2}.values(),
+        range(10**9),
+        {1: "x" * 3_000},
+        frozenset(range(700)),
+    ],
+)
+def test_a_value_of_usual_size_is_its_repr(value):
+    assert written(value)["value"] == repr(value)
+
+
+def test_values_that_hold_themselves_are_their_repr():
+    tree = Map("root", [])
+    tree.cells.append(Map("leaf", tree))
+    ring = {}
+    ring[1] = ring
+    assert written(tree)["value"] == repr(tree)
+    assert written(ring)["value"] == "{1: {...}}"
 
 
 def test_a_number_of_many_digits_is_named_by_its_size():
