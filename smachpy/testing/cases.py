@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 import unittest
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 from smachpy import log
 from smachpy.testing import session
@@ -17,7 +18,7 @@ class MissionTestCase(unittest.TestCase):
     """A test case with `self.mission`, a `MissionKit` for each test.
 
     Under pytest its options hold: coverage, rate and seeds. With `--mission-seeds` each test runs
-    with one after the other, up to the first that fails.
+    with one after the other, up to the first that fails; it is skipped if it skips with each.
 
     Attributes:
         seed: Picks the interleaving of all tests of the class; None: as the session says.
@@ -28,24 +29,25 @@ class MissionTestCase(unittest.TestCase):
     seed: ClassVar[int | None] = None
     mission: MissionKit
     _seed: int | None = None
-    _passed = False
 
     def run(self, result: unittest.TestResult | None = None) -> unittest.TestResult | None:
         """Run the test, with each seed."""
         seeds = session.current().seeds if self.seed is None else (self.seed,)
-        for seed in seeds:
-            self._seed, self._passed = seed, False
-            result = super().run(result)
-            if not self._passed:
-                if len(seeds) > 1:
-                    log.logwarn(f"{self.id()}: mission seed {seed}")
+        self._seed = seeds[0]
+        if len(seeds) == 1:
+            return super().run(result)
+        if result is None:
+            result = self.defaultTestResult()
+        skips = 0
+        for number, seed in enumerate(seeds, 1):
+            self._seed = seed
+            part = _Part(result, is_last=number == len(seeds), all_skip=skips == number - 1)
+            super().run(cast("unittest.TestResult", part))
+            skips += part.skipped
+            if part.failed:
+                log.logwarn(f"{self.id()}: mission seed {seed}")
                 break
         return result
-
-    def doCleanups(self) -> bool:  # type: ignore[override]  # noqa: N802  unittest's name
-        """Close the kit; return whether the test passed."""
-        self._passed = bool(super().doCleanups())
-        return self._passed
 
     def setUp(self) -> None:
         """Open the kit."""
@@ -54,3 +56,66 @@ class MissionTestCase(unittest.TestCase):
         self.mission = MissionKit(seed=self._seed, rate=around.rate, on_run=around.on_run)
         self.mission.__enter__()
         self.addCleanup(self.mission.__exit__, None, None, None)
+
+
+class _Part:
+    """A test's result as it is with one of its seeds; the rest is that of the test.
+
+    Only the last seed tells of what is no failure: pytest takes what comes first for the whole
+    test, and a skip would hide the failure with a later seed.
+
+    Args:
+        result: That of the test.
+        is_last: No seed comes after this one.
+        all_skip: The test skipped with all seeds before.
+
+    Attributes:
+        failed: The test failed.
+        skipped: It, or a part of it, skipped.
+    """
+
+    def __init__(self, result: unittest.TestResult, *, is_last: bool, all_skip: bool) -> None:
+        self._result = result
+        self._is_last = is_last
+        self._all_skip = all_skip
+        self.failed = False
+        self.skipped = False
+
+    def __getattr__(self, name: str) -> Any:
+        own = getattr(self._result, name)
+        return self._add_part if name == "addSubTest" else own  # not every result has it
+
+    def addSkip(self, test: Any, reason: str) -> None:  # noqa: N802  unittest's names
+        self.skipped = True
+        if self._is_last and self._all_skip:
+            self._result.addSkip(test, reason)
+
+    def addExpectedFailure(self, test: Any, error: Any) -> None:  # noqa: N802
+        if self._is_last:
+            self._result.addExpectedFailure(test, error)
+
+    def addUnexpectedSuccess(self, test: Any) -> None:  # noqa: N802
+        self.failed = True
+        self._result.addUnexpectedSuccess(test)
+
+    def addFailure(self, test: Any, error: Any) -> None:  # noqa: N802
+        self.failed = True
+        self._result.addFailure(test, error)
+
+    def addError(self, test: Any, error: Any) -> None:  # noqa: N802
+        if not _is_skip(error[0]):
+            self.failed = True
+        elif not (self._is_last and self._all_skip):
+            self.skipped = True
+            return
+        self._result.addError(test, error)
+
+    def _add_part(self, test: Any, part: Any, error: Any) -> None:
+        self.failed = self.failed or error is not None
+        self._result.addSubTest(test, part, error)
+
+
+def _is_skip(kind: type[BaseException]) -> bool:
+    """Tell whether it is pytest's own skip, which is an error to unittest."""
+    pytest = sys.modules.get("pytest")
+    return pytest is not None and issubclass(kind, pytest.skip.Exception)

@@ -54,7 +54,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Start measuring, if it is wanted."""
+    """Check the options; start measuring, if it is wanted.
+
+    Raises:
+        pytest.UsageError: there are no seeds.
+    """
+    count = config.getoption("mission_seeds")
+    if count is not None and count < 1:
+        raise pytest.UsageError(f"--mission-seeds: got {count}; expected 1 or more.")
     wanted = (
         "mission_coverage",
         "mission_coverage_fail_under",
@@ -153,8 +160,6 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Repeat the tests that use a mission with many seeds, if it is wanted."""
     count = metafunc.config.getoption("mission_seeds")
     if count is not None and "mission_seed" in metafunc.fixturenames:
-        if count < 1:
-            raise pytest.UsageError(f"--mission-seeds: got {count}; expected 1 or more.")
         seeds = _seeds(metafunc.config)
         metafunc.parametrize("mission_seed", seeds, ids=[f"seed{seed}" for seed in seeds])
 

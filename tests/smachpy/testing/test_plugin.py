@@ -10,6 +10,7 @@ import sys
 import pytest
 
 from smachpy.cli import main
+from smachpy.testing import MissionTestCase, session
 from smachpy.testing import cli as testing_cli
 
 pytest_plugins = ["pytester"]
@@ -186,6 +187,103 @@ def test_the_options_hold_without_the_fixtures_too(pytester):
     plain.stdout.fnmatch_lines(["*case None*"])
 
 
+NO_FAILURES = """
+import unittest
+import pytest
+from smachpy.testing import MissionTestCase
+
+class Test(MissionTestCase):
+    @unittest.skip("why")
+    def test_decorated(self):
+        pass
+
+    def test_skips(self):
+        self.skipTest("why")
+
+    def test_skips_as_pytest(self):
+        pytest.skip("why")
+
+    def test_skips_once(self):
+        if self.mission.seed == 0:
+            self.skipTest("why")
+
+    def test_skips_last(self):
+        if self.mission.seed == 2:
+            self.skipTest("why")
+
+    @unittest.expectedFailure
+    def test_expected(self):
+        self.fail()
+"""
+
+FAILURES = """
+import unittest
+import pytest
+from smachpy.testing import MissionTestCase
+
+class Test(MissionTestCase):
+    def test_fails_after_a_skip(self):
+        if self.mission.seed == 0:
+            self.skipTest("why")
+        self.fail()
+
+    def test_fails_after_a_skip_of_pytest(self):
+        if self.mission.seed == 0:
+            pytest.skip("why")
+        self.fail()
+
+    @unittest.expectedFailure
+    def test_fails_not_with_one_seed(self):
+        self.assertEqual(self.mission.seed, 1)
+
+    def test_in_a_part(self):
+        with self.subTest(), self.subTest():
+            self.assertNotEqual(self.mission.seed, 1)
+
+    def test_in_its_cleanup(self):
+        self.addCleanup(self.assertNotEqual, self.mission.seed, 1)
+"""
+
+
+def test_a_seed_with_which_a_test_does_not_run_hides_no_other_one(pytester, caplog):
+    pytester.makepyfile(NO_FAILURES)
+    result = pytester.runpytest_inprocess(*OPTIONS, "--mission-seeds=3", "-s")
+    result.assert_outcomes(passed=2, skipped=3, xfailed=1)
+    assert not caplog.messages
+    pytester.makepyfile(FAILURES)
+    result = pytester.runpytest_inprocess(*OPTIONS, "--mission-seeds=3", "-s")
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    told = dict(re.findall(r"Test[.](test_\w+): mission seed (\d)", "\n".join(caplog.messages)))
+    assert told == {
+        "test_fails_after_a_skip": "1",
+        "test_fails_after_a_skip_of_pytest": "1",
+        "test_fails_not_with_one_seed": "1",
+        "test_in_a_part": "1",
+        "test_in_its_cleanup": "1",
+    }
+    names = set(re.findall(r"^FAILED .*::(test_\w+)", result.stdout.str(), re.MULTILINE))
+    assert names | {"test_in_a_part"} == set(told)
+
+
+def test_a_result_of_unittest_has_what_each_seed_gave():
+    class Test(MissionTestCase):
+        def test_fails(self):
+            assert self.mission.seed == 4
+
+        def test_skips(self):
+            self.skipTest("why")
+
+    around = session.Session((4, 5, 6))
+    session.begin(around)
+    try:
+        result = Test("test_fails").run()
+        assert (result.testsRun, len(result.failures)) == (2, 1)
+        result = Test("test_skips").run()
+        assert (result.testsRun, len(result.skipped), result.errors) == (3, 1, [])
+    finally:
+        session.end(around)
+
+
 def test_the_command_line_alias(pytester):
     pytester.makepyfile(test_m=TESTS)
     done = subprocess.run(
@@ -271,8 +369,11 @@ def test_every_test_of_a_mission_is_repeated_with_many_seeds(pytester):
 
 def test_seeds_are_at_least_one(pytester):
     pytester.makepyfile(SEEDED)
-    result = pytester.runpytest_inprocess(*OPTIONS, "--mission-seeds=0")
-    result.stdout.fnmatch_lines(["*--mission-seeds: got 0; expected 1 or more.*"])
+    for count in ("0", "-1"):
+        result = pytester.runpytest_inprocess(*OPTIONS, f"--mission-seeds={count}")
+        assert result.ret == pytest.ExitCode.USAGE_ERROR
+        told = f"*--mission-seeds: got {count}; expected 1 or more.*"
+        result.stderr.fnmatch_lines([told])
 
 
 def test_a_test_may_choose_its_seed(pytester):
