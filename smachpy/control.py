@@ -74,10 +74,12 @@ class Control:
         Threads: called in the thread of the change, the machine's own at a breakpoint, which it
             holds up: let it wake a thread that works. What it raises is logged.
         """
-        self._listeners = (*self._listeners, listener)
+        with self._lock:
+            self._listeners = (*self._listeners, listener)
 
         def forget() -> None:
-            self._listeners = tuple(item for item in self._listeners if item is not listener)
+            with self._lock:
+                self._listeners = tuple(item for item in self._listeners if item is not listener)
 
         return forget
 

@@ -13,6 +13,7 @@ may be left out), `command`, and what that needs:
     break path [outcome]  unbreak path [outcome]
     initial path states
 
+A path is the whole one that viewers show, from the machine on ("/JOB/A").
 `running` is "keep" or "cancel", as for `Control.pause`. An answer is `id`, `ok`, `text` (why not),
 `paused` and `breakpoints` (pairs path, outcome) as they were then: what they are now is what
 `control_state` has told last.
@@ -82,9 +83,9 @@ class ControlServer:
         self._executor = SerialExecutor(node.clock, f"control of {server_name}")
         self._results = Publisher(server_name + RESULT_TOPIC, String, node=node)
         self._states = Publisher(server_name + STATE_TOPIC, String, latch=True, node=node)
+        self._commands = Subscriber(server_name + CONTROL_TOPIC, String, self._take, node=node)
         self._forget = machine.control.on_change(lambda: self._executor.submit(self._tell_state))
         self._executor.submit(self._tell_state)
-        self._commands = Subscriber(server_name + CONTROL_TOPIC, String, self._take, node=node)
 
     def close(self) -> None:
         """Obey no more; a second call does nothing."""
@@ -159,28 +160,34 @@ class ControlServer:
         container = self._find(path)
         if not hasattr(container, "set_initial_state"):
             raise CommandError(
-                f"command 'initial': path: got {self._shown(path)!r}; expected a container's."
+                f"command 'initial': path: got {self._shown(path)!r}; expected a container's, such "
+                f"as {self._path!r}."
             )
         container.set_initial_state([str(state) for state in states], UserData())
 
     def _find(self, path: str) -> Any:
         """The state at a path, whose labels may have slashes in them; None when there is none."""
         root = self._root()
-        if path != root and not path.startswith(root + "/"):
-            return None
-        return _below(self._machine, path.removeprefix(root))
+        return _below(self._machine, path.removeprefix(root)) if _is_in(root, path) else None
 
     def _root(self) -> str:
         return f"/{self._machine.name or 'SM_ROOT'}"
 
     def _own(self, path: str) -> str:
-        return self._root() + path.removeprefix(self._path) if self._is_ours(path) else path
-
-    def _is_ours(self, path: str) -> bool:
-        return path == self._path or path.startswith(self._path + "/")
+        """The path of the machine's own that a command means."""
+        return _moved(path, self._path, self._root())
 
     def _shown(self, path: str) -> str:
-        return self._path + path.removeprefix(self._root())
+        return _moved(path, self._root(), self._path)
+
+
+def _is_in(root: str, path: str) -> bool:
+    return path == root or path.startswith(root + "/")
+
+
+def _moved(path: str, old: str, new: str) -> str:
+    """Return `path` with the root `new` in place of `old`; as it is when it is not in that."""
+    return new + path.removeprefix(old) if _is_in(old, path) else path
 
 
 def _below(state: Any, rest: str) -> Any:

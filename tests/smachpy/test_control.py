@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+import threading
+
 import pytest
 
 import smachpy
@@ -371,3 +374,26 @@ def test_who_wants_to_know_hears_of_every_change_and_of_nothing_else(clock, capl
     forget()
     control.remove_breakpoint("/P/INNER")
     assert len(heard) == 5
+
+
+def test_listeners_of_changes_come_and_go_in_many_threads():
+    control = mission().control
+    heard = []
+
+    def come_and_go():
+        for _ in range(300):
+            control.on_change(lambda: heard.append("stays"))
+            control.on_change(lambda: heard.append("left"))()
+
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    threads = [threading.Thread(target=come_and_go) for _ in range(4)]
+    try:
+        for thread in threads:
+            thread.start()
+    finally:
+        for thread in threads:
+            thread.join()
+        sys.setswitchinterval(before)
+    control.pause()
+    assert heard == ["stays"] * 1200

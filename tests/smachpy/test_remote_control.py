@@ -14,7 +14,13 @@ from actionlib_core.topic import Subscriber
 from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import IntrospectionServer, State, StateMachine
 from smachpy.events import PreemptRequested, to_record
-from smachpy.remote_control import STATE_TOPIC, CommandError, ControlClient, parse_command
+from smachpy.remote_control import (
+    STATE_TOPIC,
+    CommandError,
+    ControlClient,
+    ControlServer,
+    parse_command,
+)
 from smachpy.run_state import RunState
 
 
@@ -232,3 +238,27 @@ def test_a_breakpoint_that_nothing_can_reach_is_refused(slashes, path, outcome, 
     assert not answer["ok"]
     assert words in answer["text"]
     assert machine.control.breakpoints() == ()
+
+
+def test_a_server_that_cannot_listen_leaves_nothing_at_the_machine(clock, monkeypatch):
+    def fails(*_, **__):
+        raise RuntimeError("no subscriber")
+
+    monkeypatch.setattr("smachpy.remote_control.Subscriber", fails)
+    published = []
+    monkeypatch.setattr(ControlServer, "_tell_state", lambda _: published.append(1))
+    machine = StateMachine(outcomes=["done"], name="JOB")
+    session = MemoryNetwork(clock).session()
+    with Node("robot", transport=session, clock=clock) as node:
+        with pytest.raises(RuntimeError, match="no subscriber"):
+            ControlServer("robot", machine, "/JOB", node)
+        machine.control.pause()
+        clock.sleep(1.0)
+    assert not published
+
+
+@pytest.mark.parametrize("path", ["", "JOB", "A", "/A"])
+def test_a_path_begins_with_the_machine(world, path):
+    _, client, _, _ = world
+    answer = client.send({"command": "initial", "path": path, "states": ["B"]})
+    assert f"got {path!r}; expected a container's, such as '/JOB'" in answer["text"]
