@@ -155,7 +155,8 @@ class SimpleActionServer:
         A second call does nothing, nor does one before `start`. A stopped server is not started
         again.
 
-        Blocks: until `execute_cb` has returned, 0.4 s at most; then its goal is ABORTED.
+        Blocks: until `execute_cb` has returned, 0.4 s at most (then its goal is ABORTED), and then
+            until the clients have heard the ends of all goals, 0.7 s at most.
         """
         forget, self._forget = self._forget, None
         if forget is None:
