@@ -15,7 +15,7 @@ from actionlib_core._core.client_goal import UNLISTED_S, ClientGoal, Duty, Path
 from actionlib_core._core.states import TERMINAL, CommState, Status
 from actionlib_core.comm_state_machine import CommStateMachine
 from actionlib_core.exceptions import ActionlibError, TransportError
-from actionlib_core.presence import age_of, token_key
+from actionlib_core.presence import token_key
 from actionlib_core.shutdown import current_shutdown
 
 if TYPE_CHECKING:
@@ -119,14 +119,15 @@ class GoalManager:
         return self._current
 
     def _choose_server(self) -> None:
-        """Find the server after a change, the youngest of several. Needs the lock.
+        """Find the server after a change. Needs the lock.
 
-        A token may outlast its server, until the lease of a link is over that was lost.
+        Goals name it if it is alone. Of two one is about to give way, or is dead and its token
+        outlasts it until a lease is over: which one cannot be told.
         """
         ends = [end for end, error in self._servers.items() if error is None]
         there = [end for end in ends if end not in self._leaving]
-        self._current = max(there, key=age_of, default=None)
-        self._token = "" if self._current is None else token_key(self._current)
+        self._current = there[0] if there else None
+        self._token = token_key(there[0]) if len(there) == 1 else ""
 
     def _meet(self, server: Endpoint) -> None:
         """Note that a server is one of ours: it shows a token. Needs the lock."""
@@ -257,8 +258,10 @@ class GoalManager:
     def _lose_goals_of(self, server: Endpoint, what: str) -> None:
         """Give up the goals that a server has, or may have. Needs the lock."""
         reason = f"the action server of node '{server.node}' (session {server.session}) {what}"
-        # A server that has said farewell has named its goals: others are not with it.
-        mine = {server.session} if server in self._leaving else {"", server.session}
+        # A server that has said farewell has named its goals: others are not with it. Nor are those
+        # that were sent to several servers while one of them is there.
+        others_there = server in self._leaving or self._current is not None
+        mine = {server.session} if others_there else {"", server.session}
         self._leaving.discard(server)
         for machine in list(self._machines.values()):
             goal = machine.goal
@@ -626,8 +629,8 @@ class GoalManager:
             server = self._current
             if server is None and self._foreign_until <= self._clock.now():
                 return
-            goal.on_offered(server.session if server is not None else "")
             token = self._token
+            goal.on_offered(server.session if server is not None and token else "")
         stamp_ns = goal.stamp_ns
         self._port.send_goal(pack_goal(stamp_ns, goal.id, stamp_ns, machine.body, token))
         if not goal.offered:  # a farewell came in between: another server may have heard it

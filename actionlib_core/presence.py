@@ -69,12 +69,7 @@ def with_age(endpoint: Endpoint, now_ns: int) -> Endpoint:
 
 def is_younger(endpoint: Endpoint, other: Endpoint) -> bool:
     """Tell whether `endpoint` came after `other`; both sides say the same."""
-    return age_of(endpoint) > age_of(other)
-
-
-def age_of(endpoint: Endpoint) -> tuple[int, str]:
-    """Return what tells ends of one name apart by age; the youngest has the greatest."""
-    return endpoint.entity, endpoint.session
+    return (endpoint.entity, endpoint.session) > (other.entity, other.session)
 
 
 def token_key(endpoint: Endpoint) -> str:

@@ -322,7 +322,7 @@ def test_copy_of_a_goal_that_outlives_its_server_does_not_run_at_the_next(world)
     assert first.runs == [1]
 
 
-def test_goal_goes_to_the_youngest_server_that_shows_a_token(world):
+def test_goal_runs_although_a_dead_server_still_shows_a_token(world):
     """A token may outlast its server, until the lease of a lost link is over."""
     client = SimpleActionClient("demo", msg.TestAction, node=world.node("client"))
     words = msg.TestAction._type, msg.TestAction._md5sum, "0" * 32, "/dead", 1
