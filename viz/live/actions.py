@@ -142,7 +142,7 @@ class Actions:
     # -- what there is ---------------------------------------------------------------------------
 
     def summary(self) -> dict[str, Any]:
-        """Return the actions by name and the goals, newest first."""
+        """Return the actions by name, names of those that are gone, the goals, newest first."""
         with self._lock:
             servers = {name: list(ends.values()) for name, ends in sorted(self._servers.items())}
             goals = [goal.to_json() for goal in reversed(self._goals.values())]
@@ -157,6 +157,7 @@ class Actions:
                 for name, ends in servers.items()
                 if ends
             ],
+            "gone": [name for name, ends in servers.items() if not ends],
             "goals": goals,
         }
 

@@ -68,14 +68,16 @@ def counting(world):
 
 
 def test_actions_are_found_and_forgotten(world):
-    assert world.actions.summary() == {"actions": [], "goals": []}
+    assert world.actions.summary() == {"actions": [], "gone": [], "goals": []}
     server = world.serve()
     (found,) = world.actions.summary()["actions"]
     assert found == {"name": "count", "type": "actionlib/Test", "node": "robot", "servers": 1}
+    assert world.actions.summary()["gone"] == []
     assert world.changes
     server.action_server.stop()
     world.clock.sleep(0.5)
     assert world.actions.summary()["actions"] == []
+    assert world.actions.summary()["gone"] == ["count"]
 
 
 def test_a_form_is_told_of_the_fields(world):

@@ -427,17 +427,23 @@ class Network:
     revision = 0
 
     def __init__(self):
-        self.names = []
+        self.names, self.seen = [], set()
 
     def listen(self, on_change):
         self.on_change = on_change
 
     def summary(self):
         one = {"type": "a/B", "node": "n", "servers": 1}
-        return {"actions": [{"name": name, **one} for name in self.names], "goals": []}
+        gone = sorted(self.seen - set(self.names))
+        return {
+            "actions": [{"name": name, **one} for name in self.names],
+            "gone": gone,
+            "goals": [],
+        }
 
     def turn(self, *names):
         self.names = list(names)
+        self.seen.update(names)
         self.revision += 1
         self.on_change()
 
@@ -448,13 +454,31 @@ def test_a_state_whose_goal_has_no_server_waits_and_does_not_run(served, look):
     page = look(served.start(actions=network))
     page.wait_for_selector('g.waiting[data-path="/JOB/A"]')
     label = page.get_attribute('g[data-path="/JOB/A"]', "aria-label")
-    assert label == "/JOB/A, waits for a server of drive"
-    wait_for(page, "document.querySelector('.goal .pill-text').textContent === 'no server'")
+    assert label == "/JOB/A, no server of drive seen"
+    wait_for(page, "document.querySelector('.goal .pill-text').textContent === 'no server seen'")
     network.turn("drive")
     wait_for(page, "!document.querySelector('g.waiting')")
     assert page.get_attribute('g[data-path="/JOB/A"]', "aria-label") == "/JOB/A, running"
     wait_for(page, "document.querySelector('.goal .pill-text').textContent === 'active'")
     network.turn()  # gone again: nobody works on it
+    page.wait_for_selector('g.waiting[data-path="/JOB/A"]')
+
+
+def test_a_server_that_shows_itself_by_answers_only_is_not_missed(served, look):
+    """As behind a bridge, which declares no servers."""
+    answer = {"action": "drive", "goal_id": "1"}
+    done = {**answer, "status": "SUCCEEDED", "text": "", "result": {}}
+    again = [("GoalDone", "/JOB/A", done), ("GoalSent", "/JOB/A", {**GOAL[2], "goal_id": "2"})]
+    network = Network()
+    machine = served.add("one", events=[*run()[:2], GOAL])
+    page = look(served.start(actions=network))
+    page.wait_for_selector('g.waiting[data-path="/JOB/A"]')  # nobody has answered yet
+    machine.add(served.events(again, after=3))
+    wait_for(page, "!document.querySelector('g.waiting')")
+    assert page.get_attribute('g[data-path="/JOB/A"]', "aria-label") == "/JOB/A, running"
+    wait_for(page, "document.querySelector('.goal .pill-text').textContent === 'active'")
+    network.turn("drive")
+    network.turn()  # it did show one, and has gone: who answered then answers no more
     page.wait_for_selector('g.waiting[data-path="/JOB/A"]')
 
 

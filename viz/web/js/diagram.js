@@ -241,7 +241,7 @@ export class Diagram {
 
   // -- restyling --------------------------------------------------------------------------------
 
-  // `goal`: what the state has sent and waits for; `unserved`: nobody is there to take it.
+  // `goal`: what the state has sent and waits for; `unserved`: nobody is seen who would take it.
   paint(path, state, now, goal, unserved = false) {
     const group = this.nodes.get(path);
     if (!group) return;
@@ -261,7 +261,7 @@ export class Diagram {
     write(group.badge, active ? elapsed(state, now) : group.note || "");
     const part = active ? goal?.progress?.fraction ?? 0 : 0;
     if (group.bar && group.bar.part !== part) group.bar.style.transform = `scaleX(${group.bar.part = part})`;
-    const status = active ? (state.preempt ? `asked to stop${state.serviced ? ", takes it up" : ""}` : unserved ? `waits for a server of ${goal.action}` : "running") : state?.outcome ?? "not visited";
+    const status = active ? (state.preempt ? `asked to stop${state.serviced ? ", takes it up" : ""}` : unserved ? `no server of ${goal.action} seen` : "running") : state?.outcome ?? "not visited";
     const label = `${path}, ${status}${group.change ? `, ${group.change}` : ""}`;
     if (group.label !== label) group.setAttribute("aria-label", group.label = label);
     this.minisDue.set(path, active);

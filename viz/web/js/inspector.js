@@ -138,7 +138,7 @@ function Goals({ page, data, now }) {
           <span class="times">${g.attempt > 1 ? `attempt ${g.attempt} \u00b7 ` : ""}${span((until - ms(g.since)) / 1000)}</span></div>
         <div class=${`bar ${part == null && g.ended == null ? "unknown" : ""}`} role="progressbar" aria-valuenow=${part == null ? undefined : Math.round(part * 100)}>
           <i style=${{ width: `${Math.round((part ?? (g.ended != null ? 1 : 0)) * 100)}%` }}></i></div>
-        <div class="text"><span class=${`pill-text ${kind}`}>${waits ? "no server" : g.ended == null ? "active" : g.status.toLowerCase()}</span>
+        <div class="text"><span class=${`pill-text ${kind}`}>${waits ? "no server seen" : g.ended == null ? "active" : g.status.toLowerCase()}</span>
           ${" "}${g.text || [g.progress?.distance != null ? `${g.progress.distance.toFixed(2)} m left` : "", g.progress?.text ?? ""].filter(Boolean).join(" \u00b7 ")}
           ${part != null && g.ended == null ? html`<span class="times">${Math.round(part * 100)} %</span>` : ""}</div>
         <${More} label="goal" value=${g.goal} /></div>`;

@@ -37,7 +37,7 @@ export const statistics = signal(null);
 export const notice = signal(null);
 export const help = signal(false);
 export const comparison = signal(null); // with another machine: its name, the differences
-export const actions = signal({ actions: [], goals: [], known: false }); // on the network; goals sent from here
+export const actions = signal({ actions: [], gone: [], goals: [], known: false }); // on the network; goals sent from here
 export const actionsOpen = signal(false);
 export const picked = signal(null); // name of the action whose form is shown
 export const logFilter = signal("all");
@@ -115,14 +115,21 @@ export function seekEvent(step) {
   else seekTo(Math.min(to, run.events.length));
 }
 
-// Names of the actions that have a server, as one text; null when nobody has looked.
-export const served = computed(() => (actions.value.known ? actions.value.actions.map((one) => one.name).join("\n") : null));
+// Names of the actions that have a server and of those that had one, as one text; null when nobody has looked.
+export const served = computed(() => {
+  const { actions: there, gone, known } = actions.value;
+  return known ? JSON.stringify([there.map((one) => one.name), gone]) : null;
+});
 
-// Whether a goal waits, as its action has no server.
+// Whether a goal seems to wait for a server. One behind a bridge shows no token, only what it answers.
 export function unserved(goal) {
   if (served.value === null || !goal || goal.ended != null || goal.feedback != null) return false;
   if (connection.value !== "live" || cursor.value !== null || facts.value?.stale != null || facts.value?.recorded) return false;
-  return !served.value.split("\n").includes(goal.action.replace(/^\//, ""));
+  const plain = (name) => name.replace(/^\//, "");
+  const name = plain(goal.action), [there, gone] = JSON.parse(served.value);
+  if (there.includes(name)) return false;
+  const answered = (one) => plain(one.action) === name && (one.feedback != null || one.result != null);
+  return gone.includes(name) || !Object.values(run.now.goals).some(answered);
 }
 
 export const isActive = (state) => state?.since != null;
