@@ -16,7 +16,15 @@ import json
 import math
 from typing import Any, NamedTuple, TypeAlias
 
-from smachpy._core.shown import DEEPEST, LONGEST_LIST, LONGEST_TEXT, WIDEST_INT, Room, text_of
+from smachpy._core.shown import (
+    DEEPEST,
+    LONGEST_LIST,
+    LONGEST_TEXT,
+    MOST_TEXT,
+    WIDEST_INT,
+    Room,
+    text_of,
+)
 
 
 class Started(NamedTuple):
@@ -320,6 +328,16 @@ def record_text(record: dict[str, Any]) -> str:
         return json.dumps(record)
     except (TypeError, ValueError, RecursionError):
         return json.dumps({key: _plain(value, Room()) for key, value in record.items()})
+
+
+def was_cut(text: str, size: int) -> bool:
+    """Return whether a text in a record may be the beginning of a longer one.
+
+    Args:
+        text: As it is in the record.
+        size: Characters that the whole record has as JSON; texts of a long one are cut shorter.
+    """
+    return text.endswith("\u2026") and (len(text) > LONGEST_TEXT or size >= MOST_TEXT)
 
 
 def from_record(record: dict[str, Any]) -> Event:

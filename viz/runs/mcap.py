@@ -4,8 +4,8 @@ Topics of the machine MACHINE: /MACHINE/smach/container_structure (of every cont
 /MACHINE/smach/container_status (whenever it changes) and /MACHINE/smach/events (std_msgs/String,
 every event as JSON); of its actions: /ACTION/goal, /feedback and /result with the types that ROS's
 actionlib has for them (`MoveBaseActionGoal`, ...), and /ACTION/status. A recording keeps at most
-1,000 elements of a list and does not tell of cancels, so neither does the file: messages that
-cannot be made from it are counted.
+1,000 elements of a list, cuts long texts and does not tell of cancels, so neither does the file:
+messages that cannot be made from it are left out and counted.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from actionlib_core.interfaces.smach_msgs.msg import SmachContainerStatus, Smach
 from actionlib_core.interfaces.std_msgs.msg import Header, String
 from actionlib_core.time import Time
 from smachpy import log
+from smachpy.events import was_cut
 from smachpy.run_state import RunState
 from smachpy.userdata_json import dumps
 
@@ -66,6 +67,7 @@ class _Export:
         self._server = f"/{recording.record.label}"
         self._ids: dict[str, Any] = {}
         self._statuses: dict[str, dict[str, Any]] = {}  # action -> goal id -> GoalStatus
+        self._ended: set[tuple[str, str]] = set()  # action and goal id
         self.left_out: Counter[tuple[str, str]] = Counter()  # by topic and reason
 
     def run(self) -> None:
@@ -79,7 +81,7 @@ class _Export:
             text = json.dumps(event)
             self._write(f"{self._server}/smach/events", String(data=text), stamp)
             if event["kind"] in GOAL_PARTS:
-                self._write_goal(event, GOAL_PARTS[event["kind"]])
+                self._write_goal(event, GOAL_PARTS[event["kind"]], len(text))
             parent = self._containers.get(event["path"].rpartition("/")[0])
             if parent is not None and event["kind"] != "GoalFeedback":
                 message = self._status(parent, event)
@@ -101,7 +103,7 @@ class _Export:
             data=message.to_bytes(),
         )
 
-    def _write_goal(self, event: dict[str, Any], part: str) -> None:
+    def _write_goal(self, event: dict[str, Any], part: str, size: int) -> None:
         action, stamp = f"/{event['action'].strip('/')}", event["stamp_ns"]
         header = Header(stamp=Time(0, stamp))
         if part == "goal":
@@ -116,19 +118,22 @@ class _Export:
         if isinstance(content, dict) and "$msg" in content:
             try:
                 wrapper = _action_type(content["$msg"], part)
-                inside = get_message(content["$msg"]).from_dict(_restored(content, ""))
+                inside = get_message(content["$msg"]).from_dict(_restored(content, "", size))
                 self._write(f"{action}/{part}", wrapper(header, **more, **{part: inside}), stamp)
             except (ActionlibError, TypeError, ValueError) as error:
                 self.left_out[f"{action}/{part}", str(error).partition("\n")[0]] += 1
         elif content is not None:
             self.left_out[f"{action}/{part}", "it was recorded as text"] += 1
         known = self._statuses.setdefault(action, {})
+        if part == "feedback" and (action, event["goal_id"]) in self._ended:
+            return  # it was under way when the goal ended
         known[event["goal_id"]] = status
         if part != "feedback":
             statuses = list(known.values())
             self._write(f"{action}/status", GoalStatusArray(header, statuses), stamp)
         if part == "result":
             del known[event["goal_id"]]
+            self._ended.add((action, event["goal_id"]))
 
     def _status(self, container: StateRecord, event: dict[str, Any]) -> Any:
         active = set(self._state.active())
@@ -168,24 +173,40 @@ def _action_type(name: str, part: str) -> type[Any]:
     return get_message(f"{name.removesuffix(word)}Action{word}")
 
 
-def _restored(value: Any, kind: str) -> Any:
-    """A recorded value as the plain data that `from_dict` takes; `kind` is its field's type."""
-    if isinstance(value, dict):
-        if "$msg" not in value:
-            return value
-        message = get_message(value["$msg"])
+def _restored(value: Any, kind: str, size: int) -> Any:
+    """A recorded value as the plain data that `from_dict` takes.
+
+    Args:
+        value: What was recorded.
+        kind: Its field's type.
+        size: Characters of the whole record.
+
+    Raises:
+        ValueError: only a part of it was recorded.
+    """
+    if isinstance(value, dict) and "$msg" in value:
+        message, parts = get_message(value["$msg"]), value["fields"]
         kinds = dict(zip(message.__slots__, message._slot_types, strict=True))
-        return {
-            name: _restored(item, kinds.get(name, "")) for name, item in value["fields"].items()
-        }
-    element = kind.partition("[")[0]
+        if isinstance(parts, str):
+            raise ValueError(f"too long to be recorded: {value['$msg']}")
+        return {name: _restored(parts[name], kinds.get(name, ""), size) for name in parts}
     if isinstance(value, list):
-        return [_restored(item, element) for item in value]
-    if isinstance(value, str):
-        if element in _FLOATS and value in _NO_NUMBERS:
-            return float(value)
-        if element in _OCTETS and value.startswith(("b'", 'b"')):
-            return list(ast.literal_eval(value))
-        if "[" in kind:
-            raise ValueError(f"too long to be recorded: {value[:40]}")
-    return value
+        element = kind.partition("[")[0]
+        return [_restored(item, element, size) for item in value]
+    return _restored_text(value, kind, size) if isinstance(value, str) else value
+
+
+def _restored_text(text: str, kind: str, size: int) -> Any:
+    element = kind.partition("[")[0]
+    if element in _FLOATS and text in _NO_NUMBERS:
+        return float(text)
+    if was_cut(text, size):
+        raise ValueError(f"too long to be recorded: a {kind}")
+    if element in _OCTETS and text.startswith(("b'", 'b"')):
+        try:
+            return list(ast.literal_eval(text))
+        except SyntaxError as error:
+            raise ValueError(f"no bytes: {text[:40]}") from error
+    if "[" in kind:
+        raise ValueError(f"too long to be recorded: {text[:40]}")
+    return text

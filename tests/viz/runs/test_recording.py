@@ -420,6 +420,64 @@ def test_mcap_has_what_json_has_no_word_for_and_names_what_is_left_out(record, t
     assert "it was recorded as text" in caplog.text
 
 
+def test_mcap_leaves_out_what_was_cut(record, tmp_path, caplog):
+    fields = "".join(f"uint8[] part{n}\n" for n in range(30))
+    definition = f"string text\nuint8[] data\nstring[] words\n{fields}---\n---\n"
+    define_action("mcap_test_msgs/Photo", definition)
+    from actionlib_core.interfaces import get_message
+
+    goal_type = get_message("mcap_test_msgs/PhotoGoal")
+    whole = [
+        goal_type(text="loading\u2026", words=["\u2026"]),
+        goal_type(text="x" * 4000, data=bytes(990)),
+    ]
+    cut = [
+        goal_type(data=bytes(1000)),
+        goal_type(**{f"part{n}": bytes(900) for n in range(30)}),
+        goal_type(text="x" * 4001),
+        goal_type(words=["x" * 3000] * 34, text="loading"),
+    ]
+    recording = read_recording(record("run.jsonl"))
+    recording.events += [
+        {**to_record(GoalSent("/JOB/FIRST", 0.0, n, "scan", f"g{n}", goal)), "seq": n}
+        for n, goal in enumerate([*whole, *cut], 100)
+    ]
+    damaged = json.loads(json.dumps(recording.events[-5]))
+    damaged["goal"]["fields"]["data"] = "b'\\x0'"
+    shortened = {**damaged, "goal": {**damaged["goal"], "fields": "<dict of 3 elements>"}}
+    recording.events += [damaged, shortened]
+    sent = [
+        m.goal
+        for topic, _, m in exported(recording, tmp_path / "run.mcap")
+        if topic == "/scan/goal"
+    ]
+    assert sent == whole
+    assert "2 message(s) of /scan/goal are left out: too long to be recorded: a uint8[]." in (
+        caplog.text
+    )
+    assert "left out: too long to be recorded: a string." in caplog.text
+    assert "left out: no bytes: b'" in caplog.text
+    assert "left out: too long to be recorded: mcap_test_msgs/PhotoGoal." in caplog.text
+
+
+def test_mcap_does_not_bring_a_goal_back_that_has_ended(record, tmp_path):
+    recording = read_recording(record("run.jsonl"))
+    path, action = "/JOB/FIRST", "robot/move_base"
+    events = [
+        GoalSent(path, 0.0, 1, action, "a", None),
+        GoalDone(path, 0.0, 2, action, "a", "SUCCEEDED", "", None),
+        GoalFeedback(path, 0.0, 3, action, "a", None),
+        GoalSent(path, 0.0, 4, action, "b", None),
+    ]
+    recording.events[2:2] = [{**to_record(e), "seq": 0} for e in events]
+    statuses = [
+        [(one.goal_id.id, one.status) for one in m.status_list]
+        for topic, _, m in exported(recording, tmp_path / "run.mcap")
+        if topic == "/robot/move_base/status"
+    ]
+    assert statuses == [[("a", 1)], [("a", 3)], [("b", 1)]]
+
+
 def test_progress_of_goals_that_come_as_plain_data():
     from viz.live.progress import annotate
 
