@@ -56,6 +56,8 @@ class Counterexample:
         choices: What was chosen in it, as texts for `replay`.
         script: A program that repeats it.
         picture: The machine with this run; None when nothing that draws is installed.
+        is_cut: `max_time` ended its shortening: a faster computer may find a shorter one. Otherwise
+            it is the same on all.
     """
 
     reason: str
@@ -63,9 +65,12 @@ class Counterexample:
     choices: tuple[str, ...]
     script: str
     picture: Path | None = None
+    is_cut: bool = False
 
     def __str__(self) -> str:
         shown = "" if self.picture is None else f"\npicture: {self.picture}"
+        if self.is_cut:
+            shown += "\n(max_time ended its shortening: a faster computer may find a shorter one)"
         return f"{self.reason}\n{self.run.explain()}{shown}\nTo repeat it:\n\n{self.script}"
 
 
@@ -143,7 +148,8 @@ def explore(
     Args:
         machine: A container, or a function that makes one; needed when its items run out.
         max_runs: Most runs.
-        max_time: Longest time [s of the computer]; to shorten what it found as long again.
+        max_time: Longest time [s of the computer]; to shorten what it found as long again, which
+            `Counterexample.is_cut` tells of.
         max_depth: Choices of a run after this many are not varied.
         max_steps: Leaves with doubles in a run; with more it counts as one that never ends.
         limit: Longest run [s of its own clock, without what outlasts others]; so, too.
@@ -441,12 +447,13 @@ class _Shrinker:
         best = run, verdict, list(self.runner.explorer.choices)
         tries = 0
         end = _COMPUTER.now() + self.max_time
-        better = True
+        better, late = True, False
         while better and tries < SHRINKING_RUNS:
             better = False
             for told in _simpler(best[2]):
                 tries += 1
-                if tries >= SHRINKING_RUNS or _COMPUTER.now() > end:
+                late = _COMPUTER.now() > end
+                if tries >= SHRINKING_RUNS or late:
                     break
                 try:
                     found, error = self.runner.run(told)
@@ -462,7 +469,8 @@ class _Shrinker:
                 break
         run, (_, reason), choices = best
         texts = tuple(str(choice) for choice in _without_usual_end(choices))
-        return Counterexample(reason, run, texts, _script(self.runner, texts, reason))
+        script = _script(self.runner, texts, reason)
+        return Counterexample(reason, run, texts, script, is_cut=late)
 
 
 def _simpler(choices: list[Choice]) -> Iterator[tuple[int, ...]]:
@@ -523,4 +531,4 @@ def _drawn(example: Counterexample, folder: Callable[[], Path] | None) -> Counte
     if folder is None:
         return example
     picture = example.run.draw(folder() / f"{example.run.record.label}-counterexample.svg")
-    return Counterexample(example.reason, example.run, example.choices, example.script, picture)
+    return replace(example, picture=picture)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import itertools
 import time
 import weakref
 
@@ -11,7 +12,14 @@ import pytest
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from actionlib_core.simple_action_client import SimpleActionClient
 from smachpy import CBState, Concurrence, Iterator, SimpleActionState, State, StateMachine
-from smachpy.testing import TimeLimitError, UnknownStateError, explore, mission_kit, replay
+from smachpy.testing import (
+    TimeLimitError,
+    UnknownStateError,
+    exploration,
+    explore,
+    mission_kit,
+    replay,
+)
 from smachpy.testing.explorers import Explorer
 
 
@@ -597,6 +605,24 @@ def test_a_run_that_raises_is_shortened_to_one_that_raises_the_same():
         sm.add("X", CBState(broken, outcomes=["done"], input_keys=["n"]))
     found = explore(sm, keep=["C", "X"], preempts=0)
     assert "ValueError: long" in reason(found)
+
+
+def test_a_counterexample_says_when_the_computer_s_clock_ended_its_shortening(monkeypatch):
+    def no_c_before_e(run):
+        return not run.visits("B")
+
+    seconds = itertools.count()
+    found = explore(sound, invariants=[no_c_before_e])
+    assert not found.counterexample.is_cut
+    assert "max_time ended" not in str(found)
+    monkeypatch.setattr(exploration._COMPUTER, "now", lambda: next(seconds))
+    slow = explore(sound, invariants=[no_c_before_e], max_time=4)
+    assert slow.counterexample.is_cut
+    told = "(max_time ended its shortening: a faster computer may find a shorter one)"
+    assert told in str(slow)
+    assert explore(sound, invariants=[no_c_before_e], max_time=900).counterexample.choices == (
+        found.counterexample.choices
+    )
 
 
 def test_leaves_raise_what_they_and_their_containers_expect():
