@@ -35,6 +35,8 @@ its events become text. Further ones are thinned out and counted."""
 
 CLOSE_S = 2.0
 
+_FIELDS = {"kind": str, "path": str, "stamp_ns": int}
+
 
 class RecordingError(SmachError):
     """A recording cannot be written or read.
@@ -247,8 +249,12 @@ def _read_header(path: Path, line: str) -> Recording:
 def _read_event(path: Path, number: int, line: str) -> dict[str, Any]:
     try:
         event: dict[str, Any] = json.loads(line)
-        str(event["kind"]), str(event["path"]), int(event["stamp_ns"])
-        int(event.get("dropped", 0))
+        for name, kind in _FIELDS.items():
+            if type(event[name]) is not kind:
+                raise ValueError(f"{name}: {event[name]!r}")  # noqa: TRY301
+        dropped = event.get("dropped", 0)
+        if type(dropped) is not int or dropped < 0:
+            raise ValueError(f"dropped: {dropped!r}")  # noqa: TRY301
     except (ValueError, KeyError, TypeError) as error:
         raise RecordingError(
             path, f"line {number}: got {line[:60]!r} ({error}); expected an event."
@@ -281,13 +287,18 @@ def read_recordings(places: Iterable[str | Path]) -> list[Recording]:
     Raises:
         RecordingError: there is no such file or folder, or a file that is named cannot be read.
     """
-    found: list[Recording] = []
+    return list(each_recording(places))
+
+
+def each_recording(places: Iterable[str | Path]) -> Iterator[Recording]:
+    """Yield what `read_recordings` returns, each when it is asked for; raises as that."""
     for place in places:
         for path in find_recordings([place]):
             try:
-                found.append(read_recording(path))
+                recording = read_recording(path)
             except RecordingError as error:
                 if not Path(place).is_dir():
                     raise
                 log.logwarn(f"{error} It is left out.")
-    return found
+                continue
+            yield recording

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from smachpy.run_state import RAISED
 from viz.model import Marks, outcome_class
-from viz.runs.recording import find_recordings, read_recordings
+from viz.runs.recording import each_recording, find_recordings
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -219,8 +219,7 @@ class StatisticsOfFiles:
         self._places = list(places)
         find_recordings(self._places)
         self._lock = threading.Lock()
-        self._groups: dict[str, list[Recording]] | None = None
-        self._found: dict[str, Statistics] = {}
+        self._found: dict[str, tuple[StateRecord, Statistics]] | None = None
 
     def of(self, record: StateRecord) -> dict[str, Any] | None:
         """Return the statistics of a machine; None when there are no runs of it.
@@ -231,14 +230,13 @@ class StatisticsOfFiles:
         Raises:
             RecordingError: a file cannot be read.
         """
-        counted = self.counted()
-        if record.label in counted:
-            return counted[record.label].to_json()
+        found = self._read()
+        if record.label in found:
+            return found[record.label][1].to_json()
         states = _states_below(record)
-        for label, runs in self._grouped().items():
-            recorded = runs[-1].record
+        for recorded, statistics in found.values():
             if _states_below(recorded) == states:
-                told = counted[label].to_json()
+                told = statistics.to_json()
                 told["states"] = {
                     record.path + path.removeprefix(recorded.path): numbers
                     for path, numbers in told["states"].items()
@@ -248,16 +246,17 @@ class StatisticsOfFiles:
 
     def counted(self) -> dict[str, Statistics]:
         """Return the statistics by machine; raises as `of`."""
-        groups = self._grouped()
-        with self._lock:
-            if not self._found:
-                self._found = {name: count(runs) for name, runs in groups.items()}
-            return self._found
+        return {label: statistics for label, (_, statistics) in self._read().items()}
 
-    def _grouped(self) -> dict[str, list[Recording]]:
+    def _read(self) -> dict[str, tuple[StateRecord, Statistics]]:
+        """By machine: as it was in its last file, and what all its files add up to."""
         with self._lock:
-            if self._groups is None:
-                self._groups = {}
-                for recording in read_recordings(self._places):
-                    self._groups.setdefault(recording.record.label, []).append(recording)
-            return self._groups
+            if self._found is None:
+                found: dict[str, tuple[StateRecord, Statistics]] = {}
+                for recording in each_recording(self._places):
+                    label = recording.record.label
+                    statistics = found[label][1] if label in found else Statistics()
+                    statistics.add(recording.events)
+                    found[label] = recording.record, statistics
+                self._found = found
+            return self._found

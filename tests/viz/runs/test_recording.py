@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import json
 import math
 import threading
+import weakref
 from dataclasses import asdict
 from types import SimpleNamespace
 
@@ -118,6 +120,24 @@ def test_a_broken_line_in_the_middle_is_named(record):
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join([*lines[:2], "{broken\n", *lines[2:]]))
     with pytest.raises(RecordingError, match="line 3"):
+        read_recording(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *[("dropped", value) for value in ("5", -1, 1.5, True, None, [1])],
+        *[("stamp_ns", value) for value in ("5", None, 1.5)],
+        ("kind", 3),
+        ("path", ["/A"]),
+    ],
+)
+def test_a_field_that_is_none_is_named_with_its_line(record, name, value):
+    path = record("run.jsonl")
+    lines = path.read_text().splitlines(keepends=True)
+    lines[2] = json.dumps({**json.loads(lines[2]), name: value}) + "\n"
+    path.write_text("".join(lines))
+    with pytest.raises(RecordingError, match=rf"line 3: .*\({name}: .*expected an event"):
         read_recording(path)
 
 
@@ -555,6 +575,31 @@ def test_statistics_of_a_machine_that_is_shown_under_another_name(record, tmp_pa
     assert runs.of(describe(make_machine(extra=True), name="SM_ROOT")) is None
     with pytest.raises(RecordingError, match="no such"):
         StatisticsOfFiles([tmp_path / "none"])
+
+
+def test_counted_runs_are_not_kept(record, tmp_path, monkeypatch):
+    from viz.runs import statistics
+
+    for name in ("a", "b", "c"):
+        record(f"{name}.jsonl")
+    seen = []
+
+    def followed(places):
+        for recording in recording_module.each_recording(places):
+            assert sum(events() is not None for events in seen) <= 1  # the one before
+            recording.events = Events(recording.events)
+            seen.append(weakref.ref(recording.events))
+            yield recording
+
+    class Events(list):
+        """A list that can be followed."""
+
+    monkeypatch.setattr(statistics, "each_recording", followed)
+    runs = StatisticsOfFiles([tmp_path])
+    assert runs.of(describe(make_machine()))["runs"] == len(seen) == 3
+    assert runs.counted()["JOB"].runs == 3
+    gc.collect()
+    assert not any(events() is not None for events in seen)
 
 
 def test_files_of_one_name_are_two_machines(record, tmp_path):
