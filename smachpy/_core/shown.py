@@ -1,8 +1,9 @@
 """The text of a value that is to be looked at: its `repr`, where that is soon made.
 
 How long a `repr` takes is not known before it is made, so what is inside the value is counted
-first. This knows Python's own containers, dataclasses, namespaces and exceptions, and the size of
-whatever has one; a `__repr__` that a program wrote for a class without a length is called as it is.
+first. This knows Python's own containers, messages, dataclasses, namespaces and exceptions, and the
+size of whatever has one; a `__repr__` that a program wrote for a class without a length is called
+as it is.
 """
 
 from __future__ import annotations
@@ -114,6 +115,8 @@ def _fields(value: Any) -> list[tuple[str, Any]] | None:
     if hasattr(kind, "__dataclass_fields__") and hasattr(kind.__repr__, "__wrapped__"):
         names = [field.name for field in fields(value) if field.repr]
         return [(f"{name}=", getattr(value, name)) for name in names]
+    if hasattr(kind, "_md5sum") and hasattr(kind, "__slots__"):
+        return [(f"{name}=", getattr(value, name, None)) for name in kind.__slots__]
     if isinstance(value, SimpleNamespace):
         return [(f"{name}=", part) for name, part in vars(value).items()]
     if isinstance(value, BaseException):

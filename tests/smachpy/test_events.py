@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import smachpy
+from actionlib_core.interfaces.std_msgs.msg import Int8MultiArray, String
 from smachpy import events
 from smachpy.events import (
     CallbackFailed,
@@ -282,6 +283,8 @@ cells = [Cell()] * 100_000
         ({1: ["x" * 200_000]}, "{1: <list of 1 elements>}"),
         ({b"x" * 200_000}, "<set of 1 elements>"),
         ({1: b"x" * 200_000}, "{1: <bytes of 200000 elements>}"),
+        ({1: Int8MultiArray(data=[0] * 100_000)}, "{1: Int8MultiArray(layout=MultiArrayLayout("),
+        ({1: String(data="x" * 200_000)}, "{1: String(data='xxx"),
         (Route(), "<Route of 5000 elements>"),
     ],
 )
@@ -311,6 +314,7 @@ def test_many_large_values_share_what_is_looked_at():
         Map("hall", [[0] * 9] * 9),
         SimpleNamespace(a=1),
         ValueError("x", 3),
+        {1: String(data="a")},
         {1: 2}.values(),
         range(10**9),
         {1: "x" * 3_000},
