@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from smachpy._runtime.asker import asking
 from smachpy.container import Container
-from smachpy.events import Entered, Failed, Iterated, Left
+from smachpy.events import Entered, Failed, Iterated, Left, Retried
 from smachpy.introspection import describe
 from smachpy.testing._core.search import Choice
 from smachpy.testing._core.values import Values
@@ -179,9 +179,7 @@ class Explorer:
         if isinstance(event, Entered):
             self._active[event.path] = event.t
             self._attempts.pop(event.path, None)
-            inside = event.path + "/"
-            for path in [path for path in self._ended if path.startswith(inside)]:
-                del self._ended[path]
+            self._forget_ends(event.path)
             if event.path in self._leaves:
                 self._begins(event.path)
         elif isinstance(event, Left | Failed):
@@ -192,8 +190,17 @@ class Explorer:
             self._ended[event.path] = left
             if event.path in self._leaves:
                 self._outlasting.clear()  # another one may be the next to end
+        elif isinstance(event, Retried):
+            self._attempts[event.path] = event.attempt
+            self._forget_ends(event.path)
         elif isinstance(event, Iterated):
             self._items[event.path] = event[3]  # tuples have an `index` of their own
+
+    def _forget_ends(self, path: str) -> None:
+        """Forget how what is in a container ended: it begins again."""
+        inside = path + "/"
+        for ended in [ended for ended in self._ended if ended.startswith(inside)]:
+            del self._ended[ended]
 
     def _begins(self, path: str) -> None:
         """Choose whether a preempt comes while a leaf that is kept runs."""
@@ -217,6 +224,7 @@ class Explorer:
         return (
             about,
             self._preempts,
+            self._attempts.get(self._root_path, 0),
             tuple(sorted(active)),
             tuple(sorted(self._hanging)),
             tuple(sorted(self._outlasting)),

@@ -674,6 +674,37 @@ def test_what_a_leaf_raised_is_part_of_the_situation_beside_it(deep, interleavin
     assert "ZeroDivisionError" in reason(found)
 
 
+@pytest.mark.parametrize("is_root", [False, True])
+def test_the_attempts_of_a_container_are_part_of_the_situation(is_root):
+    options = {"retry": (2, 0.0, RuntimeError), "on_exception": {RuntimeError: "failed"}}
+    inner = StateMachine(["done", "failed"], **options)
+    with inner:
+        inner.add("A", Leaf("done"), {"done": "B"})
+        inner.add("B", Leaf("done"))
+    outer = StateMachine(["done", "failed"], name="M")
+    with outer:
+        outer.add("IN", inner)
+    machine = inner if is_root else outer
+    seen = set()
+
+    def explored(**options):
+        found = explore(
+            machine,
+            faults=["raise"],
+            preempts=0,
+            on_run=lambda run: seen.add((run.path[-1], run.outcome)),
+            **options,
+        )
+        assert found.exhaustive
+        runs = set(seen)
+        seen.clear()
+        return runs
+
+    every = explored(invariants=[lambda _: True])  # which compares no situations
+    assert len(every) == 3  # done, or failed in the second A or B
+    assert explored() == every
+
+
 class NewError(Exception):
     def __new__(cls, one, two):
         return super().__new__(cls, one, two)
