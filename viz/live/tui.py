@@ -33,6 +33,12 @@ BAR = 20
 MOST_GOALS = 4
 MOST_VALUES = 100
 LOGGED_LINES = 500
+LOGGED_BACK = 100
+"""Lines of the log while one looks back: all of them at every step take too long."""
+
+STRIDE = 1000
+"""Steps back fold so many events at most, but for one in so many."""
+
 LOGGED = {
     *("Started", "Finished", "Left", "Failed", "GoalDone", "Retried"),
     *("PreemptRequested", "PreemptServiced", "Abandoned"),
@@ -80,6 +86,7 @@ class MissionApp(App[None]):
         self._shown: tuple[str, int] = ("", 0)
         self._seq = 0
         self._until: int | None = None  # number of the event that is looked back at
+        self._mark = 0, ""  # number of an earlier one, and the state after it
         self._state = RunState()
         self._places: dict[str, TreeNode[StateRecord]] = {}
         self._follow = True
@@ -133,7 +140,7 @@ class MissionApp(App[None]):
 
     def _begin(self, machine: Machine, record: StateRecord) -> None:
         self._shown = (machine.epoch, machine.revision)
-        self._until = None
+        self._until, self._mark = None, (0, "")
         tree = self.query_one(Tree)
         tree.reset(Text(record.label), record)
         self._places = {record.path: tree.root}
@@ -142,13 +149,32 @@ class MissionApp(App[None]):
         self._fold_anew(machine)
 
     def _fold_anew(self, machine: Machine) -> None:
-        """Fold what is known of the machine, as far as it is looked at."""
+        """Fold what is known of the machine."""
         base, events = machine.told()
         self._state, self._seq = RunState(base), 0
-        self.query_one(RichLog).clear()
-        self.query_one(DataTable).clear()
-        self._fold([e for e in events if self._until is None or e["seq"] <= self._until])
+        self._mark = 0, ""
+        self._fold(events)
         self._draw_userdata()
+        self._write_anew(events, LOGGED_LINES)
+
+    def _look_back(self, machine: Machine, until: int) -> None:
+        """Fold as far as event `until`, from the mark if that is one of those before it."""
+        base, events = machine.told()
+        events = [event for event in events if event["seq"] <= until]
+        number, text = self._mark
+        at = sum(event["seq"] <= number for event in events)
+        if at and events[at - 1]["seq"] == number:
+            self._state = RunState(json.loads(text))
+        else:
+            at = max(0, len(events) - STRIDE)
+            self._state = RunState(base)
+            self._fold(events[:at])
+            if at:
+                self._mark = self._seq, json.dumps(self._state.data)
+        self._fold(events[at:])
+        self._seq = until
+        self._draw_userdata()
+        self._write_anew(events, LOGGED_BACK)
 
     def _grow(self, node: TreeNode[Any], record: StateRecord) -> None:
         for child in record.children:
@@ -162,18 +188,30 @@ class MissionApp(App[None]):
         texts = machine.since(self._seq)
         if texts is None:  # some are gone, or it was all told anew
             self._fold_anew(machine)
-        elif self._fold([json.loads(text) for text in texts]):
-            self._draw_userdata()
+        else:
+            self._go_on([json.loads(text) for text in texts])
 
     def _fold(self, events: list[dict[str, Any]]) -> bool:
         """Take events in; whether userdata was written."""
-        log = self.query_one(RichLog)
         for event in events:
             self._state.fold(event)
             self._seq = event["seq"]
-        for event in [one for one in events if one["kind"] in LOGGED][-LOGGED_LINES:]:
-            log.write(_line(event))
         return any(event["kind"] == "UserdataWritten" for event in events)
+
+    def _go_on(self, events: list[dict[str, Any]]) -> None:
+        """Take in and show what comes next."""
+        if self._fold(events):
+            self._draw_userdata()
+        self._write(events, LOGGED_LINES)
+
+    def _write(self, events: list[dict[str, Any]], most: int) -> None:
+        log = self.query_one(RichLog)
+        for event in [one for one in events if one["kind"] in LOGGED][-most:]:
+            log.write(_line(event))
+
+    def _write_anew(self, events: list[dict[str, Any]], most: int) -> None:
+        self.query_one(RichLog).clear()
+        self._write(events, most)
 
     def _draw_userdata(self) -> None:
         table = self.query_one(DataTable)
@@ -281,15 +319,22 @@ class MissionApp(App[None]):
         if machine is None or machine.record is None:
             return
         here = self._seq if self._until is None else self._until
-        numbers = [event["seq"] for event in machine.events()]
+        events = machine.events()
+        numbers = [event["seq"] for event in events]
         to = (
             [n for n in numbers if n < here][-1:]
             if step < 0
             else [n for n in numbers if n > here][:1]
         )
-        if to:
-            self._until = None if to[0] == numbers[-1] else to[0]
+        if not to:
+            return
+        self._until = None if to[0] == numbers[-1] else to[0]
+        if self._until is None:
             self._fold_anew(machine)
+        elif step > 0 and machine.since(here) is not None:
+            self._go_on([events[numbers.index(to[0])]])
+        else:
+            self._look_back(machine, to[0])
 
     def action_live(self) -> None:
         """Show what goes on now."""

@@ -8,6 +8,7 @@ from textual.widgets import DataTable, RichLog, Static, Tree
 
 from smachpy import CBState, StateMachine
 from smachpy.run_state import RunState
+from viz.live import tui
 from viz.live.machines import Machine, Machines
 from viz.live.tui import MissionApp
 from viz.runs.recording import Recorder, read_recording
@@ -229,3 +230,60 @@ def test_one_event_back_one_on_and_back_to_now(tmp_path, clock):
 def test_events_that_are_missing_are_counted(tmp_path, clock):
     machine = watched(tmp_path, [event(1), event(9, "Left", outcome="ok", dropped=7)])
     assert "7 events missing" in seen(machine)["status"]
+
+
+def test_looking_back_folds_what_is_near_and_shows_what_was(tmp_path, clock, monkeypatch):
+    monkeypatch.setattr(tui, "STRIDE", 10)
+    monkeypatch.setattr(tui, "LOGGED_BACK", 10)
+    events = [event(1, "Started", "/JOB")]
+    for n in range(2, 402, 2):
+        events += [event(n), event(n + 1, "Left", outcome=f"end{n + 1}")]
+    machine = watched(tmp_path, events)
+    folds = []
+    fold = RunState.fold
+    monkeypatch.setattr(
+        RunState, "fold", lambda state, one: (folds.append(one), fold(state, one))[1]
+    )
+
+    async def look():
+        app = MissionApp(Machines(), None)
+        async with app.run_test(size=(140, 50)) as pilot:
+            app._machine = machine
+            app.refresh_view()
+            await pilot.pause()
+            folds.clear()
+            at = len(events)
+            for step in [-1] * 20 + [1] * 5 + [-1] * 10:
+                app.action_go_by(step)
+                at += step
+                there = RunState()
+                for one in events[:at]:
+                    fold(there, one)
+                assert app._state.data == there.data
+                assert f" end{at - 1 + at % 2}" in app.query_one(RichLog).lines[-1].text
+            lines = len(app.query_one(RichLog).lines)
+            app.action_live()
+            assert len(app.query_one(RichLog).lines) > lines
+            assert app._state.data["states"]["/JOB/FIRST"]["visits"] == 200
+
+    asyncio.run(look())
+    assert len(folds) < 3_000  # from the beginning each time it is 13,000
+
+
+def test_looking_back_at_few_events_begins_with_what_was_before_them(tmp_path, clock):
+    machine = watched(tmp_path)
+    recording = machine.events()
+
+    async def look():
+        app = MissionApp(Machines(), None)
+        async with app.run_test(size=(140, 50)):
+            app._machine = machine
+            app.refresh_view()
+            for at in (*range(len(recording) - 1, 0, -1), *range(2, 5), 3, 2):
+                app.action_go_by(-1 if at < app._seq else 1)
+                there = RunState()
+                for one in recording[:at]:
+                    there.fold(one)
+                assert app._state.data == there.data, at
+
+    asyncio.run(look())
