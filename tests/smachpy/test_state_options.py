@@ -349,7 +349,8 @@ def test_the_group_that_a_concurrence_makes_of_errors_can_be_asked_for():
 
     assert run(fails(on_exception={ExceptionGroup: "broken"}))[0] == "broken"
     assert run(within(fails(), on_exception={ExceptionGroup: "broken"}))[0] == "broken"
-    assert run(fails(retry=(2, 0.0, ExceptionGroup)))[0] == "ok"
+    # The first to fail may stop the other before it has: that one fails at the next attempt.
+    assert run(fails(retry=(3, 0.0, ExceptionGroup)))[0] == "ok"
 
 
 def test_hooks_run_around_the_state():
