@@ -192,7 +192,7 @@ def explore(
     begun = _COMPUTER.now()
     search = Search(max_depth)
     with _Runner(
-        machine, options, times, tuple(keep), userdata, doubles, real_actions=real_actions
+        machine, options, tuple(keep), userdata, doubles, times, real_actions=real_actions
     ) as runner:
         shrinker = _Shrinker(runner, own, grace, max_time)
         runs = 0
@@ -262,7 +262,7 @@ def replay(
     options = Options(frozenset(faults), preempts, interleavings, max_steps, dict(writes or {}))
     times = _Times(limit, steps, "replay")
     with _Runner(
-        machine, options, times, tuple(keep), userdata, doubles, real_actions=real_actions
+        machine, options, tuple(keep), userdata, doubles, times, real_actions=real_actions
     ) as runner:
         run, error = runner.run(choices)
     if error is not None:
@@ -284,6 +284,9 @@ class _Times(NamedTuple):
     call: str = "explore"
 
 
+_TIMES = _Times()
+
+
 class _Runner:
     """Runs a machine again and again, each time from the same beginning."""
 
@@ -291,10 +294,10 @@ class _Runner:
         self,
         machine: Container | Callable[[], Container],
         options: Options,
-        times: _Times,
         keep: tuple[str, ...],
         userdata: Mapping[str, Any] | None,
         doubles: Iterable[Replacement] = (),
+        times: _Times = _TIMES,
         *,
         real_actions: bool,
     ) -> None:
