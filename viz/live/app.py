@@ -400,10 +400,11 @@ class _Page:
                 else:
                     due = min(due, wait)
             try:
-                await asyncio.wait_for(self.news.wait(), max(due, COALESCE_S))
-                await asyncio.sleep(COALESCE_S)
+                async with asyncio.timeout(max(due, COALESCE_S)):
+                    await self.news.wait()
             except TimeoutError:
                 continue
+            await asyncio.sleep(COALESCE_S)
 
     def _tell_actions(self, actions: Actions, now: float) -> str:
         self._told, self._told_at = actions.revision, now
