@@ -231,11 +231,15 @@ class ZenohTransport:
         _leave(self.clock, self.session)
         self.gate.wait_idle(IDLE_S)
         # Not earlier: what zenoh's objects do when they are dropped is nothing after the session.
+        if ending.begun:
+            _kept.extend(self._declared)
         self._declared.clear()
         _open_transports.pop(self, None)
 
     def forget(self, entry: Declared) -> bool:
         """Drop an entry that is being closed; False when it was gone already."""
+        if ending.begun:
+            _kept.append(entry)
         with self._lock:
             return self._declared.pop(entry, False) is None
 
@@ -331,6 +335,10 @@ def _leave(clock: RealClock, session: zenoh.Session) -> None:
 # Sessions stay alive until they are closed, so that no finalizer ever does it.
 _open_transports: dict[ZenohTransport, None] = {}
 _loopbacks: weakref.WeakSet[SerialExecutor] = weakref.WeakSet()
+
+# What is closed as the interpreter ends. A thread that drops the last reference to an object of
+# zenoh's leaves the interpreter for a moment, and must not come back after its end.
+_kept: list[Declared] = []
 
 
 def _close_all() -> None:
