@@ -25,6 +25,7 @@ from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatusArray
 from actionlib_core.presence import (
     Kind,
     find_mismatch,
+    in_conflict,
     is_younger,
     list_endpoints,
     parse_token,
@@ -43,7 +44,6 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-LIST_TIMEOUT_S = 1.0
 FAREWELL_LIST_S = 0.2
 RESULT = Quality(express=True, block=True)
 FAREWELL = RESULT
@@ -119,12 +119,10 @@ class ServerPort:
             ServerConflictError: the name has a server.
             TransportError: the session is closed.
 
-        Blocks: until the network has said who has the name, `LIST_TIMEOUT_S` at most.
+        Blocks: until the network has said who has the name, 1 s at most.
         """
         transport = self._node.transport
-        there = list_endpoints(
-            transport, kind=Kind.ACTION_SERVER, name=self.name, timeout=LIST_TIMEOUT_S
-        )
+        there = list_endpoints(transport, kind=Kind.ACTION_SERVER, name=self.name)
         if there:
             raise self._conflict(there[0])
         try:
@@ -310,9 +308,7 @@ class ServerPort:
             log.error("%s", self._conflict(other, stays=True))
 
     def _conflict(self, other: Endpoint, *, stays: bool = False) -> ServerConflictError:
-        ends = [(end.node, end.session) for end in (self.endpoint, other)]
-        mine, others = reversed(ends) if stays else ends
-        return ServerConflictError(self.name, mine, others)
+        return ServerConflictError(self.name, *in_conflict(self.endpoint, other, stays=stays))
 
     def _meet_client(self, presence: Presence, client: Endpoint) -> None:
         if presence.alive:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 ROOT = "@smachpy"
 WORDS_BEFORE_NAME = 7
+LIST_TIMEOUT_S = 1.0  # longest wait for the network to say who is there
 
 
 class Kind(StrEnum):
@@ -110,8 +111,23 @@ def token_pattern(kind: Kind | None = None, name: str = "**", *, session: str = 
     return f"{ROOT}/{kind.value if kind else '*'}/{session}/*/*/*/*/{name}"
 
 
+def in_conflict(
+    own: Endpoint, other: Endpoint, *, stays: bool = False
+) -> tuple[tuple[str, str], tuple[str, str]]:
+    """Return (node, session) of the one of two servers that gives way, and of the one that stays.
+
+    `own` gives way; `stays`: the other one does.
+    """
+    gives, keeps = (other, own) if stays else (own, other)
+    return (gives.node, gives.session), (keeps.node, keeps.session)
+
+
 def list_endpoints(
-    transport: Transport, *, kind: Kind | None = None, name: str = "**", timeout: float = 1.0
+    transport: Transport,
+    *,
+    kind: Kind | None = None,
+    name: str = "**",
+    timeout: float = LIST_TIMEOUT_S,
 ) -> list[Endpoint]:
     """Return the ends that are there now, sorted.
 

@@ -33,7 +33,15 @@ from actionlib_core.exceptions import (
     WaitTimeoutError,
 )
 from actionlib_core.node import get_node
-from actionlib_core.presence import Endpoint, Kind, is_younger, list_endpoints, token_key, with_age
+from actionlib_core.presence import (
+    Endpoint,
+    Kind,
+    in_conflict,
+    is_younger,
+    list_endpoints,
+    token_key,
+    with_age,
+)
 from actionlib_core.shutdown import requested
 from actionlib_core.time import to_seconds
 from actionlib_core.wire import check_encoding, encoding_of, parse_encoding
@@ -53,7 +61,6 @@ logger = logging.getLogger("actionlib_core")
 NAME_KIND = "service name"
 CALLS_AT_ONCE = 500  # of one service; each has a thread
 BUSY_LOG_S = 10.0  # shortest time between two words in the log that calls are refused
-LIST_TIMEOUT_S = 1.0
 CALL_TIMEOUT_S = 60.0  # default limit of a call
 APPEAR_S = 2.0  # how much of it a call gives a server to appear
 FOREVER_S = 1e8  # for the network, which wants a number: three years
@@ -198,12 +205,7 @@ class Service(_ServiceEnd):
     def _refuse_second(self) -> None:
         if not self._alone:
             return
-        there = list_endpoints(
-            self.node.transport,
-            kind=Kind.SERVICE,
-            name=self.resolved_name,
-            timeout=LIST_TIMEOUT_S,
-        )
+        there = list_endpoints(self.node.transport, kind=Kind.SERVICE, name=self.resolved_name)
         if there:
             raise self._conflict(there[0])
 
@@ -227,9 +229,7 @@ class Service(_ServiceEnd):
         self.close()
 
     def _conflict(self, other: Endpoint, *, stays: bool = False) -> ServiceConflictError:
-        ends = [(end.node, end.session) for end in (self._own, other)]
-        mine, others = reversed(ends) if stays else ends
-        return ServiceConflictError(self.resolved_name, mine, others)
+        return ServiceConflictError(self.resolved_name, *in_conflict(self._own, other, stays=stays))
 
     # -- calls ---------------------------------------------------------------------------------
 
