@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     from actionlib_core.sent_goal import SentGoal as SentGoal
     from actionlib_core.server_goal_handle import ServerGoalHandle as ServerGoalHandle
     from actionlib_core.service import Service as Service
-    from actionlib_core.service import ServiceProxy as ServiceProxy
-    from actionlib_core.service import wait_for_service as wait_for_service
+    from actionlib_core.service_proxy import ServiceProxy as ServiceProxy
+    from actionlib_core.service_proxy import wait_for_service as wait_for_service
     from actionlib_core.simple_action_client import SimpleActionClient as SimpleActionClient
     from actionlib_core.simple_action_client import SimpleGoalState as SimpleGoalState
     from actionlib_core.simple_action_server import SimpleActionServer as SimpleActionServer
@@ -75,7 +75,8 @@ _NAMES = {
     "node": ("Node", "get_node", "init", "use_node"),
     "sent_goal": ("SentGoal",),
     "server_goal_handle": ("ServerGoalHandle",),
-    "service": ("Service", "ServiceProxy", "wait_for_service"),
+    "service": ("Service",),
+    "service_proxy": ("ServiceProxy", "wait_for_service"),
     "simple_action_client": ("SimpleActionClient", "SimpleGoalState"),
     "simple_action_server": ("SimpleActionServer",),
     "status_tracker": ("StatusTracker",),

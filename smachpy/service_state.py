@@ -12,7 +12,7 @@ from actionlib_core.exceptions import (
     WaitTimeoutError,
 )
 from actionlib_core.node import get_node
-from actionlib_core.service import CALL_TIMEOUT_S, ServiceProxy
+from actionlib_core.service_proxy import CALL_TIMEOUT_S, ServiceProxy
 from actionlib_core.time import to_seconds
 from smachpy import log
 from smachpy._runtime.messages import Incoming, Outgoing, UserCallback, raise_problems

@@ -78,7 +78,7 @@ def _type(args: argparse.Namespace) -> int:
 
 
 def _call(args: argparse.Namespace) -> int:
-    from actionlib_core.service import ServiceProxy
+    from actionlib_core.service_proxy import ServiceProxy
 
     type_name, text = _words(args)
     with open_node(args, settle=0.0 if type_name else SETTLE_S) as node:

@@ -21,7 +21,8 @@ from actionlib_core.exceptions import (
 from actionlib_core.interfaces import define_service
 from actionlib_core.interfaces.std_srvs.srv import Empty, SetBool, SetBoolResponse, Trigger
 from actionlib_core.node import Node
-from actionlib_core.service import Service, ServiceProxy, wait_for_service
+from actionlib_core.service import Service
+from actionlib_core.service_proxy import ServiceProxy, wait_for_service
 from actionlib_core.transport.faulty import FaultyTransport
 from actionlib_core.transport.memory import MemoryNetwork
 

@@ -9,7 +9,7 @@ import smachpy
 from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import SetBool
 from actionlib_core.node import Node
-from actionlib_core.service import ServiceProxy
+from actionlib_core.service_proxy import ServiceProxy
 from missions.ask_operator import AskOperator
 from missions.exceptions import MissionError
 

@@ -6,7 +6,7 @@ import pytest
 
 from actionlib_core.node import Node, use_node
 from actionlib_core.presence import list_endpoints
-from actionlib_core.service import ServiceProxy
+from actionlib_core.service_proxy import ServiceProxy
 from actionlib_core.transport.memory import MemoryNetwork
 from missions.demo_service import NAME, TOPIC, client, demo_service, server
 from missions.exceptions import MissionError

@@ -20,7 +20,8 @@ from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import Trigger
 from actionlib_core.node import Node
 from actionlib_core.sent_goal import SentGoal
-from actionlib_core.service import Service, ServiceProxy
+from actionlib_core.service import Service
+from actionlib_core.service_proxy import ServiceProxy
 from actionlib_core.simple_action_client import SimpleActionClient, SimpleGoalState
 from actionlib_core.simple_action_server import SimpleActionServer
 from actionlib_core.time import Duration

@@ -9,7 +9,7 @@ import pytest
 from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import Trigger
 from actionlib_core.node import Node
-from actionlib_core.service import ServiceProxy
+from actionlib_core.service_proxy import ServiceProxy
 from actionlib_core.topic import Subscriber
 from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import IntrospectionServer, State, StateMachine

@@ -6,7 +6,7 @@ import pytest
 
 from actionlib_core.interfaces.geometry_msgs.msg import Point
 from actionlib_core.node import Node
-from actionlib_core.service import ServiceProxy
+from actionlib_core.service_proxy import ServiceProxy
 from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import CBState, StateMachine
 from smachpy.value_server import LONGEST_VALUE, VALUE_SERVICE, ReadValue, ValueServer, value_text

@@ -18,7 +18,7 @@ from actionlib_core.exceptions import ActionlibError
 from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import Trigger
 from actionlib_core.presence import Kind, parse_token, token_key, token_pattern
-from actionlib_core.service import ServiceProxy
+from actionlib_core.service_proxy import ServiceProxy
 from actionlib_core.wire import encoding_of
 from smachpy.feed import DESCRIPTION_TOPIC, EVENTS_TOPIC, HISTORY_SERVICE
 from smachpy.introspection import StateRecord

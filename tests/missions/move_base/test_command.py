@@ -10,7 +10,7 @@ import pytest
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.std_srvs.srv import SetBool
 from actionlib_core.node import Node
-from actionlib_core.service import ServiceProxy
+from actionlib_core.service_proxy import ServiceProxy
 from actionlib_core.simple_action_client import SimpleActionClient
 from missions.maps import FOLDER
 from missions.move_base.__main__ import main

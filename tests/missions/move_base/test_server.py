@@ -13,7 +13,7 @@ from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBas
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.interfaces.sensor_msgs.msg import BatteryState
 from actionlib_core.interfaces.std_srvs.srv import Empty
-from actionlib_core.service import ServiceProxy
+from actionlib_core.service_proxy import ServiceProxy
 from actionlib_core.simple_action_client import SimpleActionClient
 from actionlib_core.topic import Publisher, Subscriber, wait_for_message
 from missions.interfaces import ChargeAction, ChargeGoal

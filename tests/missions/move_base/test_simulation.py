@@ -14,7 +14,7 @@ from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.interfaces.std_msgs.msg import Bool
 from actionlib_core.interfaces.std_srvs.srv import Empty, SetBool
 from actionlib_core.node import Node, use_node
-from actionlib_core.service import ServiceProxy
+from actionlib_core.service_proxy import ServiceProxy
 from actionlib_core.simple_action_client import SimpleActionClient
 from actionlib_core.topic import Subscriber, wait_for_message
 from actionlib_core.transport.memory import MemoryNetwork
