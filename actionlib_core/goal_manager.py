@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 from actionlib_core._action_wire import pack_goal
 from actionlib_core._callbacks import CallbackQueue
 from actionlib_core._client_port import ClientPort
-from actionlib_core._core.client_goal import UNLISTED_S, ClientGoal, Duty, Path
+from actionlib_core._core.client_goal import ClientGoal, Duty, Path
+from actionlib_core._core.known_servers import KnownServers
+from actionlib_core._core.recent import Recent
 from actionlib_core._core.states import TERMINAL, CommState, Status
 from actionlib_core.comm_state_machine import CommStateMachine
 from actionlib_core.exceptions import ActionlibError, TransportError
-from actionlib_core.presence import token_key
 from actionlib_core.shutdown import current_shutdown
 
 if TYPE_CHECKING:
@@ -34,15 +35,9 @@ ACK_AT = 64  # so many acknowledgements go out at once
 _ONLY_GOAL: Duty = Duty.GOAL
 STATUSES = {int(status): status for status in Status}
 UNSURE = " and had not acknowledged the goal, which may or may not have begun"
-REMEMBERED = 1024  # ids of ended goals whose result may come again, and sessions of servers
+REMEMBERED = 1024  # ids of ended goals whose result may come again
 
 _managers: weakref.WeakSet[GoalManager] = weakref.WeakSet()
-
-
-def _trim(remembered: dict[str, None]) -> None:
-    """Forget the oldest beyond the limit."""
-    if len(remembered) > REMEMBERED:
-        del remembered[next(iter(remembered))]
 
 
 def _free_locks() -> None:
@@ -79,15 +74,9 @@ class GoalManager:
         self._lock = threading.RLock()
         _managers.add(self)
         self._machines: dict[str, CommStateMachine] = {}
-        self._ended: dict[str, None] = {}
+        self._ended = Recent(REMEMBERED)
         self._acks: list[str] = []
-        self._servers: dict[Endpoint, TypeMismatchError | None] = {}
-        self._away: dict[Endpoint, float] = {}
-        self._leaving: set[Endpoint] = set()
-        self._current: Endpoint | None = None
-        self._token = ""
-        self._met: dict[str, None] = {}
-        self._foreign_until = 0.0
+        self._servers = KnownServers()
         self._waiters: list[Event] = []
         self._timer: Timer | None = None
         self._due = 0.0
@@ -116,40 +105,7 @@ class GoalManager:
     @property
     def server(self) -> Endpoint | None:
         """The action's server, None while there is none of our type."""
-        return self._current
-
-    def _choose_server(self) -> None:
-        """Find the server after a change. Needs the lock.
-
-        Goals name it if it is alone. Of two one is about to give way, or is dead and its token
-        outlasts it until a lease is over: which one cannot be told.
-        """
-        ends = [end for end, error in self._servers.items() if error is None]
-        there = [end for end in ends if end not in self._leaving]
-        self._current = there[0] if there else None
-        self._token = token_key(there[0]) if len(there) == 1 else ""
-
-    def _meet(self, server: Endpoint) -> None:
-        """Note that a server is one of ours: it shows a token. Needs the lock."""
-        self._met[server.session] = None
-        self._foreign_until = 0.0
-        _trim(self._met)
-
-    def _hear_foreign(self, session: str) -> None:
-        """Take a status list while no server shows a token: a bridge may stand for one.
-
-        The last words of a server that has left do not count.
-        """
-        now = self._clock.now()
-        with self._lock:
-            if session in self._met or self._current is not None:
-                return
-            if self._foreign_until <= now:
-                for machine in self._machines.values():
-                    if not machine.goal.acknowledged:
-                        machine.goal.hurry(now)
-                self._arm(now)
-            self._foreign_until = now + UNLISTED_S
+        return self._servers.current
 
     def wait_for_server(self, timeout: float | None) -> bool:
         """Wait for a server; return whether there is one.
@@ -169,9 +125,9 @@ class GoalManager:
                 with self._lock:
                     if self._closed:
                         return False
-                    if self._current is not None:
+                    if self._servers.current is not None:
                         return True
-                    self._check_types()
+                    self._servers.check_types()
                     changed.clear()
                     if changed not in self._waiters:
                         self._waiters.append(changed)
@@ -181,15 +137,10 @@ class GoalManager:
                     with self._lock:
                         if changed in self._waiters:
                             self._waiters.remove(changed)
-                        return self._current is not None
+                        return self._servers.current is not None
         finally:
             if forget is not None:
                 forget()
-
-    def _check_types(self) -> None:
-        for error in self._servers.values():
-            if error is not None:
-                raise error
 
     def _wake(self) -> None:
         waiters, self._waiters = self._waiters, []
@@ -200,19 +151,15 @@ class GoalManager:
         """Take the appearance of a server."""
         now = self._clock.now()
         with self._lock:
-            self._servers[server] = error
-            self._meet(server)
-            self._choose_server()
+            returned, replaced = self._servers.appear(server, error)
             if error is None:
-                returned = self._away.pop(server, None) is not None
-                for old in list(self._away):
+                for old in replaced:
                     self._lose_goals_of(old, f"restarted as session {server.session}")
-                    del self._away[old]
                 for machine in self._machines.values():
                     if returned or not machine.goal.acknowledged:
                         machine.goal.hurry(now)
                 self._arm(now)
-            elif self._current is None:
+            elif self._servers.current is None:
                 for machine in list(self._machines.values()):
                     if not machine.goal.acknowledged:
                         self._take(machine, machine.goal.lose(str(error)))
@@ -221,15 +168,14 @@ class GoalManager:
     def on_server_gone(self, server: Endpoint) -> None:
         """Take the disappearance of a server."""
         with self._lock:
-            if server not in self._servers or self._servers.pop(server) is not None:
+            if not self._servers.vanish(server):
                 return  # unknown, or of another type
-            self._choose_server()
-            if server in self._leaving or self._server_lost_timeout <= 0:
+            if self._servers.has_said_farewell(server) or self._server_lost_timeout <= 0:
                 self._lose_goals_of(server, "is gone")
             else:
-                now = self._clock.now()
-                self._away[server] = now + self._server_lost_timeout
-                self._arm(self._away[server])
+                until = self._clock.now() + self._server_lost_timeout
+                self._servers.away[server] = until
+                self._arm(until)
 
     def on_farewell(self, entries: list[StatusEntry], server: Endpoint) -> None:
         """Take the last list of a server that leaves, and answer it.
@@ -241,10 +187,7 @@ class GoalManager:
         with self._lock:
             if self._closed:
                 return
-            self._meet(server)
-            if server in self._servers:
-                self._leaving.add(server)
-                self._choose_server()
+            self._servers.say_farewell(server)
             for machine in list(self._machines.values()):
                 goal = machine.goal
                 entry = taken.get(goal.id)
@@ -255,17 +198,24 @@ class GoalManager:
             acks, self._acks = self._acks, []
         self._port.send_acks(acks, self._clock.time_ns(), farewell=True)
 
+    def _hear_foreign(self, session: str) -> None:
+        """Take a status list while no server shows a token: send what waits for one."""
+        now = self._clock.now()
+        with self._lock:
+            if not self._servers.hear_foreign(session, now):
+                return
+            for machine in self._machines.values():
+                if not machine.goal.acknowledged:
+                    machine.goal.hurry(now)
+            self._arm(now)
+
     def _lose_goals_of(self, server: Endpoint, what: str) -> None:
         """Give up the goals that a server has, or may have. Needs the lock."""
         reason = f"the action server of node '{server.node}' (session {server.session}) {what}"
-        # A server that has said farewell has named its goals: others are not with it. Nor are those
-        # that were sent to several servers while one of them is there.
-        others_there = server in self._leaving or self._current is not None
-        mine = {server.session} if others_there else {"", server.session}
-        self._leaving.discard(server)
+        sessions = self._servers.forget(server)
         for machine in list(self._machines.values()):
             goal = machine.goal
-            if goal.offered and goal.server in mine:
+            if goal.offered and goal.server in sessions:
                 self._take(machine, goal.lose(reason if goal.acknowledged else reason + UNSURE))
 
     # -- what the user does --------------------------------------------------------------------
@@ -335,8 +285,8 @@ class GoalManager:
             known = self._machines.get(goal.id)
             if known is not None:
                 return self._take_up(known, machine, created)
-            if self._current is None:
-                self._check_types()
+            if self._servers.current is None:
+                self._servers.check_types()
             now = self._clock.now()
             duty = goal.begin(now)
             self._machines[goal.id] = machine
@@ -438,7 +388,7 @@ class GoalManager:
 
     def on_statuses(self, entries: list[StatusEntry], server: str) -> None:
         """Take a status list."""
-        if self._current is None:
+        if self._servers.current is None:
             self._hear_foreign(server)
         if not self._machines:
             return
@@ -451,7 +401,7 @@ class GoalManager:
                 if machine is not None:
                     self._hear(machine, entry, server, now)
             if len(listed) < len(self._machines) or not listed.issuperset(self._machines):
-                answers = self._current is not None
+                answers = self._servers.current is not None
                 for machine in list(self._machines.values()):
                     if machine.goal.id not in listed:
                         self._take(machine, machine.goal.on_unlisted(now, answers=answers))
@@ -553,8 +503,7 @@ class GoalManager:
             self._machines.pop(machine.goal.id, None)
             if machine.ended is not None:
                 machine.ended.set()
-            self._ended[machine.goal.id] = None
-            _trim(self._ended)
+            self._ended.add(machine.goal.id)
         if machine.on_transition is None:
             if machine.goal.over and machine.on_feedback is not None:
                 self.callbacks.call(machine.settled.set)  # behind the last feedback
@@ -583,8 +532,7 @@ class GoalManager:
             if self._closed:
                 return
             acks, self._acks = self._acks, []
-            for server in [end for end, until in self._away.items() if until <= now]:
-                del self._away[server]
+            for server in self._servers.take_overdue(now):
                 self._lose_goals_of(server, "is gone")
             for machine in list(self._machines.values()):
                 path, duty = machine.goal.tick(now)
@@ -592,7 +540,7 @@ class GoalManager:
                 if duty:
                     duties.append((machine, duty))
             dues = [machine.goal.due for machine in self._machines.values()]
-            dues.extend(self._away.values())
+            dues.extend(self._servers.away.values())
             if dues:
                 self._arm(max(min(dues), now + TICK_S))
         if acks:
@@ -626,10 +574,9 @@ class GoalManager:
         with self._lock:
             if goal.over:  # cancelled or stopped while it had not been sent
                 return
-            server = self._current
-            if server is None and self._foreign_until <= self._clock.now():
+            if not self._servers.may_listen(self._clock.now()):
                 return
-            token = self._token
+            server, token = self._servers.current, self._servers.token
             goal.on_offered(server.session if server is not None and token else "")
         stamp_ns = goal.stamp_ns
         self._port.send_goal(pack_goal(stamp_ns, goal.id, stamp_ns, machine.body, token))
