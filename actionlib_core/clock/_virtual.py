@@ -112,7 +112,7 @@ class VirtualClock:
         return self._now
 
     def time_ns(self) -> int:
-        return START_TIME_NS + round(self._now * 1e9)
+        return START_TIME_NS + int(self._now * 1e9 + 0.5)
 
     def sleep(self, seconds: float) -> None:
         if seconds > 0:
@@ -130,10 +130,10 @@ class VirtualClock:
 
     def call_later(self, delay: float, callback: Callable[[], object]) -> VirtualTimer:
         timer = VirtualTimer(callback)
-        with self._lock:
-            if delay <= 0:
-                self._ready.append(timer)
-            else:
+        if delay <= 0:
+            self._ready.append(timer)  # no lock: appending is one step, and others only take out
+        else:
+            with self._lock:
                 heapq.heappush(self._deadlines, (self._now + delay, next(self._count), timer))
         if self.rate is not None:
             self._poke.set()
@@ -249,8 +249,10 @@ class VirtualClock:
         with self._lock:
             if self._closed:
                 raise Stopped
+            if event is not None and event._flag:  # noqa: SLF001  set since the caller looked
+                return True
             deadline = None if timeout is None else self._now + timeout
-            if deadline is not None and self._is_alone(deadline):
+            if deadline is not None and not self._ready and self._is_alone(deadline):
                 self._now = deadline
                 return False
             # Noted in the heap only when another participant gets the turn: most never need it.
@@ -267,8 +269,11 @@ class VirtualClock:
         return me.woken
 
     def _is_alone(self, deadline: float) -> bool:
-        """Tell whether nobody can go on before `deadline`: the wait is a step of time, no more."""
-        if self._ready or self.rate is not None or self._is_past(deadline):
+        """Tell whether nothing is due before `deadline`: the wait is a step of time, no more.
+
+        Only to be asked when nobody is ready.
+        """
+        if self.rate is not None or (self.limit is not None and deadline > self.limit):
             return False
         due = self._next_due()
         return due is None or due > deadline
@@ -300,8 +305,10 @@ class VirtualClock:
             with self._lock:
                 self._wake(me)
                 if not steps:  # the turn is still mine
-                    self._ready = [r for r in self._ready if r is not me]
-                    self._ready[:0] = [] if chosen in {None, me} else [chosen]
+                    if me in self._ready:
+                        self._ready.remove(me)
+                    if chosen is not None and chosen is not me:
+                        self._ready.insert(0, chosen)
                     raise
             self._poke.set()
             if len(steps) == 1 and not me.gate.acquire_within(INTERRUPT_S):
@@ -323,8 +330,7 @@ class VirtualClock:
     def _next_turn(self, me: Participant | None = None) -> Participant | None:
         """Run callbacks and choose who goes on, `me` who waits or another; None when nobody can."""
         while True:
-            pause = 0.0 if self.rate is None else self._pause(me)
-            if pause:
+            if self.rate is not None and (pause := self._pause(me)):
                 self._pace(pause)
                 continue
             with self._lock:
@@ -365,8 +371,13 @@ class VirtualClock:
 
     def _choose(self, me: Participant | None) -> Participant | VirtualTimer | None:
         ready = self._ready
-        if not ready and self._jump(me):
-            return me
+        if not ready:
+            if me is not None and me.deadline is not None and self._is_alone(me.deadline):
+                self._now = me.deadline
+                self._stop_waiting(me, woken=False)
+                return me
+            self._note(me)
+            self._jump()
         if self.most_turns is not None and self._is_stuck() and self._stop_owner():
             return self._owner
         if ready:
@@ -376,7 +387,7 @@ class VirtualClock:
             over = self.limit is not None and self._next_due() is not None
             self._owner.error = TimeLimit(self._now, waits) if over else Deadlock(waits)
             self._wake(self._owner)
-            ready.clear()
+            ready.remove(self._owner)
             return self._owner
         return None
 
@@ -399,9 +410,6 @@ class VirtualClock:
         self._turns = 0
         return True
 
-    def _is_past(self, due: float) -> bool:
-        return self.limit is not None and due > self.limit
-
     def _next_due(self) -> float | None:
         """Return the next deadline that still matters."""
         deadlines = self._deadlines
@@ -416,22 +424,11 @@ class VirtualClock:
             heapq.heappop(deadlines)
         return None
 
-    def _jump(self, me: Participant | None) -> bool:
-        """Advance to the next deadline; all that are due become ready, `me` alone goes on at once.
-
-        Returns:
-            Whether that is so.
-        """
-        due = self._next_due() if self._deadlines else None
-        if me is not None and me.deadline is not None and not me.noted:
-            if (due is None or me.deadline < due) and not self._is_past(me.deadline):
-                self._now = me.deadline
-                self._stop_waiting(me, woken=False)
-                return True
-            self._note(me)
-            due = self._next_due()
-        if due is None or self._is_past(due):
-            return False
+    def _jump(self) -> None:
+        """Advance to the next deadline; all that are due become ready."""
+        due = self._next_due()
+        if due is None or (self.limit is not None and due > self.limit):
+            return
         self._now = max(due, self._now)
         self._stepped = time.monotonic() if self.rate is not None else 0.0
         while self._next_due() == due:
@@ -440,7 +437,6 @@ class VirtualClock:
                 self._ready.append(what)
             else:
                 self._end_wait(what, woken=False)
-        return False
 
     def _call(self, callback: Callable[[], object]) -> None:
         self._in_callback = True
@@ -456,9 +452,10 @@ class VirtualClock:
         finally:
             self._in_callback = False
 
-    def _wake_all(self, waiters: list[Participant]) -> None:
+    def _set(self, event: VirtualEvent) -> None:
         with self._lock:
-            for participant in tuple(waiters):
+            event._flag = True  # noqa: SLF001  the two are one secret
+            for participant in tuple(event._waiters):  # noqa: SLF001
                 self._wake(participant)
         if self.rate is not None:
             self._poke.set()

@@ -125,9 +125,7 @@ class VirtualEvent:
         return self._flag
 
     def set(self) -> None:
-        self._flag = True
-        if self._waiters:
-            self._clock._wake_all(self._waiters)  # noqa: SLF001  the two are one module's secret
+        self._clock._set(self)  # noqa: SLF001  the two are one secret
 
     def clear(self) -> None:
         self._flag = False

@@ -103,6 +103,23 @@ def test_close_ends_a_participant_that_never_started():
     assert started == []
 
 
+def test_set_by_a_foreign_thread_just_before_the_wait_begins_is_seen(clock, monkeypatch):
+    event = clock.event()
+    wait = clock._wait
+
+    def wait_late(*args):
+        thread = threading.Thread(target=event.set)
+        thread.start()
+        thread.join()
+        return wait(*args)
+
+    monkeypatch.setattr(clock, "_wait", wait_late)
+    assert event.wait()
+    event.clear()
+    assert event.wait(5.0)
+    assert clock.now() == 0.0
+
+
 def test_a_foreign_thread_may_set_but_not_wait(clock):
     event, errors = clock.event(), []
 
