@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from functools import partial
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from actionlib_core.clock._serial import report_thread_exception
 from actionlib_core.exceptions import TransportError
@@ -29,29 +29,29 @@ CLOSE_WAIT_S = 0.9  # how long `close` waits for a callback that is running in a
 
 
 class Inbox:
-    """What waits for one session, first in, first out."""
+    """What waits for one session, first in, first out: who gets it, and what."""
 
     __slots__ = ("_clock", "_deaf", "_idle", "_items", "_running")
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self._items: deque[Callable[[], object]] = deque()
+        self._items: deque[tuple[Receiver, Any]] = deque()
         self._running: int | None = None
         self._idle: Event | None = None
         self._deaf = False
 
-    def post(self, item: Callable[[], object]) -> None:
-        self._items.append(item)
+    def post(self, receiver: Receiver, item: object) -> None:
+        self._items.append((receiver, item))
         self._clock.call_later(0.0, self._deliver)
 
     # No lock: who delivers says so before it looks whether it may, and who shuts says so before it
     # looks whether somebody delivers.
     def _deliver(self) -> None:
-        item = self._items.popleft()
+        receiver, item = self._items.popleft()
         self._running = threading.get_ident()
         try:
             if not self._deaf:
-                item()
+                receiver.deliver(item)
         except Exception:  # noqa: BLE001  a border: reported, the next item is delivered
             report_thread_exception()
         finally:
@@ -70,6 +70,13 @@ class Inbox:
         self._deaf = True
         if self._idle is not None and self._running not in {None, threading.get_ident()}:
             self._idle.wait(CLOSE_WAIT_S)
+
+
+class Receiver(Protocol):
+    """What an inbox delivers to."""
+
+    def deliver(self, item: Any) -> None:
+        """Take what was posted, unless closed."""
 
 
 class Entry:
@@ -107,7 +114,7 @@ class Listener(Entry, Generic[T]):
         self._callback = callback
 
     def post(self, item: T) -> None:
-        self.session.inbox.post(partial(self.deliver, item))
+        self.session.inbox.post(self, item)
 
     def deliver(self, item: T) -> None:
         if not self.closed:
@@ -132,7 +139,7 @@ class Subscriber(Listener[Sample]):
         _add(self.network.subscribers, key, self)
         for publisher in self.network.latches.get(key, ()) if history else ():
             if publisher.last is not None:
-                self.post(publisher.last)
+                self.post(publisher.sample(publisher.last))
 
     def withdraw_locked(self) -> None:
         _remove(self.network.subscribers, self._key, self)
@@ -200,20 +207,21 @@ class Token(Entry):
 class Publisher(Entry):
     """The sending end of a key."""
 
-    __slots__ = ("_encoding", "_key", "_latch", "last")
+    __slots__ = ("_encoding", "_key", "_latch", "_source", "last")
 
     def __init__(self, session: MemoryTransport, key: str, encoding: str, *, latch: bool) -> None:
         super().__init__(session)
         self._key = key
         self._encoding = encoding
         self._latch = latch
-        self.last: Sample | None = None
+        self._source = session.session_id
+        self.last: bytes | None = None
         if latch:
             _add(self.network.latches, key, self)
 
     def put(self, payload: bytes) -> None:
-        sample = Sample(self._key, payload, self._encoding, self.session.session_id)
-        with self.network.lock:
+        network = self.network
+        with network.lock:
             if self.closed:
                 if self.session.killed:
                     return
@@ -221,9 +229,15 @@ class Publisher(Entry):
                     f"{self._key}: the publisher is closed. Try sending before the node is closed."
                 )
             if self._latch:
-                self.last = sample
-            for subscriber in self.network.subscribers.get(self._key, ()):
-                subscriber.post(sample)
+                self.last = payload
+            subscribers = network.subscribers.get(self._key)
+            if subscribers:
+                sample = self.sample(payload)
+                for subscriber in subscribers:
+                    subscriber.post(sample)
+
+    def sample(self, payload: bytes) -> Sample:
+        return Sample(self._key, payload, self._encoding, self._source)
 
     def matching(self) -> bool:
         return self._key in self.network.subscribers
@@ -270,7 +284,7 @@ class Exchange(Entry):
 
     def reply_locked(self, reply: Reply) -> None:
         if self._waiting:
-            self.session.inbox.post(partial(self._deliver, partial(self._on_reply, reply)))
+            self.session.inbox.post(self, partial(self._on_reply, reply))
 
     def finish_locked(self) -> None:
         if self._waiting:
@@ -281,15 +295,15 @@ class Exchange(Entry):
     def _end(self) -> None:
         if self._timer is not None:
             self._timer.cancel()
-        self.session.inbox.post(partial(self._deliver, self._finish))
+        self.session.inbox.post(self, self._finish)
 
     def _finish(self) -> None:
         self.close()
         self._on_done()
 
-    def _deliver(self, function: Callable[[], object]) -> None:
+    def deliver(self, item: Callable[[], object]) -> None:
         if not self.closed:
-            function()
+            item()
 
     def withdraw_locked(self) -> None:
         self._waiting = 0
