@@ -1,17 +1,20 @@
 """What virtual time costs beside the mission's own computing.
 
-An hour of patrol runs with the real `move_base` server and the simulated robot in virtual time. As
-only one participant runs at a time, every moment belongs to somebody: the meter is switched where
-one calls the clock or the network in memory, and where it comes back from it.
+An hour of patrol runs with the real `move_base` server and the simulated robot in virtual time, and
+py-spy looks a hundred times a second which line of which file computes: the thread that holds
+Python's lock, the innermost frame of ours. Looking from outside changes the run's speed and not its
+shares, which a meter inside did.
 
-  clock     waits, hand-overs between threads, timers, spawning
-  network   the network in memory: sending, and handing messages over
-  messages  what clients and servers do with messages that arrive, in the clock's callbacks
+  clock     `actionlib_core/clock`: waits, timers, spawning, whose turn it is; to ask it for the
+            time is the business of who asks
+  network   `actionlib_core/transport`: sending, and handing messages over in memory
+  messages  the rest of `actionlib_core`: what clients and servers do with messages
   mission   all else: the robot, its server, the states of the mission
 
-The first two are what a run pays for virtual time and must fit into the budget; the others are the
-mission's own computing, which real time costs as well. All that is given in seconds of the wall and
-of the processor: on a busy computer the wall's are those of other programs, too.
+The first two, and the handing over of turns between threads, in which nobody computes, are what a
+run pays for virtual time and must fit into the budget; the others are the mission's own computing,
+which real time costs as well. All is in seconds of the wall, of the quickest hour. The hours run on
+one processor: one participant computes at a time, and changing processors cools its caches.
 
 Transitions are compared with the same machine on the real clock, where nobody listens to it; the
 ways are measured by turns. The test kit keeps every event, which is part of its figure.
@@ -25,17 +28,22 @@ import argparse
 import contextlib
 import json
 import os
+import subprocess
 import sys
+import tempfile
+import threading
 import time
 from collections import Counter
 from functools import partial
 from pathlib import Path
 
 from actionlib_core.clock import RealClock, VirtualClock, use_clock
+from actionlib_core.clock._gates import make_gate
+from actionlib_core.clock._virtual_parts import Participant
 from actionlib_core.interfaces.actionlib.msg import TestAction
 from actionlib_core.node import Node, use_node
 from actionlib_core.simple_action_server import SimpleActionServer
-from actionlib_core.transport import _memory_entries as entries
+from actionlib_core.transport._memory_entries import Inbox
 from actionlib_core.transport.memory import MemoryNetwork
 from missions.maps import OFFICE_MAP, OFFICE_ROBOT
 from missions.move_base.config import load_config
@@ -47,117 +55,26 @@ from smachpy import CBState, Concurrence, SimpleActionState, StateMachine
 from smachpy.testing import mission_kit
 
 KINDS = ("clock", "network", "messages", "mission")
-COUNTED = ("_wait", "_deliver", "call_later", "spawn")
+PLACES = {  # in the path of a file -> kind
+    "actionlib_core/clock/": "clock",
+    "actionlib_core/transport/": "network",
+    "actionlib_core/": "messages",
+    "missions/": "mission",
+    "smachpy/": "mission",
+}
+COUNTED = [
+    (VirtualClock, "_wait"),
+    (VirtualClock, "call_later"),
+    (VirtualClock, "spawn"),
+    (Inbox, "_deliver"),
+    (Participant, "begin"),
+]
+TELLING_TIME = ("VirtualClock.now ", "VirtualClock.time_ns ")
+SAMPLES_HZ = 100
 ROUND_S = 80.0  # a round of the patrol takes about so long
 TRANSITIONS = 10_000
 HOUR_BUDGET_S = 0.5  # clock and network, for an hour of patrol
 TRANSITION_BUDGET = 5.0  # times the real clock's
-
-
-class Meter:
-    """Gives every moment to a kind of work; the kinds follow each other, whatever the thread.
-
-    Measuring costs time itself. How it falls on a call's own kind and on the kind that calls it is
-    found beforehand; how much it is in the run, where nothing is as warm as in a loop, comes from
-    what the run takes without it (`weigh`), and is taken off.
-    """
-
-    def __init__(self, clock):
-        self.clock = clock
-        self.calls = Counter()
-        self._inner = self._outer = 0.0
-        self._weight = 1.0
-        self.start()
-        self._calibrate()
-        self.start()
-
-    def start(self):
-        """Forget what was measured."""
-        self.spent = Counter()
-        self._inside = Counter()
-        self._around = Counter()
-        self._kind = "mission"
-        self._since = self.clock()
-
-    def _calibrate(self, count=50_000):
-        measured = self.wrap(_nothing, "inner")
-        begun = self.clock()
-        for _ in range(count):
-            _nothing()
-        bare = (self.clock() - begun) / count
-        self.switch("outer")
-        for _ in range(count):
-            measured()
-        self.switch("")
-        self._inner = self.spent["inner"] / count - bare
-        self._outer = self.spent["outer"] / count
-        self.calls.clear()
-
-    def switch(self, kind):
-        """Begin work of another kind; return the kind of before."""
-        now = self.clock()
-        self.spent[self._kind] += now - self._since
-        before, self._kind, self._since = self._kind, kind, now
-        return before
-
-    def weigh(self, bare):
-        """Learn what the run takes without a meter [s]: the kinds add up to that."""
-        cost = sum(self._cost(kind) for kind in KINDS)
-        self._weight = (sum(self.spent[kind] for kind in KINDS) - bare) / cost
-
-    def seconds(self, kind):
-        """Return what was spent on a kind, without the measuring."""
-        return self.spent[kind] - self._weight * self._cost(kind)
-
-    def _cost(self, kind):
-        return self._inside[kind] * self._inner + self._around[kind] * self._outer
-
-    def wrap(self, function, kind, then=None):
-        """Return `function` as work of a kind; what calls it goes on as before, or as `then`."""
-
-        def measured(*args, **kwargs):
-            before = self.switch(kind)
-            self.calls[function.__name__] += 1
-            self._inside[kind] += 1
-            self._around[before] += 1
-            try:
-                return function(*args, **kwargs)
-            finally:
-                if then != kind:  # else another thread has the turn by now
-                    self.switch(then or before)
-
-        return measured
-
-
-def _nothing():
-    pass
-
-
-MEASURED = [
-    (VirtualClock, ["_wait", "_wake_all", "call_later", "spawn"], "clock"),
-    (entries.Publisher, ["put"], "network"),
-    (entries.Inbox, ["_deliver"], "network"),
-    (entries.Listener, ["post"], "network"),
-    (entries.Exchange, ["limit", "finish_locked", "reply_locked"], "network"),
-]
-CALLBACKS = [(entries.Listener, "deliver"), (entries.Exchange, "_deliver")]
-
-
-@contextlib.contextmanager
-def measuring(meter):
-    """Switch the meter wherever the clock or the network is entered or left."""
-    places = [(owner, name, kind) for owner, names, kind in MEASURED for name in names]
-    places += [(owner, name, "messages") for owner, name in CALLBACKS]
-    places += [(VirtualClock, "_enter", "clock"), (VirtualClock, "_leave", "clock")]
-    thens = {"_enter": "mission", "_leave": "clock"}  # a thread's first and last step
-    real = [(owner, name, getattr(owner, name)) for owner, name, _ in places]
-    for owner, name, kind in places:
-        setattr(owner, name, meter.wrap(getattr(owner, name), kind, thens.get(name)))
-    try:
-        yield
-    finally:
-        for owner, name, function in real:
-            setattr(owner, name, function)
 
 
 @contextlib.contextmanager
@@ -179,21 +96,95 @@ def robot(clock):
             server.close()
 
 
-def hour(seconds, seed, meter=None):
-    """Patrol for about `seconds` of virtual time; return virtual, wall and processor seconds."""
+def hour(seconds, seed):
+    """Patrol for about `seconds` of virtual time; return virtual and wall seconds."""
     machine = patrol(rounds=max(1, round(seconds / ROUND_S)))
     with VirtualClock(seed) as clock, use_clock(clock), robot(clock):
-        with measuring(meter) if meter else contextlib.nullcontext():
-            if meter:
-                meter.start()
-            wall, cpu = time.perf_counter(), time.process_time()
-            outcome = machine.execute()
-            wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-            if meter:
-                meter.switch("")
+        start = time.perf_counter()
+        outcome = machine.execute()
+        wall = time.perf_counter() - start
         if outcome != "succeeded":
             raise RuntimeError(f"the patrol ended {outcome!r}; expected 'succeeded'")
-        return clock.now(), wall, cpu
+        return clock.now(), wall
+
+
+def count_calls(seconds, seed):
+    """Return name -> how often it happens in an hour, and how often another thread goes on."""
+    calls = Counter()
+    with contextlib.ExitStack() as stack:
+        for owner, name in COUNTED:
+            stack.enter_context(counting(owner, name, calls))
+        virtual, _ = hour(seconds, seed)
+    return {name: count * 3600 / virtual for name, count in calls.items()}
+
+
+@contextlib.contextmanager
+def counting(owner, name, calls):
+    function = getattr(owner, name)
+
+    def counted(*args, **kwargs):
+        calls[name] += 1
+        return function(*args, **kwargs)
+
+    setattr(owner, name, counted)
+    try:
+        yield
+    finally:
+        setattr(owner, name, function)
+
+
+def hand_over_s(count=50_000):
+    """Return the seconds from a thread that gives its turn away to the one that takes it."""
+    here, there = make_gate(), make_gate()
+
+    def answer():
+        for _ in range(count):
+            there.acquire()
+            here.release()
+
+    def ask():
+        for _ in range(count):
+            there.release()
+            here.acquire()
+
+    thread = threading.Thread(target=answer)
+    thread.start()
+    spent = timed(ask)
+    thread.join()
+    return spent / (2 * count)
+
+
+def shares(seconds, seed, hours):
+    """Return kind -> share of the computing, as py-spy sees it from outside."""
+    with tempfile.TemporaryDirectory() as folder:
+        found = Path(folder, "samples")
+        program = [sys.executable, __file__, "--only-hours", str(hours)]
+        program += ["--seconds", str(seconds), "--seed", str(seed)]
+        spy = [Path(sys.executable).with_name("py-spy"), "record", "--full-filenames", "--gil"]
+        spy += ["--rate", str(SAMPLES_HZ)]
+        subprocess.run(
+            [*spy, "--format", "raw", "--output", str(found), "--", *program],
+            check=True,
+            stdout=subprocess.DEVNULL,
+        )
+        kinds = Counter()
+        for line in found.read_text().splitlines():
+            stack, _, count = line.rpartition(" ")
+            if "hour (" in stack or "run_turns (" in stack:
+                kinds[kind_of(stack)] += int(count)
+    print(f"{kinds.total()} samples", file=sys.stderr)
+    return {kind: count / kinds.total() for kind, count in kinds.items()}
+
+
+def kind_of(stack):
+    """Return the kind of work of a stack, the innermost frame last."""
+    for frame in reversed(stack.split(";")):
+        if frame.startswith(TELLING_TIME):
+            continue
+        for place, kind in PLACES.items():
+            if place in frame:
+                return kind
+    return "mission"
 
 
 # -- transitions -------------------------------------------------------------------------------
@@ -318,41 +309,21 @@ def transitions(rounds):
 # -- figures -----------------------------------------------------------------------------------
 
 
-def shares(seconds, seed, rounds, clock, bare):
-    """Return kind -> seconds for an hour of patrol, of the quickest run, and name -> calls.
-
-    `bare` is what the quickest run takes without a meter [s].
-    """
-    meter = Meter(clock)
-    quickest = None
-    for _ in range(rounds):
-        virtual = hour(seconds, seed, meter)[0]
-        spent = sum(meter.spent[kind] for kind in KINDS)
-        if quickest is None or spent < quickest:
-            quickest = spent
-            meter.weigh(bare)
-            found = {kind: meter.seconds(kind) * 3600 / virtual for kind in KINDS}
-        calls = {name: meter.calls[name] * 3600 / virtual for name in COUNTED}
-        meter.calls.clear()
-    return found, calls
-
-
 def figures(seconds, seed, rounds):
     """Return name -> figure; those of the patrol are for one hour, of the quickest run."""
-    runs = [hour(seconds, seed) for _ in range(rounds)]
-    virtual, wall, cpu = (min(values) for values in zip(*runs, strict=True))
-    found = {
-        "patrol: virtual s": virtual,
-        "patrol: wall s": wall * 3600 / virtual,
-        "patrol: processor s": cpu * 3600 / virtual,
-    }
-    for name, clock, bare in (
-        ("wall", time.perf_counter, wall),
-        ("processor", time.process_time, cpu),
-    ):
-        best, calls = shares(seconds, seed, rounds, clock, bare)
-        found |= {f"patrol: {kind} {name} s": best[kind] for kind in KINDS}
-        found[f"patrol: clock + network {name} s"] = best["clock"] + best["network"]
+    virtual, wall = min((hour(seconds, seed) for _ in range(rounds)), key=lambda run: run[1])
+    wall *= 3600 / virtual
+    found = {"patrol: virtual s": virtual, "patrol: wall s": wall}
+    calls = count_calls(seconds, seed)
+    hand_over = hand_over_s()
+    turns = calls.pop("begin")
+    share = shares(seconds, seed, 2 * rounds)
+    computing = wall - turns * hand_over
+    found |= {f"patrol: {kind} s": share[kind] * computing for kind in KINDS}
+    found["patrol: turns given to another thread s"] = turns * hand_over
+    found["patrol: clock + network s"] = wall - (share["messages"] + share["mission"]) * computing
+    found["patrol: a turn given to another thread us"] = hand_over * 1e6
+    found["patrol: turns given to another thread"] = turns
     found |= {f"patrol: calls of {name}": count for name, count in calls.items()}
     return found | transitions(rounds)
 
@@ -370,10 +341,17 @@ def verdict(name, value):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seconds", type=float, default=3600.0, help="of patrol")
-    parser.add_argument("--seed", type=int, help="of the interleaving")
+    parser.add_argument("--seed", type=int, default=1, help="of the interleaving")
     parser.add_argument("--rounds", type=int, default=3, help="of every measurement")
     parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.add_argument("--only-hours", type=int, help="patrol so many hours and say nothing")
     args = parser.parse_args()
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    if args.only_hours:
+        for _ in range(args.only_hours):
+            hour(args.seconds, args.seed)
+        return 0
     found = figures(args.seconds, args.seed, args.rounds)
     load = os.getloadavg()[0]
     if args.json:
