@@ -18,12 +18,6 @@ from actionlib_core.node import CLOSE_S, Node, get_node, use_node
 from actionlib_core.presence import Kind, list_endpoints
 from actionlib_core.simple_action_server import SimpleActionServer
 from actionlib_core.transport.faulty import FaultyTransport
-from actionlib_core.transport.memory import MemoryNetwork
-
-
-@pytest.fixture
-def network(clock):
-    return MemoryNetwork(clock)
 
 
 def test_names_of_a_node(network, clock):

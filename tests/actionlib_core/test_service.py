@@ -26,21 +26,9 @@ from actionlib_core.service_proxy import ServiceProxy, wait_for_service
 from actionlib_core.transport.faulty import FaultyTransport
 from actionlib_core.transport.memory import MemoryNetwork
 
+NODES = ("server", "caller")
+
 AddTwoInts = define_service("test_pkg/AddTwoInts", "int64 a\nint64 b\n---\nint64 sum\n")
-
-
-@pytest.fixture
-def network(clock):
-    return MemoryNetwork(clock)
-
-
-@pytest.fixture
-def nodes(clock, network):
-    made = [Node(name, transport=network.session(), clock=clock) for name in ("server", "caller")]
-    yield made
-    for node in made:
-        node.close()
-        node.transport.close()
 
 
 @pytest.mark.parametrize(

@@ -22,15 +22,7 @@ from actionlib_core.node import Node, use_node
 from actionlib_core.topic import Publisher, Subscriber, wait_for_message
 from actionlib_core.transport.memory import MemoryNetwork
 
-
-@pytest.fixture
-def nodes(clock):
-    network = MemoryNetwork(clock)
-    made = [Node(name, transport=network.session(), clock=clock) for name in ("talker", "listener")]
-    yield made
-    for node in made:
-        node.close()
-        node.transport.close()
+NODES = ("talker", "listener")
 
 
 def test_messages_arrive_in_order(nodes, clock):

@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 
 import pytest
 
-from actionlib_core.clock import RealClock, VirtualClock, use_clock
-from actionlib_core.transport.faulty import FaultyTransport
-from actionlib_core.transport.memory import MemoryNetwork
+from tests.transports import TRANSPORTS, opened
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -85,39 +83,9 @@ class Network:
             session.close()
 
 
-def _memory(clock: Clock) -> Network:
-    return Network(clock, MemoryNetwork(clock).session)
-
-
-def _zenoh() -> Network:
-    from actionlib_core.transport.zenoh import ZenohTransport
-
-    return Network(RealClock(), ZenohTransport)
-
-
-@pytest.fixture(
-    params=[
-        "memory-virtual",
-        "memory-seeded",
-        "memory-real",
-        "faulty",
-        pytest.param("zenoh", marks=pytest.mark.zenoh),
-    ]
-)
+@pytest.fixture(params=TRANSPORTS)
 def network(request: pytest.FixtureRequest) -> Iterator[Network]:
-    if request.param == "faulty":
-        with VirtualClock() as clock, use_clock(clock):
-            inner = MemoryNetwork(clock)
-            network = Network(clock, lambda: FaultyTransport(inner.session()))
-            yield network
-            network.close()
-    elif request.param in {"memory-virtual", "memory-seeded"}:
-        seed = None if request.param == "memory-virtual" else 7
-        with VirtualClock(seed) as clock, use_clock(clock):
-            network = _memory(clock)
-            yield network
-            network.close()
-    else:
-        network = _zenoh() if request.param == "zenoh" else _memory(RealClock())
+    with opened(request.param, seed=7) as (clock, open_session):
+        network = Network(clock, open_session)
         yield network
         network.close()

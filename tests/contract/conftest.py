@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from actionlib_core.clock import RealClock, VirtualClock, use_clock
 from actionlib_core.node import Node
 from actionlib_core.transport.faulty import DELIVERED, FaultyTransport, RandomFaults
-from actionlib_core.transport.memory import MemoryNetwork
+from tests.transports import TRANSPORTS, opened
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -78,42 +77,15 @@ class World:
             node.transport.close()
 
 
-def _zenoh_session() -> Transport:
-    from actionlib_core.transport.zenoh import ZenohTransport
-
-    return ZenohTransport()
-
-
-@pytest.fixture(
-    params=[
-        "memory-virtual",
-        "memory-seeded",
-        "memory-real",
-        "faulty",
-        pytest.param("zenoh", marks=pytest.mark.zenoh),
-    ]
-)
+@pytest.fixture(params=TRANSPORTS)
 def world(request: pytest.FixtureRequest) -> Iterator[World]:
-    if request.param == "faulty":
-        with VirtualClock() as clock, use_clock(clock):
-            inner, seeds = MemoryNetwork(clock), itertools.count(SEED)
-            world = World(
-                clock,
-                lambda: FaultyTransport(inner.session(), SmallFaults(next(seeds))),
-                late=LATE_S,
-            )
-            yield world
-            world.close()
-    elif request.param in {"memory-virtual", "memory-seeded"}:
-        seed = None if request.param == "memory-virtual" else SEED
-        with VirtualClock(seed) as clock, use_clock(clock):
-            world = World(clock, MemoryNetwork(clock).session)
-            yield world
-            world.close()
-    else:
-        clock = RealClock()
-        with use_clock(clock):
-            session = _zenoh_session if request.param == "zenoh" else MemoryNetwork(clock).session
-            world = World(clock, session)
-            yield world
-            world.close()
+    seeds = itertools.count(SEED)
+    late = LATE_S if request.param == "faulty" else 0.0
+
+    def make_faulty(session: Transport) -> Transport:
+        return FaultyTransport(session, SmallFaults(next(seeds)))
+
+    with opened(request.param, SEED, make_faulty) as (clock, open_session):
+        world = World(clock, open_session, late=late)
+        yield world
+        world.close()

@@ -5,39 +5,16 @@ from __future__ import annotations
 import pytest
 
 from actionlib_core.action_server import ActionServer
-from actionlib_core.clock import VirtualClock, use_clock
 from actionlib_core.interfaces.actionlib.msg import TestAction as Action
 from actionlib_core.interfaces.actionlib.msg import TestGoal as Goal
 from actionlib_core.interfaces.actionlib.msg import TestResult as Result
-from actionlib_core.node import Node
-from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import SimpleActionState, StateMachine, UserData
+from tests.two_nodes import TwoNodes
 
 OUTCOMES = ["succeeded", "aborted", "preempted"]
 
 
-class World:
-    def __init__(self, seed=None):
-        self.clock = VirtualClock(seed)
-        self.network = MemoryNetwork(self.clock)
-        self.robot = self.node("robot")
-        self.mission = self.node("mission")
-
-    def node(self, name):
-        return Node(name, transport=self.network.session(), clock=self.clock)
-
-    def __enter__(self):
-        self.clock.__enter__()
-        self._using = use_clock(self.clock)
-        self._using.__enter__()
-        return self
-
-    def __exit__(self, *error):
-        self.mission.close()
-        self.robot.close()
-        self._using.__exit__(*error)
-        self.clock.__exit__(*error)
-
+class World(TwoNodes):
     def state(self, **kwargs):
         return SimpleActionState("do", Action, goal=Goal(1), node=self.mission, **kwargs)
 

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from actionlib_core.clock import VirtualClock, use_clock
 from actionlib_core.interfaces.actionlib.msg import TestAction as Action
 from actionlib_core.interfaces.actionlib.msg import TestFeedback as Feedback
 from actionlib_core.interfaces.actionlib.msg import TestGoal as Goal
 from actionlib_core.interfaces.actionlib.msg import TestResult as Result
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
-from actionlib_core.node import Node
 from actionlib_core.simple_action_client import SimpleActionClient
-from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import CBState, InvalidStateError, State, StateMachine
 from smachpy.action_server_wrapper import ActionServerWrapper
+from tests.two_nodes import TwoNodes
 
 ALL = ["done", "failed", "stopped"]
 
@@ -36,25 +34,10 @@ class Count(State):
         return "done" if ud.action_goal.goal < 100 else "failed"
 
 
-class World:
+class World(TwoNodes):
     def __init__(self, seed=None):
-        self.clock = VirtualClock(seed)
-        network = MemoryNetwork(self.clock)
-        self.robot = Node("robot", transport=network.session(), clock=self.clock)
-        self.mission = Node("mission", transport=network.session(), clock=self.clock)
+        super().__init__(seed)
         self.feedback = []
-
-    def __enter__(self):
-        self.clock.__enter__()
-        self._using = use_clock(self.clock)
-        self._using.__enter__()
-        return self
-
-    def __exit__(self, *error):
-        self.mission.close()
-        self.robot.close()
-        self._using.__exit__(*error)
-        self.clock.__exit__(*error)
 
     def wrap(self, machine, **kwargs):
         outcomes = {

@@ -4,46 +4,30 @@ from __future__ import annotations
 
 import pytest
 
-from actionlib_core.clock import VirtualClock, use_clock
 from actionlib_core.interfaces.actionlib.msg import TestAction as Action
 from actionlib_core.interfaces.actionlib.msg import TestGoal as Goal
 from actionlib_core.interfaces.actionlib.msg import TestResult as Result
-from actionlib_core.node import Node
 from actionlib_core.simple_action_server import SimpleActionServer
 from actionlib_core.transport.faulty import FaultyTransport, RandomFaults
-from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import SimpleActionState, StateMachine
+from tests.two_nodes import TwoNodes
 
 
-class World:
+class World(TwoNodes):
     def __init__(self, seed=0, **faults):
-        self.clock = VirtualClock(seed)
-        network = MemoryNetwork(self.clock)
-        self.links = [
-            FaultyTransport(
-                network.session(), RandomFaults(seed, **faults), clock=self.clock, lease=5.0
-            )
-            for _ in range(2)
-        ]
-        self.robot = Node("robot", transport=self.links[0], clock=self.clock)
-        self.mission = Node("mission", transport=self.links[1], clock=self.clock)
+        self.faults, self.seed = faults, seed
+        super().__init__(seed)
         self.runs = []
 
+    def session(self):
+        faults = RandomFaults(self.seed, **self.faults)
+        return FaultyTransport(super().session(), faults, clock=self.clock, lease=5.0)
+
     def __enter__(self):
-        self.clock.__enter__()
-        self._using = use_clock(self.clock)
-        self._using.__enter__()
+        super().__enter__()
         self.server = SimpleActionServer("do", Action, self.run, False, node=self.robot)
         self.server.start()
         return self
-
-    def __exit__(self, *error):
-        self.mission.close()
-        self.robot.close()
-        for link in self.links:
-            link.close()
-        self._using.__exit__(*error)
-        self.clock.__exit__(*error)
 
     def run(self, goal):
         self.runs.append(goal.goal)
@@ -93,7 +77,7 @@ def test_a_preempt_reaches_the_robot(seed, moment):
 def test_a_cut_shorter_than_the_lease_is_survived_and_a_longer_one_is_noticed(cut_s, outcome, at):
     with World() as world:
         machine = world.machine()
-        world.clock.call_later(at, lambda: world.links[1].cut(cut_s))
+        world.clock.call_later(at, lambda: world.mission.transport.cut(cut_s))
         start = world.clock.now()
         assert machine.execute() == outcome
         took = world.clock.now() - start
@@ -105,7 +89,7 @@ def test_a_cut_shorter_than_the_lease_is_survived_and_a_longer_one_is_noticed(cu
 def test_a_preempt_while_the_link_is_cut_is_bounded():
     with World() as world:
         machine = world.machine(preempt_timeout=2.0)
-        world.clock.call_later(1.0, world.links[1].cut)
+        world.clock.call_later(1.0, world.mission.transport.cut)
         world.clock.call_later(1.5, machine.request_preempt)
         start = world.clock.now()
         assert machine.execute() == "preempted"

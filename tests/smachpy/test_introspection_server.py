@@ -6,17 +6,14 @@ import json
 
 import pytest
 
-from actionlib_core.clock import VirtualClock, use_clock
 from actionlib_core.interfaces.smach_msgs.msg import (
     SmachContainerInitialStatusCmd,
     SmachContainerStatus,
     SmachContainerStructure,
 )
 from actionlib_core.interfaces.std_msgs.msg import Int32, String
-from actionlib_core.node import Node
 from actionlib_core.presence import list_endpoints
 from actionlib_core.topic import Publisher, Subscriber
-from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import (
     Concurrence,
     InvalidStateError,
@@ -36,6 +33,7 @@ from smachpy.introspection import (
     IntrospectionServer,
 )
 from smachpy.introspection_server import DESCRIPTION_TOPIC, EVENTS_TOPIC
+from tests.two_nodes import TwoNodes
 
 
 class Wait(State):
@@ -49,25 +47,7 @@ class Wait(State):
         return "done"
 
 
-class World:
-    def __init__(self, seed=None):
-        self.clock = VirtualClock(seed)
-        self.network = MemoryNetwork(self.clock)
-        self.robot = Node("robot", transport=self.network.session(), clock=self.clock)
-        self.desk = Node("desk", transport=self.network.session(), clock=self.clock)
-
-    def __enter__(self):
-        self.clock.__enter__()
-        self._using = use_clock(self.clock)
-        self._using.__enter__()
-        return self
-
-    def __exit__(self, *error):
-        self.desk.close()
-        self.robot.close()
-        self._using.__exit__(*error)
-        self.clock.__exit__(*error)
-
+class World(TwoNodes):
     def serve(self, machine, **kwargs):
         server = IntrospectionServer("robot", machine, "/SM_ROOT", node=self.robot, **kwargs)
         server.start()
@@ -75,7 +55,7 @@ class World:
 
     def listen(self, topic, message_class):
         found = []
-        Subscriber("robot" + topic, message_class, found.append, node=self.desk)
+        Subscriber("robot" + topic, message_class, found.append, node=self.mission)
         return found
 
     def remotely(self, function):
@@ -196,7 +176,7 @@ def test_structure_that_changes_is_sent_again(world):
 def test_events_can_be_followed_from_elsewhere(world):
     machine = make_machine()
     world.serve(machine)
-    client = IntrospectionClient(node=world.desk)
+    client = IntrospectionClient(node=world.mission)
     found, here = [], []
     machine.subscribe(here.append)
     end = client.subscribe("robot", lambda event, seq: found.append((seq, event)))
@@ -216,7 +196,7 @@ def test_events_have_the_path_that_the_server_gives(world):
     server = IntrospectionServer("robot", machine, "/OFFICE", node=world.robot)
     server.start()
     found = []
-    client = IntrospectionClient(node=world.desk)
+    client = IntrospectionClient(node=world.mission)
     client.subscribe("robot", lambda event, seq: found.append(event.path))
     world.clock.sleep(0.1)
     machine.execute()
@@ -230,7 +210,7 @@ def test_events_have_the_path_that_the_server_gives(world):
 def test_the_description_is_that_of_describe(world):
     machine = make_machine()
     world.serve(machine)
-    client = IntrospectionClient(node=world.desk)
+    client = IntrospectionClient(node=world.mission)
     assert world.remotely(lambda: client.get_description("robot")) == describe(machine)
     with pytest.raises(
         SmachError, match=r"got no answer in 2 s; servers that are there: \['/robot'\]"
@@ -239,20 +219,20 @@ def test_the_description_is_that_of_describe(world):
 
 
 def test_servers_are_found(world):
-    client = IntrospectionClient(node=world.desk)
+    client = IntrospectionClient(node=world.mission)
     assert client.get_servers() == []
     server = world.serve(make_machine())
     assert client.get_servers() == ["/robot"]
     server.stop()
     assert client.get_servers() == []
-    assert list_endpoints(world.desk.transport) == []
+    assert list_endpoints(world.mission.transport) == []
 
 
 @pytest.mark.parametrize("name", ["robot", "/robot"])
 def test_the_initial_state_is_set_for_the_next_run(world, name):
     machine = make_machine()
     world.serve(machine)
-    client = IntrospectionClient(node=world.desk)
+    client = IntrospectionClient(node=world.mission)
     userdata = UserData()
     userdata.count = (1, b"two")
     assert client.set_initial_state(name, "/SM_ROOT", ["LAST"], userdata, timeout=3.0) is True
@@ -266,7 +246,7 @@ def test_the_initial_state_is_set_for_the_next_run(world, name):
 
 def test_a_state_that_is_not_there_is_refused(world, caplog):
     world.serve(make_machine())
-    client = IntrospectionClient(node=world.desk)
+    client = IntrospectionClient(node=world.mission)
     start = world.clock.now()
     assert client.set_initial_state("robot", "/SM_ROOT", ["LSAT"], timeout=3.0) is False
     assert world.clock.now() - start < 0.5
@@ -276,13 +256,13 @@ def test_a_state_that_is_not_there_is_refused(world, caplog):
 
 def test_refused_then_accepted(world):
     world.serve(make_machine())
-    client = IntrospectionClient(node=world.desk)
+    client = IntrospectionClient(node=world.mission)
     for states, expected in ((["NO"], False), (["LAST"], True), (["NO"], False), (["LAST"], True)):
         assert client.set_initial_state("robot", "/SM_ROOT", states, timeout=3.0) is expected
 
 
 def test_without_a_server_or_path_it_is_false_after_the_timeout(world, caplog):
-    client = IntrospectionClient(node=world.desk)
+    client = IntrospectionClient(node=world.mission)
     assert client.set_initial_state("robot", "/SM_ROOT", ["A"], timeout=3.0) is False
     assert world.clock.now() == 3.0
     world.serve(make_machine())
@@ -293,7 +273,7 @@ def test_without_a_server_or_path_it_is_false_after_the_timeout(world, caplog):
 def test_a_server_that_only_shows_takes_no_commands(world):
     machine = make_machine()
     world.serve(machine, obey=False)
-    client = IntrospectionClient(node=world.desk)
+    client = IntrospectionClient(node=world.mission)
     assert client.set_initial_state("robot", "/SM_ROOT", ["LAST"], timeout=1.0) is False
     assert machine.get_initial_states() == ["FIRST"]
 
@@ -301,7 +281,7 @@ def test_a_server_that_only_shows_takes_no_commands(world):
 def test_userdata_that_cannot_travel_is_named(world):
     userdata = UserData()
     userdata.fine, userdata.bad = 1, object()
-    client = IntrospectionClient(node=world.desk)
+    client = IntrospectionClient(node=world.mission)
     with pytest.raises(InvalidStateError, match=r"userdata: got \['bad'\], which JSON cannot"):
         client.set_initial_state("robot", "/SM_ROOT", ["A"], userdata)
 
@@ -312,7 +292,7 @@ def test_a_pickle_or_other_rubbish_from_the_network_does_nothing(world, text, ca
     world.serve(machine)
     found = world.listen(STATUS_TOPIC, SmachContainerStatus)
     with Publisher(
-        "robot" + INIT_TOPIC, SmachContainerInitialStatusCmd, node=world.desk
+        "robot" + INIT_TOPIC, SmachContainerInitialStatusCmd, node=world.mission
     ) as commands:
         commands.publish("/SM_ROOT", ["LAST"], text)
         world.clock.sleep(0.1)
@@ -349,14 +329,14 @@ def test_stop_sends_the_last_status_and_everything_that_waits(world):
     assert machine._listeners == ()
     server.start()  # and again
     world.clock.sleep(0.1)
-    assert IntrospectionClient(node=world.desk).get_servers() == ["/robot"]
+    assert IntrospectionClient(node=world.mission).get_servers() == ["/robot"]
 
 
 def test_a_node_that_closes_stops_the_server(world):
     server = world.serve(make_machine())
     world.robot.close()
     server.stop()
-    assert list_endpoints(world.desk.transport) == []
+    assert list_endpoints(world.mission.transport) == []
 
 
 def test_a_proxy_alone_shows_and_obeys_one_container(world):
@@ -364,11 +344,11 @@ def test_a_proxy_alone_shows_and_obeys_one_container(world):
     proxy = ContainerProxy("robot", machine, "/SM_ROOT", node=world.robot)
     proxy.start()
     proxy.start()
-    client = IntrospectionClient(node=world.desk)
+    client = IntrospectionClient(node=world.mission)
     assert client.set_initial_state("robot", "/SM_ROOT", ["LAST"], timeout=1.0) is True
     proxy.stop()
     proxy.stop()
-    assert list_endpoints(world.desk.transport) == []
+    assert list_endpoints(world.mission.transport) == []
 
 
 def test_only_containers_can_be_shown(world):
@@ -404,5 +384,5 @@ def test_userdata_that_changes_while_it_is_read_is_shown_as_that(world):
     world.clock.sleep(0.1)
     data = json.loads(next(m.local_data for m in found if m.path == "/SM_ROOT"))
     assert data == {"restless": "<Restless that changes>", "number": "<int that changes>"}
-    client = IntrospectionClient(node=world.desk)
+    client = IntrospectionClient(node=world.mission)
     assert client.set_initial_state("robot", "/SM_ROOT", ["LAST"], timeout=1.0) is True

@@ -6,34 +6,17 @@ import threading
 
 import pytest
 
-from actionlib_core.clock import VirtualClock, use_clock
 from actionlib_core.interfaces.std_msgs.msg import Int32
-from actionlib_core.node import Node
 from actionlib_core.topic import Publisher
-from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import StateMachine, UserData, cb_interface, events
 from smachpy.monitor_state import MonitorState
+from tests.two_nodes import TwoNodes
 
 
-class World:
+class World(TwoNodes):
     def __init__(self, seed=None):
-        self.clock = VirtualClock(seed)
-        network = MemoryNetwork(self.clock)
-        self.robot = Node("robot", transport=network.session(), clock=self.clock)
-        self.mission = Node("mission", transport=network.session(), clock=self.clock)
+        super().__init__(seed)
         self.publisher = Publisher("level", Int32, node=self.robot)
-
-    def __enter__(self):
-        self.clock.__enter__()
-        self._using = use_clock(self.clock)
-        self._using.__enter__()
-        return self
-
-    def __exit__(self, *error):
-        self.mission.close()
-        self.robot.close()
-        self._using.__exit__(*error)
-        self.clock.__exit__(*error)
 
     def say(self, *values, at):
         self.clock.call_later(at, lambda: [self.publisher.publish(value) for value in values])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from actionlib_core.clock import VirtualClock, use_clock
 from actionlib_core.exceptions import TypeMismatchError
 from actionlib_core.interfaces.std_srvs.srv import (
     SetBool,
@@ -13,35 +12,19 @@ from actionlib_core.interfaces.std_srvs.srv import (
     Trigger,
     TriggerResponse,
 )
-from actionlib_core.node import Node
 from actionlib_core.service import Service
 from actionlib_core.time import Duration
-from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import InvalidStateError, InvalidUserCodeError, StateMachine, UserData, cb_interface
 from smachpy.service_state import ServiceState
+from tests.two_nodes import TwoNodes
 
 OUTCOMES = ["succeeded", "aborted", "preempted"]
 
 
-class World:
+class World(TwoNodes):
     def __init__(self, seed=None):
-        self.clock = VirtualClock(seed)
-        self.network = MemoryNetwork(self.clock)
-        self.robot = Node("robot", transport=self.network.session(), clock=self.clock)
-        self.mission = Node("mission", transport=self.network.session(), clock=self.clock)
+        super().__init__(seed)
         self.requests = []
-
-    def __enter__(self):
-        self.clock.__enter__()
-        self._using = use_clock(self.clock)
-        self._using.__enter__()
-        return self
-
-    def __exit__(self, *error):
-        self.mission.close()
-        self.robot.close()
-        self._using.__exit__(*error)
-        self.clock.__exit__(*error)
 
     def serve(self, seconds=0.0):
         def answer(request):

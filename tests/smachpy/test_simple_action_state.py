@@ -7,7 +7,6 @@ import threading
 import pytest
 
 from actionlib_core.action_server import ActionServer
-from actionlib_core.clock import VirtualClock, use_clock
 from actionlib_core.exceptions import ActionException, TypeMismatchError
 from actionlib_core.interfaces.actionlib.msg import (
     TestAction as Action,
@@ -27,10 +26,8 @@ from actionlib_core.interfaces.actionlib.msg import (
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.interfaces.geometry_msgs.msg import PoseStamped
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
-from actionlib_core.node import Node
 from actionlib_core.simple_action_server import SimpleActionServer
 from actionlib_core.time import Duration
-from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import (
     Concurrence,
     InvalidStateError,
@@ -41,37 +38,20 @@ from smachpy import (
     events,
 )
 from smachpy.simple_action_state import SimpleActionState
+from tests.two_nodes import TwoNodes
 
 OUTCOMES = ["succeeded", "aborted", "preempted"]
 
 
-class World:
+class World(TwoNodes):
     """A clock, a robot's node with the action server "do", and the mission's node."""
 
     def __init__(self, seed=None):
-        self.clock = VirtualClock(seed)
-        self.network = MemoryNetwork(self.clock)
-        self.robot = self.node("robot")
-        self.mission = self.node("mission")
+        super().__init__(seed)
         self.goals = []
         self.cancels = []
         self.events = []
         self.server_busy = False
-
-    def __enter__(self):
-        self.clock.__enter__()
-        self._using = use_clock(self.clock)
-        self._using.__enter__()
-        return self
-
-    def __exit__(self, *error):
-        self.mission.close()
-        self.robot.close()
-        self._using.__exit__(*error)
-        self.clock.__exit__(*error)
-
-    def node(self, name):
-        return Node(name, transport=self.network.session(), clock=self.clock)
 
     def serve(self, run):
         """Start a simple server; `run(server, goal)`."""

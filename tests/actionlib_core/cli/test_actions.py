@@ -52,11 +52,6 @@ class Shell:
 
 
 @pytest.fixture
-def network(clock):
-    return MemoryNetwork(clock)
-
-
-@pytest.fixture
 def shell(network, clock, capsys):
     return Shell(network, clock, capsys)
 

@@ -6,20 +6,10 @@ import pytest
 
 from actionlib_core.cli import UsageError, _network
 from actionlib_core.interfaces.std_msgs.msg import String
-from actionlib_core.node import Node
 from actionlib_core.presence import Kind
 from actionlib_core.topic import Publisher
-from actionlib_core.transport.memory import MemoryNetwork
 
-
-@pytest.fixture
-def nodes(clock):
-    network = MemoryNetwork(clock)
-    made = [Node(name, transport=network.session(), clock=clock) for name in ("cli", "robot")]
-    yield made
-    for node in made:
-        node.close()
-        node.transport.close()
+NODES = ("cli", "robot")
 
 
 def test_an_empty_network_is_known_after_a_quiet_moment(nodes, clock):

@@ -10,19 +10,9 @@ import pytest
 
 from actionlib_core.cli import main
 from actionlib_core.interfaces.std_srvs.srv import SetBool, Trigger
-from actionlib_core.node import Node
 from actionlib_core.service import Service
-from actionlib_core.transport.memory import MemoryNetwork
 
-
-@pytest.fixture
-def nodes(clock):
-    network = MemoryNetwork(clock)
-    made = [Node(name, transport=network.session(), clock=clock) for name in ("cli", "robot")]
-    yield made
-    for node in made:
-        node.close()
-        node.transport.close()
+NODES = ("cli", "robot")
 
 
 @pytest.fixture

@@ -14,19 +14,9 @@ from actionlib_core.cli._message_text import flatten, shorten, split_path, to_ya
 from actionlib_core.interfaces.geometry_msgs.msg import Point, PoseStamped
 from actionlib_core.interfaces.sensor_msgs.msg import LaserScan
 from actionlib_core.interfaces.std_msgs.msg import Int32, String
-from actionlib_core.node import Node
 from actionlib_core.topic import Publisher, Subscriber
-from actionlib_core.transport.memory import MemoryNetwork
 
-
-@pytest.fixture
-def nodes(clock):
-    network = MemoryNetwork(clock)
-    made = [Node(name, transport=network.session(), clock=clock) for name in ("cli", "robot")]
-    yield made
-    for node in made:
-        node.close()
-        node.transport.close()
+NODES = ("cli", "robot")
 
 
 @pytest.fixture
