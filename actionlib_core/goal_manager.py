@@ -155,10 +155,7 @@ class GoalManager:
             if error is None:
                 for old in replaced:
                     self._lose_goals_of(old, f"restarted as session {server.session}")
-                for machine in self._machines.values():
-                    if returned or not machine.goal.acknowledged:
-                        machine.goal.hurry(now)
-                self._arm(now)
+                self._hurry(now, every=returned)
             elif self._servers.current is None:
                 for machine in list(self._machines.values()):
                     if not machine.goal.acknowledged:
@@ -174,7 +171,7 @@ class GoalManager:
                 self._lose_goals_of(server, "is gone")
             else:
                 until = self._clock.now() + self._server_lost_timeout
-                self._servers.away[server] = until
+                self._servers.expect_back(server, until)
                 self._arm(until)
 
     def on_farewell(self, entries: list[StatusEntry], server: Endpoint) -> None:
@@ -202,12 +199,18 @@ class GoalManager:
         """Take a status list while no server shows a token: send what waits for one."""
         now = self._clock.now()
         with self._lock:
-            if not self._servers.hear_foreign(session, now):
-                return
-            for machine in self._machines.values():
-                if not machine.goal.acknowledged:
-                    machine.goal.hurry(now)
-            self._arm(now)
+            if self._servers.hear_foreign(session, now):
+                self._hurry(now)
+
+    def _hurry(self, now: float, *, every: bool = False) -> None:
+        """Send at once what waits for a server; `every` goal, if it has to be asked for anew.
+
+        Needs the lock.
+        """
+        for machine in self._machines.values():
+            if every or not machine.goal.acknowledged:
+                machine.goal.hurry(now)
+        self._arm(now)
 
     def _lose_goals_of(self, server: Endpoint, what: str) -> None:
         """Give up the goals that a server has, or may have. Needs the lock."""

@@ -46,5 +46,5 @@ class TwoNodes:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._left.close()
-        self._using.close()
+        with self._using:  # left even if a node does not close
+            self._left.close()

@@ -80,6 +80,10 @@ class KnownServers:
         """Tell whether a server has named the goals that are with it, before it leaves."""
         return server in self._leaving
 
+    def expect_back(self, server: Endpoint, until: float) -> None:
+        """Give a server whose token vanished some time: its link may be cut for a moment."""
+        self.away[server] = until
+
     def take_overdue(self, now: float) -> list[Endpoint]:
         """Return, and expect no more, those that have been away too long."""
         overdue = [server for server, until in self.away.items() if until <= now]

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 
 class Recent:
-    """The last words that were added; the oldest beyond the limit are forgotten."""
+    """Words that were added; beyond the limit, those that came first are forgotten.
+
+    A word that comes again keeps its place.
+    """
 
     __slots__ = ("_limit", "_words")
 

@@ -112,7 +112,7 @@ class VirtualClock:
         return self._now
 
     def time_ns(self) -> int:
-        return START_TIME_NS + int(self._now * 1e9 + 0.5)
+        return START_TIME_NS + round(self._now * 1e9)
 
     def sleep(self, seconds: float) -> None:
         if seconds > 0:
@@ -130,10 +130,10 @@ class VirtualClock:
 
     def call_later(self, delay: float, callback: Callable[[], object]) -> VirtualTimer:
         timer = VirtualTimer(callback)
-        if delay <= 0:
-            self._ready.append(timer)  # no lock: appending is one step, and others only take out
-        else:
-            with self._lock:
+        with self._lock:
+            if delay <= 0:
+                self._ready.append(timer)
+            else:
                 heapq.heappush(self._deadlines, (self._now + delay, next(self._count), timer))
         if self.rate is not None:
             self._poke.set()
@@ -252,7 +252,7 @@ class VirtualClock:
             if event is not None and event._flag:  # noqa: SLF001  set since the caller looked
                 return True
             deadline = None if timeout is None else self._now + timeout
-            if deadline is not None and not self._ready and self._is_alone(deadline):
+            if deadline is not None and self._is_alone(deadline):
                 self._now = deadline
                 return False
             # Noted in the heap only when another participant gets the turn: most never need it.
@@ -269,11 +269,8 @@ class VirtualClock:
         return me.woken
 
     def _is_alone(self, deadline: float) -> bool:
-        """Tell whether nothing is due before `deadline`: the wait is a step of time, no more.
-
-        Only to be asked when nobody is ready.
-        """
-        if self.rate is not None or (self.limit is not None and deadline > self.limit):
+        """Tell whether nobody can go on before `deadline`: the wait is a step of time, no more."""
+        if self._ready or self.rate is not None or self._is_past(deadline):
             return False
         due = self._next_due()
         return due is None or due > deadline
@@ -305,10 +302,8 @@ class VirtualClock:
             with self._lock:
                 self._wake(me)
                 if not steps:  # the turn is still mine
-                    if me in self._ready:
-                        self._ready.remove(me)
-                    if chosen is not None and chosen is not me:
-                        self._ready.insert(0, chosen)
+                    self._ready = [r for r in self._ready if r is not me]
+                    self._ready[:0] = [] if chosen in {None, me} else [chosen]
                     raise
             self._poke.set()
             if len(steps) == 1 and not me.gate.acquire_within(INTERRUPT_S):
@@ -387,7 +382,7 @@ class VirtualClock:
             over = self.limit is not None and self._next_due() is not None
             self._owner.error = TimeLimit(self._now, waits) if over else Deadlock(waits)
             self._wake(self._owner)
-            ready.remove(self._owner)
+            ready.clear()
             return self._owner
         return None
 
@@ -410,6 +405,9 @@ class VirtualClock:
         self._turns = 0
         return True
 
+    def _is_past(self, due: float) -> bool:
+        return self.limit is not None and due > self.limit
+
     def _next_due(self) -> float | None:
         """Return the next deadline that still matters."""
         deadlines = self._deadlines
@@ -427,7 +425,7 @@ class VirtualClock:
     def _jump(self) -> None:
         """Advance to the next deadline; all that are due become ready."""
         due = self._next_due()
-        if due is None or (self.limit is not None and due > self.limit):
+        if due is None or self._is_past(due):
             return
         self._now = max(due, self._now)
         self._stepped = time.monotonic() if self.rate is not None else 0.0

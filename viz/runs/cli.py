@@ -9,6 +9,7 @@ from smachpy.cli import UsageError
 
 if TYPE_CHECKING:
     import argparse
+    from collections.abc import Iterable, Iterator
 
     from rich.console import Console
 
@@ -79,12 +80,12 @@ def _list(args: argparse.Namespace) -> int:
     from rich.table import Table
     from rich.text import Text
 
-    from viz.runs.recording import read_recordings
+    from viz.runs.recording import each_recording
 
     table = Table(box=None, pad_edge=False)
     for title in ("file", "machine", "began", "time", "outcome", "events"):
         table.add_column(title, no_wrap=True, justify="right" if title == "events" else "left")
-    for recording in read_recordings(args.places):
+    for recording in each_recording(args.places):
         table.add_row(*map(Text, _line(recording)))
     _console().print(table)
     return 0
@@ -109,31 +110,32 @@ def _line(recording: Recording) -> tuple[str, ...]:
     )
 
 
-def _read(place: str) -> list[Recording]:
-    from viz.runs.recording import read_recordings
+def _each(places: Iterable[str]) -> Iterator[Recording]:
+    """Yield the recordings of places, each of which must have some."""
+    from viz.runs.recording import each_recording
 
-    found = read_recordings([place])
-    if not found:
-        raise UsageError(f"smachpy runs: {place!r}: got no recordings; expected *.jsonl files.")
-    return found
+    for place in places:
+        empty = True
+        for recording in each_recording([place]):
+            empty = False
+            yield recording
+        if empty:
+            raise UsageError(f"smachpy runs: {place!r}: got no recordings; expected *.jsonl files.")
 
 
 def _show(args: argparse.Namespace) -> int:
     from rich.table import Table
     from rich.text import Text
 
-    from viz.runs.statistics import count, never_taken
+    from viz.runs.statistics import count_by_machine, never_taken
 
-    recordings = [one for place in args.places for one in _read(place)]
     console = _console()
-    for label in dict.fromkeys(one.record.label for one in recordings):
-        group = [one for one in recordings if one.record.label == label]
-        record, statistics = group[-1].record, count(group)
+    for label, (record, statistics, lost) in count_by_machine(_each(args.places)).items():
         ended = ", ".join(f"{outcome} x{n}" for outcome, n in statistics.outcomes.items())
         console.print(
             f"{label}: {statistics.runs} run(s); {ended or 'none has ended'}", markup=False
         )
-        if lost := sum(one.dropped for one in group):
+        if lost:
             console.print(f"{lost} events are missing: visits and outcomes are at least these")
         table = Table(box=None, pad_edge=False)
         for title in ("state", "visits", "median", "95 %", "failed", "outcomes"):
@@ -199,21 +201,21 @@ def _draw_both(args: argparse.Namespace, old: Side, new: Side) -> None:
 
 def _side(place: str) -> Side:
     """What is to be compared: recordings, or a machine that has not run."""
-    from viz.runs.statistics import count
+    from viz.runs.statistics import count_by_machine
     from viz.runs.union import Side
 
     if not place.endswith(".jsonl") and not Path(place).is_dir():
         from viz.cli import read_record
 
         return Side(place, read_record(place))
-    recordings = _read(place)
-    labels = {one.record.label for one in recordings}
-    if len(labels) > 1:
+    counted = count_by_machine(_each([place]))
+    if len(counted) > 1:
         raise UsageError(
-            f"smachpy runs compare: {place!r}: got runs of {sorted(labels)}; expected those of one "
-            "machine. Try naming the files."
+            f"smachpy runs compare: {place!r}: got runs of {sorted(counted)}; expected those of "
+            "one machine. Try naming the files."
         )
-    return Side(place, recordings[-1].record, count(recordings))
+    [(record, statistics, _)] = counted.values()
+    return Side(place, record, statistics)
 
 
 def _export(args: argparse.Namespace) -> int:

@@ -263,7 +263,7 @@ def _read_event(path: Path, number: int, line: str) -> dict[str, Any]:
 
 
 def find_recordings(places: Iterable[str | Path]) -> list[Path]:
-    """Return the files that are named, and those in the folders that are named, by time.
+    """Return the files that are named, and those in the folders that are named, sorted.
 
     Raises:
         RecordingError: there is no such file or folder.
@@ -279,19 +279,15 @@ def find_recordings(places: Iterable[str | Path]) -> list[Path]:
     return found
 
 
-def read_recordings(places: Iterable[str | Path]) -> list[Recording]:
-    """Read the files that are named, and those in the folders that are named, by time.
+def each_recording(places: Iterable[str | Path]) -> Iterator[Recording]:
+    """Yield the files that are named, and those in the folders that are named, sorted.
 
-    What is in a folder and is no recording is named in the log and left out.
+    Each is read when it is asked for. What is in a folder and is no recording is named in the log
+    and left out.
 
     Raises:
         RecordingError: there is no such file or folder, or a file that is named cannot be read.
     """
-    return list(each_recording(places))
-
-
-def each_recording(places: Iterable[str | Path]) -> Iterator[Recording]:
-    """Yield what `read_recordings` returns, each when it is asked for; raises as that."""
     for place in places:
         for path in find_recordings([place]):
             try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from smachpy.run_state import RAISED
 from viz.model import Marks, outcome_class
@@ -114,12 +114,31 @@ def quantile(values: Sequence[float], share: float) -> float | None:
     return ordered[max(rank, 1) - 1]
 
 
-def count(recordings: Iterable[Recording]) -> Statistics:
-    """Return what the recordings add up to."""
-    statistics = Statistics()
+class Counted(NamedTuple):
+    """The runs of one machine.
+
+    Attributes:
+        record: The machine as it was in its last recording.
+        statistics: What all of them add up to.
+        dropped: Events that are missing in them.
+    """
+
+    record: StateRecord
+    statistics: Statistics
+    dropped: int
+
+
+def count_by_machine(recordings: Iterable[Recording]) -> dict[str, Counted]:
+    """Count recordings by the machine's label; none is kept longer than until the next comes."""
+    found: dict[str, Counted] = {}
     for recording in recordings:
+        label = recording.record.label
+        before = found.get(label)
+        statistics = Statistics() if before is None else before.statistics
         statistics.add(recording.events)
-    return statistics
+        dropped = recording.dropped + (0 if before is None else before.dropped)
+        found[label] = Counted(recording.record, statistics, dropped)
+    return found
 
 
 def never_taken(record: StateRecord, statistics: Statistics) -> list[tuple[str, str]]:
@@ -219,7 +238,7 @@ class StatisticsOfFiles:
         self._places = list(places)
         find_recordings(self._places)
         self._lock = threading.Lock()
-        self._found: dict[str, tuple[StateRecord, Statistics]] | None = None
+        self._found: dict[str, Counted] | None = None
 
     def of(self, record: StateRecord) -> dict[str, Any] | None:
         """Return the statistics of a machine; None when there are no runs of it.
@@ -232,9 +251,9 @@ class StatisticsOfFiles:
         """
         found = self._read()
         if record.label in found:
-            return found[record.label][1].to_json()
+            return found[record.label].statistics.to_json()
         states = _states_below(record)
-        for recorded, statistics in found.values():
+        for recorded, statistics, _ in found.values():
             if _states_below(recorded) == states:
                 told = statistics.to_json()
                 told["states"] = {
@@ -246,17 +265,10 @@ class StatisticsOfFiles:
 
     def counted(self) -> dict[str, Statistics]:
         """Return the statistics by machine; raises as `of`."""
-        return {label: statistics for label, (_, statistics) in self._read().items()}
+        return {label: counted.statistics for label, counted in self._read().items()}
 
-    def _read(self) -> dict[str, tuple[StateRecord, Statistics]]:
-        """By machine: as it was in its last file, and what all its files add up to."""
+    def _read(self) -> dict[str, Counted]:
         with self._lock:
             if self._found is None:
-                found: dict[str, tuple[StateRecord, Statistics]] = {}
-                for recording in each_recording(self._places):
-                    label = recording.record.label
-                    statistics = found[label][1] if label in found else Statistics()
-                    statistics.add(recording.events)
-                    found[label] = recording.record, statistics
-                self._found = found
+                self._found = count_by_machine(each_recording(self._places))
             return self._found

@@ -48,17 +48,17 @@ def test_server_that_was_away_returns_or_is_replaced():
     servers = KnownServers()
     servers.appear(A, None)
     assert servers.vanish(A)
-    servers.away[A] = 5.0
+    servers.expect_back(A, 5.0)
     assert servers.appear(A, None) == (True, [])
     assert servers.vanish(A)
-    servers.away[A] = 9.0
+    servers.expect_back(A, 9.0)
     assert servers.appear(B, None) == (False, [A])
     assert servers.take_overdue(9.0) == []
 
 
 def test_server_that_stays_away_is_overdue_once():
     servers = KnownServers()
-    servers.away[A] = 5.0
+    servers.expect_back(A, 5.0)
     assert servers.take_overdue(4.9) == []
     assert servers.take_overdue(5.0) == [A]
     assert servers.take_overdue(5.0) == []

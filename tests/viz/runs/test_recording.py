@@ -27,7 +27,7 @@ from viz.runs.recording import (
     read_recording,
     recording_lines,
 )
-from viz.runs.statistics import StatisticsOfFiles, count, never_taken, quantile
+from viz.runs.statistics import StatisticsOfFiles, count_by_machine, never_taken, quantile
 
 
 def make_machine(*, failing=False, extra=False):
@@ -227,7 +227,7 @@ def test_a_value_that_json_does_not_take_costs_no_other_event(tmp_path, clock):
 
 def test_statistics_over_runs(record):
     runs = [read_recording(record(f"{i}.jsonl", failing=i == 2)) for i in range(3)]
-    statistics = count(runs)
+    [(_, statistics, _)] = count_by_machine(runs).values()
     assert statistics.runs == 3
     assert statistics.outcomes == {"succeeded": 2, "aborted": 1}
     first = statistics.states["/JOB/FIRST"]
