@@ -1,14 +1,18 @@
 # smachpy: `make run` drives the patrol mission, `make test` checks everything.
-BIN := .venv/bin
+# `make test PYTHON=3.12` (a version, command or path) works in .venv-3.12; else .venv has the system's Python.
+export PYTHON
+export VENV := .venv$(if $(PYTHON),-$(patsubst python%,%,$(notdir $(PYTHON))))
+BIN := $(VENV)/bin
+DEFAULT_TESTS := -m "not slow and not browser"
 # Continuous integration (CI=true) runs the slow tests and those in a browser too.
-TESTS := $(if $(CI),,-m "not slow and not browser")
+TESTS := $(if $(CI),,$(DEFAULT_TESTS))
 # One worker more than two cores: many tests wait for processes.
 WORKERS := -n 3 --dist worksteal
 
 # The commands and the tests start many processes; each is quicker with cached bytecode.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help run test contract-100 lint types format bench clean
+.PHONY: help run test test-pythons contract-100 soak lint types format bench clean
 
 help:  ## Show the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /\1\t/p' Makefile | expand -t 14
@@ -17,18 +21,27 @@ run:  ## Drive the simulated robot through the patrol mission
 	@.ci/venv dot,sim
 	@$(BIN)/smachpy run patrol --start-robot --out out
 
-test: lint types  ## Check everything: ruff, mypy, import-linter, pytest
+test: lint types  ## Check everything: ruff, mypy, import-linter, the page's JavaScript, pytest
+	@.ci/web test
 	$(BIN)/python -m pytest -q $(WORKERS) $(TESTS)
+
+test-pythons:  ## Run the default tests on every Python that is claimed and found (SKIP=3.11: but that one)
+	@.ci/test-pythons $(WORKERS) $(DEFAULT_TESTS)
 
 contract-100:  ## Run the contract tests a hundred times in a row, with other faults each time
 	@.ci/venv dot,sim,test
 	@.ci/contract 100 $(WORKERS) $(TESTS)
+
+soak:  ## Attack what is promised for some minutes and print the figures (GOALS=20000 SECONDS=150 SEED=1)
+	@.ci/venv dot,sim,test
+	$(BIN)/python tests/soak/soak.py $(if $(GOALS),--goals $(GOALS)) $(if $(SECONDS),--seconds $(SECONDS)) $(if $(SEED),--seed $(SEED))
 
 lint:
 	@.ci/venv dot,sim,test
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/lint-imports
+	@.ci/web lint
 
 types:
 	@.ci/venv dot,sim,test
@@ -38,6 +51,7 @@ format:  ## Put the code into shape
 	@.ci/venv dot,sim,test
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
+	@.ci/web format
 
 clean:  ## Remove everything that was made
-	rm -rf .venv out build dist *.egg-info .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-* viz/web/node_modules out build dist *.egg-info .mypy_cache .ruff_cache .hypothesis

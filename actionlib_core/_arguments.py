@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from actionlib_core.exceptions import ActionlibError
+from actionlib_core.exceptions import ActionlibError, DurationTypeError, InvalidDurationError
 from actionlib_core.time import to_seconds
 
 
@@ -55,6 +55,9 @@ def check_queue_size(where: str, value: object) -> None:
         )
 
 
+SECONDS = "seconds, 0 or more, as a number or a Duration"
+
+
 def check_seconds(where: str, argument: str, value: object) -> float:
     """Return a time that has an end, as a number; refuse what is none.
 
@@ -64,26 +67,42 @@ def check_seconds(where: str, argument: str, value: object) -> float:
         value: What was given: seconds as a number or a `Duration`.
 
     Raises:
-        ActionlibError: it is neither, or negative, or has no end.
+        DurationTypeError: it is neither.
+        InvalidDurationError: it is negative or NaN, or has no end.
     """
-    try:
-        seconds = to_seconds(value)  # type: ignore[call-overload]
-    except TypeError:
-        seconds = None
-    if seconds is None or not (math.isfinite(seconds) and seconds >= 0):
-        raise ActionlibError(
-            f"{where}: {argument}: got {value!r}; expected seconds, 0 or more, as a number or a "
-            "Duration."
-        )
-    return float(seconds)
+    seconds = check_limit(where, argument, value)
+    if seconds is None:
+        kind = DurationTypeError if value is None else InvalidDurationError
+        raise kind(where, argument, value, SECONDS)
+    return seconds
 
 
 def check_limit(where: str, argument: str, value: object) -> float | None:
     """Return the longest time for something; None, or infinity, sets no limit. As `check_seconds`.
 
     Raises:
-        ActionlibError: it is no time, or negative.
+        DurationTypeError: it is no time.
+        InvalidDurationError: it is negative or NaN.
     """
-    if value is None or value == math.inf:
+    seconds = check_delay(where, argument, value)
+    if seconds is not None and seconds < 0:
+        raise InvalidDurationError(where, argument, value, SECONDS)
+    return seconds
+
+
+def check_delay(where: str, argument: str, value: object) -> float | None:
+    """As `check_limit`, for what is often the rest of a time: a negative one is allowed."""
+    if value is None:
         return None
-    return check_seconds(where, argument, value)
+    try:
+        seconds = float(to_seconds(value))  # type: ignore[call-overload]
+    except (TypeError, ValueError):
+        raise DurationTypeError(where, argument, value, SECONDS) from None
+    if math.isnan(seconds):
+        raise InvalidDurationError(where, argument, value, SECONDS)
+    return None if seconds == math.inf else seconds
+
+
+def check_wait(where: str, argument: str, value: object) -> float | None:
+    """As `check_limit`, by actionlib's rule: 0 sets no limit, too."""
+    return check_limit(where, argument, value) or None

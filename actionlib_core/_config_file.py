@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
 
 from actionlib_core.config import Config
 from actionlib_core.exceptions import ConfigError
+from actionlib_core.suggest import did_you_mean
+from actionlib_core.yaml_text import YamlTextError, load_yaml
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -24,15 +25,15 @@ def read_config_file(path: Path) -> Config:
     Raises:
         ConfigError: it cannot be read or has errors; the text names all with line and field.
     """
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
-
     try:
-        data = YAML(typ="rt").load(path)
+        data = load_yaml(path.read_text(encoding="utf-8"), "rt")
     except OSError as error:
-        raise ConfigError(str(path), f"cannot be read: {error.strerror}.") from error
-    except YAMLError as error:
-        raise ConfigError(str(path), f"not YAML: {error}") from error
+        raise ConfigError(str(path), f"cannot be read: {error.strerror or error}.") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(str(path), "not YAML: it is no UTF-8 text.") from error
+    except YamlTextError as error:
+        where = f"line {error.line}: " if error.line else ""
+        raise ConfigError(str(path), f"{where}not YAML: {error.reason}.") from error
     reader = _Reader(path.parent)
     config = Config() if data is None else reader.read_record(Config, data, "")
     if reader.problems:
@@ -94,7 +95,10 @@ class _Reader:
 
     def _read_scalar(self, hint: Any, value: object, path: str) -> object:
         if hint is float and isinstance(value, (int, float)) and not isinstance(value, bool):
-            return float(value)
+            try:
+                return float(value)
+            except OverflowError:
+                return self._report(path, "too large", value, "a number")
         if hint in {bool, int} and type(value) is hint:
             return value
         if hint is str and isinstance(value, str):
@@ -111,10 +115,9 @@ class _Reader:
         return None
 
     def _report_unknown(self, path: str, key: str, known: list[str]) -> None:
-        close = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
-        hint = f" Did you mean {close[0]!r}?" if close else ""
         self.problems.append(
-            f"line {self._line}: {path}: unknown field: got {key!r}; expected one of {known}.{hint}"
+            f"line {self._line}: {path}: unknown field: got {key!r}; expected one of {known}."
+            f"{did_you_mean(key, known)}"
         )
 
     def _go_to(self, data: object, key: object) -> None:

@@ -46,7 +46,8 @@ class ChildProcess:
         environment: Mapping[str, str] | None = None,
     ) -> None:
         self.module = module
-        self._command = [sys.executable, "-m", module, *arguments]
+        # -P: a user's module in the current folder must not take the place of one of ours.
+        self._command = [sys.executable, "-P", "-m", module, *arguments]
         self._environment = dict(environment or {})
         self._on_change = on_change
         self._clock = RealClock()  # processes know no other

@@ -10,6 +10,7 @@ The file is YAML with the fields of `Config`; `SMACHPY_CONFIG` names it, or an a
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 ENVIRONMENT_VARIABLE = "SMACHPY_CONFIG"
 DOMAIN_VARIABLE = "SMACHPY_DOMAIN"
 LAST_DOMAIN = 9999
+MOST_DIGITS = 9  # of a number that is read
 ROUTER_ENDPOINT = "tcp/127.0.0.1:7447"
 
 Mode = Literal["peer", "client", "router"]
@@ -162,8 +164,9 @@ def _check_numbers(config: Config) -> str:
         return f"domain: out of range: got {config.domain!r}; expected 0 to {LAST_DOMAIN}."
     for name, low in (("lease", 0.1), ("connect_timeout", 0.0), ("settle", 0.0)):
         value = getattr(config, name)
-        if value < low:
-            return f"{name}: too small: got {value!r}; expected at least {low} [s]."
+        if not low <= value < math.inf:
+            what = "too small" if value < low else "no length of time"
+            return f"{name}: {what}: got {value!r}; expected at least {low} [s]."
     return ""
 
 
@@ -256,10 +259,9 @@ def load_config(source: Config | str | Path | None = None) -> Config:
 
 def _domain_of_environment() -> int:
     text = os.environ.get(DOMAIN_VARIABLE) or "0"
-    try:
-        return int(text)
-    except ValueError:
+    if not (text.isascii() and text.isdigit() and len(text) <= MOST_DIGITS):
         raise ConfigError(
             "environment",
             f"{DOMAIN_VARIABLE}: not a number: got {text!r}; expected 0 to {LAST_DOMAIN}.",
-        ) from None
+        )
+    return int(text)

@@ -2,6 +2,8 @@
 
 Exception
  +-- ActionlibError
+      +-- InvalidDurationError  a duration that cannot be waited: negative, NaN
+      |    +-- DurationTypeError  one that is no number
       +-- NameSetupError        several problems in names or arguments, all at once
       |    +-- InvalidNameError a name breaks the ROS name rules (caret text)
       +-- ConfigError           a configuration has errors, all at once
@@ -26,6 +28,24 @@ from __future__ import annotations
 
 class ActionlibError(Exception):
     """Root of all errors that actionlib_core raises on purpose."""
+
+
+class InvalidDurationError(ActionlibError, ValueError):
+    """A duration that cannot be waited: negative, not a number, or without the end it needs.
+
+    Attributes:
+        argument: Name of the argument.
+        value: What was given.
+    """
+
+    def __init__(self, where: str, argument: str, value: object, expected: str) -> None:
+        self.argument = argument
+        self.value = value
+        super().__init__(f"{where}: {argument}: got {value!r}; expected {expected}.")
+
+
+class DurationTypeError(InvalidDurationError, TypeError):
+    """A duration that is neither a number nor a `Duration`, a text for example."""
 
 
 class NameSetupError(ActionlibError, ValueError):

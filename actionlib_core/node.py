@@ -22,10 +22,10 @@ from actionlib_core.clock import RealClock, current_clock
 from actionlib_core.clock._ending import ending
 from actionlib_core.clock._serial import report_thread_exception
 from actionlib_core.config import load_config
-from actionlib_core.exceptions import NodeError
+from actionlib_core.exceptions import NodeError, TransportError
 from actionlib_core.names import check_base_name, clean_namespace, parse_arguments, resolve_name
-from actionlib_core.presence import Endpoint, Kind, token_key
 from actionlib_core.shutdown import current_shutdown
+from actionlib_core.wire.presence import Endpoint, Kind, token_key
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterator, Sequence
@@ -197,6 +197,23 @@ class Node:
 
         return forget
 
+    def let_go(self, closer: Callable[[], object]) -> None:
+        """Call `closer` soon, in another thread: nobody holds any more what it closes.
+
+        Threads: any, also one that collects garbage, at any moment.
+        """
+
+        def close() -> None:
+            try:
+                closer()
+            except TransportError:  # the node was closed meanwhile, and all that is on it
+                if not self._closed:
+                    raise
+
+        if not self._closed:
+            name = f"let go by node {self.full_name}"
+            self.clock.call_later(0.0, lambda: self.clock.spawn(close, name=name))
+
     def time_to_leave(self, longest: float) -> float:
         """Return how long what is being closed may wait [s].
 
@@ -259,14 +276,18 @@ class _Default:
 
     def get(self) -> Node:
         with self._lock:
-            if self._node is None or self._node.closed:
+            if not self.exists:
                 self._make(f"{_program_name()}_{os.getpid()}", load_config(), sys.argv[1:], None)
             assert self._node is not None
             return self._node
 
+    @property
+    def exists(self) -> bool:
+        return self._node is not None and not self._node.closed
+
     def init(self, name: str, config: Config, argv: Sequence[str], namespace: str | None) -> Node:
         with self._lock:
-            if self._node is not None and not self._node.closed:
+            if self._node is not None and self.exists:
                 raise NodeError(
                     f"init: the default node exists already: got {name!r}; expected the first "
                     f"call, as the node is called {self._node.full_name!r}. Try calling init "
@@ -300,6 +321,11 @@ def _leave(node: Node, pid: int) -> None:
 
 
 _default = _Default()
+
+
+def has_node() -> bool:
+    """Tell whether the process's default node has been made, and so has joined its network."""
+    return _default.exists
 
 
 def init(

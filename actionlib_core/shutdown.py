@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
     from actionlib_core.clock import Clock, Event
 
+EXIT_THREADS = 4  # timers, callbacks, and two for what a machine does when it is preempted
+
 
 class Shutdown:
     """One shutdown, requested at most once until `clear`.
@@ -99,9 +101,13 @@ class Shutdown:
         Returns:
             Forgets the callback.
 
-        Threads: the callback runs in the main thread and may block; threads still run then. An
-            exception is given to `threading.excepthook`.
+        Threads: the callback runs in the main thread and may block; threads still run then, and
+            `EXIT_THREADS` wait for what the current clock spawns, as Python 3.12 starts none any
+            more. An exception is given to `threading.excepthook`.
         """
+        clock = current_clock()
+        if isinstance(clock, RealClock):
+            clock.keep_threads(EXIT_THREADS)
         with self._lock:
             if not self._at_exit:
                 atexit.register(self.leave)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from actionlib_core._action_wire import ActionTypes
 from actionlib_core.exceptions import FieldError
 from actionlib_core.interfaces import get_action
+from actionlib_core.wire.action_messages import ActionTypes
+from actionlib_core.yaml_text import YamlTextError, load_yaml
 
 if TYPE_CHECKING:
     import os
@@ -55,13 +56,10 @@ def yaml_msg(type_: type[M], filename: str | os.PathLike[str]) -> M:
 
 def yaml_msgs_str(type_: type[M], yaml_str: str, filename: str | None = None) -> list[M]:
     """Read messages from a YAML list of mappings; see `yaml_msg_str`."""
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
-
     with _From(filename):
         try:
-            found = YAML(typ="safe", pure=True).load(yaml_str)
-        except YAMLError as error:
+            found = load_yaml(yaml_str)
+        except YamlTextError as error:
             raise FieldError(f"{type_._type}: malformed YAML: {error}") from error
         entries = [] if found is None else found
         if not isinstance(entries, list):

@@ -4,7 +4,7 @@
 
 Raw and measured exchanges take turns, so that a busy computer slows both; look at the ratios. Raw
 zenoh runs in two processes of its own: in ours its callbacks are faster than it makes them, as
-`actionlib_core` keeps the states of zenoh's threads (`actionlib_core/transport/_pin.py`). The
+`actionlib_core` keeps the states of zenoh's threads (`actionlib_core/transport/_inlet.py`). The
 figures `kept` are raw zenoh with the same help, in the processes of the goals.
 """
 

@@ -29,7 +29,7 @@ from pathlib import Path
 
 import smachpy
 from actionlib_core.clock import RealClock, use_clock
-from viz.runs.recording import Recorder
+from smachpy.events.recording import Recorder
 
 ROUNDS = 7
 STEPS = 2000

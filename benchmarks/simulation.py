@@ -22,20 +22,20 @@ from dataclasses import replace
 
 import numpy as np
 
+from actionlib_core.action.simple_client import SimpleActionClient
 from actionlib_core.clock import VirtualClock, use_clock
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.node import Node, use_node
-from actionlib_core.simple_action_client import SimpleActionClient
 from actionlib_core.transport.memory import MemoryNetwork
-from missions.exceptions import NavigationError
-from missions.maps import OFFICE_MAP, OFFICE_ROBOT
-from missions.move_base.config import load_config
-from missions.move_base.geometry import Pose2D
-from missions.move_base.occupancy import OccupancyMap, load_map
-from missions.move_base.pilot import Pilot
-from missions.move_base.simulation import Simulation
-from missions.move_base.world import Robot, World
-from missions.waypoint_file import goal_at
+from smachpy.sim.config import load_config
+from smachpy.sim.exceptions import NavigationError
+from smachpy.sim.geometry import Pose2D
+from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
+from smachpy.sim.occupancy import OccupancyMap, load_map
+from smachpy.sim.pilot import Pilot
+from smachpy.sim.simulation import Simulation
+from smachpy.sim.world import Robot, World
+from smachpy.states import goal_at
 
 HALL, CELL, PILLAR = 60.0, 0.1, 0.4  # [m]
 RATE = 20.0  # [Hz]

@@ -76,7 +76,7 @@ def main():
     args = parser.parse_args()
     os.environ.setdefault("SMACHPY_DOMAIN", str(1 + os.getpid() % 9999))
     robot, _ = start(ROBOT, "--states", args.states, "--rate", args.rate)
-    view, address = start("-m", "smachpy.cli", "view", "--child", "--port", 0)
+    view, address = start("-m", "smachpy.command", "view", "--child", "--port", 0)
     try:
         found = re.match(r"http://[^#]*", address)
         assert found, address

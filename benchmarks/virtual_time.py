@@ -38,21 +38,21 @@ from collections import Counter
 from functools import partial
 from pathlib import Path
 
+from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.clock import RealClock, VirtualClock, use_clock
 from actionlib_core.clock._gates import make_gate
 from actionlib_core.clock._virtual_parts import Participant
 from actionlib_core.interfaces.actionlib.msg import TestAction
 from actionlib_core.node import Node, use_node
-from actionlib_core.simple_action_server import SimpleActionServer
 from actionlib_core.transport._memory_entries import Inbox
 from actionlib_core.transport.memory import MemoryNetwork
-from missions.maps import OFFICE_MAP, OFFICE_ROBOT
-from missions.move_base.config import load_config
-from missions.move_base.occupancy import load_map
-from missions.move_base.server import RobotServer
-from missions.move_base.world import Robot, World
-from missions.patrol import patrol
+from missions.lesson_2_patrol import patrol
 from smachpy import CBState, Concurrence, SimpleActionState, StateMachine
+from smachpy.sim.config import load_config
+from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
+from smachpy.sim.occupancy import load_map
+from smachpy.sim.server import RobotServer
+from smachpy.sim.world import Robot, World
 from smachpy.testing import mission_kit
 
 KINDS = ("clock", "network", "messages", "mission")

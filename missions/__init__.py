@@ -1,4 +1,4 @@
-"""Missions to run, read and copy from, and the simulated robot they drive.
+"""Missions to run, read and copy from; README.md beside this file says in which order.
 
-`smachpy list` names them, `smachpy run NAME` runs one.
+`smachpy list` names them, `smachpy run NAME` runs one. Nothing imports this package.
 """

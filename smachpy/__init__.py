@@ -20,17 +20,11 @@ talk to action servers, services and topics are imported when they are first use
 
 from __future__ import annotations
 
+import sys as _sys
 from typing import TYPE_CHECKING, Any
 
-from smachpy._core.retry import Retry as Retry
-from smachpy._decorator import state as state
-from smachpy._runtime.frame import current_state as current_state
-from smachpy.concurrence import Concurrence as Concurrence
-from smachpy.concurrence import Rule as Rule
-from smachpy.concurrence import all_of as all_of
-from smachpy.concurrence import any_of as any_of
-from smachpy.concurrence import n_of as n_of
-from smachpy.container import Container as Container
+from actionlib_core.compat import alias_modules as _alias_modules
+from smachpy.compat import MODULES as _SMACH_MODULES
 from smachpy.exceptions import InconsistentMachineError as InconsistentMachineError
 from smachpy.exceptions import InvalidConstructionError as InvalidConstructionError
 from smachpy.exceptions import InvalidStateError as InvalidStateError
@@ -40,37 +34,50 @@ from smachpy.exceptions import ReadOnlyError as ReadOnlyError
 from smachpy.exceptions import SmachError as SmachError
 from smachpy.exceptions import UserDataKeyError as UserDataKeyError
 from smachpy.exceptions import UserDataTypeError as UserDataTypeError
+from smachpy.introspection import Kind as Kind
 from smachpy.introspection import StateRecord as StateRecord
 from smachpy.introspection import describe as describe
-from smachpy.iterator import Iterator as Iterator
 from smachpy.log import logdebug as logdebug
 from smachpy.log import logerr as logerr
 from smachpy.log import loginfo as loginfo
 from smachpy.log import logwarn as logwarn
 from smachpy.log import set_loggers as set_loggers
-from smachpy.sequence import Sequence as Sequence
-from smachpy.state import CBState as CBState
-from smachpy.state import State as State
-from smachpy.state_machine import StateMachine as StateMachine
-from smachpy.user_data import Remapper as Remapper
-from smachpy.user_data import UserData as UserData
+from smachpy.machines.concurrence import Concurrence as Concurrence
+from smachpy.machines.concurrence import Rule as Rule
+from smachpy.machines.concurrence import all_of as all_of
+from smachpy.machines.concurrence import any_of as any_of
+from smachpy.machines.concurrence import n_of as n_of
+from smachpy.machines.container import Container as Container
+from smachpy.machines.decorator import state as state
+from smachpy.machines.iterator import Iterator as Iterator
+from smachpy.machines.sequence import Sequence as Sequence
+from smachpy.machines.state import CBState as CBState
+from smachpy.machines.state import Options as Options
+from smachpy.machines.state import State as State
+from smachpy.machines.state import get_options as get_options
+from smachpy.machines.state import set_options as set_options
+from smachpy.machines.state_machine import StateMachine as StateMachine
+from smachpy.mission_info import mission as mission
+from smachpy.run.frame import current_state as current_state
+from smachpy.run.options import Retry as Retry
+from smachpy.run.preempt_handler import set_preempt_handler as set_preempt_handler
+from smachpy.userdata.user_data import Remapper as Remapper
+from smachpy.userdata.user_data import UserData as UserData
 from smachpy.util import CBInterface as CBInterface
 from smachpy.util import cb_interface as cb_interface
 from smachpy.util import has_smach_interface as has_smach_interface
 from smachpy.util import is_shutdown as is_shutdown
-from smachpy.util import set_preempt_handler as set_preempt_handler
 from smachpy.util import set_shutdown_check as set_shutdown_check
 
 if TYPE_CHECKING:
-    from smachpy.action_server_wrapper import ActionServerWrapper as ActionServerWrapper
+    from smachpy.actions.action_server_wrapper import ActionServerWrapper as ActionServerWrapper
+    from smachpy.actions.condition_state import ConditionState as ConditionState
+    from smachpy.actions.monitor_state import MonitorState as MonitorState
+    from smachpy.actions.service_state import ServiceState as ServiceState
+    from smachpy.actions.simple_action_state import SimpleActionState as SimpleActionState
     from smachpy.checks import check as check
-    from smachpy.condition_state import ConditionState as ConditionState
-    from smachpy.introspection import Kind as Kind
-    from smachpy.introspection_client import IntrospectionClient as IntrospectionClient
-    from smachpy.introspection_server import IntrospectionServer as IntrospectionServer
-    from smachpy.monitor_state import MonitorState as MonitorState
-    from smachpy.service_state import ServiceState as ServiceState
-    from smachpy.simple_action_state import SimpleActionState as SimpleActionState
+    from smachpy.network.client import IntrospectionClient as IntrospectionClient
+    from smachpy.network.server import IntrospectionServer as IntrospectionServer
 
 __all__ = [
     "ActionServerWrapper",
@@ -87,7 +94,9 @@ __all__ = [
     "InvalidTransitionError",
     "InvalidUserCodeError",
     "Iterator",
+    "Kind",
     "MonitorState",
+    "Options",
     "ReadOnlyError",
     "Remapper",
     "Retry",
@@ -107,14 +116,17 @@ __all__ = [
     "cb_interface",
     "current_state",
     "describe",
+    "get_options",
     "has_smach_interface",
     "is_shutdown",
     "logdebug",
     "logerr",
     "loginfo",
     "logwarn",
+    "mission",
     "n_of",
     "set_loggers",
+    "set_options",
     "set_preempt_handler",
     "set_shutdown_check",
     "state",
@@ -122,15 +134,21 @@ __all__ = [
 
 # Names of states that need actionlib_core -> module that defines them; imported on first use.
 _LAZY: dict[str, str] = {
-    "ActionServerWrapper": "smachpy.action_server_wrapper",
-    "ConditionState": "smachpy.condition_state",
-    "IntrospectionClient": "smachpy.introspection_client",
-    "IntrospectionServer": "smachpy.introspection_server",
-    "MonitorState": "smachpy.monitor_state",
-    "ServiceState": "smachpy.service_state",
-    "SimpleActionState": "smachpy.simple_action_state",
+    "ActionServerWrapper": "smachpy.actions.action_server_wrapper",
+    "ConditionState": "smachpy.actions.condition_state",
+    "IntrospectionClient": "smachpy.network.client",
+    "IntrospectionServer": "smachpy.network.server",
+    "MonitorState": "smachpy.actions.monitor_state",
+    "ServiceState": "smachpy.actions.service_state",
+    "SimpleActionState": "smachpy.actions.simple_action_state",
     "check": "smachpy.checks",
 }
+
+
+_alias_modules(_SMACH_MODULES)
+# Importing a submodule sets an attribute of its package. `smachpy.state` is the decorator, so the
+# module of that name must count as imported already.
+_sys.modules["smachpy.state"] = _sys.modules["smachpy.machines.state"]
 
 
 def __getattr__(name: str) -> Any:

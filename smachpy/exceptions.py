@@ -19,8 +19,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from actionlib_core import suggest
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
+
+did_you_mean = suggest.did_you_mean
 
 
 class SmachError(Exception):
@@ -40,7 +44,15 @@ class InvalidConstructionError(SmachError):
 
 
 class InvalidStateError(SmachError):
-    """A state, its label or its options are wrong."""
+    """A state, its label, its arguments or its options are wrong.
+
+    Attributes:
+        problems: One text per problem, "argument: got ...; expected ...", or none: see `message`.
+    """
+
+    def __init__(self, message: str = "", problems: Iterable[str] = ()) -> None:
+        self.problems = tuple(problems)
+        super().__init__(message)
 
 
 class InvalidTransitionError(SmachError):
@@ -55,12 +67,12 @@ class InconsistentMachineError(InvalidTransitionError, InvalidStateError):
     """
 
     def __init__(self, where: str, problems: Sequence[str]) -> None:
+        text = "".join(problems)
+        if len(problems) != 1:
+            lines = "".join(f"\n  - {problem}" for problem in problems)
+            text = f"{where} has {len(problems)} problems:{lines}"
+        super().__init__(text)
         self.problems = tuple(problems)
-        if len(self.problems) == 1:
-            super().__init__(self.problems[0])
-        else:
-            lines = "".join(f"\n  - {problem}" for problem in self.problems)
-            super().__init__(f"{where} has {len(self.problems)} problems:{lines}")
 
 
 class InvalidUserCodeError(SmachError):
@@ -107,24 +119,25 @@ class UserDataTypeError(InvalidUserCodeError, TypeError):
         expected: The annotated type.
     """
 
-    def __init__(self, key: str, value: object, expected: object) -> None:
+    def __init__(self, key: str, value: object, expected: object, *, path: str = "") -> None:
         self.key = key
         self.value = value
         self.expected = expected
         name = getattr(expected, "__name__", None) or str(expected)
         super().__init__(
-            f"userdata key {key!r} has another type: got {value!r} ({type(value).__name__}); "
-            f"expected {name}."
+            f"{path}{': ' if path else ''}userdata key {key!r} has another type: got {value!r} "
+            f"({type(value).__name__}); expected {name}.",
+            path=path,
         )
 
 
 class ReadOnlyError(InvalidUserCodeError, TypeError):
-    """A state tried to change a value that it declared as input only."""
+    """A state tried to change a value that it declared as input only.
 
+    Attributes:
+        key: The userdata key, or "" for a view of `get_const`.
+    """
 
-def did_you_mean(word: object, known: Iterable[object]) -> str:
-    """Return " Did you mean …?" when `word` looks like one of `known`, else ""."""
-    import difflib  # errors are rare, imports are not
-
-    near = difflib.get_close_matches(str(word), [str(k) for k in known], n=1, cutoff=0.5)
-    return f" Did you mean {near[0]!r}?" if near else ""
+    def __init__(self, message: str = "", *, key: str = "", path: str = "") -> None:
+        self.key = key
+        super().__init__(message, path=path)

@@ -7,21 +7,21 @@ of these records.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
+from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    ClassVar,
+    Literal,
+    Protocol,
+    TypeAlias,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from smachpy.introspection_client import IntrospectionClient
-    from smachpy.introspection_server import (
-        INIT_TOPIC,
-        STATUS_TOPIC,
-        STRUCTURE_TOPIC,
-        ContainerProxy,
-        IntrospectionServer,
-    )
-    from smachpy.state import State
 
 __all__ = [
     "INIT_TOPIC",
@@ -153,14 +153,27 @@ class StateRecord:
         """
         import json
 
-        return _state_from(json.loads(text), "$")
+        record: StateRecord = _record(StateRecord, json.loads(text), "$")
+        return record
+
+
+class Described(Protocol):
+    """What `describe` asks a state."""
+
+    _smachpy_is_container: ClassVar[bool]
+
+    def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]: ...
+    def describe_structure(self) -> Structure: ...
+    def get_registered_outcomes(self) -> tuple[str, ...]: ...
+    def get_registered_input_keys(self) -> tuple[str, ...]: ...
+    def get_registered_output_keys(self) -> tuple[str, ...]: ...
 
 
 @dataclass(frozen=True, slots=True)
 class Structure:
     """What a container adds to its record; returned by `Container.describe_structure`."""
 
-    children: tuple[tuple[str, State, tuple[tuple[str, str], ...]], ...] = ()
+    children: tuple[tuple[str, Described, tuple[tuple[str, str], ...]], ...] = ()
     initial: tuple[str, ...] = ()
     transitions: tuple[TransitionRecord, ...] = ()
     rules: tuple[RuleRecord, ...] = ()
@@ -168,19 +181,20 @@ class Structure:
     details: tuple[tuple[str, str], ...] = field(default=())
 
 
-def describe(machine: State, *, name: str | None = None) -> StateRecord:
+def describe(machine: Described, *, name: str | None = None) -> StateRecord:
     """Return the structure of `machine`, without running it; inconsistent machines too.
 
     Args:
         machine: Any state; a container is described with all its descendants.
         name: Label of the root; default: the container's `name`.
     """
-    label = name or getattr(machine, "name", None) or "SM_ROOT"
+    own = getattr(machine, "name", None) if machine._smachpy_is_container else None
+    label = name or own or "SM_ROOT"
     return _describe(machine, f"/{label}", label, ())
 
 
 def _describe(
-    state: State, path: str, label: str, remapping: tuple[tuple[str, str], ...]
+    state: Described, path: str, label: str, remapping: tuple[tuple[str, str], ...]
 ) -> StateRecord:
     kind, details = state.describe_details()
     structure = state.describe_structure()
@@ -207,7 +221,7 @@ def _describe(
     )
 
 
-def _first_paragraph(state: State) -> str:
+def _first_paragraph(state: Described) -> str:
     cls = type(state)
     if cls.__module__.partition(".")[0] == "smachpy":  # the library's own texts say nothing new
         return ""
@@ -215,66 +229,57 @@ def _first_paragraph(state: State) -> str:
     return " ".join(doc.strip().split("\n\n")[0].split())
 
 
-def _state_from(data: Any, where: str) -> StateRecord:
-    fields = _fields(data, StateRecord, where)
-    if fields.get("kind") not in KINDS:
-        raise ValueError(
-            f"{where}.kind: got {fields.get('kind')!r}; expected one of {sorted(KINDS)}."
-        )
-    for name in ("outcomes", "input_keys", "output_keys", "initial"):
-        fields[name] = tuple(fields.get(name, ()))
-    for name in ("remapping", "details"):
-        fields[name] = _pairs(fields.get(name, ()))
-    fields["children"] = tuple(
-        _state_from(child, f"{where}.children[{i}]")
-        for i, child in enumerate(fields.get("children", ()))
-    )
-    fields["transitions"] = tuple(
-        TransitionRecord(**_fields(edge, TransitionRecord, f"{where}.transitions[{i}]"))
-        for i, edge in enumerate(fields.get("transitions", ()))
-    )
-    fields["rules"] = tuple(
-        _rule_from(rule, f"{where}.rules[{i}]") for i, rule in enumerate(fields.get("rules", ()))
-    )
-    return StateRecord(**fields)
+def _rebuilt(kind: Any, data: Any, where: str) -> Any:
+    """Return the value of the annotated type `kind` that JSON gave back as `data`."""
+    arguments = get_args(kind)
+    if is_dataclass(kind):
+        return _record(kind, data, where)
+    if get_origin(kind) is tuple:
+        if isinstance(data, list) and arguments[1] is Ellipsis:
+            return tuple(_rebuilt(arguments[0], one, f"{where}[{i}]") for i, one in enumerate(data))
+        if isinstance(data, list) and len(data) == len(arguments):
+            return tuple(
+                _rebuilt(one, part, where) for one, part in zip(arguments, data, strict=True)
+            )
+        expected = "a list" if arguments[1] is Ellipsis else f"a list of {len(arguments)}"
+    elif get_origin(kind) is Literal:
+        if isinstance(data, str) and data in arguments:
+            return data
+        expected = f"one of {sorted(arguments)}"
+    elif isinstance(data, kind):  # a class, or a union of some
+        return data
+    else:
+        expected = "a text" if kind is not bool else "true or false"
+    raise ValueError(f"{where}: got {data!r}; expected {expected}.")
 
 
-def _rule_from(data: Any, where: str) -> RuleRecord:
-    fields = _fields(data, RuleRecord, where)
-    fields["conditions"] = _pairs(fields.get("conditions", ()))
-    return RuleRecord(**fields)
-
-
-def _pairs(data: Any) -> tuple[tuple[str, str], ...]:
-    return tuple((str(a), str(b)) for a, b in data)
-
-
-def _fields(data: Any, cls: type, where: str) -> dict[str, Any]:
-    slots: dict[str, Any] = cls.__dataclass_fields__  # type: ignore[attr-defined]
+def _record(cls: Any, data: Any, where: str) -> Any:
     if not isinstance(data, dict):
         raise ValueError(f"{where}: got {type(data).__name__}; expected an object.")  # noqa: TRY004
-    unknown = sorted(set(data) - set(slots))
-    needed = {name for name, spec in slots.items() if _is_required(spec)}
-    missing = sorted(needed - set(data))
+    hints, slots = get_type_hints(cls), fields(cls)
+    unknown = sorted(set(data) - set(hints))
+    missing = sorted(
+        slot.name for slot in slots if slot.default is MISSING and slot.name not in data
+    )
     if unknown or missing:
         raise ValueError(f"{where}: got unknown fields {unknown}, missing fields {missing}.")
-    return dict(data)
+    return cls(**{n: _rebuilt(hints[n], part, f"{where}.{n}") for n, part in data.items()})
 
 
-def _is_required(spec: Any) -> bool:
-    from dataclasses import MISSING
-
-    return spec.default is MISSING and spec.default_factory is MISSING
-
-
+INIT_TOPIC: str
+STATUS_TOPIC: str
+STRUCTURE_TOPIC: str
+ContainerProxy: Any
+IntrospectionClient: Any
+IntrospectionServer: Any
 # What smach_ros.introspection holds -> module that defines it; imported on first use.
 _LAZY = {
-    "INIT_TOPIC": "smachpy.introspection_server",
-    "STATUS_TOPIC": "smachpy.introspection_server",
-    "STRUCTURE_TOPIC": "smachpy.introspection_server",
-    "ContainerProxy": "smachpy.introspection_server",
-    "IntrospectionClient": "smachpy.introspection_client",
-    "IntrospectionServer": "smachpy.introspection_server",
+    "INIT_TOPIC": "smachpy.network.server",
+    "STATUS_TOPIC": "smachpy.network.server",
+    "STRUCTURE_TOPIC": "smachpy.network.server",
+    "ContainerProxy": "smachpy.network.server",
+    "IntrospectionClient": "smachpy.network.client",
+    "IntrospectionServer": "smachpy.network.server",
 }
 
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING, NamedTuple
 
+from smachpy.machines.problems import Problems
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -32,7 +34,15 @@ def set_loggers(
     debug: Callable[[str], object],
     error: Callable[[str], object],
 ) -> None:
-    """Send the four kinds of messages to these functions; mind the order of the arguments."""
+    """Send the four kinds of messages to these functions; mind the order of the arguments.
+
+    Raises:
+        InvalidStateError: one of them cannot be called.
+    """
+    problems = Problems("set_loggers")
+    for name, function in (("info", info), ("warn", warn), ("debug", debug), ("error", error)):
+        problems.function(name, function, f"{name}(text)", 1, optional=False)
+    problems.raise_all()
     _current[0] = _Loggers(info, warn, debug, error)
 
 

@@ -1,13 +1,18 @@
-"""Pictures for messages: drawn by an installed package, or not at all.
+"""What shows machines and runs, offered by an installed package (`viz`).
 
-A package that draws offers functions in the entry-point group `smachpy.pictures`: `run`, called as
-`draw(record, file, run=events)`, and `svg`, called as `draw(machine)`, which returns SVG text.
+Such a package has entry points in the group `smachpy.pictures`:
+
+run: called as `draw(machine_or_record, file, run=events)`, writes a picture
+svg: called as `draw(machine)`, returns SVG text
+history: a class; its `on_event` takes events in, and `run=` above takes it
+terminal: a class, shows a run in the terminal while it happens (`viz.TerminalView`)
+viewer: a class, serves the live page in a process of its own (`viz.live.process.ViewerProcess`)
 """
 
 from __future__ import annotations
 
 from importlib.metadata import entry_points
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from smachpy import log
 from smachpy.events import Entered, Event, Left
@@ -17,10 +22,23 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from pathlib import Path
 
-    from smachpy.introspection import StateRecord
-    from smachpy.state import State
+    from smachpy.introspection import Described, StateRecord
 
 GROUP = "smachpy.pictures"
+
+
+def load(name: str) -> Any:
+    """Return what an installed package offers as `name`, None when none does.
+
+    Raises:
+        ImportError: the package cannot be imported, or another package of its name can.
+    """
+    for point in entry_points(group=GROUP, name=name):
+        try:
+            return point.load()
+        except AttributeError as error:  # a module of that name, but another one
+            raise ImportError(f"{point.value} is missing", name=point.module) from error
+    return None
 
 
 def draw_run(record: StateRecord, events: Iterable[Event], file: Path) -> Path | None:
@@ -31,18 +49,19 @@ def draw_run(record: StateRecord, events: Iterable[Event], file: Path) -> Path |
 
     Blocks: while the picture is laid out, under a second.
     """
-    for point in entry_points(group=GROUP, name="run"):
-        try:
-            file.parent.mkdir(parents=True, exist_ok=True)
-            point.load()(record, file, run=list(events))
-        except (SmachError, OSError, ImportError) as error:
-            log.logwarn(f"{record.path}: no picture {str(file)!r}: {error}")
+    try:
+        draw = load("run")
+        if draw is None:
             return None
-        return file
-    return None
+        file.parent.mkdir(parents=True, exist_ok=True)
+        draw(record, file, run=list(events))
+    except (SmachError, OSError, ImportError) as error:
+        log.logwarn(f"{record.path}: no picture {str(file)!r}: {error}")
+        return None
+    return file
 
 
-def draw_svg(machine: State) -> str | None:
+def draw_svg(machine: Described) -> str | None:
     """Return `machine` as SVG text, None when nothing that draws is installed.
 
     Raises:
@@ -50,10 +69,8 @@ def draw_svg(machine: State) -> str | None:
 
     Blocks: while the picture is laid out, under a second.
     """
-    for point in entry_points(group=GROUP, name="svg"):
-        picture: str = point.load()(machine)
-        return picture
-    return None
+    draw = load("svg")
+    return None if draw is None else str(draw(machine))
 
 
 def draw_moments(

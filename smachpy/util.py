@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 
-from smachpy import log
-from smachpy._core.names import unique_names
+from smachpy.machines.names import unique_names
+from smachpy.machines.problems import Problems
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
-
-    from smachpy.state import State
 
 __all__ = [
     "CBInterface",
@@ -42,59 +40,15 @@ def is_shutdown() -> bool:
     return _check[0]()
 
 
-def set_preempt_handler(sc: State, *, timeout: float | None = 60.0) -> None:
-    """Preempt `sc` when the program is to end, and let it finish before the network is left.
-
-    A machine that runs is preempted by Ctrl-C and by the program's shutdown anyway. This makes the
-    program wait for one that runs in another thread, so that its goals are cancelled and not left
-    running; and, when called in the main thread, it makes SIGTERM a request to end as Ctrl-C is,
-    unless the program handles that itself.
-
-    Args:
-        sc: A container, or a state.
-        timeout: Longest wait for its end [s]; None waits for ever.
-    """
-    from actionlib_core import shutdown
-    from smachpy._runtime.asker import shutdown_asking
-
-    running: Callable[[], bool] = getattr(sc, "is_running", lambda: True)
-    wait: Callable[[float | None], object] = getattr(sc, "wait_ended", lambda _timeout: True)
-
-    def stop() -> None:
-        if running():
-            with shutdown_asking(current):
-                sc.request_preempt()
-            if not wait(timeout):
-                log.logerr(f"{sc!r} still runs {timeout} s after its preempt; it is left behind.")
-
-    current = shutdown.current_shutdown()
-    forget = _handle_sigterm()
-    if forget is not None:
-        current.at_exit(forget)
-    current.on_shutdown(stop)
-    current.at_exit(stop)
-
-
-def _handle_sigterm() -> Callable[[], object] | None:
-    """Let SIGTERM request the program's end; returns how to undo that, None if it was not done."""
-    import contextlib
-    import signal
-    import threading
-
-    from actionlib_core.clock import RealClock, current_clock
-    from actionlib_core.shutdown import handle_signals
-
-    real = isinstance(current_clock(), RealClock)
-    main = threading.current_thread() is threading.main_thread()
-    if not (real and main and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL):
-        return None
-    handling = contextlib.ExitStack()
-    handling.enter_context(handle_signals((signal.SIGTERM,)))
-    return handling.close
-
-
 def set_shutdown_check(cb: Callable[[], bool]) -> None:
-    """Make `cb` say whether the program is shutting down; machines then end 'preempted'."""
+    """Make `cb` say whether the program is shutting down; machines then end 'preempted'.
+
+    Raises:
+        InvalidStateError: `cb` cannot be called.
+    """
+    problems = Problems("set_shutdown_check")
+    problems.function("cb", cb, "cb()", 0, optional=False)
+    problems.raise_all()
     _check[0] = cb
 
 
@@ -131,6 +85,9 @@ class CBInterface(Generic[P, R_co]):
         output_keys: Iterable[str] | None = None,
         io_keys: Iterable[str] | None = None,
     ) -> None:
+        problems = Problems(type(self).__name__)
+        problems.function("cb", cb, "cb(userdata, ...)", optional=False, plain=False)
+        problems.raise_all()
         both = unique_names(io_keys or (), "io_keys")
         self._cb = cb
         self._outcomes = unique_names(outcomes or (), "outcomes")
@@ -175,13 +132,26 @@ class cb_interface:  # noqa: N801  SMACH's name
         *,
         io_keys: Iterable[str] | None = None,
     ) -> None:
+        problems = Problems("cb_interface")
         self._interface = (
-            tuple(outcomes or ()),
-            tuple(input_keys or ()),
-            tuple(output_keys or ()),
-            tuple(io_keys or ()),
+            problems.names("outcomes", outcomes or ()),
+            problems.names("input_keys", input_keys or ()),
+            problems.names("output_keys", output_keys or ()),
+            problems.names("io_keys", io_keys or ()),
         )
+        problems.raise_all()
 
     def __call__(self, cb: Callable[P, R_co]) -> CBInterface[P, R_co]:
         """Attach the interface to `cb`."""
         return CBInterface(cb, *self._interface)
+
+
+set_preempt_handler: Any
+
+
+def __getattr__(name: str) -> Any:
+    if name == "set_preempt_handler":  # its name in smach_ros; it knows machines, this does not
+        from importlib import import_module
+
+        return import_module("smachpy.run.preempt_handler").set_preempt_handler
+    raise AttributeError(f"module 'smachpy.util' has no attribute {name!r}")

@@ -19,15 +19,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from viz.drawing import PictureError as PictureError
-    from viz.drawing import atlas as atlas
-    from viz.drawing import picture as picture
-    from viz.drawing import render as render
-    from viz.drawing import svg as svg
-    from viz.engine import EngineError as EngineError
-    from viz.extract import UnknownPathError as UnknownPathError
-    from viz.history import History as History
-    from viz.terminal import TerminalView as TerminalView
+    from viz.model.extract import UnknownPathError as UnknownPathError
+    from viz.model.history import History as History
+    from viz.pictures.drawing import PictureError as PictureError
+    from viz.pictures.drawing import atlas as atlas
+    from viz.pictures.drawing import picture as picture
+    from viz.pictures.drawing import render as render
+    from viz.pictures.drawing import svg as svg
+    from viz.pictures.graphviz_process import EngineError as EngineError
+    from viz.terminal.panel import TerminalView as TerminalView
 
 __all__ = [
     "EngineError",
@@ -42,15 +42,15 @@ __all__ = [
 ]
 
 _HOMES = {
-    "EngineError": "viz.engine",
-    "History": "viz.history",
-    "PictureError": "viz.drawing",
-    "TerminalView": "viz.terminal",
-    "UnknownPathError": "viz.extract",
-    "atlas": "viz.drawing",
-    "picture": "viz.drawing",
-    "render": "viz.drawing",
-    "svg": "viz.drawing",
+    "EngineError": "viz.pictures.graphviz_process",
+    "History": "viz.model.history",
+    "PictureError": "viz.pictures.drawing",
+    "TerminalView": "viz.terminal.panel",
+    "UnknownPathError": "viz.model.extract",
+    "atlas": "viz.pictures.drawing",
+    "picture": "viz.pictures.drawing",
+    "render": "viz.pictures.drawing",
+    "svg": "viz.pictures.drawing",
 }
 
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from smachpy.cli import UsageError
+from smachpy.command import UsageError
 
 if TYPE_CHECKING:
     from smachpy.introspection import StateRecord
-    from viz.model import Marks
     from viz.runs.statistics import Statistics
 
 FORMATS = "svg, png, pdf, dot, json, mmd or txt"
@@ -82,7 +81,8 @@ def _depth(text: str) -> int:
 
 
 def _run(args: argparse.Namespace) -> int:
-    from viz import drawing, extract
+    from viz.model import extract
+    from viz.pictures import drawing
 
     if not args.output and not args.atlas:
         raise UsageError(
@@ -90,9 +90,13 @@ def _run(args: argparse.Namespace) -> int:
             f"Try -o {Path(args.target).stem or 'machine'}.svg"
         )
     record = read_record(args.target)
-    looks = {"theme": args.theme, "show_implicit": args.show_implicit}
+    looks: dict[str, Any] = {"theme": args.theme, "show_implicit": args.show_implicit}
     if args.runs:
-        looks |= {"run": _runs(args, record), "legend": _legend(args, record)}
+        from viz.runs.statistics import marks_of
+
+        statistics = _statistics(args, record)
+        looks["run"] = marks_of(statistics, record, heat=args.heat)
+        looks["legend"] = _legend(statistics, args.heat)
     if args.atlas:
         part = extract.find(record, args.path) if args.path else record
         print(drawing.atlas(part, args.atlas, **looks))
@@ -120,19 +124,12 @@ def _statistics(args: argparse.Namespace, record: StateRecord) -> Statistics:
     return counted[record.label]
 
 
-def _runs(args: argparse.Namespace, record: StateRecord) -> Marks:
-    from viz.runs.statistics import marks_of
-
-    return marks_of(_statistics(args, record), record, heat=args.heat)
-
-
-def _legend(args: argparse.Namespace, record: StateRecord) -> tuple[tuple[str, str], ...]:
+def _legend(statistics: Statistics, heat: str) -> tuple[tuple[str, str], ...]:
     """What the numbers and colours of recorded runs mean, for the picture."""
-    found = _statistics(args, record)
-    ends = ", ".join(f"{outcome} \u00d7{n}" for outcome, n in found.outcomes.items())
-    words = {"time": "the longer in all", "failures": "the more failed"}[args.heat]
+    ends = ", ".join(f"{outcome} \u00d7{n}" for outcome, n in statistics.outcomes.items())
+    words = {"time": "the longer in all", "failures": "the more failed"}[heat]
     return (
-        ("", f"{found.runs} runs: {ends or 'none has ended'}"),
+        ("", f"{statistics.runs} runs: {ends or 'none has ended'}"),
         ("heat", f"the warmer, {words}"),
         ("", "\u00d7: visits, then their median time"),
     )
@@ -145,8 +142,8 @@ def read_record(text: str) -> StateRecord:
         UsageError: there is no such file, or it is no record.
         SmachError: the target cannot be loaded.
     """
+    from smachpy.command.targets import load_target
     from smachpy.introspection import StateRecord, describe
-    from smachpy.targets import load_target
 
     if not text.endswith(".json"):
         target = load_target(text)

@@ -18,12 +18,13 @@ import traceback
 from importlib.metadata import version
 from typing import TYPE_CHECKING, NoReturn
 
-from actionlib_core.cli._output import while_read
+from actionlib_core.cli._command import while_read
 from actionlib_core.exceptions import ActionlibError
 from actionlib_core.names import parse_arguments
+from actionlib_core.output import printable, run_program, tell
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from actionlib_core.node import Node
 
@@ -47,24 +48,36 @@ class _Parser(argparse.ArgumentParser):
     """argparse with the house's exit code and a way out in every error."""
 
     def error(self, message: str) -> NoReturn:
-        self.exit(EXIT_ERROR, f"{self.prog}: {message}\nTry '{self.prog} --help'.\n")
+        self.exit(EXIT_ERROR, f"{self.prog}: {printable(message)}\nTry '{self.prog} --help'.\n")
 
 
-def main(argv: Sequence[str] | None = None, *, node: Node | None = None) -> int:
+def main(
+    argv: Sequence[str] | None = None,
+    *,
+    node: Node | None = None,
+    on_ready: Callable[[], object] = lambda: None,
+) -> int:
     """Run the command line; returns the exit code.
 
-    Exit codes: 0 success, 1 the goal or call did not succeed, 2 bad input, 130 Ctrl-C, 143 SIGTERM.
+    Exit codes: 0 success, 1 the goal or call did not succeed, 2 bad input or an output that cannot
+    be written, 130 Ctrl-C, 143 SIGTERM.
 
     Args:
         argv: The arguments; those of the process when None.
         node: Where to work; None joins the network for this command.
+        on_ready: Called when everything is imported, before the command begins.
     """
     given = list(sys.argv[1:] if argv is None else argv)
+    return run_program("actionlib", lambda: _run(given, node, on_ready))
+
+
+def _run(given: list[str], node: Node | None, on_ready: Callable[[], object]) -> int:
     debug = "--debug" in given
     try:
         names = parse_arguments([word for word in given if word != "--debug"])
         args = _parser().parse_args(names.rest)
         args.node, args.names = node, names
+        on_ready()
         code = 0  # `actionlib list | head`: the reader has seen enough
         with _terminable(), while_read():
             code = int(args.run(args))
@@ -75,9 +88,9 @@ def main(argv: Sequence[str] | None = None, *, node: Node | None = None) -> int:
         return EXIT_INTERRUPTED
     except ActionlibError as error:
         if debug:
-            traceback.print_exception(error)
+            sys.stderr.write(printable("".join(traceback.format_exception(error))))
         else:
-            print(f"actionlib: {error}", file=sys.stderr)
+            tell("actionlib", str(error))
         return EXIT_ERROR
     return code
 

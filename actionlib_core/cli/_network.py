@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import contextlib
-import difflib
 import os
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from actionlib_core.cli import UsageError
-from actionlib_core.cli._packages import known
-from actionlib_core.presence import Endpoint, Kind, list_endpoints, parse_token, token_pattern
+from actionlib_core.exceptions import InterfaceError
+from actionlib_core.output import tell
+from actionlib_core.suggest import did_you_mean
+from actionlib_core.wire.presence import Kind, list_endpoints, parse_token, token_pattern
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Collection, Iterable, Iterator
+    from collections.abc import Callable, Collection, Iterable, Iterator
 
     from actionlib_core.node import Node
     from actionlib_core.transport import Presence, Reply
+    from actionlib_core.wire.presence import Endpoint
 
 SETTLE_S = 0.4  # the network is known when nobody new has shown up for so long
 SETTLE_MOST_S = 3.0
@@ -24,6 +27,18 @@ FIND_S = 2.0  # a name that is not there then may still come within this: a busy
 ASK_S = 2.0
 
 ACTION_KINDS = (Kind.ACTION_SERVER, Kind.ACTION_CLIENT)
+TOPIC_KINDS = (Kind.PUBLISHER, Kind.SUBSCRIBER)
+SERVICE_KINDS = (Kind.SERVICE,)
+_WORDS = {  # kind -> what a name of it is, what ROS calls its types, what lists it
+    **dict.fromkeys(ACTION_KINDS, ("action", "action", "list")),
+    **dict.fromkeys(TOPIC_KINDS, ("topic", "msg", "topic list")),
+    **dict.fromkeys(SERVICE_KINDS, ("service", "srv", "service list")),
+}
+
+INTERFACES = "smachpy.interfaces"
+"""Entry points of modules that make definitions known when they are imported."""
+
+T = TypeVar("T")
 
 
 @contextlib.contextmanager
@@ -64,11 +79,36 @@ def _settle(node: Node, quiet: float) -> None:
         watch.close()
 
 
-def find_by_name(node: Node, full: str, kinds: Collection[Kind]) -> list[Endpoint]:
-    """Return the ends of a full name, of some kinds; waits a little for the first.
+# -- who is there ----------------------------------------------------------------------------------
 
-    Blocks: `FIND_S` at most.
+
+def list_names(node: Node, kinds: Collection[Kind]) -> dict[str, list[Endpoint]]:
+    """Return the ends of some kinds there are, by full name.
+
+    Blocks: until the network has answered, a second at most.
     """
+    found: dict[str, list[Endpoint]] = {}
+    for end in list_endpoints(node.transport):
+        if end.kind in kinds:
+            found.setdefault(end.name, []).append(end)
+    return dict(sorted(found.items()))
+
+
+def find_by_name(
+    node: Node, full: str, kinds: Collection[Kind], timeout: float | None = FIND_S
+) -> list[Endpoint]:
+    """Return the ends of a full name, of some kinds; waits for the first.
+
+    Blocks: until there is one, `timeout` [s] at most; None waits for ever.
+    """
+    late: list[Endpoint] = []
+    came = node.clock.event()
+
+    def on_presence(presence: Presence) -> None:
+        end = parse_token(presence.key)
+        if end is not None and presence.alive and end.kind in kinds:
+            late.append(end)
+            came.set()
 
     def there() -> list[Endpoint]:
         return [end for end in list_endpoints(node.transport, name=full) if end.kind in kinds]
@@ -76,19 +116,40 @@ def find_by_name(node: Node, full: str, kinds: Collection[Kind]) -> list[Endpoin
     found = there()
     if found:
         return found
-    came = node.clock.event()
-
-    def on_presence(presence: Presence) -> None:
-        end = parse_token(presence.key)
-        if end is not None and presence.alive and end.kind in kinds:
-            came.set()
-
     watch = node.transport.watch_alive(token_pattern(None, full), on_presence)
     try:
-        came.wait(FIND_S)
+        came.wait(timeout)
     finally:
         watch.close()
-    return there()
+    return there() or late
+
+
+def find_ends(
+    node: Node, name: str, kinds: Collection[Kind], timeout: float | None = FIND_S
+) -> list[Endpoint]:
+    """Return the ends of a name as typed, of some kinds; there is one at least.
+
+    Raises:
+        UsageError: there are none; the text says which there are.
+
+    Blocks: as `find_by_name`.
+    """
+    what, _, listing = _WORDS[next(iter(kinds))]
+    full = node.resolve(name, f"{what} name")
+    found = find_by_name(node, full, kinds, timeout)
+    if not found:
+        missing, way_out = "not there", f"Try 'actionlib {listing}'."
+        if Kind.ACTION_CLIENT not in kinds and what == "action":
+            missing = "got no server" + ("" if timeout is None else f" within {timeout:g} s")
+            way_out = f"Try 'actionlib {listing}', or start its server."
+        there = which_there_are(full, list_names(node, kinds))
+        raise UsageError(f"{what} '/{full}': {missing}; {there} {way_out}")
+    return found
+
+
+def find_server(node: Node, name: str, timeout: float | None = FIND_S) -> Endpoint:
+    """Return the server of an action; raises and blocks as `find_ends`."""
+    return find_ends(node, name, (Kind.ACTION_SERVER,), timeout)[0]
 
 
 def which_there_are(wanted: str, names: Iterable[str]) -> str:
@@ -101,93 +162,70 @@ def which_there_are(wanted: str, names: Iterable[str]) -> str:
     there = [f"/{name}" for name in names]
     if not there:
         return "expected one, but there is none at all."
-    near = difflib.get_close_matches(f"/{wanted}", there, n=1, cutoff=0.6)
-    hint = f" Did you mean {near[0]!r}?" if near else ""
-    return f"expected one of {there}.{hint}"
+    return f"expected one of {there}.{did_you_mean(f'/{wanted}', there)}"
 
 
-def list_ends(node: Node, name: str = "**") -> dict[str, list[Endpoint]]:
-    """Return the ends of actions, by full name."""
-    found: dict[str, list[Endpoint]] = {}
-    for end in list_endpoints(node.transport, name=name):
-        if end.kind in ACTION_KINDS:
-            found.setdefault(end.name, []).append(end)
-    return dict(sorted(found.items()))
+# -- types -----------------------------------------------------------------------------------------
 
 
-def show_type(type_name: str) -> str:
-    """Return an action's type as ROS tools show it: `pkg/action/Name`."""
+def show_type(kind: Kind, type_name: str) -> str:
+    """Return a type as ROS tools show it: `pkg/msg/Name`, `pkg/action/Name`."""
     package, _, name = type_name.partition("/")
-    return f"{package}/action/{name.removesuffix('Action')}"
+    section = _WORDS[kind][1]
+    return f"{package}/{section}/{name.removesuffix('Action') if section == 'action' else name}"
 
 
-def find_ends(node: Node, name: str) -> list[Endpoint]:
-    """Return the ends of an action.
-
-    Raises:
-        UsageError: there are none.
-    """
-    full = node.resolve(name, "action name")
-    ends = find_by_name(node, full, ACTION_KINDS)
-    if not ends:
-        raise UsageError(
-            f"action '/{full}': got no server and no client; "
-            f"{which_there_are(full, list_ends(node))} Try 'actionlib list'."
-        )
-    return ends
+def types_of(ends: Iterable[Endpoint]) -> list[str]:
+    """Return the types of ends as ROS tools show them."""
+    return sorted({show_type(end.kind, end.type) for end in ends})
 
 
-def find_server(node: Node, name: str) -> Endpoint:
-    """Return the server of an action.
+def only_type(ends: list[Endpoint], name: str) -> str:
+    """Return the type that all ends of a name have.
 
     Raises:
-        UsageError: there is none.
+        UsageError: they have several.
     """
-    full = node.resolve(name, "action name")
-    for end in find_by_name(node, full, (Kind.ACTION_SERVER,)):
-        return end
-    raise UsageError(
-        f"action '/{full}': got no server; {which_there_are(full, list_servers(node))} "
-        "Try 'actionlib list', or start its server."
-    )
+    types = sorted({end.type for end in ends})
+    if len(types) > 1:
+        what = _WORDS[ends[0].kind][0]
+        raise UsageError(f"{what} '{name}': got types {types}; expected one. Try naming it.")
+    return types[0]
 
 
-def list_servers(node: Node) -> list[str]:
-    """Return the full names of the actions that have a server."""
-    ends = list_endpoints(node.transport, kind=Kind.ACTION_SERVER)
-    return sorted({end.name for end in ends})
-
-
-def wait_for_server(node: Node, name: str, timeout: float | None) -> Endpoint:
-    """Wait for the server of an action and return it.
+def load_packages() -> None:
+    """Make known what installed packages define.
 
     Raises:
-        UsageError: there is none within `timeout` [s].
-
-    Blocks: until there is one; None waits for ever.
+        InterfaceError: such a package cannot be imported.
     """
-    full = node.resolve(name, "action name")
-    found: list[Endpoint] = []
-    there = node.clock.event()
+    for point in entry_points(group=INTERFACES):
+        try:
+            point.load()
+        except Exception as error:
+            # A user's own package may have the name of one that is installed, and hide it: then
+            # only the definitions of that one are missing.
+            absent = isinstance(error, ModuleNotFoundError) and error.name
+            if absent and f"{point.module}.".startswith(f"{absent}."):
+                tell("actionlib", f"interfaces of {point.name!r} are not known: {error}")
+                continue
+            raise InterfaceError(
+                f"interfaces of {point.name!r}: importing {point.value!r} raised "
+                f"{type(error).__name__}: {error}."
+            ) from error
 
-    def on_presence(presence: Presence) -> None:
-        end = parse_token(presence.key)
-        if end is not None and presence.alive:
-            found.append(end)
-            there.set()
 
-    watch = node.transport.watch_alive(token_pattern(Kind.ACTION_SERVER, full), on_presence)
+def known(get: Callable[[str], T], name: str) -> T:
+    """Return what `get` finds under `name`, in installed packages too.
+
+    Raises:
+        InterfaceError: it is nowhere.
+    """
     try:
-        there.wait(timeout)
-    finally:
-        watch.close()
-    if not found:
-        raise UsageError(
-            f"action '/{full}': got no server within {timeout:g} s; "
-            f"{which_there_are(full, list_servers(node))} Try 'actionlib list', or start its "
-            "server."
-        )
-    return found[0]
+        return get(name)
+    except InterfaceError:
+        load_packages()  # costs an import, so only now
+        return get(name)
 
 
 def action_class(type_name: str) -> Any:
@@ -201,14 +239,10 @@ def action_class(type_name: str) -> Any:
     return known(get_action, type_name)
 
 
-class Answer(NamedTuple):
-    """What a server said about its goals."""
-
-    encoding: str
-    payload: bytes
+# -- goals -----------------------------------------------------------------------------------------
 
 
-def ask(node: Node, name: str, goal_id: str, about: Literal["result", "goal"] = "result") -> Answer:
+def ask(node: Node, name: str, goal_id: str, about: Literal["result", "goal"] = "result") -> Reply:
     """Ask the server of an action about a goal, or about all ("").
 
     Args:
@@ -218,13 +252,13 @@ def ask(node: Node, name: str, goal_id: str, about: Literal["result", "goal"] = 
         about: What became of it, or what it was.
 
     Raises:
-        UsageError: no answer came.
+        UsageError: no answer came, or an error.
 
     Blocks: `ASK_S` at most.
     """
-    from actionlib_core._action_wire import action_keys, pack_goal_id
     from actionlib_core.interfaces.actionlib_msgs.msg import GoalID
-    from actionlib_core.wire import encoding_of
+    from actionlib_core.wire.action_messages import action_keys, pack_goal_id
+    from actionlib_core.wire.encoding import encoding_of
 
     replies: list[Reply] = []
     done = node.clock.event()
@@ -238,11 +272,10 @@ def ask(node: Node, name: str, goal_id: str, about: Literal["result", "goal"] = 
         on_done=done.set,
     )
     done.wait(ASK_S + 1.0)
-    for reply in replies:
-        if not reply.error:
-            return Answer(reply.encoding, reply.payload)
-    if replies:
-        raise UsageError(replies[0].payload.decode(errors="replace"))
+    for reply in sorted(replies, key=lambda reply: reply.error):
+        if reply.error:
+            raise UsageError(reply.payload.decode(errors="replace"))
+        return reply
     raise UsageError(
         f"action '/{full}': got no answer within {ASK_S:g} s; expected one. Try 'actionlib info'."
     )

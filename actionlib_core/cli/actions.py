@@ -5,79 +5,48 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.cli._command import add_command
+from actionlib_core.cli._listing import add_list, add_type
 from actionlib_core.cli._network import (
+    ACTION_KINDS,
     action_class,
     find_ends,
-    list_ends,
+    list_names,
     open_node,
     show_type,
+    types_of,
 )
-from actionlib_core.cli._output import add_json
-from actionlib_core.presence import Kind
+from actionlib_core.wire.presence import Kind
 
 if TYPE_CHECKING:
     import argparse
 
-    from actionlib_core.presence import Endpoint
-
 
 def register(subparsers: Any) -> None:
     """Add the commands to an argparse subparsers object."""
-    parser = subparsers.add_parser("list", help="list the actions there are")
-    parser.add_argument("-t", "--show-types", action="store_true", help="also their types")
-    parser.add_argument("-c", "--count-actions", action="store_true", help="only how many")
-    add_json(parser)
-    parser.set_defaults(run=_list)
-
-    parser = subparsers.add_parser("info", help="show the clients and servers of an action")
+    add_list(
+        subparsers, "actions", ACTION_KINDS, lambda n, e: {"name": f"/{n}", "types": types_of(e)}
+    )
+    add_type(subparsers, "an action", ACTION_KINDS)
+    parser = add_command(subparsers, "info", _info, "show the clients and servers of an action")
     parser.add_argument("name", metavar="NAME")
     parser.add_argument("-t", "--show-types", action="store_true", help="also their types")
     parser.add_argument("-c", "--count", action="store_true", help="only how many")
-    add_json(parser)
-    parser.set_defaults(run=_info)
-
-    parser = subparsers.add_parser("type", help="print the type of an action")
-    parser.add_argument("name", metavar="NAME")
-    add_json(parser)
-    parser.set_defaults(run=_type)
-
-    parser = subparsers.add_parser("find", help="list the actions of a type")
+    parser = add_command(subparsers, "find", _find, "list the actions of a type")
     parser.add_argument("type", metavar="TYPE", help="pkg/Name, pkg/action/Name or pkg/NameAction")
     parser.add_argument("-c", "--count-actions", action="store_true", help="only how many")
-    add_json(parser)
-    parser.set_defaults(run=_find)
-
-
-def _types(ends: list[Endpoint]) -> list[str]:
-    return sorted({show_type(end.type) for end in ends})
-
-
-def _list(args: argparse.Namespace) -> int:
-    with open_node(args) as node:
-        found = list_ends(node)
-    if args.json:
-        print(json.dumps([{"name": f"/{n}", "types": _types(e)} for n, e in found.items()]))
-    elif args.count_actions:
-        print(len(found))
-    else:
-        for name, ends in found.items():
-            print(f"/{name} [{', '.join(_types(ends))}]" if args.show_types else f"/{name}")
-    return 0
 
 
 def _info(args: argparse.Namespace) -> int:
     with open_node(args) as node:
-        ends = find_ends(node, args.name)
+        ends = find_ends(node, args.name, ACTION_KINDS)
     groups = {
-        title: [end for end in ends if end.kind is kind]
+        title: [(f"/{end.node}", *types_of([end]), end.session) for end in ends if end.kind is kind]
         for title, kind in (("clients", Kind.ACTION_CLIENT), ("servers", Kind.ACTION_SERVER))
     }
     if args.json:
         described = {
-            title: [
-                {"node": f"/{e.node}", "type": show_type(e.type), "session": e.session}
-                for e in group
-            ]
+            title: [dict(zip(("node", "type", "session"), end, strict=True)) for end in group]
             for title, group in groups.items()
         }
         print(json.dumps({"name": f"/{ends[0].name}", **described}))
@@ -85,22 +54,16 @@ def _info(args: argparse.Namespace) -> int:
     print(f"Action: /{ends[0].name}")
     for title, group in groups.items():
         print(f"Action {title}: {len(group)}")
-        for end in () if args.count else group:
-            print(f"    /{end.node}{f' [{show_type(end.type)}]' if args.show_types else ''}")
-    return 0
-
-
-def _type(args: argparse.Namespace) -> int:
-    with open_node(args) as node:
-        types = _types(find_ends(node, args.name))
-    print(json.dumps(types) if args.json else "\n".join(types))
+        for node_name, type_name, _ in () if args.count else group:
+            print(f"    {node_name}{f' [{type_name}]' if args.show_types else ''}")
     return 0
 
 
 def _find(args: argparse.Namespace) -> int:
-    wanted = show_type(action_class(args.type)._type)
+    wanted = show_type(Kind.ACTION_SERVER, action_class(args.type)._type)
     with open_node(args) as node:
-        names = [f"/{name}" for name, ends in list_ends(node).items() if wanted in _types(ends)]
+        actions = list_names(node, ACTION_KINDS)
+    names = [f"/{name}" for name, ends in actions.items() if wanted in types_of(ends)]
     if args.json:
         print(json.dumps(names))
     elif args.count_actions:

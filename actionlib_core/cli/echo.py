@@ -8,10 +8,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.cli import EXIT_FAILED
+from actionlib_core.cli._command import add_command, count, print_json, print_message, seconds
 from actionlib_core.cli._feed import Feed
-from actionlib_core.cli._network import action_class, open_node, wait_for_server
-from actionlib_core.cli._numbers import count, seconds
-from actionlib_core.cli._output import add_json, print_json, print_message
+from actionlib_core.cli._network import action_class, find_server, open_node
 
 if TYPE_CHECKING:
     import argparse
@@ -21,23 +20,21 @@ if TYPE_CHECKING:
 
 def register(subparsers: Any) -> None:
     """Add the command to an argparse subparsers object."""
-    parser = subparsers.add_parser("echo", help="print goals, feedback and results as they pass")
+    parser = add_command(subparsers, "echo", run, "print goals, feedback and results as they pass")
     parser.add_argument("name", metavar="NAME", help="the action")
     parser.add_argument("-s", "--status", action="store_true", help="also the status lists")
     parser.add_argument("--once", action="store_true", help="end after the first message")
     parser.add_argument("-n", "--count", type=count, metavar="N", help="end after N messages")
     parser.add_argument("--timeout", type=seconds, metavar="S", help="end after this time [s]")
-    add_json(parser)
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Print messages until Ctrl-C, `--timeout` or, with `--once` or `-n`, enough of them."""
-    from actionlib_core._action_wire import action_keys
     from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatusArray
+    from actionlib_core.wire.action_messages import action_keys
 
     with open_node(args, settle=0.0) as node:
-        server = wait_for_server(node, args.name, args.timeout)
+        server = find_server(node, args.name, args.timeout)
         example = action_class(server.type)()
         keys = action_keys(server.name)
         classes = {

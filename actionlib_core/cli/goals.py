@@ -7,13 +7,13 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.cli import EXIT_FAILED, UsageError
-from actionlib_core.cli._network import Answer, action_class, ask, find_server, open_node
-from actionlib_core.cli._output import add_json, print_message
+from actionlib_core.cli._command import add_command, print_message
+from actionlib_core.cli._network import action_class, ask, find_server, open_node
 
 if TYPE_CHECKING:
     import argparse
 
-    from actionlib_core._action_wire import StatusEntry
+    from actionlib_core.goal.ports import StatusEntry
     from actionlib_core.node import Node
 
 NS = 1_000_000_000
@@ -21,9 +21,11 @@ NS = 1_000_000_000
 
 def register(subparsers: Any) -> None:
     """Add the commands to an argparse subparsers object."""
-    parser = subparsers.add_parser(
+    parser = add_command(
+        subparsers,
         "cancel",
-        help="cancel goals of an action",
+        _cancel,
+        "cancel goals of an action",
         description="With an ID: that goal. With --before: those with a stamp at or before it. "
         "With both: either. With --all: all, of all clients. Exit code 1 when no goal with the ID "
         "runs.",
@@ -32,19 +34,17 @@ def register(subparsers: Any) -> None:
     parser.add_argument("id", metavar="ID", nargs="?", default="", help="a goal's id")
     parser.add_argument("--all", action="store_true", help="all goals")
     parser.add_argument("--before", metavar="STAMP", help="seconds since the epoch")
-    add_json(parser)
-    parser.set_defaults(run=_cancel)
 
     parser = subparsers.add_parser("goal", help="look at the goals of an action")
     verbs = parser.add_subparsers(metavar="VERB", required=True)
-    verb = verbs.add_parser("list", help="list the goals that a server tracks")
+    verb = add_command(verbs, "list", _list, "list the goals that a server tracks")
     verb.add_argument("name", metavar="NAME", help="the action")
     verb.add_argument("-c", "--count", action="store_true", help="only how many")
-    add_json(verb)
-    verb.set_defaults(run=_list)
-    verb = verbs.add_parser(
+    verb = add_command(
+        verbs,
         "info",
-        help="show a goal, its status, and its result when there is one",
+        _info,
+        "show a goal, its status, and its result when there is one",
         description="A server keeps the goal and the result until the client has the result; "
         "then only the status is left.",
     )
@@ -54,21 +54,19 @@ def register(subparsers: Any) -> None:
     only.add_argument("--goal-only", action="store_true", help="only the goal")
     only.add_argument("--status-only", action="store_true", help="only the status")
     only.add_argument("--result-only", action="store_true", help="only the result")
-    add_json(verb)
-    verb.set_defaults(run=_info)
 
 
 def _goals(node: Node, name: str) -> list[StatusEntry]:
     """Return the goals that a server tracks, without cancels whose goals never came."""
-    from actionlib_core._action_wire import unpack_statuses
-    from actionlib_core._core.states import Status
+    from actionlib_core.goal.states import Status
+    from actionlib_core.wire.action_messages import unpack_statuses
 
     entries = unpack_statuses(ask(node, name, "").payload)
     return [entry for entry in entries if entry.stamp_ns or entry.status != Status.RECALLING]
 
 
 def _describe(entry: StatusEntry) -> dict[str, Any]:
-    from actionlib_core._core.states import Status
+    from actionlib_core.goal.states import Status
 
     return {
         "id": entry.id,
@@ -139,11 +137,11 @@ def _not_there(entry: StatusEntry, what: str, args: argparse.Namespace) -> int:
 
 def _status(node: Node, args: argparse.Namespace, spec: Any) -> tuple[StatusEntry, Any]:
     """Return the status of a goal and its result, None when it is not there."""
-    from actionlib_core._action_wire import unpack_report, unpack_status
     from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
-    from actionlib_core.wire import encoding_of
+    from actionlib_core.wire.action_messages import unpack_report, unpack_status
+    from actionlib_core.wire.encoding import encoding_of
 
-    answer: Answer = ask(node, args.name, args.id)
+    answer = ask(node, args.name, args.id)
     if answer.encoding == encoding_of(GoalStatus):
         return unpack_status(answer.payload), None
     entry, start = unpack_report(answer.payload)
@@ -152,7 +150,7 @@ def _status(node: Node, args: argparse.Namespace, spec: Any) -> tuple[StatusEntr
 
 def _goal(node: Node, args: argparse.Namespace, spec: Any) -> Any:
     """Return what a goal was, None when the server has let go of it."""
-    from actionlib_core._action_wire import unpack_goal
+    from actionlib_core.wire.action_messages import unpack_goal
 
     try:
         answer = ask(node, args.name, args.id, "goal")
@@ -169,11 +167,11 @@ def _cancel(args: argparse.Namespace) -> int:
     if args.all and (args.id or args.before):
         raise UsageError("cancel: got --all beside ID or --before; expected one of the two.")
     stamp_ns = _stamp(args.before)
-    from actionlib_core._action_wire import pack_goal_id
-    from actionlib_core._client_port import GOAL
-    from actionlib_core._core.states import TERMINAL
+    from actionlib_core.goal.states import TERMINAL
     from actionlib_core.interfaces.actionlib_msgs.msg import GoalID
-    from actionlib_core.wire import encoding_of
+    from actionlib_core.wire.action_messages import pack_goal_id
+    from actionlib_core.wire.client_port import GOAL
+    from actionlib_core.wire.encoding import encoding_of
 
     with open_node(args) as node:
         name = find_server(node, args.name).name

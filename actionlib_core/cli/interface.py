@@ -6,7 +6,8 @@ import json
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core.cli._packages import known, load_packages
+from actionlib_core.cli._command import add_command
+from actionlib_core.cli._network import known, load_packages
 
 if TYPE_CHECKING:
     import argparse
@@ -25,38 +26,20 @@ def register(subparsers: Any) -> None:
         "(my_pkg/msg/Name.msg, my_pkg/srv/Name.srv, my_pkg/action/Name.action), and from programs.",
     )
     verbs = parser.add_subparsers(metavar="VERB", required=True)
-    _register_show(verbs)
-    _register_list(verbs)
-    _register_stubs(verbs)
-
-
-def _register_show(verbs: Any) -> None:
-    parser = verbs.add_parser("show", help="print a definition, nested types written out")
+    parser = add_command(verbs, "show", _show, "print a definition, nested types written out")
     parser.add_argument("name", metavar="NAME", help="pkg/Name or pkg/action/Name")
     parser.add_argument(
         "-a", "--all-comments", action="store_true", help="also the comments of nested types"
     )
-    parser.add_argument("--json", action="store_true", help="fields, constants and md5 as JSON")
-    parser.set_defaults(run=_show)
-
-
-def _register_list(verbs: Any) -> None:
-    parser = verbs.add_parser("list", help="list all definitions found")
+    parser = add_command(verbs, "list", _list, "list all definitions found")
     parser.add_argument("-m", "--only-msgs", action="store_true", help="messages only")
     parser.add_argument("-s", "--only-srvs", action="store_true", help="services only")
     parser.add_argument("-a", "--only-actions", action="store_true", help="actions only")
-    parser.add_argument("--json", action="store_true", help="as JSON")
-    parser.set_defaults(run=_list)
-
-
-def _register_stubs(verbs: Any) -> None:
-    parser = verbs.add_parser("stubs", help="write typed .pyi files for editors and mypy")
+    parser = add_command(verbs, "stubs", _stubs, "write typed .pyi files for editors and mypy")
     parser.add_argument("folder", metavar="DIR", help="where to; DIR/my_pkg/msg.pyi is written")
     parser.add_argument(
         "packages", metavar="PACKAGE", nargs="*", help="which (default: all not bundled)"
     )
-    parser.add_argument("--json", action="store_true", help="the paths written as JSON")
-    parser.set_defaults(run=_stubs)
 
 
 def _show(args: argparse.Namespace) -> int:

@@ -8,15 +8,19 @@ import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.cli._command import add_command
+
 if TYPE_CHECKING:
     from actionlib_core.config import Config
 
 
 def register(subparsers: Any) -> None:
     """Add the command to an argparse subparsers object."""
-    parser = subparsers.add_parser(
+    parser = add_command(
+        subparsers,
         "router",
-        help="run a router, for networks without multicast",
+        _run,
+        "run a router, for networks without multicast",
         description="Runs a zenoh router until Ctrl-C. Programs with mode 'client' or 'peer' and "
         "its endpoint in 'connect' reach each other through it. Without --listen or a "
         "configuration only programs on this machine get in.",
@@ -31,8 +35,6 @@ def register(subparsers: Any) -> None:
     parser.add_argument(
         "--config", metavar="FILE", default=argparse.SUPPRESS, help="default: $SMACHPY_CONFIG"
     )
-    parser.add_argument("--json", action="store_true", help="say what runs as JSON")
-    parser.set_defaults(run=_run)
 
 
 def _run(args: argparse.Namespace) -> int:
@@ -43,7 +45,12 @@ def _run(args: argparse.Namespace) -> int:
     with shutdown.handle_signals():
         transport = ZenohTransport(config)
         try:
-            _say(config, transport.session_id, as_json=args.json)
+            if args.json:
+                print(json.dumps({"id": transport.session_id, "listen": list(config.listen)}))
+            else:
+                listen = ", ".join(config.listen)
+                print(f"router {transport.session_id} listens at {listen}; Ctrl-C ends it")
+            sys.stdout.flush()
             shutdown.event().wait()
         finally:
             transport.close()
@@ -60,11 +67,3 @@ def _config(args: argparse.Namespace) -> Config:
     if args.connect:
         changes["connect"] = tuple(args.connect)
     return replace(config, **changes)
-
-
-def _say(config: Config, session_id: str, *, as_json: bool) -> None:
-    if as_json:
-        print(json.dumps({"id": session_id, "listen": list(config.listen)}))
-    else:
-        print(f"router {session_id} listens at {', '.join(config.listen)}; Ctrl-C ends it")
-    sys.stdout.flush()

@@ -7,21 +7,22 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.cli import EXIT_FAILED, UsageError
-from actionlib_core.cli._network import action_class, open_node, wait_for_server
-from actionlib_core.cli._numbers import seconds
-from actionlib_core.cli._output import (
-    add_json,
-    discard_output,
+from actionlib_core.cli._command import (
+    add_command,
     print_json,
     print_message,
+    print_progress,
+    seconds,
     while_read,
 )
+from actionlib_core.cli._network import action_class, find_server, open_node
+from actionlib_core.output import discard_output
 
 if TYPE_CHECKING:
     import argparse
 
-    from actionlib_core.action_client import ActionClient
-    from actionlib_core.sent_goal import SentGoal
+    from actionlib_core.action.client import ActionClient
+    from actionlib_core.action.sent_goal import SentGoal
 
 _TYPE = re.compile(r"\w+(/\w+){1,2}")
 CANCEL_S = 10.0  # how long the answer to a cancel is awaited
@@ -30,9 +31,11 @@ CANCELED = {"PREEMPTED", "RECALLED"}
 
 def register(subparsers: Any) -> None:
     """Add the command to an argparse subparsers object."""
-    parser = subparsers.add_parser(
+    parser = add_command(
+        subparsers,
         "send_goal",
-        help="send a goal, wait for its result",
+        run,
+        "send a goal, wait for its result",
         description="Exit code 0 when the goal SUCCEEDED. Ctrl-C and SIGTERM cancel it first, and "
         "so does a reader of the output that leaves (... | head).",
     )
@@ -48,8 +51,6 @@ def register(subparsers: Any) -> None:
     parser.add_argument(
         "--timeout", type=seconds, metavar="S", help="longest time for server and goal [s]"
     )
-    add_json(parser)
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -64,12 +65,11 @@ def run(args: argparse.Namespace) -> int:
 def _run(args: argparse.Namespace) -> int:
     type_name, text = _split(args.words, stdin=args.stdin)
     with open_node(args, settle=0.0) as node:
-        if not args.json:
-            print("Waiting for an action server to become available...", flush=True)
+        print_progress(args, "Waiting for an action server to become available...")
         started = node.clock.now()
-        server = wait_for_server(node, args.name, args.timeout)
+        server = find_server(node, args.name, args.timeout)
         spec = action_class(type_name or server.type)
-        from actionlib_core.action_client import ActionClient
+        from actionlib_core.action.client import ActionClient
 
         client: ActionClient[Any] = ActionClient(args.name, spec, node=node)
         try:
@@ -145,12 +145,11 @@ def _follow(handle: SentGoal[Any, Any], args: argparse.Namespace) -> None:
 
 def _cancel(handle: SentGoal[Any, Any], args: argparse.Namespace) -> None:
     handle.cancel()
-    if not args.json:
-        with while_read():
-            print("Canceling goal...", flush=True)
+    with while_read():
+        print_progress(args, "Canceling goal...")
     handle.wait(CANCEL_S)
-    if handle.status.name in CANCELED and not args.json:
-        print("Goal canceled.", flush=True)
+    if handle.status.name in CANCELED:
+        print_progress(args, "Goal canceled.")
 
 
 def _print_end(handle: SentGoal[Any, Any], args: argparse.Namespace) -> None:

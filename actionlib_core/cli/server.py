@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.cli._command import add_command, print_json, print_message, print_progress
 from actionlib_core.cli._network import action_class, open_node
-from actionlib_core.cli._output import add_json, print_json, print_message
 from actionlib_core.exceptions import ActionlibError
+from actionlib_core.output import tell
 
 if TYPE_CHECKING:
-    import argparse
-
-    from actionlib_core.server_goal_handle import ServerGoalHandle
+    from actionlib_core.action.server import ServerGoalHandle
 
 HELP = """Commands, one a line; N is a goal's number, the newest open one when left out:
   [N] accept [TEXT]      [N] reject [TEXT]
@@ -22,50 +22,43 @@ HELP = """Commands, one a line; N is a goal's number, the newest open one when l
 
 def register(subparsers: Any) -> None:
     """Add the command to an argparse subparsers object."""
-    parser = subparsers.add_parser(
+    parser = add_command(
+        subparsers,
         "server",
-        help="be the server of an action, by hand",
+        run,
+        "be the server of an action, by hand",
         description="Prints goals and takes commands from standard input.",
         epilog=HELP,
-        formatter_class=_raw(),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("name", metavar="NAME", help="the action")
     parser.add_argument("type", metavar="TYPE", help="pkg/Name, pkg/action/Name or pkg/NameAction")
     parser.add_argument("--accept", action="store_true", help="accept every goal at once")
-    add_json(parser)
-    parser.set_defaults(run=run)
-
-
-def _raw() -> Any:
-    import argparse
-
-    return argparse.RawDescriptionHelpFormatter
 
 
 def run(args: argparse.Namespace) -> int:
     """Serve until the input ends."""
-    from actionlib_core.action_server import ActionServer
+    from actionlib_core.action.server import ActionServer
 
     spec = action_class(args.type)
     with open_node(args) as node:
-        desk = Desk(args)
-        server = ActionServer(args.name, spec, desk.on_goal, desk.on_cancel, node=node)
-        desk.types = server.types
-        if not args.json:
-            print(f"Serving /{server.ns}. {HELP}", flush=True)
+        operator = Operator(args)
+        server = ActionServer(args.name, spec, operator.on_goal, operator.on_cancel, node=node)
+        operator.types = server.types
+        print_progress(args, f"Serving /{server.ns}. {HELP}")
         try:
             for line in sys.stdin:
                 if line.strip() == "quit":
                     break
-                desk.obey(line)
+                operator.obey(line)
         finally:
             server.stop()
         server.wait(0.0)
     return 0
 
 
-class Desk:
-    """The goals that have come, by number, and the commands for them."""
+class Operator:
+    """Whoever types the commands: sees the goals that have come, by number, and answers them."""
 
     def __init__(self, args: argparse.Namespace) -> None:
         self.types: Any = None
@@ -107,17 +100,17 @@ class Desk:
             else:
                 self._do(number, first, rest.strip())
         except ActionlibError as error:
-            print(f"actionlib: {error}", file=sys.stderr, flush=True)
+            tell("actionlib", str(error))
 
     def _open(self) -> list[int]:
-        from actionlib_core._core.states import TERMINAL
+        from actionlib_core.goal.states import TERMINAL
 
         return [
             n for n, goal in self._goals.items() if goal.get_goal_status().status not in TERMINAL
         ]
 
     def _list(self) -> None:
-        from actionlib_core._core.states import Status
+        from actionlib_core.goal.states import Status
 
         for number, goal in self._goals.items():
             print(f"{number} {Status(goal.get_goal_status().status).name}", flush=True)

@@ -13,6 +13,7 @@ import sys
 import threading
 import time
 import weakref
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.clock._current import use_clock
@@ -47,6 +48,7 @@ REAL_TIME = (
 # Packages whose locks guard a few lines that never wait.
 SHORT_LOCKS = ("actionlib_core", "smachpy", "viz", "logging")
 
+_getframe = sys._getframe  # noqa: SLF001  what is replaced depends on the caller
 _sleep, _allocate = time.sleep, threading.Lock
 _localtime, _asctime = time.localtime, time.asctime
 _thread_start, _thread_join = threading.Thread.start, threading.Thread.join
@@ -106,7 +108,7 @@ def _is_in(module: str, packages: tuple[str, ...]) -> bool:
 
 def _virtual_sleep(seconds: float, /) -> None:
     clock = _here()
-    if clock is None or _belongs(sys._getframe(1), REAL_TIME):  # noqa: SLF001  the caller decides
+    if clock is None or _belongs(_getframe(1), REAL_TIME):
         _sleep(seconds)
     elif seconds < 0:
         raise ValueError("sleep length must be non-negative")
@@ -117,7 +119,7 @@ def _virtual_sleep(seconds: float, /) -> None:
 def _reader(real: Callable[[], Any], virtual: Callable[[VirtualClock], Any]) -> Callable[[], Any]:
     def read() -> Any:
         clock = _here()
-        if clock is None or _belongs(sys._getframe(1), REAL_TIME):  # noqa: SLF001
+        if clock is None or _belongs(_getframe(1), REAL_TIME):
             return real()
         return virtual(clock)
 
@@ -133,7 +135,7 @@ def _of_now(real: Callable[..., Any], index: int) -> Callable[..., Any]:
 
     def convert(*args: Any) -> Any:
         clock = _here()
-        if clock is None or len(args) > index or _belongs(sys._getframe(1), REAL_TIME):  # noqa: SLF001
+        if clock is None or len(args) > index or _belongs(_getframe(1), REAL_TIME):
             return real(*args)
         now = clock.time_ns() / 1e9
         return real(*args, _localtime(now) if index or real is _asctime else now)
@@ -195,7 +197,7 @@ class PatchedLock:
 
 def _call_site() -> str:
     """Name the line of the user's code that waits."""
-    frame: FrameType | None = sys._getframe(1)  # noqa: SLF001
+    frame: FrameType | None = _getframe(1)
     while frame is not None and _belongs(frame, _WAITERS):
         frame = frame.f_back
     if frame is None:
@@ -207,7 +209,7 @@ _WAITERS = ("actionlib_core.clock", "asyncio", "concurrent.futures", "queue", "t
 
 
 def _lock() -> Any:
-    return _allocate() if _is_short(sys._getframe(1)) else PatchedLock()  # noqa: SLF001
+    return _allocate() if _is_short(_getframe(1)) else PatchedLock()
 
 
 def _is_short(caller: FrameType) -> bool:
@@ -219,7 +221,7 @@ def _is_short(caller: FrameType) -> bool:
 
 def _make_rlock(real: Callable[[], Any]) -> Callable[[], Any]:
     def make() -> Any:
-        if _is_short(sys._getframe(1)):  # noqa: SLF001
+        if _is_short(_getframe(1)):
             return real()
         return threading._RLock()  # noqa: SLF001  on `_allocate_lock`
 
@@ -239,7 +241,7 @@ def _make_simple_queue(real: Callable[[], Any]) -> Callable[[], Any]:
 def _start(thread: threading.Thread) -> None:
     """Start a thread; a participant's thread becomes a participant."""
     clock = _here()
-    if clock is None or _belongs(sys._getframe(1), REAL_TIME):  # noqa: SLF001
+    if clock is None or _belongs(_getframe(1), REAL_TIME):
         _really(_thread_start, thread)
         return
     run = thread.run
@@ -313,16 +315,15 @@ def _takes_part(pool: Any) -> bool:
     return type(pool._work_queue) is not _SimpleQueue or pool._shutdown  # noqa: SLF001  no other way
 
 
+# A pool has no public way to tell what it was made with.
+_POOL_ARGUMENTS = attrgetter("_max_workers", "_thread_name_prefix", "_initializer", "_initargs")
+
+
 def _twin(pool: Any, clock: VirtualClock) -> ThreadPoolExecutor:
     """Return the pool that stands in for one whose threads wait in real time."""
     twins = _twins.setdefault(pool, {})
     if clock not in twins:
-        twins[clock] = _pool[2](
-            pool._max_workers,  # noqa: SLF001  there is no other way to learn these
-            pool._thread_name_prefix,  # noqa: SLF001
-            pool._initializer,  # noqa: SLF001
-            pool._initargs,  # noqa: SLF001
-        )
+        twins[clock] = _pool[2](*_POOL_ARGUMENTS(pool))
     return twins[clock]
 
 
@@ -380,6 +381,8 @@ def _replacements() -> dict[int, Any]:
         (time.asctime, _of_now(time.asctime, 0)),
         (time.strftime, _of_now(time.strftime, 1)),
         (threading.Lock, _lock),
+        # What `threading` itself waits on: another object than `Lock` since Python 3.13.
+        (threading._allocate_lock, _lock),  # type: ignore[attr-defined]  # noqa: SLF001
         (threading.RLock, _make_rlock(threading.RLock)),
         (queue.SimpleQueue, _make_simple_queue(queue.SimpleQueue)),
         (asyncio.events.new_event_loop, _make_loop(asyncio.events.new_event_loop)),

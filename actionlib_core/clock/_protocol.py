@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Protocol, TypeVar, runtime_checkable
 
 if TYPE_CHECKING:
@@ -32,10 +33,13 @@ class Event(Protocol):
         """Wait until the flag is set.
 
         Args:
-            timeout: Longest wait [s]; None waits for ever, 0 or less does not wait.
+            timeout: Longest wait [s]; None and infinity wait for ever, 0 or less does not wait.
 
         Returns:
             Whether the flag was set.
+
+        Raises:
+            ValueError: `timeout` is NaN.
 
         Blocks: until the flag is set or `timeout` has passed.
         """
@@ -99,7 +103,10 @@ class Clock(Protocol):
         ...
 
     def sleep(self, seconds: float) -> None:
-        """Wait.
+        """Wait; a negative time is none.
+
+        Raises:
+            ValueError: `seconds` is NaN.
 
         Blocks: for `seconds`.
         """
@@ -118,10 +125,14 @@ class Clock(Protocol):
         ...
 
     def call_later(self, delay: float, callback: Callable[[], object]) -> Timer:
-        """Call `callback` once, `delay` seconds from now.
+        """Call `callback` once, `delay` seconds from now; never when `delay` is infinity.
+
+        Raises:
+            ValueError: `delay` is NaN.
 
         Threads: the callback runs on the clock's own thread, one at a time with all other
-        callbacks; it must not wait. An exception is given to `threading.excepthook`.
+        callbacks; it must not wait. An exception is given to `threading.excepthook`,
+            `SystemExit` to the log; the other timers go on.
         """
         ...
 
@@ -131,3 +142,13 @@ class Clock(Protocol):
         Blocks: until the coroutine has returned, raised or was cancelled.
         """
         ...
+
+
+def check_seconds(where: str, seconds: float) -> None:
+    """Check that `seconds` can be waited; infinity can, and means for ever.
+
+    Raises:
+        ValueError: it is not a number (NaN).
+    """
+    if math.isnan(seconds):
+        raise ValueError(f"{where}: got {seconds!r}; expected a number of seconds.")

@@ -6,11 +6,13 @@ import _thread
 import contextvars
 import heapq
 import itertools
+import math
 import threading
 import time
 from typing import TYPE_CHECKING, TypeVar
 
-from actionlib_core.clock._serial import report_exit, report_thread_exception
+from actionlib_core.clock._protocol import check_seconds
+from actionlib_core.clock._serial import report_callback, report_thread_exception
 from actionlib_core.clock._threads import ThreadCache, mark_idle
 
 if TYPE_CHECKING:
@@ -50,12 +52,13 @@ class RealEvent:
     def wait(self, timeout: float | None = None) -> bool:
         if self._flag:
             return True
-        if timeout is not None and timeout <= 0:
+        if timeout is not None and not timeout > 0:
+            check_seconds("wait", timeout)
             return False
         waiter = _thread.allocate_lock()
         waiter.acquire()
-        self._waiters.append(waiter)
         try:
+            self._waiters.append(waiter)
             # Set between the first look and the append: nobody may wake us.
             if self.is_set():
                 return True
@@ -156,20 +159,36 @@ class _TimerThread:
         self._changed = RealEvent()
 
     def add(self, delay: float, timer: RealTimer) -> None:
+        check_seconds("call_later", delay)
+        if delay == math.inf:
+            return
         with self._lock:
             due = self._clock.now() + max(delay, 0.0)
             heapq.heappush(self._heap, (due, next(self._count), timer))
             if not self._running:
-                self._running = True
-                # An empty context: timers belong to the clock, not to who came first.
-                contextvars.Context().run(self._start)
+                self._start()
             elif self._heap[0][2] is timer:
                 self._changed.set()
 
     def _start(self) -> None:
-        self._clock.spawn(self._run, name="clock-timers")
+        """Start the thread; with the lock held."""
+        self._running = True
+        try:
+            # An empty context: timers belong to the clock, not to who came first.
+            contextvars.Context().run(self._clock.spawn, self._run, name="clock-timers")
+        except BaseException:  # the system gives no thread: the next timer tries again
+            self._running = False
+            raise
 
     def _run(self) -> None:
+        try:
+            self._call_all()
+        except BaseException:  # out of memory, for one: the timers that are left need a thread
+            with self._lock:
+                self._start()
+            raise
+
+    def _call_all(self) -> None:
         while True:
             with self._lock:
                 self._changed.clear()
@@ -187,10 +206,8 @@ class _TimerThread:
             if callback is not None:
                 try:
                     callback()
-                except SystemExit as error:
-                    report_exit("clock-timers", error)
                 except BaseException:  # noqa: BLE001  a border: reported, other timers go on
-                    report_thread_exception()
+                    report_callback("clock-timers")
 
 
 class RealClock:
@@ -206,6 +223,8 @@ class RealClock:
     def sleep(self, seconds: float) -> None:
         if seconds > 0:
             time.sleep(seconds)
+        else:
+            check_seconds("sleep", seconds)
 
     def event(self, name: str = "an event") -> RealEvent:  # noqa: ARG002  for virtual time
         return RealEvent()
@@ -214,6 +233,13 @@ class RealClock:
         task = RealTask(target, name)
         self._cache.start(task)
         return task
+
+    def keep_threads(self, count: int) -> None:
+        """Have `count` threads ready for what is spawned while the program ends.
+
+        Python 3.12 starts no thread then; more tasks than that wait for one another.
+        """
+        self._cache.keep(count)
 
     def call_later(self, delay: float, callback: Callable[[], object]) -> RealTimer:
         timer = RealTimer(callback)

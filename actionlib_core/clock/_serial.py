@@ -100,7 +100,26 @@ def report_thread_exception() -> None:
     import sys
 
     kind, value, traceback = sys.exc_info()
-    if kind is not None:
+    if kind is None or value is None:
+        return
+    try:
         threading.excepthook(
             threading.ExceptHookArgs((kind, value, traceback, threading.current_thread()))
         )
+    except BaseException as error:  # noqa: BLE001  the program's own hook: it must not end us
+        sys.__excepthook__(kind, value, traceback)
+        sys.__excepthook__(type(error), error, error.__traceback__)
+
+
+def report_callback(name: str) -> None:
+    """Report the exception being handled, which a callback has raised; lets nothing through."""
+    import sys
+
+    error = sys.exc_info()[1]
+    if not isinstance(error, SystemExit):
+        report_thread_exception()
+        return
+    try:
+        report_exit(name, error)
+    except BaseException:  # noqa: BLE001  a handler of the program's log
+        report_thread_exception()

@@ -10,6 +10,7 @@ import contextlib
 import contextvars
 import heapq
 import itertools
+import math
 import operator
 import os
 import random
@@ -18,9 +19,10 @@ import time
 import weakref
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from actionlib_core.clock._gates import make_gate
+from actionlib_core.clock._gates import LockGate, make_gate
+from actionlib_core.clock._protocol import check_seconds
 from actionlib_core.clock._real import RealEvent
-from actionlib_core.clock._serial import report_exit, report_thread_exception
+from actionlib_core.clock._serial import report_callback
 from actionlib_core.clock._virtual_parts import (
     Deadlock,
     Participant,
@@ -116,7 +118,9 @@ class VirtualClock:
 
     def sleep(self, seconds: float) -> None:
         if seconds > 0:
-            self._wait(None, seconds)
+            self.wait_for(None, seconds)
+        else:
+            check_seconds("sleep", seconds)
 
     def event(self, name: str = "an event") -> VirtualEvent:
         return VirtualEvent(self, name)
@@ -129,11 +133,12 @@ class VirtualClock:
         return task
 
     def call_later(self, delay: float, callback: Callable[[], object]) -> VirtualTimer:
+        check_seconds("call_later", delay)
         timer = VirtualTimer(callback)
         with self._lock:
             if delay <= 0:
                 self._ready.append(timer)
-            else:
+            elif delay < math.inf:
                 heapq.heappush(self._deadlines, (self._now + delay, next(self._count), timer))
         if self.rate is not None:
             self._poke.set()
@@ -199,6 +204,10 @@ class VirtualClock:
                 participant.gate.release()
             for participant in others:
                 participant.ended.wait(JOIN_S)
+        # Programs keep clocks (in frames, contexts, tracebacks) longer than they use them: the file
+        # of the owner's gate goes now. Only the owner itself is sure not to wait at it.
+        if self._participants.get(threading.get_ident()) is self._owner:
+            self._owner.gate = LockGate()
 
     def __enter__(self) -> Self:
         return self
@@ -239,9 +248,9 @@ class VirtualClock:
             self._wake(participant)
             return True
 
-    # -- scheduling ----------------------------------------------------------------------------
+    # -- for participants and their events -----------------------------------------------------
 
-    def _wait(self, event: VirtualEvent | None, timeout: float | None) -> bool:
+    def wait_for(self, event: VirtualEvent | None, timeout: float | None) -> bool:
         """Let others run until `event` is set or `timeout` has passed; whether it was set."""
         me = self._participants.get(threading.get_ident())
         if me is None or self._in_callback:
@@ -249,9 +258,9 @@ class VirtualClock:
         with self._lock:
             if self._closed:
                 raise Stopped
-            if event is not None and event._flag:  # noqa: SLF001  set since the caller looked
+            if event is not None and event.flag:  # set since the caller looked
                 return True
-            deadline = None if timeout is None else self._now + timeout
+            deadline = None if timeout is None or timeout == math.inf else self._now + timeout
             if deadline is not None and self._is_alone(deadline):
                 self._now = deadline
                 return False
@@ -260,7 +269,7 @@ class VirtualClock:
             me.event, me.deadline, me.woken = event, deadline, False
             me.noted = deadline is None
             if event is not None:
-                event._waiters.append(me)  # noqa: SLF001
+                event.waiters.append(me)
         self._hand_over(me)
         if me.error is not None:
             error, me.error = me.error, None
@@ -279,7 +288,7 @@ class VirtualClock:
         if self._closed and me is not self._owner:
             raise Stopped
 
-    def _enter(self, me: Participant) -> bool:
+    def enter(self, me: Participant) -> bool:
         """Begin the first turn in a new thread; False when the clock was closed before it came."""
         with self._lock:
             self._participants[threading.get_ident()] = me
@@ -311,7 +320,7 @@ class VirtualClock:
                 raise
             me.error = error
 
-    def _leave(self, me: Participant) -> None:
+    def leave(self, me: Participant) -> None:
         """Hand the turn on for good: the participant's thread ends."""
         with self._lock:
             self._participants.pop(threading.get_ident(), None)
@@ -440,20 +449,19 @@ class VirtualClock:
         self._in_callback = True
         try:
             contextvars.Context().run(callback)
-        except SystemExit as error:
-            report_exit("clock-timers", error)
         except BaseException as error:  # a border: reported, the run goes on
             main = threading.current_thread() is threading.main_thread()
             if main and isinstance(error, KeyboardInterrupt):  # Ctrl-C came, whoever was running
                 raise
-            report_thread_exception()
+            report_callback("clock-timers")
         finally:
             self._in_callback = False
 
-    def _set(self, event: VirtualEvent) -> None:
+    def set_event(self, event: VirtualEvent) -> None:
+        """Set `event`; those who wait for it can go on."""
         with self._lock:
-            event._flag = True  # noqa: SLF001  the two are one secret
-            for participant in tuple(event._waiters):  # noqa: SLF001
+            event.flag = True
+            for participant in tuple(event.waiters):
                 self._wake(participant)
         if self.rate is not None:
             self._poke.set()
@@ -469,8 +477,8 @@ class VirtualClock:
     def _stop_waiting(self, participant: Participant, *, woken: bool) -> None:
         del self._waits[participant]
         event, participant.event = participant.event, None
-        if event is not None and participant in event._waiters:  # noqa: SLF001
-            event._waiters.remove(participant)  # noqa: SLF001
+        if event is not None and participant in event.waiters:
+            event.waiters.remove(participant)
         participant.noted = True
         participant.woken = woken
 

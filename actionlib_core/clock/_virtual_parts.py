@@ -6,6 +6,7 @@ import sys
 import threading
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.clock._protocol import check_seconds
 from actionlib_core.clock._real import RealEvent
 from actionlib_core.clock._serial import report_thread_exception
 from actionlib_core.clock._threads import mark_idle
@@ -113,29 +114,30 @@ class Participant:
 class VirtualEvent:
     """An event of a `VirtualClock`; `set` may come from any thread."""
 
-    __slots__ = ("_clock", "_flag", "_waiters", "name")
+    __slots__ = ("_clock", "flag", "name", "waiters")
 
     def __init__(self, clock: VirtualClock, name: str = "an event") -> None:
         self._clock = clock
-        self._flag = False
-        self._waiters: list[Participant] = []
+        self.flag = False
+        self.waiters: list[Participant] = []
         self.name = name
 
     def is_set(self) -> bool:
-        return self._flag
+        return self.flag
 
     def set(self) -> None:
-        self._clock._set(self)  # noqa: SLF001  the two are one secret
+        self._clock.set_event(self)
 
     def clear(self) -> None:
-        self._flag = False
+        self.flag = False
 
     def wait(self, timeout: float | None = None) -> bool:
-        if self._flag:
+        if self.flag:
             return True
-        if timeout is not None and timeout <= 0:
+        if timeout is not None and not timeout > 0:
+            check_seconds("wait", timeout)
             return False
-        return self._clock._wait(self, timeout) or self._flag  # noqa: SLF001
+        return self._clock.wait_for(self, timeout) or self.flag
 
 
 class VirtualTask:
@@ -173,7 +175,7 @@ class VirtualTask:
     def run_turns(self, worker: Worker | None = None) -> None:
         """Run in a thread that has its first turn."""
         try:
-            if self._clock._enter(self.participant):  # noqa: SLF001  the two are one secret
+            if self._clock.enter(self.participant):
                 self.ident = threading.get_ident()
                 self._context.run(self._target)
         except Stopped:
@@ -189,7 +191,7 @@ class VirtualTask:
             self._done.set()
             if worker is not None:
                 worker.free()
-            self._clock._leave(self.participant)  # noqa: SLF001
+            self._clock.leave(self.participant)
 
 
 class VirtualTimer:

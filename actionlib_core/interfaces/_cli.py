@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 from actionlib_core.exceptions import InterfaceError
 from actionlib_core.interfaces import _stubs
 from actionlib_core.interfaces._registry import parse_name, registry
-from actionlib_core.interfaces._sections import ACTION_PARTS, SERVICE_PARTS
-from actionlib_core.interfaces._sources import BUNDLED, KINDS
+from actionlib_core.interfaces._sources import ACTION_PARTS, BUNDLED, KINDS, SERVICE_PARTS
 
 if TYPE_CHECKING:
     import os

@@ -261,9 +261,13 @@ class _Cursor:
             targets = ", ".join(self._names)
             self.source.add(f"{targets}, = {unpack}(d, {self.position()})")
             size = struct.calcsize(f"<{self._codes}")
-            self._skip += size
+            self.skip(size)
             self.minimum += size
         self._codes, self._names = "", []
+
+    def skip(self, size: int) -> None:
+        """Go on `size` bytes further."""
+        self._skip += size
 
     def position(self) -> str:
         """The expression of the next byte to read; call only when flushed."""
@@ -367,7 +371,7 @@ def _read_array(cursor: _Cursor, kind: FieldType, resolve: Resolve) -> str:
         cursor.flush()
         unpack = cursor.source.codec("unpack_from", f"{kind.length}{code}")
         cursor.source.add(f"{name} = list({unpack}(d, {cursor.position()}))")
-        cursor._skip += kind.length * struct.calcsize(code)  # noqa: SLF001 # one machine, two parts
+        cursor.skip(kind.length * struct.calcsize(code))
     elif code:
         cursor.flush()
         size = struct.calcsize(f"<{code}")

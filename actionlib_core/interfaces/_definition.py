@@ -7,13 +7,18 @@ the ROS 1 checksum covers); the tests hold the result against `rosbags`.
 
 from __future__ import annotations
 
-import difflib
 import keyword
 import re
+import struct
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
 
 from actionlib_core.exceptions import InterfaceError
-from actionlib_core.interfaces._extent import too_large
+from actionlib_core.interfaces._arrays import STRUCT_CODES
+from actionlib_core.suggest import did_you_mean
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
 
 INTEGERS = {
     "int8": (-(2**7), 2**7 - 1),
@@ -157,15 +162,6 @@ class Definition:
 def attribute_of(name: str) -> str:
     """Return the Python attribute for a field name: with "_" behind keywords and own methods."""
     return f"{name}_" if keyword.iskeyword(name) or name in RESERVED else name
-
-
-def did_you_mean(word: str, known: object) -> str:
-    """Return " Did you mean 'x' or 'y'?" for the nearest of `known`, "" when nothing is near."""
-    names = [str(name) for name in known] if isinstance(known, (list, tuple, set, dict)) else []
-    lowered = {name.lower(): name for name in names}
-    close = [lowered[word.lower()]] if word.lower() in lowered else []
-    close += [n for n in difflib.get_close_matches(word, names, n=3, cutoff=0.6) if n not in close]
-    return f" Did you mean {' or '.join(map(repr, close[:3]))}?" if close else ""
 
 
 def parse(name: str, text: str, *, source: str = "", first_line: int = 1) -> Definition:
@@ -333,3 +329,79 @@ def _constant_value(kind: str, text: str) -> bool | int | float | str:
     if not lowest <= number <= highest:
         raise ValueError(f"got {number}; expected {lowest} to {highest} ({kind})")
     return number
+
+
+# --- size and depth: what no computer could make is refused at its definition --------------------
+
+LARGEST = 100_000_000  # bytes of a message with its default values
+MOST_FIELDS = 50_000  # the code that writes and reads has a line for each
+DEEPEST = 50  # types in types: a value is walked down by calls in calls
+NESTED = "types in one another"
+MOST_LOOPS = 19  # arrays in arrays: Python has no more loops in a loop
+
+_SIZES = {base: struct.calcsize(f"<{code}") for base, code in STRUCT_CODES.items()}
+_SIZES |= {"string": 4, "time": 8, "duration": 8}
+_LENGTH_SIZE = 4  # of a dynamic array
+
+
+class Extent(NamedTuple):
+    """What a type, or a field, asks for.
+
+    Attributes:
+        size: Bytes of the default value.
+        fields: Fields, those of nested types counted again at each place.
+        depth: Types in types; 0 for a built-in one.
+        loops: Arrays in arrays.
+    """
+
+    size: int
+    fields: int
+    depth: int
+    loops: int
+
+
+def field_extent(kind: FieldType, extent_of: Callable[[str], Extent]) -> Extent:
+    """Return the extent of a field; `extent_of` returns that of a nested type."""
+    inner = Extent(_SIZES[kind.base], 1, 0, 0) if kind.is_builtin else extent_of(kind.base)
+    if not kind.is_array:
+        return inner
+    size = _LENGTH_SIZE if kind.length is None else kind.length * max(inner.size, 1)
+    loops = inner.loops + (kind.base not in STRUCT_CODES)
+    return inner._replace(size=size, loops=loops)
+
+
+def message_extent(fields: Iterable[Extent]) -> Extent:
+    """Return the extent of a message of these fields."""
+    every = list(fields)
+    return Extent(
+        sum(field.size for field in every),
+        sum(field.fields for field in every),
+        1 + max((field.depth for field in every), default=0),
+        max((field.loops for field in every), default=0),
+    )
+
+
+def find_excess(extent: Extent) -> tuple[str, str] | None:
+    """Return which attribute of a message's extent is too much, and the problem; None when none."""
+    problems = {
+        "fields": (MOST_FIELDS, "fields, nested ones counted"),
+        "depth": (DEEPEST, NESTED),
+        "loops": (MOST_LOOPS, "arrays in one another"),
+    }
+    for attribute, (most, what) in problems.items():
+        if (value := getattr(extent, attribute)) > most:
+            return attribute, too_many(f"{value:,}", what, most)
+    return ("size", too_large(f"{extent.size:,} bytes")) if extent.size > LARGEST else None
+
+
+def too_many(got: str, what: str, most: int) -> str:
+    """Return the problem of a count."""
+    return f"got {got} {what}; expected {most:,} at most"
+
+
+def too_large(what: str) -> str:
+    """Return the problem of a message of a size."""
+    return (
+        f"got a message of {what} at least; expected {LARGEST:,} bytes at most. Try an array "
+        "without a length"
+    )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, cast
 from actionlib_core.exceptions import FieldError, InterfaceError
 from actionlib_core.interfaces import _arrays
 from actionlib_core.interfaces._codegen import WRITE_ERRORS, make_codecs
-from actionlib_core.interfaces._definition import attribute_of, did_you_mean
+from actionlib_core.interfaces._definition import attribute_of
 from actionlib_core.interfaces._values import (
     coerced,
     default_source,
@@ -17,6 +17,7 @@ from actionlib_core.interfaces._values import (
     to_time,
 )
 from actionlib_core.interfaces._yaml import dump, load
+from actionlib_core.suggest import did_you_mean
 from actionlib_core.time import Duration, Time
 
 if TYPE_CHECKING:
@@ -261,7 +262,7 @@ def _take_extra(message: Message, extra: dict[str, Any]) -> None:
     ours = {field.name: field.attribute for field in message._definition.fields}
     problems = [
         f"{message._type}: got unknown field {name!r}; expected {', '.join(known) or 'none'}."
-        + did_you_mean(name, known)
+        + did_you_mean(name, known, most=3)
         for name in extra
         if name not in ours
     ]

@@ -10,8 +10,8 @@ from importlib.machinery import ModuleSpec
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.exceptions import InterfaceError
-from actionlib_core.interfaces._definition import did_you_mean
 from actionlib_core.interfaces._registry import ROOT, Registry, registry
+from actionlib_core.suggest import did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

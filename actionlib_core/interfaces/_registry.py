@@ -10,21 +10,19 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from actionlib_core.exceptions import InterfaceError
 from actionlib_core.interfaces._definition import (
     BUILTINS,
-    Definition,
-    did_you_mean,
-    parse,
-)
-from actionlib_core.interfaces._extent import (
     DEEPEST,
     NESTED,
+    Definition,
     Extent,
     field_extent,
     find_excess,
     message_extent,
+    parse,
     too_many,
 )
 from actionlib_core.interfaces._message import Message, make_class
 from actionlib_core.interfaces._sources import PATH_VARIABLE, Kind, Source, Sources
+from actionlib_core.suggest import did_you_mean
 
 if TYPE_CHECKING:
     import os
@@ -240,7 +238,7 @@ class Registry:
             near += [name for name in known if name.endswith(f"/{short}")]
             hint = f" Did you mean {' or '.join(map(repr, near[:3]))}?"
         else:
-            hint = did_you_mean(full, known)
+            hint = did_you_mean(full, known, most=3)
         path = ", ".join(
             f"{folder}{'' if folder.is_dir() else ' (missing)'}"
             for folder in self.sources.search_path()

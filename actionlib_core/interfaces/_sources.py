@@ -1,20 +1,19 @@
-"""Where definitions come from: inline text, user folders in ROS layout, the bundled folder."""
+"""Where definitions come from: inline text, user folders in ROS layout, the bundled folder.
+
+`.srv` and `.action` text has parts between `---` lines, of which messages are made.
+"""
 
 from __future__ import annotations
 
 import os
+import re
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
-from actionlib_core.exceptions import InterfaceError
-from actionlib_core.interfaces._sections import (
-    ACTION_PARTS,
-    SERVICE_PARTS,
-    Section,
-    action_messages,
-    split,
-)
+from actionlib_core.exceptions import InterfaceError, InterfaceWarning
+from actionlib_core.interfaces._definition import Position
 
 Kind = Literal["msg", "srv", "action"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -23,6 +22,14 @@ PATH_VARIABLE = "SMACHPY_INTERFACE_PATH"
 BUNDLED = Path(__file__).parent / "share"
 """The folder of the definitions that come with this package."""
 
+_SEPARATOR = "---"
+# Printed course notes turn three hyphens into an en or em dash.
+_LOOKS_LIKE_SEPARATOR = re.compile(r"\s*(-{2,}|[\u2012-\u2015]+|-[\u2012-\u2015]+)\s*(#.*)?\Z")
+
+SERVICE_PARTS = ("request", "response")
+ACTION_PARTS = ("goal", "result", "feedback")
+_warned: dict[str | tuple[str, type[Warning], int], int] = {}  # so that each is shown once
+
 
 @dataclass(frozen=True, slots=True)
 class Source:
@@ -30,6 +37,75 @@ class Source:
 
     text: str
     origin: str
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """One part of a definition and the line it starts at."""
+
+    text: str
+    first_line: int
+
+
+def split(text: str, parts: tuple[str, ...], source: str) -> tuple[Section, ...]:
+    """Split a definition at its separators.
+
+    Args:
+        text: The whole `.srv` or `.action` text.
+        parts: Names of the parts expected, for the error message.
+        source: File name for messages.
+
+    Raises:
+        InterfaceError: More or fewer separators than the parts need.
+
+    Warns:
+        InterfaceWarning: A separator that is not exactly three hyphens.
+    """
+    lines = text.splitlines()
+    sections: list[list[str]] = [[]]
+    starts = [1]
+    wanted = len(parts) - 1
+    expected = f"expected {wanted} `---` between {', '.join(parts)}"
+    for number, line in enumerate(lines, 1):
+        match = _LOOKS_LIKE_SEPARATOR.match(line)
+        if match is None:
+            sections[-1].append(line)
+            continue
+        at = Position(source, number, line.index(match[1]), line)
+        if len(starts) > wanted:
+            raise InterfaceError(at.problem(f"one separator too many; {expected}"))
+        if match[1] != _SEPARATOR:
+            what = f"separator {match[1]!r} taken for '---'. Try writing '---'"
+            warnings.warn_explicit(what, InterfaceWarning, source, number, registry=_warned)
+        sections.append([])
+        starts.append(number + 1)
+    if len(starts) <= wanted:
+        at = Position(source, len(lines) or 1, 0, lines[-1] if lines else "")
+        raise InterfaceError(at.problem(f"got {len(starts) - 1} separators; {expected}"))
+    return tuple(
+        Section("\n".join(part) + "\n" if part else "", start)
+        for part, start in zip(sections, starts, strict=True)
+    )
+
+
+def action_messages(name: str) -> dict[str, str]:
+    """Return the text of the four messages around an action's goal, result and feedback.
+
+    Source: actionlib's genaction.
+
+    Args:
+        name: The action's short name, "MoveBase".
+    """
+    return {
+        f"{name}Action": f"{name}ActionGoal action_goal\n"
+        f"{name}ActionResult action_result\n"
+        f"{name}ActionFeedback action_feedback\n",
+        f"{name}ActionGoal": f"Header header\nactionlib_msgs/GoalID goal_id\n{name}Goal goal\n",
+        f"{name}ActionResult": "Header header\nactionlib_msgs/GoalStatus status\n"
+        f"{name}Result result\n",
+        f"{name}ActionFeedback": "Header header\nactionlib_msgs/GoalStatus status\n"
+        f"{name}Feedback feedback\n",
+    }
 
 
 class Sources:

@@ -10,8 +10,8 @@ from actionlib_core.interfaces._definition import (
     FLOATS,
     INTEGERS,
     FieldType,
-    did_you_mean,
 )
+from actionlib_core.suggest import did_you_mean
 from actionlib_core.time import Duration, Time, TimeValue
 
 if TYPE_CHECKING:

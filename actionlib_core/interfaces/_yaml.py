@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.exceptions import FieldError
 from actionlib_core.time import TimeValue
+from actionlib_core.yaml_text import YamlTextError, load_yaml
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -85,12 +86,9 @@ def load(text: str, where: str) -> Mapping[str, Any]:
     Raises:
         FieldError: No YAML, or no mapping.
     """
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
-
     try:
-        values = YAML(typ="safe", pure=True).load(text)
-    except (YAMLError, ValueError, OverflowError, RecursionError) as error:
+        values = load_yaml(text)
+    except YamlTextError as error:
         raise FieldError(f"{where}: malformed YAML: {error}") from error
     if values is None:
         return {}

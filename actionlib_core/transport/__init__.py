@@ -131,6 +131,11 @@ class Transport(Protocol):
         """This session's id: lower-case hexadecimal, unique on the network."""
         ...
 
+    @property
+    def rediscovery(self) -> float:
+        """Longest time until a lost link that could be there again is there again [s]."""
+        ...
+
     def publisher(self, key: str, encoding: str = "", quality: Quality = ...) -> PublisherPort:
         """Declare that this session sends on `key`."""
         ...

@@ -11,8 +11,8 @@ import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from actionlib_core.presence import ROOT, WORDS_BEFORE_NAME
 from actionlib_core.transport._keys import key_matches
+from actionlib_core.wire.presence import ROOT, WORDS_BEFORE_NAME
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

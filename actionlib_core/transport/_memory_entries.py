@@ -19,7 +19,7 @@ from actionlib_core.transport._keys import compile_pattern
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from actionlib_core.clock import Clock, Event, Timer
+    from actionlib_core.clock import Clock, Event
     from actionlib_core.transport.memory import MemoryTransport
 
 T = TypeVar("T")
@@ -103,6 +103,12 @@ class Entry:
         """Leave the network's tables."""
         raise NotImplementedError
 
+    def link_dead_locked(self) -> None:
+        """The session's link has been cut for longer than its lease (`FaultyTransport`)."""
+
+    def link_back_locked(self) -> None:
+        """The session's link is there again."""
+
 
 class Listener(Entry, Generic[T]):
     """A callback of a session."""
@@ -124,7 +130,7 @@ class Listener(Entry, Generic[T]):
 class Subscriber(Listener[Sample]):
     """Gets the messages of a key."""
 
-    __slots__ = ("_key",)
+    __slots__ = ("_history", "_key")
 
     def __init__(
         self,
@@ -136,10 +142,18 @@ class Subscriber(Listener[Sample]):
     ) -> None:
         super().__init__(session, callback)
         self._key = key
+        self._history = history
         _add(self.network.subscribers, key, self)
-        for publisher in self.network.latches.get(key, ()) if history else ():
+        self.link_back_locked()
+
+    def link_back_locked(self) -> None:
+        for publisher in self.network.latches.get(self._key, ()) if self._history else ():
             if publisher.last is not None:
                 self.post(publisher.sample(publisher.last))
+
+    def deliver(self, item: Sample) -> None:
+        if not self.session.is_cut:
+            super().deliver(item)
 
     def withdraw_locked(self) -> None:
         _remove(self.network.subscribers, self._key, self)
@@ -158,7 +172,7 @@ class Queryable(Listener["MemoryQuery"]):
         _add(self.network.queryables, key, self)
 
     def deliver(self, item: MemoryQuery) -> None:
-        if self.closed:
+        if self.closed or self.session.is_cut:
             item.finish()
             return
         try:
@@ -172,36 +186,75 @@ class Queryable(Listener["MemoryQuery"]):
         _remove(self.network.queryables, self._key, self)
 
 
-class Watcher(Listener[Presence]):
-    """Hears of tokens."""
+class Watcher(Listener[Presence | None]):
+    """Is told of tokens, through a faulty link of those that can be seen through it."""
 
-    __slots__ = ("pattern",)
+    __slots__ = ("_shown", "_there", "pattern")
 
     def __init__(
         self, session: MemoryTransport, pattern: str, callback: Callable[[Presence], None]
     ) -> None:
-        super().__init__(session, callback)
+        super().__init__(session, callback)  # type: ignore[arg-type]  # None stays here
         self.pattern = compile_pattern(pattern)
+        self._there: set[str] = set()
+        self._shown: set[str] = set()
         self.network.watchers.append(self)
         for key in self.network.match_tokens(self.pattern):
             self.post(Presence(key, alive=True))
+
+    def deliver(self, item: Presence | None) -> None:
+        link = self.session.link
+        if link is None:
+            super().deliver(item)
+            return
+        if item is not None:
+            (self._there.add if item.alive else self._there.discard)(item.key)
+        if link.is_cut and not link.is_dead:
+            return
+        with self.network.lock:
+            seen = set(self.session.own_tokens(self.pattern))  # no link is needed for these
+        seen |= set() if link.is_dead else self._there
+        gone, new = sorted(self._shown - seen), sorted(seen - self._shown)
+        self._shown = seen
+        for key in gone:
+            super().deliver(Presence(key, alive=False))
+        for key in new:
+            super().deliver(Presence(key, alive=True))
+
+    def link_dead_locked(self) -> None:
+        self.post(None)
+
+    def link_back_locked(self) -> None:
+        self.post(None)
 
     def withdraw_locked(self) -> None:
         self.network.watchers.remove(self)
 
 
 class Token(Entry):
-    """A liveliness token."""
+    """A liveliness token; the others lose sight of it when the link is dead."""
 
-    __slots__ = ("_key",)
+    __slots__ = ("_shown", "key")
 
     def __init__(self, session: MemoryTransport, key: str) -> None:
         super().__init__(session)
-        self._key = key
-        self.network.count_token(key, 1)
+        self.key = key
+        self._shown = False
+        if not session.is_cut:
+            self.link_back_locked()
+
+    def link_back_locked(self) -> None:
+        if not self._shown:
+            self._shown = True
+            self.network.count_token(self.key, 1)
+
+    def link_dead_locked(self) -> None:
+        if self._shown:
+            self._shown = False
+            self.network.count_token(self.key, -1)
 
     def withdraw_locked(self) -> None:
-        self.network.count_token(self._key, -1)
+        self.link_dead_locked()
 
 
 class Publisher(Entry):
@@ -220,6 +273,21 @@ class Publisher(Entry):
             _add(self.network.latches, key, self)
 
     def put(self, payload: bytes) -> None:
+        link = self.session.link
+        if link is None or self.closed:
+            self._put(payload)
+            return
+        for delay in link.choose(self._key):
+            if delay <= 0:
+                self._put(payload)
+            else:
+                link.later(delay, partial(self._put_late, payload))
+
+    def _put_late(self, payload: bytes) -> None:
+        if not self.closed:
+            self._put(payload)
+
+    def _put(self, payload: bytes) -> None:
         network = self.network
         with network.lock:
             if self.closed:
@@ -240,7 +308,8 @@ class Publisher(Entry):
         return Sample(self._key, payload, self._encoding, self._source)
 
     def matching(self) -> bool:
-        return self._key in self.network.subscribers
+        link = self.session.link
+        return self._key in self.network.subscribers and not (link is not None and link.is_dead)
 
     def withdraw_locked(self) -> None:
         if self._latch:
@@ -255,36 +324,42 @@ class Exchange(Entry):
     def __init__(
         self,
         session: MemoryTransport,
-        queryables: list[Queryable],
-        make_query: Callable[[Exchange, MemoryTransport], MemoryQuery],
+        timeout: float,
         on_reply: Callable[[Reply], None],
         on_done: Callable[[], None],
     ) -> None:
         super().__init__(session)
         self._on_reply = on_reply
         self._on_done = on_done
-        self._waiting = len(queryables)
-        self._timer: Timer | None = None
-        for queryable in queryables:
-            queryable.post(make_query(self, queryable.session))
-        if not queryables:
-            self._end()
+        self._waiting = 1  # for the question to be asked; then for each that was asked
+        self._timer = self.network.clock.call_later(timeout, self._time_out)
 
-    def limit(self, timeout: float) -> None:
-        """End the exchange `timeout` [s] from now."""
+    def ask(self, key: str, payload: bytes, encoding: str) -> None:
+        """Put the question to all who are there, unless time is up."""
         with self.network.lock:
-            if self._waiting:
-                self._timer = self.network.clock.call_later(timeout, self._time_out)
+            if not self._waiting:
+                return
+            for queryable in self.network.queryables.get(key, ()):
+                self._waiting += 1
+                queryable.post(MemoryQuery(self, queryable.session, key, payload, encoding))
+            self.finish_locked()
 
     def _time_out(self) -> None:
         with self.network.lock:
-            if self._waiting:
-                self._waiting = 0
-                self._end()
+            self.link_dead_locked()
+
+    def link_dead_locked(self) -> None:
+        if self._waiting:
+            self._waiting = 0
+            self._end()
 
     def reply_locked(self, reply: Reply) -> None:
         if self._waiting:
-            self.session.inbox.post(self, partial(self._on_reply, reply))
+            self.session.inbox.post(self, partial(self._take_reply, reply))
+
+    def _take_reply(self, reply: Reply) -> None:
+        if not self.session.is_cut:
+            self._on_reply(reply)
 
     def finish_locked(self) -> None:
         if self._waiting:
@@ -293,8 +368,7 @@ class Exchange(Entry):
                 self._end()
 
     def _end(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
+        self._timer.cancel()
         self.session.inbox.post(self, self._finish)
 
     def _finish(self) -> None:
@@ -307,20 +381,20 @@ class Exchange(Entry):
 
     def withdraw_locked(self) -> None:
         self._waiting = 0
-        if self._timer is not None:
-            self._timer.cancel()
+        self._timer.cancel()
 
 
 class MemoryQuery(Entry):
     """A query as one queryable sees it."""
 
-    __slots__ = ("_exchange", "encoding", "key", "payload")
+    __slots__ = ("_exchange", "_finished", "encoding", "key", "payload")
 
     def __init__(
         self, exchange: Exchange, session: MemoryTransport, key: str, payload: bytes, encoding: str
     ) -> None:
         super().__init__(session)
         self._exchange = exchange
+        self._finished = False
         self.key = key
         self.payload = payload
         self.encoding = encoding
@@ -334,11 +408,22 @@ class MemoryQuery(Entry):
 
     def _reply(self, reply: Reply) -> None:
         with self.network.lock:
-            if not self.closed:
+            if not (self.closed or self.session.is_cut):
                 self._exchange.reply_locked(reply)
 
     def finish(self) -> None:
-        self.close()
+        with self.network.lock:
+            self._finished = True
+            link = self.session.link
+            if link is None or not link.is_cut or link.is_dead:
+                self.close_locked()
+
+    def link_dead_locked(self) -> None:
+        self.close_locked()
+
+    def link_back_locked(self) -> None:
+        if self._finished:
+            self.close_locked()
 
     def withdraw_locked(self) -> None:
         self._exchange.finish_locked()

@@ -6,16 +6,20 @@ Source:
 
 from __future__ import annotations
 
+import secrets
 from typing import TYPE_CHECKING
 
 from actionlib_core.config import ROUTER_ENDPOINT
-from actionlib_core.presence import ROOT
 from actionlib_core.transport._access import ACCESS_KEY
+from actionlib_core.wire.presence import ROOT
 
 if TYPE_CHECKING:
     from actionlib_core.config import AccessRule, Config
 
+DISCOVERY_GROUP = "224.0.0.224"  # zenoh's own
 FIRST_PORT = 7446  # zenoh's own for discovery, domain 0
+SCOUT_S = 8.0  # zenoh's longest time between two looks for others
+RETRY_S = 1.0  # between two tries of an endpoint that does not answer
 LOOPBACK = "tcp/127.0.0.1:0"
 _MESSAGES = [
     "put",
@@ -28,6 +32,12 @@ _MESSAGES = [
     "liveliness_query",
     "declare_liveliness_subscriber",
 ]
+# Of two peers one dials the other, never both, as zenoh does unasked: with both, a link that only
+# one side has given up (a process was suspended, a cable cut, for about the lease) can be dialled
+# anew and be added to what is left of the old one, for ever. Each side then names keys by numbers
+# that the other does not know, or has given to other keys.
+# https://github.com/eclipse-zenoh/zenoh/issues/2806
+_ONE_DIALS = {"peer": {"to_router": "always", "to_peer": "greater-zid"}}
 _LOOKING = ["liveliness_query", "declare_liveliness_subscriber"]
 
 
@@ -38,8 +48,15 @@ def zenoh_settings(config: Config) -> dict[str, object]:
         "connect/endpoints": list(config.connect),
         "connect/timeout_ms": round(config.connect_timeout * 1e3),
         "connect/exit_on_failure": bool(config.connect),
+        "connect/retry": {
+            "period_init_ms": round(RETRY_S * 1e3),
+            "period_max_ms": round(RETRY_S * 1e3),
+            "period_increase_factor": 1,
+        },
         "listen/endpoints": _listen(config),
         "scouting/multicast/enabled": config.discovery != "off",
+        "scouting/multicast/autoconnect_strategy": _ONE_DIALS,
+        "scouting/gossip/autoconnect_strategy": _ONE_DIALS,
         "scouting/delay": round(config.settle * 1e3),
         "open/return_conditions/connect_scouted": config.settle > 0,
         "open/return_conditions/declares": config.settle > 0,
@@ -49,11 +66,25 @@ def zenoh_settings(config: Config) -> dict[str, object]:
     }
     if config.discovery != "off":
         settings["scouting/multicast/interface"] = config.discovery
-        settings["scouting/multicast/address"] = f"224.0.0.224:{FIRST_PORT + config.domain}"
+        settings["scouting/multicast/address"] = f"{DISCOVERY_GROUP}:{FIRST_PORT + config.domain}"
     settings.update(_tls(config))
     settings.update(_login(config))
     settings.update(_access(config))
     return settings
+
+
+def new_session_id(now_ns: int) -> str:
+    """Return an id for a session that opens now: greater, as zenoh compares, than earlier ones.
+
+    Of two peers the one with the greater id dials. The one that comes later looks around at once;
+    the others look every 8 s only, so it should be that one.
+
+    Args:
+        now_ns: The time [ns since the epoch].
+    """
+    # Zenoh compares from the last byte of the number to the first.
+    raw = now_ns.to_bytes(8, "big") + secrets.token_bytes(8)
+    return f"{int.from_bytes(raw, 'little'):x}"
 
 
 def _listen(config: Config) -> list[str]:

@@ -1,4 +1,3 @@
-# ruff: noqa: D102  the methods of a session are documented in the protocol
 """A bad network on purpose: drops, delays, repeats, reorders, and cuts of the link.
 
 Wrap one end's session, or both, to see what a protocol makes of it. Everything is deterministic: a
@@ -7,50 +6,99 @@ plan decides the fate of the n-th message of a key, the clock delivers what is l
 
 from __future__ import annotations
 
+import random
 import threading
 from collections import Counter
-from functools import partial
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
 
 from actionlib_core.clock import current_clock
-from actionlib_core.transport import Presence, Quality, Reply, Sample
-from actionlib_core.transport._faults import (
-    DELIVERED,
-    DROPPED,
-    RandomFaults,
-    ScriptedFaults,
-    Sent,
-    deliver_all,
-)
-from actionlib_core.transport._faulty_parts import (
-    Asking,
-    Part,
-    Publisher,
-    Queryable,
-    Subscriber,
-    Token,
-    Watcher,
-)
 from actionlib_core.transport._keys import key_matches
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping, Sequence
+    from typing import TypeAlias
 
     from actionlib_core.clock import Clock, Timer
-    from actionlib_core.transport import Closable, PublisherPort, Query, Transport
-    from actionlib_core.transport._faults import Fate, Plan
+    from actionlib_core.transport.memory import MemoryTransport
 
-__all__ = [
-    "DELIVERED",
-    "DROPPED",
-    "FaultyTransport",
-    "RandomFaults",
-    "ScriptedFaults",
-    "Sent",
-    "deliver_all",
-]
+    Fate: TypeAlias = tuple[float, ...]
+    Plan: TypeAlias = Callable[[str, int], Fate]
 
-DEFAULT_QUALITY = Quality()
+DELIVERED: Fate = (0.0,)
+DROPPED: Fate = ()
+
+
+def deliver_all(key: str, number: int) -> Fate:  # noqa: ARG001  a plan's signature
+    """Return the fate of a message on a good network: one copy, at once."""
+    return DELIVERED
+
+
+@dataclass(frozen=True)
+class RandomFaults:
+    """Chooses fates at random; the seed, the key and the number of the message decide.
+
+    Attributes:
+        seed: Another one, other faults.
+        pattern: Which keys are concerned.
+        drop: Share of the messages that are lost, 0 to 1.
+        repeat: Share of those that arrive twice.
+        delay: Share of those that come late, and so out of order.
+        longest: Longest delay [s].
+    """
+
+    seed: int
+    pattern: str = "**"
+    drop: float = 0.0
+    repeat: float = 0.0
+    delay: float = 0.0
+    longest: float = 1.0
+
+    def __call__(self, key: str, number: int) -> Fate:
+        """Return the fate of the message `number` of `key`."""
+        if not key_matches(self.pattern, key):
+            return DELIVERED
+        dice = random.Random(f"{self.seed} {key} {number}")  # noqa: S311  no secret
+        if dice.random() < self.drop:
+            return DROPPED
+        copies = 2 if dice.random() < self.repeat else 1
+        late = dice.random() < self.delay
+        return tuple(dice.uniform(0, self.longest) if late or n else 0.0 for n in range(copies))
+
+
+@dataclass(frozen=True)
+class ScriptedFaults:
+    """Gives the messages of a key the fates of a list, in turn; those after it are delivered.
+
+    Attributes:
+        fates: Key pattern -> fates; the first pattern that matches counts. A fate is the delays [s]
+            of the copies: `()` loses the message, `(0.0,)` delivers it, `(0.0, 0.5)` repeats it.
+    """
+
+    fates: Mapping[str, Sequence[Fate]] = field(default_factory=dict)
+
+    def __call__(self, key: str, number: int) -> Fate:
+        """Return the fate of the message `number` of `key`."""
+        for pattern, fates in self.fates.items():
+            if key_matches(pattern, key):
+                return fates[number] if number < len(fates) else DELIVERED
+        return DELIVERED
+
+
+class Sent(NamedTuple):
+    """What became of a message, for the report of a failed test.
+
+    Attributes:
+        t: When it was sent [s].
+        key: On which key.
+        number: Which of that key, from 0.
+        fate: The delays of its copies; empty when it was lost.
+    """
+
+    t: float
+    key: str
+    number: int
+    fate: Fate
 
 
 class FaultyTransport:
@@ -62,7 +110,7 @@ class FaultyTransport:
     messages come once more.
 
     Args:
-        inner: The session that does the work; closing this closes it.
+        inner: The session that gets the faults; closing this closes it.
         plan: Decides the fate of what this session sends: messages, and queries too, of which only
             one copy is ever sent.
         clock: Delivers what is late; the current clock when None.
@@ -73,7 +121,7 @@ class FaultyTransport:
 
     def __init__(
         self,
-        inner: Transport,
+        inner: MemoryTransport,
         plan: Plan = deliver_all,
         *,
         clock: Clock | None = None,
@@ -89,15 +137,30 @@ class FaultyTransport:
         self._lock = threading.Lock()
         self._counts: Counter[str] = Counter()
         self._timers: list[Timer] = []
-        self._parts: dict[Part, None] = {}
-        self._closed = False
+        # What the session declares looks at its link by itself.
+        inner.link = self
+        self.publisher = inner.publisher
+        self.subscribe = inner.subscribe
+        self.queryable = inner.queryable
+        self.query = inner.query
+        self.declare_alive = inner.declare_alive
+        self.watch_alive = inner.watch_alive
+        self.list_alive = inner.list_alive
 
     @property
     def session_id(self) -> str:
         """The inner session's id."""
         return self.inner.session_id
 
-    # -- faults --------------------------------------------------------------------------------
+    @property
+    def rediscovery(self) -> float:
+        """That of the inner session."""
+        return self.inner.rediscovery
+
+    def close(self) -> None:
+        """Close the session."""
+        self._cancel_timers()
+        self.inner.close()
 
     def cut(self, seconds: float | None = None) -> None:
         """Cut the link, for `seconds` or until `restore`; no effect when it is cut."""
@@ -111,25 +174,26 @@ class FaultyTransport:
 
     def restore(self) -> None:
         """Mend the link; no effect when it is not cut."""
-        with self._lock:
+        with self.inner.network.lock:
             if not self.is_cut:
                 return
             self.is_cut = self.is_dead = False
-            timers, self._timers = self._timers, []
-            parts = list(self._parts)
-        for timer in timers:
-            timer.cancel()
-        for part in parts:
-            part.on_restored()
+            for entry in list(self.inner.declared):
+                entry.link_back_locked()
+        self._cancel_timers()
 
     def _die(self) -> None:
+        with self.inner.network.lock:
+            if self.is_cut:
+                self.is_dead = True
+                for entry in list(self.inner.declared):
+                    entry.link_dead_locked()
+
+    def _cancel_timers(self) -> None:
         with self._lock:
-            if not self.is_cut or self._closed:
-                return
-            self.is_dead = True
-            parts = list(self._parts)
-        for part in parts:
-            part.on_dead()
+            timers, self._timers = self._timers, []
+        for timer in timers:
+            timer.cancel()
 
     def choose(self, key: str) -> Fate:
         """Return the fate of the next message on `key`, and note it."""
@@ -141,85 +205,10 @@ class FaultyTransport:
         return fate
 
     def later(self, delay: float, function: Callable[[], object]) -> None:
-        """Call `function` after `delay` [s], unless the link is cut or the session closed then."""
+        """Call `function` after `delay` [s], unless the link is cut then."""
 
         def call() -> None:
-            if not (self.is_cut or self._closed):
+            if not self.is_cut:
                 function()
 
         self.clock.call_later(delay, call)
-
-    # -- the protocol --------------------------------------------------------------------------
-
-    def publisher(
-        self, key: str, encoding: str = "", quality: Quality = DEFAULT_QUALITY
-    ) -> PublisherPort:
-        return Publisher(self, key, self.inner.publisher(key, encoding, quality))
-
-    def subscribe(
-        self, key: str, callback: Callable[[Sample], None], *, history: bool = True
-    ) -> Closable:
-        return Subscriber(self, key, callback, history=history)
-
-    def queryable(self, key: str, callback: Callable[[Query], None]) -> Closable:
-        return Queryable(self, key, callback)
-
-    def query(
-        self,
-        key: str,
-        payload: bytes,
-        *,
-        encoding: str = "",
-        timeout: float,
-        on_reply: Callable[[Reply], None],
-        on_done: Callable[[], None],
-    ) -> Closable:
-        asking = Asking(self, on_reply, on_done)
-        ask = partial(
-            self.inner.query,
-            key,
-            payload,
-            encoding=encoding,
-            timeout=timeout,
-            on_reply=asking.take_reply,
-            on_done=asking.finish,
-        )
-        asking.start(ask, self.choose(key), timeout)
-        return asking
-
-    def declare_alive(self, key: str) -> Closable:
-        return Token(self, key)
-
-    def watch_alive(self, pattern: str, callback: Callable[[Presence], None]) -> Closable:
-        return Watcher(self, pattern, callback)
-
-    def list_alive(self, pattern: str, timeout: float) -> list[str]:
-        keys = self.inner.list_alive(pattern, timeout)
-        if not self.is_dead:
-            return keys
-        return sorted(key for key in self.own_tokens() if key_matches(pattern, key))
-
-    def close(self) -> None:
-        with self._lock:
-            self._closed = True
-            timers, self._timers = self._timers, []
-        for timer in timers:
-            timer.cancel()
-        self.inner.close()
-
-    # -- parts ---------------------------------------------------------------------------------
-
-    def add(self, part: Part) -> None:
-        """Tell `part` of cuts from now on."""
-        with self._lock:
-            self._parts[part] = None
-
-    def remove(self, part: Part) -> None:
-        """Forget `part`."""
-        with self._lock:
-            self._parts.pop(part, None)
-
-    def own_tokens(self) -> set[str]:
-        """Return the keys of this session's tokens."""
-        with self._lock:
-            return {part.key for part in self._parts if isinstance(part, Token)}

@@ -23,13 +23,13 @@ from actionlib_core.transport._memory_entries import (
     Entry,
     Exchange,
     Inbox,
-    MemoryQuery,
     Publisher,
     Queryable,
     Subscriber,
     Token,
     Watcher,
 )
+from actionlib_core.transport.faulty import DELIVERED
 
 if TYPE_CHECKING:
     import re
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
     from actionlib_core.clock import Clock
     from actionlib_core.transport import Query
+    from actionlib_core.transport.faulty import FaultyTransport
 
 E = TypeVar("E", bound=Entry)
 
@@ -88,6 +89,7 @@ class MemoryTransport:
         self.inbox = Inbox(network.clock)
         self.declared: dict[Entry, None] = {}
         self.killed = False
+        self.link: FaultyTransport | None = None
         self._session_id = session_id
         self._closed = False
 
@@ -95,6 +97,16 @@ class MemoryTransport:
     def session_id(self) -> str:
         """This session's id."""
         return self._session_id
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether nothing gets out or in."""
+        return self.link is not None and self.link.is_cut
+
+    @property
+    def rediscovery(self) -> float:
+        """None is ever lost."""
+        return 0.0
 
     def publisher(
         self, key: str, encoding: str = "", quality: Quality = DEFAULT_QUALITY
@@ -123,16 +135,12 @@ class MemoryTransport:
         on_done: Callable[[], None],
     ) -> Exchange:
         check_key(key)
-
-        def make_query(exchange: Exchange, session: MemoryTransport) -> MemoryQuery:
-            return MemoryQuery(exchange, session, key, payload, encoding)
-
-        def ask() -> Exchange:
-            asked = list(self.network.queryables.get(key, ()))
-            return Exchange(self, asked, make_query, on_reply, on_done)
-
-        exchange = self._declare(ask, key)
-        exchange.limit(timeout)
+        exchange = self._declare(lambda: Exchange(self, timeout, on_reply, on_done), key)
+        fate = DELIVERED if self.link is None else self.link.choose(key)
+        if self.link is not None and fate and fate[0] > 0:
+            self.link.later(fate[0], lambda: exchange.ask(key, payload, encoding))
+        elif fate:
+            exchange.ask(key, payload, encoding)
         return exchange
 
     def declare_alive(self, key: str) -> Token:
@@ -146,7 +154,14 @@ class MemoryTransport:
         compiled = compile_pattern(pattern)
         with self.network.lock:
             self._check_open(pattern)
+            if self.link is not None and self.link.is_dead:
+                return self.own_tokens(compiled)
             return self.network.match_tokens(compiled)
+
+    def own_tokens(self, pattern: re.Pattern[str]) -> list[str]:
+        """Return this session's tokens that a compiled pattern stands for. Needs the lock."""
+        own = {entry.key for entry in self.declared if isinstance(entry, Token)}
+        return sorted(key for key in own if pattern.fullmatch(key + "/"))
 
     def close(self) -> None:
         self._end(wait=True)

@@ -1,4 +1,6 @@
-"""The messages and actions of these missions, from the files in ROS layout beside this module.
+"""The messages and actions of the course's missions and of the fleet.
+
+They are made from the files in ROS layout beside this module.
 
 Own definitions are added in the same way: a folder in ROS layout and `add_path`. The services are
 in `missions.interfaces.srv`.
@@ -13,10 +15,6 @@ from actionlib_core.interfaces import add_path
 add_path(Path(__file__).parent)
 
 from actionlib_core.interfaces.mission_msgs.msg import (  # noqa: E402  found since the line above
-    ChargeAction,
-    ChargeFeedback,
-    ChargeGoal,
-    ChargeResult,
     CountdownAction,
     CountdownFeedback,
     CountdownGoal,
@@ -41,10 +39,6 @@ from actionlib_core.interfaces.mission_msgs.msg import (  # noqa: E402  found si
 )
 
 __all__ = [
-    "ChargeAction",
-    "ChargeFeedback",
-    "ChargeGoal",
-    "ChargeResult",
     "CountdownAction",
     "CountdownFeedback",
     "CountdownGoal",

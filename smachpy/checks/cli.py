@@ -6,11 +6,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from actionlib_core.output import printable
 from smachpy.checks import check
 from smachpy.checks.report import FORMATS
 from smachpy.checks.suppression import read_settings
+from smachpy.command.targets import load_target
 from smachpy.exceptions import did_you_mean
-from smachpy.targets import load_target
 
 if TYPE_CHECKING:
     import argparse
@@ -34,6 +35,13 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         help="what must hold for every run: never(STATE), always_reaches(OUTCOME, ...), "
         "before(STATE, STATE), after_preempt(STATE); may be repeated",
     )
+    parser.add_argument(
+        "--enable",
+        action="append",
+        default=[],
+        metavar="RULE",
+        help="look for what is off by itself: no-timeout; may be repeated",
+    )
     parser.add_argument("--pictures", metavar="FOLDER", help="draw the runs that show problems")
     parser.set_defaults(run=run)
 
@@ -42,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
     """Check the targets; 1 when there are problems."""
     settings = read_settings(Path.cwd())
     reports = [_check(text, args, settings) for text in args.targets]
-    print(FORMATS[args.format](reports))
+    print(printable(FORMATS[args.format](reports)))
     _tell_unused(settings, [report.record.path[1:] for report in reports])
     if args.pictures:
         for report in reports:
@@ -66,4 +74,10 @@ def _check(text: str, args: argparse.Namespace, settings: Settings) -> Report:
     machine = target.build()
     name = machine.name or target.name
     own = [p for machine_name, texts in settings.properties if machine_name == name for p in texts]
-    return check(machine, properties=[*args.properties, *own], ignores=settings.ignores, name=name)
+    return check(
+        machine,
+        properties=[*args.properties, *own],
+        ignores=settings.ignores,
+        enable=[*args.enable, *settings.enable],
+        name=name,
+    )

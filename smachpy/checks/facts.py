@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import inspect
+from collections import Counter
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from smachpy._runtime.messages import Outgoing
-from smachpy.checks import leaves, suppression
-from smachpy.checks._core.model import Facts, OutcomeRule, Place
-from smachpy.concurrence import Concurrence
-from smachpy.container import Container
-from smachpy.iterator import Iterator as IteratorState
-from smachpy.state import CBState, State
+from smachpy.actions.messages import Outgoing
+from smachpy.checks import source, suppression
+from smachpy.checks.model import RULES, Facts, OutcomeRule, Place, Problem, Reads, Subject
+from smachpy.machines.concurrence import Concurrence
+from smachpy.machines.container import Container, state_problems
+from smachpy.machines.iterator import Iterator as IteratorState
+from smachpy.machines.state import CBState, State, get_options
 from smachpy.util import CBInterface
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator
 
     from smachpy.introspection import StateRecord
 
@@ -28,136 +30,151 @@ _LIMITS = {
 }
 
 
-def collect(machine: State, record: StateRecord) -> dict[str, Facts]:
-    """Return path -> what is known, for a machine and all below it."""
-    return {path: _facts(state, found) for path, state, found in _walk(machine, record)}
+def find_problems(state: State, path: str) -> Iterator[Problem]:
+    """Yield what holds a machine from running: inconsistencies and wrong signatures of `execute`.
+
+    `add` refuses most of it; what a program has changed afterwards is found here.
+    """
+    for text in state.find_problems(path) if isinstance(state, Container) else ():
+        rule = "unmapped-outcome" if "outcome has no transition" in text else "inconsistent"
+        yield Problem(rule, RULES[rule].severity, text.partition(": ")[0], text)
+    for text in _signature_problems(state):
+        hint = "Try `def execute(self, userdata):`, plain or async, that returns an outcome."
+        yield Problem("wrong-signature", "error", path, f"{path}: {text}", hint)
+    for label, child in state.get_children().items() if isinstance(state, Container) else ():
+        yield from find_problems(child, f"{path}/{label}")
 
 
-def _walk(state: State, record: StateRecord) -> Iterator[tuple[str, State, StateRecord]]:
-    yield record.path, state, record
-    children: Mapping[str, State] = state.get_children() if isinstance(state, Container) else {}
-    for child in record.children:
-        yield from _walk(children[child.label], child)
+def _signature_problems(state: State) -> Iterator[str]:
+    yield from (problem for problem in state_problems(state) if problem.startswith("execute:"))
+    code: Any = state.execute
+    if getattr(code, "__func__", None) is State.execute:
+        yield f"execute: got none in {type(state).__name__}; expected a method of its own."
+    if isinstance(state, CBState):
+        code = state._cb  # noqa: SLF001  one package
+    if inspect.isgeneratorfunction(code) or inspect.isasyncgenfunction(code):
+        yield "execute: got a function with `yield`, which returns no outcome; expected `return`."
 
 
-def _facts(state: State, record: StateRecord) -> Facts:
-    ignored = suppression.of_state(state, _callback_of(state))
-    if isinstance(state, Container):
-        return _of_container(state, ignored)
-    return _of_leaf(state, record, ignored)
+def collect(machine: State, record: StateRecord) -> Subject:
+    """Return a machine with what is known of it and all below it."""
+    facts: dict[str, Facts] = {}
+    containers: dict[str, Container] = {}
+
+    def walk(state: State, record: StateRecord) -> StateRecord:
+        """Return the part of a machine that its structure says how it runs."""
+        if isinstance(state, Container) and not _has_own_execute(state):
+            containers[record.path] = state
+            facts[record.path] = _of_container(state)
+            states = state.get_children()
+            children = tuple(walk(states[child.label], child) for child in record.children)
+            return replace(record, children=children)
+        if isinstance(state, Container):  # it may run its states in any way: it counts as a leaf
+            containers[record.path] = state
+            record = replace(
+                record, kind="state", children=(), initial=(), transitions=(), rules=()
+            )
+            facts[record.path] = _of_container(state)
+        else:
+            facts[record.path] = _of_leaf(state, record)
+        return record
+
+    record = walk(machine, record)
+    owners = Counter(id(container.userdata) for container in containers.values())
+    anywhere = any(known.reaches for known in facts.values())
+    for path, container in containers.items():
+        if anywhere or owners[id(container.userdata)] > 1:
+            facts[path] = replace(facts[path], watched=True)
+    return Subject(record, facts)
 
 
-def _of_container(container: Container, ignored: dict[str, str]) -> Facts:
+def _has_own_execute(state: State) -> bool:
+    return _is_foreign(type(state).execute) or "execute" in vars(state)
+
+
+def _is_foreign(code: Any) -> bool:
+    return bool(code.__module__.partition(".")[0] != "smachpy")
+
+
+def _of_container(container: Container) -> Facts:
     rules: tuple[OutcomeRule, ...] = ()
     if isinstance(container, Concurrence):
         rules = tuple(
             OutcomeRule(outcome, rule.need, rule.conditions)
-            for outcome, rule in container._rules  # noqa: SLF001  one house
+            for outcome, rule in container._rules  # noqa: SLF001  one package
         )
-    callbacks = (
-        container._start_cbs,  # noqa: SLF001
-        container._transition_cbs,  # noqa: SLF001
-        container._termination_cbs,  # noqa: SLF001
-    )
+    items = container._items if isinstance(container, IteratorState) else None  # noqa: SLF001
     return Facts(
         preset=frozenset(container.userdata.keys()),
         outcome_rules=rules,
         any_outcome=getattr(container, "_outcome_cb", None) is not None,
         cuts=getattr(container, "_child_termination_cb", None) is not None,
-        watched=any(callbacks),
-        made=_made(container),
-        empty=isinstance(container, IteratorState) and _is_empty(container._items),  # noqa: SLF001
-        ignored=ignored,
+        watched=any(
+            getattr(container, name)
+            for name in ("_start_cbs", "_transition_cbs", "_termination_cbs")
+        ),
+        prepared=get_options(container).on_enter is not None,
+        made=frozenset(get_options(container).made_outcomes()),
+        empty=isinstance(items, (list, tuple, range, dict, set, str)) and not items,
+        ignored=suppression.of_state(container, None),
     )
 
 
-def _is_empty(items: Any) -> bool:
-    return isinstance(items, (list, tuple, range, dict, set, str)) and not items
-
-
-def _of_leaf(state: State, record: StateRecord, ignored: dict[str, str]) -> Facts:
-    code = _code_of(state)
+def _of_leaf(state: State, record: StateRecord) -> Facts:
+    callback = _function(state) if type(state).execute is CBState.execute else None
+    code = None
+    if callback is not None:
+        code = source.look_at(callback, userdata=0, owner=None)
+    elif _is_foreign(type(state).execute) and "execute" not in vars(state):
+        code = source.look_at(type(state).execute, userdata=1, owner=type(state))
+    options = get_options(state)
     waits = tuple(_endless_waits(record, code.place if code else None))
+    facts = Facts(
+        made=frozenset(options.made_outcomes()),
+        prepared=options.on_enter is not None,
+        waits=waits,
+        ignored=suppression.of_state(state, callback),
+    )
     if code is None:
-        return Facts(waits=waits, made=_made(state), reads=_used(state), ignored=ignored)
-    is_own = not _is_ours(state)
-    returns, undeclared = _outcomes(record, code)
-    return Facts(
-        place=code.place if is_own or isinstance(state, CBState) else None,
-        returns=returns,
-        made=_made(state),
-        undeclared=undeclared,
+        return replace(facts, reads=None if _is_foreign(type(state)) else _sent_keys(state))
+    # An outcome that the constructor names is declared in some cases, and returned in these.
+    known = {*record.outcomes, *source.texts_in_constructors(type(state)), "preempted"}
+    returns = code.returns or {}
+    return replace(
+        facts,
+        place=code.place if _is_foreign(type(state)) or isinstance(state, CBState) else None,
+        returns=None if code.returns is None else frozenset(code.returns),
+        undeclared=tuple((o, place) for o, place in returns.items() if o not in known),
         reads=code.reads,
+        reaches=code.reaches,
         waits=waits or code.waits,
         loops=code.loops if type(state).request_preempt is State.request_preempt else (),
         is_function=isinstance(state, CBState),
-        ignored=ignored,
     )
 
 
-def _is_ours(state: State) -> bool:
-    return type(state).__module__.partition(".")[0] == "smachpy"
-
-
-def _code_of(state: State) -> leaves.Code | None:
-    """Return what is known of the user's code in a leaf."""
-    callback = _callback_of(state)
-    if callback is not None:
-        return leaves.look_at(callback, userdata=0, owner=None)
-    execute = type(state).execute
-    if execute.__module__.partition(".")[0] == "smachpy" or "execute" in vars(state):
-        return None
-    return leaves.look_at(execute, userdata=1, owner=type(state))
-
-
-def _callback_of(state: State) -> Callable[..., Any] | None:
-    """Return the function that a callback state calls, if it is a plain one."""
-    if isinstance(state, CBState) and type(state).execute is CBState.execute:
-        return _function(state._cb)  # noqa: SLF001  one house
-    return None
-
-
 def _function(given: Any) -> Callable[..., Any] | None:
-    callback = given._cb if isinstance(given, CBInterface) else given  # noqa: SLF001  one house
+    """Return the plain function that a callback or the state of one calls, if it is one."""
+    callback = given._cb if isinstance(given, CBState | CBInterface) else given  # noqa: SLF001
+    callback = callback._cb if isinstance(callback, CBInterface) else callback  # noqa: SLF001
     return callback if inspect.isfunction(callback) else None
 
 
-def _used(state: State) -> frozenset[str] | None:
-    """Return the keys that a state of this package certainly reads; None for other states."""
-    if not _is_ours(state):
-        return None
+def _sent_keys(state: State) -> Reads:
+    """Return the keys that a state of this package reads for what it sends or tests."""
     keys: set[str] = set()
+    sometimes: set[str] = set()
     callbacks = [getattr(state, "_cond_cb", None)]
     for sent in (getattr(state, "_goal", None), getattr(state, "_request", None)):
         if isinstance(sent, Outgoing):
             keys |= {*sent.slots} if sent.key is None else {sent.key, *sent.slots}
             callbacks.append(sent.callback.function)
     for callback in map(_function, callbacks):
-        code = None if callback is None else leaves.look_at(callback, userdata=0, owner=None)
-        keys |= set((code.reads if code else None) or ())
-    return frozenset(keys)
-
-
-def _outcomes(
-    record: StateRecord, code: leaves.Code
-) -> tuple[frozenset[str] | None, tuple[tuple[str, Place], ...]]:
-    """Return what the leaf can end with, and what it returns without having declared it."""
-    if code.returns is None:
-        return None, ()
-    undeclared = tuple(
-        (outcome, place)
-        for outcome, place in code.returns.items()
-        if outcome not in record.outcomes and outcome != "preempted"  # the answer to a preempt
-    )
-    return frozenset(code.returns), undeclared
-
-
-def _made(state: State) -> frozenset[str]:
-    """Return the outcomes that the options of a state give it."""
-    made = set((state.on_exception or {}).values())
-    if state.timeout is not None:
-        made.add(state.timeout_outcome)
-    return frozenset(made)
+        code = None if callback is None else source.look_at(callback, userdata=0, owner=None)
+        if code is not None and code.reads is not None:
+            keys |= code.reads.always
+            sometimes |= code.reads.sometimes
+    return Reads(frozenset(keys), frozenset(sometimes - keys))
 
 
 def _endless_waits(record: StateRecord, place: Place | None) -> Iterator[tuple[str, Place]]:
@@ -165,6 +182,5 @@ def _endless_waits(record: StateRecord, place: Place | None) -> Iterator[tuple[s
     details = dict(record.details)
     if limit is None or limit[0] in details or "timeout" in details:
         return
-    if record.kind == "condition" and "checks" in details:
-        return
-    yield limit[1], place or Place("", 0)
+    if not (record.kind == "condition" and "checks" in details):
+        yield limit[1], place or Place("", 0)

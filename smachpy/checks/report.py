@@ -7,13 +7,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from smachpy.checks._core.rules import RULES
+from smachpy.checks.model import RULES
 from smachpy.pictures import draw_moments
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
-    from smachpy.checks._core.model import Problem
+    from smachpy.checks.model import Problem
     from smachpy.introspection import StateRecord
 
 _LEVELS = {"error": "error", "warning": "warning", "note": "notice"}
@@ -22,6 +22,8 @@ _LEVELS = {"error": "error", "warning": "warning", "note": "notice"}
 @dataclass(frozen=True, slots=True)
 class Report:
     """The result of a check.
+
+    It is true when `ok` is; iterating over it, and `len`, give its problems, notes too.
 
     Attributes:
         record: The machine.
@@ -43,8 +45,24 @@ class Report:
     def __bool__(self) -> bool:
         return self.ok
 
+    def __iter__(self) -> Iterator[Problem]:
+        return iter(self.problems)
+
+    def __len__(self) -> int:
+        return len(self.problems)
+
     def __str__(self) -> str:
         return as_text([self])
+
+    def assert_ok(self) -> None:
+        """Fail with all that was found unless it is `ok`.
+
+        Raises:
+            AssertionError: there are errors or warnings.
+        """
+        __tracebackhide__ = True
+        if not self.ok:
+            raise AssertionError(str(self))
 
     def draw(self, folder: Path | str) -> list[Path]:
         """Write a picture of the machine for each problem that has a run, with that run.
@@ -66,13 +84,10 @@ def as_text(reports: Iterable[Report]) -> str:
     lines: list[str] = []
     for report in reports:
         for problem in report.problems:
-            place = problem.place
-            where = (
-                f"{_relative(place.file)}:{place.line}: "
-                if place is not None and place.file
-                else ""
+            where = ":".join(map(str, _where(problem)))
+            lines.append(
+                f"{where and where + ': '}{problem.severity}: {problem.message} [{problem.rule}]"
             )
-            lines.append(f"{where}{problem.severity}: {problem.message} [{problem.rule}]")
             if problem.steps:
                 lines.append("    run: " + " ".join(problem.steps))
             if problem.hint:
@@ -107,15 +122,11 @@ def as_github(reports: Iterable[Report]) -> str:
     """Return reports as GitHub workflow commands."""
     lines = []
     for problem in (problem for report in reports for problem in report.problems):
-        fields = [f"title={problem.rule}"]
-        if problem.place is not None and problem.place.file:
-            fields = [
-                f"file={_relative(problem.place.file)}",
-                f"line={problem.place.line}",
-                *fields,
-            ]
+        names = ("file", "line")[: len(_where(problem))]
+        fields = [f"{name}={value}," for name, value in zip(names, _where(problem), strict=True)]
         text = " ".join([problem.message, problem.hint, *problem.steps]).strip()
-        lines.append(f"::{_LEVELS[problem.severity]} {','.join(fields)}::{_escaped(text)}")
+        text = text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+        lines.append(f"::{_LEVELS[problem.severity]} {''.join(fields)}title={problem.rule}::{text}")
     return "\n".join(lines)
 
 
@@ -124,20 +135,17 @@ def as_sarif(reports: Iterable[Report]) -> str:
 
     Source: OASIS, Static Analysis Results Interchange Format 2.1.0.
     """
-    results = [_result(problem) for report in reports for problem in report.problems]
     rules = [
         {"id": rule.name, "shortDescription": {"text": rule.summary}} for rule in RULES.values()
     ]
-    driver = {
-        "name": "smachpy",
-        "informationUri": "https://pypi.org/project/smachpy",
-        "rules": rules,
-    }
+    home = "https://pypi.org/project/smachpy"
+    tool = {"driver": {"name": "smachpy", "informationUri": home, "rules": rules}}
+    results = [_result(problem) for report in reports for problem in report.problems]
     return json.dumps(
         {
             "$schema": "https://json.schemastore.org/sarif-2.1.0.json",
             "version": "2.1.0",
-            "runs": [{"tool": {"driver": driver}, "results": results}],
+            "runs": [{"tool": tool, "results": results}],
         },
         indent=2,
     )
@@ -145,10 +153,11 @@ def as_sarif(reports: Iterable[Report]) -> str:
 
 def _result(problem: Problem) -> dict[str, Any]:
     location: dict[str, Any] = {"logicalLocations": [{"fullyQualifiedName": problem.path}]}
-    if problem.place is not None and problem.place.file:
+    where = _where(problem)
+    if where:
         location["physicalLocation"] = {
-            "artifactLocation": {"uri": _relative(problem.place.file)},
-            "region": {"startLine": max(1, problem.place.line)},
+            "artifactLocation": {"uri": where[0]},
+            "region": {"startLine": max(1, where[1])},
         }
     result: dict[str, Any] = {
         "ruleId": problem.rule,
@@ -164,20 +173,18 @@ def _result(problem: Problem) -> dict[str, Any]:
 
 def _plain(problem: Problem) -> dict[str, Any]:
     plain = {**asdict(problem), "steps": problem.steps}
-    if problem.place is not None and not problem.place.file:
-        plain["place"] = None
-    return plain
+    return plain if _where(problem) else {**plain, "place": None}
 
 
-def _relative(file: str) -> str:
-    try:
-        return Path(file).relative_to(Path.cwd()).as_posix()
-    except ValueError:
-        return Path(file).as_posix()
-
-
-def _escaped(text: str) -> str:
-    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+def _where(problem: Problem) -> tuple[()] | tuple[str, int]:
+    """Return the file, from this folder if it is below it, and the line; () if not known."""
+    place = problem.place
+    if place is None or not place.file:
+        return ()
+    file = Path(place.file)
+    if file.is_relative_to(Path.cwd()):
+        file = file.relative_to(Path.cwd())
+    return file.as_posix(), place.line
 
 
 FORMATS = {"text": as_text, "json": as_json, "github": as_github, "sarif": as_sarif}

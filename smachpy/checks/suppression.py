@@ -11,15 +11,15 @@ import tomllib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from smachpy.checks._core.rules import RULES
+from smachpy.checks.model import RULES
 from smachpy.exceptions import SmachError, did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
     from pathlib import Path
 
-    from smachpy.checks._core.model import Problem
-    from smachpy.state import State
+    from smachpy.checks.model import Problem
+    from smachpy.machines.state import State
 
 S = TypeVar("S", bound="State")
 
@@ -57,9 +57,7 @@ def ignore(state: S, rule: str, reason: str) -> S:
         IgnoreError: there is no such rule, or the reason is empty.
     """
     _check("ignore", rule, reason)
-    rules = dict(getattr(state, ATTRIBUTE, {}))
-    rules[rule] = reason
-    setattr(state, ATTRIBUTE, rules)
+    setattr(state, ATTRIBUTE, {**getattr(state, ATTRIBUTE, {}), rule: reason})
     return state
 
 
@@ -81,10 +79,9 @@ def _comments(code: Any) -> dict[str, str]:
     """Return rule -> reason from the comments of a class or function."""
     if code.__module__.partition(".")[0] == "smachpy":
         return {}
-    is_class = isinstance(code, type)
-    where = f"comment in {'class' if is_class else 'function'} {code.__name__}"
+    where = f"comment in {'class' if isinstance(code, type) else 'function'} {code.__name__}"
     found = {}
-    for match in map(_COMMENT.search, _lines(code) if is_class else _lines_of(code)):
+    for match in map(_COMMENT.search, _lines(code)):
         if match is not None:
             for rule in match[1].split(","):
                 _check(where, rule.strip(), match[2].strip())
@@ -92,25 +89,12 @@ def _comments(code: Any) -> dict[str, str]:
     return found
 
 
-def _lines(cls: type) -> list[str]:
-    """Return the lines of a class: those of its methods, and those above the first one."""
-    methods = [inspect.unwrap(m) for m in vars(cls).values() if inspect.isfunction(m)]
-    lines: list[str] = []
-    for method in methods:
-        lines += _lines_of(method)
-    if methods:
-        first = min(methods, key=lambda m: m.__code__.co_firstlineno)
-        above = linecache.getlines(first.__code__.co_filename)[: first.__code__.co_firstlineno - 1]
-        for line in reversed(above):
-            lines.append(line)
-            if re.match(rf"\s*class\s+{cls.__name__}\b", line):
-                break
-    return lines
-
-
-def _lines_of(function: Callable[..., Any]) -> list[str]:
+def _lines(code: Any) -> list[str]:
+    """Return the lines of a class or function in a file with such comments; else none."""
     try:
-        return inspect.getsourcelines(function)[0]
+        # To find a class all of its file is parsed, which takes longer than the rest of a check.
+        file = linecache.getlines(inspect.getsourcefile(code) or "")
+        return inspect.getsourcelines(code)[0] if any(map(_COMMENT.search, file)) else []
     except (OSError, TypeError):
         return []  # typed at a prompt: there are no comments to be seen
 
@@ -121,10 +105,12 @@ class Settings:
 
     Attributes:
         ignores: From `ignore = [{rule = "no-timeout", path = "/PATROL/*", reason = "..."}]`.
+        enable: From `enable = ["no-timeout"]`.
         properties: From `properties = {PATROL = ["never(ABORT)"]}`: machine -> texts.
     """
 
     ignores: tuple[Ignore, ...] = ()
+    enable: tuple[str, ...] = ()
     properties: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
 
@@ -132,21 +118,26 @@ def read_settings(start: Path) -> Settings:
     """Return the settings of the nearest pyproject.toml at or above `start`.
 
     Raises:
-        IgnoreError: they make no sense; all problems at once.
+        IgnoreError: they make no sense.
     """
     for folder in (start, *start.resolve().parents):
         file = folder / "pyproject.toml"
         if file.is_file():
             table = tomllib.loads(file.read_text(encoding="utf-8"))
-            return _settings(file, table.get("tool", {}).get("smachpy", {}).get("check", {}))
+            where = f"{file}: [tool.smachpy.check]"
+            return _settings(where, table.get("tool", {}).get("smachpy", {}).get("check", {}))
     return Settings()
 
 
-def _settings(file: Path, table: dict[str, Any]) -> Settings:
-    where = f"{file}: [tool.smachpy.check]"
-    unknown = sorted(set(table) - {"ignore", "properties"})
+def _settings(where: str, table: dict[str, Any]) -> Settings:
+    unknown = sorted(set(table) - {"ignore", "enable", "properties"})
     if unknown:
-        raise IgnoreError(f"{where}: got {unknown}; expected 'ignore' and 'properties'.")
+        raise IgnoreError(f"{where}: got {unknown}; expected 'ignore', 'enable' and 'properties'.")
+    enable = table.get("enable", [])
+    if not isinstance(enable, list):
+        raise IgnoreError(f"{where}: enable: got {enable!r}; expected a list of rules.")
+    for rule in enable:
+        check_rule(f"{where}: enable", rule)
     ignores = []
     for i, entry in enumerate(table.get("ignore", [])):
         if not isinstance(entry, dict) or set(entry) - {"rule", "path", "reason"}:
@@ -156,29 +147,32 @@ def _settings(file: Path, table: dict[str, Any]) -> Settings:
             )
         _check(f"{where}: ignore[{i}]", str(entry.get("rule", "")), str(entry.get("reason", "")))
         ignores.append(Ignore(entry["rule"], entry["reason"], entry.get("path", "*")))
-    return Settings(tuple(ignores), tuple(_properties(where, table.get("properties", {}))))
-
-
-def _properties(where: str, given: Any) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield the properties of each machine."""
+    given = table.get("properties", {})
+    where = f"{where}: properties"
     if not isinstance(given, dict):
-        raise IgnoreError(
-            f"{where}: properties: got {given!r}; expected a table of machines' names."
-        )
+        raise IgnoreError(f"{where}: got {given!r}; expected a table of machines' names.")
     for name, texts in given.items():
         if not isinstance(texts, list) or not all(isinstance(text, str) for text in texts):
             hint = f" Try [{texts!r}]." if isinstance(texts, str) else ""
-            raise IgnoreError(
-                f"{where}: properties: {name}: got {texts!r}; expected a list of texts.{hint}"
-            )
-        yield name, tuple(texts)
+            raise IgnoreError(f"{where}: {name}: got {texts!r}; expected a list of texts.{hint}")
+    properties = tuple((name, tuple(texts)) for name, texts in given.items())
+    return Settings(tuple(ignores), tuple(enable), properties)
+
+
+def check_rule(where: str, rule: object) -> None:
+    """Check that there is a rule.
+
+    Raises:
+        IgnoreError: there is none of this name.
+    """
+    if not isinstance(rule, str) or rule not in RULES:
+        raise IgnoreError(
+            f"{where}: rule: got {rule!r}; expected one of {sorted(RULES)}."
+            f"{did_you_mean(str(rule), RULES)}"
+        )
 
 
 def _check(where: str, rule: str, reason: str) -> None:
-    if rule not in RULES:
-        raise IgnoreError(
-            f"{where}: rule: got {rule!r}; expected one of {sorted(RULES)}."
-            f"{did_you_mean(rule, RULES)}"
-        )
+    check_rule(where, rule)
     if not reason.strip():
         raise IgnoreError(f"{where}: rule {rule!r}: got no reason; expected why it is off.")

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from smachpy.testing.cases import MissionTestCase as MissionTestCase
     from smachpy.testing.doubles import Double as Double
     from smachpy.testing.doubles import DoubleError as DoubleError
-    from smachpy.testing.exploration import Exploration as Exploration
-    from smachpy.testing.exploration import explore as explore
-    from smachpy.testing.exploration import replay as replay
+    from smachpy.testing.exploring.exploration import Exploration as Exploration
+    from smachpy.testing.exploring.exploration import explore as explore
+    from smachpy.testing.exploring.exploration import replay as replay
     from smachpy.testing.kit import MissionKit as MissionKit
     from smachpy.testing.kit import TimeLimitError as TimeLimitError
     from smachpy.testing.kit import UnfiredWarning as UnfiredWarning
@@ -45,16 +45,16 @@ __all__ = [
 _HOMES = {
     "Double": "doubles",
     "DoubleError": "doubles",
-    "Exploration": "exploration",
+    "Exploration": "exploring.exploration",
     "MissionKit": "kit",
     "MissionTestCase": "cases",
     "Run": "runs",
     "TimeLimitError": "kit",
     "UnfiredWarning": "kit",
     "UnknownStateError": "runs",
-    "explore": "exploration",
+    "explore": "exploring.exploration",
     "mission_kit": "kit",
-    "replay": "exploration",
+    "replay": "exploring.exploration",
 }
 
 

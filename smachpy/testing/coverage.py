@@ -40,7 +40,7 @@ class Measured:
 
     def items(self, kind: str) -> list[str]:
         """Return everything of a kind that could be run."""
-        return _ITEMS[kind](self.record)
+        return _items(self.record, kind)
 
     def missed(self, kind: str) -> list[str]:
         """Return what was not run."""
@@ -124,16 +124,13 @@ class Coverage:
             return "no mission ran"
         rows: list[tuple[str, ...]] = [("machine", "runs", *KINDS, "all")]
         for machine in self.machines:
-            cells = ["{}/{}".format(*machine.counts(kind)) for kind in KINDS]
-            rows.append((machine.name, str(machine.runs), *cells, f"{machine.percent:.0f} %"))
-        widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-        lines = [
-            "  ".join(
-                cell.ljust(width) if i == 0 else cell.rjust(width)
-                for i, (cell, width) in enumerate(zip(row, widths, strict=True))
-            )
-            for row in rows
-        ]
+            counts = ["{}/{}".format(*machine.counts(kind)) for kind in KINDS]
+            rows.append((machine.name, str(machine.runs), *counts, f"{machine.percent:.0f} %"))
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines = []
+        for name, *cells in rows:
+            padded = map(str.rjust, cells, widths[1:])
+            lines.append("  ".join([name.ljust(widths[0]), *padded]))
         missed = [
             f"{machine.name}: {kind} not run: {_list(machine.missed(kind))}"
             for machine in self.machines
@@ -152,8 +149,7 @@ class Coverage:
                     "percent": round(machine.percent, 2),
                     **{
                         kind: {
-                            "run": machine.counts(kind)[0],
-                            "total": machine.counts(kind)[1],
+                            **dict(zip(("run", "total"), machine.counts(kind), strict=True)),
                             "missed": machine.missed(kind),
                             "times": machine.taken[kind],
                         }
@@ -195,44 +191,20 @@ def _list(items: Iterable[str]) -> str:
     return ", ".join(shown[:most]) + more
 
 
-def _states(record: StateRecord) -> list[str]:
-    return [state.path for state in record.walk()]
-
-
-def _outcomes(record: StateRecord) -> list[str]:
-    return [f"{state.path} -{outcome}->" for state in record.walk() for outcome in state.outcomes]
-
-
-def _edges(record: StateRecord) -> list[str]:
-    return [
-        f"{state.path}/{edge.source} -{edge.outcome}->"
-        for state in record.walk()
-        for edge in state.transitions
-    ]
-
-
-def _preempts(record: StateRecord) -> list[str]:
-    """Leaves that take time: those that can end 'preempted'."""
-    return [
-        state.path
-        for state in record.walk()
-        if not state.is_container and "preempted" in state.outcomes
-    ]
-
-
-def _timeouts(record: StateRecord) -> list[str]:
+def _items(record: StateRecord, kind: str) -> list[str]:
+    """Return everything of a kind that could be run."""
+    states = list(record.walk())
     own = own_timeouts(record)
-    return [
-        state.path
-        for state in record.walk()
-        if "timeout" in dict(state.details) or state.path in own
-    ]
-
-
-_ITEMS = {
-    "states": _states,
-    "outcomes": _outcomes,
-    "edges": _edges,
-    "preempts": _preempts,
-    "timeouts": _timeouts,
-}
+    if kind == "states":
+        return [state.path for state in states]
+    if kind == "outcomes":
+        return [f"{state.path} -{outcome}->" for state in states for outcome in state.outcomes]
+    if kind == "edges":
+        return [
+            f"{state.path}/{edge.source} -{edge.outcome}->"
+            for state in states
+            for edge in state.transitions
+        ]
+    if kind == "preempts":  # leaves that take time: those that can end 'preempted'
+        return [s.path for s in states if not s.is_container and "preempted" in s.outcomes]
+    return [s.path for s in states if "timeout" in dict(s.details) or s.path in own]

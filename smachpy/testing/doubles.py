@@ -1,15 +1,15 @@
-"""Stand-ins for states, and putting them in their places."""
+"""Doubles of states, and putting them in their places."""
 
 from __future__ import annotations
 
 import inspect
 from collections import deque
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from smachpy.container import Container
 from smachpy.exceptions import SmachError
 from smachpy.introspection import describe
-from smachpy.state import State
+from smachpy.machines.container import Container
+from smachpy.machines.state import State, get_options
 from smachpy.testing.runs import find_path
 
 if TYPE_CHECKING:
@@ -21,9 +21,11 @@ if TYPE_CHECKING:
     # Name of a state, what makes its double, and the list that gets it.
     Replacement: TypeAlias = tuple[str, Callable[[Any], "Double"], list["Double"]]
 
+S = TypeVar("S", bound=State)
+
 
 class DoubleError(SmachError):
-    """A stand-in does not fit the state it stands for."""
+    """A double does not fit the state that it replaces."""
 
 
 class Double(State):
@@ -59,10 +61,7 @@ class Double(State):
         self._writes = dict(writes or {})
         self._work = execute
         self.runs = 0
-        for option in ("timeout", "timeout_outcome", "preempt_timeout", "retry"):
-            setattr(self, option, getattr(state, option))
-        for option in ("on_exception", "on_enter", "on_exit"):
-            setattr(self, option, getattr(state, option))
+        self._smachpy.options = get_options(state)
         self._check(known)
         if inspect.iscoroutinefunction(execute):
             self.execute = self._execute_async  # type: ignore[method-assign, assignment]
@@ -81,11 +80,11 @@ class Double(State):
             raise DoubleError(
                 f"double of {name}: outcomes: got {unknown}; expected some of {list(known)}."
             )
-        keys = sorted(set(self._writes) - set(self._output_keys))
+        keys = sorted(set(self._writes) - set(self.get_registered_output_keys()))
         if keys:
             raise DoubleError(
                 f"double of {name}: writes: got {keys}; expected some of its output keys "
-                f"{list(self._output_keys)}."
+                f"{list(self.get_registered_output_keys())}."
             )
         if self._work is None and not self._script:
             raise DoubleError(f"double of {name}: outcomes: got none; expected at least one.")
@@ -103,7 +102,11 @@ class Double(State):
                 f"double of {type(self._stands_for).__name__}: execute: got {outcome!r} from "
                 f"{self._work!r}; expected an outcome. Try a function made with `async def`."
             )
-        if self._duration > 0 and self.sleep(self._duration) and "preempted" in self._outcomes:
+        if (
+            self._duration > 0
+            and self.sleep(self._duration)
+            and "preempted" in self.get_registered_outcomes()
+        ):
             self.service_preempt()
             return "preempted"
         for key, value in self._writes.items():
@@ -130,7 +133,7 @@ class Places:
     def __init__(self) -> None:
         self._before: list[tuple[Container, str, State]] = []
 
-    def put(self, root: Container, path: str, make: Callable[[State], State]) -> State:
+    def put(self, root: Container, path: str, make: Callable[[Any], S]) -> S:
         """Put what `make` gives for the state at `path` in its place.
 
         Raises:
@@ -148,33 +151,29 @@ class Places:
             container = inner
         return self.exchange(container, labels[-1], make)
 
-    def exchange(self, container: Container, label: str, make: Callable[[State], State]) -> State:
+    def exchange(self, container: Container, label: str, make: Callable[[Any], S]) -> S:
         """Put what `make` gives for a child in its place."""
         state = container[label]
         double = make(state)
         self._before.append((container, label, state))
-        _place(container, label, double)
+        container._smachpy_exchange(label, double)
         return double
 
     def describe_whole(self, root: Container) -> StateRecord | None:
-        """Return what `root` is when everything is back in its place; None: it is."""
+        """Return what `root` is without the doubles; None when there are none."""
         if not self._before:
             return None
         doubles = [(container, label, container[label]) for container, label, _ in self._before]
         try:
-            for place in reversed(self._before):
-                _place(*place)
+            for container, label, state in reversed(self._before):
+                container._smachpy_exchange(label, state)
             return describe(root)
         finally:
-            for place in doubles:
-                _place(*place)
+            for container, label, state in doubles:
+                container._smachpy_exchange(label, state)
 
     def restore(self) -> None:
         """Put the states back."""
         while self._before:
-            _place(*self._before.pop())
-
-
-def _place(container: Container, label: str, state: State) -> None:
-    container._states[label] = state  # noqa: SLF001  one house
-    container._plan = None  # noqa: SLF001  compiled from the states
+            container, label, state = self._before.pop()
+            container._smachpy_exchange(label, state)

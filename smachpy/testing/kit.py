@@ -1,4 +1,4 @@
-"""A mission under test: virtual time, a network in memory, stand-ins, preempts at will."""
+"""A mission under test: virtual time, a network in memory, doubles, preempts at any moment."""
 
 from __future__ import annotations
 
@@ -13,34 +13,38 @@ from actionlib_core.clock import Deadlock, TimeLimit, use_clock
 from actionlib_core.node import Node, use_node
 from actionlib_core.shutdown import Shutdown, use_shutdown
 from actionlib_core.transport.memory import MemoryNetwork
-from smachpy._runtime.asker import asking
+from actionlib_core.wire.presence import Kind
 from smachpy.exceptions import SmachError
 from smachpy.introspection import describe
+from smachpy.machines.container import Container
+from smachpy.run.origin import asking
 from smachpy.testing import session
 from smachpy.testing.doubles import Double, Places
-from smachpy.testing.ends import raise_errors
+from smachpy.testing.recorder import STEPS, TURN_STEPS, MissionClock, Recorder, Stuck, Trigger
 from smachpy.testing.runs import Run
-from smachpy.testing.watch import STEPS, TURN_STEPS, MissionClock, Stuck, Trigger, Watch
+from smachpy.testing.servers import (
+    ScriptedActionServer,
+    ScriptedEnd,
+    ScriptedService,
+    ScriptedTopic,
+    raise_errors,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping, Sequence
     from types import TracebackType
     from typing import Self
 
-    from smachpy.container import Container
-    from smachpy.introspection import StateRecord
-    from smachpy.testing.action_servers import ScriptedActionServer
+    from actionlib_core.wire.presence import Endpoint
     from smachpy.testing.doubles import Replacement
-    from smachpy.testing.ends import ScriptedEnd
-    from smachpy.testing.exploration import Exploration
-    from smachpy.testing.service_servers import ScriptedService
-    from smachpy.testing.topics import ScriptedTopic
+    from smachpy.testing.exploring.exploration import Exploration
 
 LIMIT_S = 6 * 3600.0
+SETTLE_S = 0.1  # after a run, for what is still on its way to a server
 
 
 class TimeLimitError(SmachError):
-    """A mission under test ran longer than the limit, or on and on while no time passed.
+    """A mission under test ran longer than the limit, or without end while no time passed.
 
     Args:
         run: The run up to there.
@@ -104,7 +108,7 @@ class MissionKit:
         self.clock = MissionClock(seed, rate=rate, choose=choose)
         self.network = MemoryNetwork(self.clock)
         self.transport = self.network.session()
-        self.node = Node("mission", transport=self.transport, clock=self.clock)
+        self.node = _MissionNode("mission", transport=self.transport, clock=self.clock)
         self.shutdown = Shutdown()
         self.draws = True
         self.call = "mission"
@@ -142,11 +146,16 @@ class MissionKit:
         else:
             _note(error, errors)
 
+    @property
+    def ends(self) -> tuple[ScriptedEnd, ...]:
+        """The scripted servers and topics of the test."""
+        return tuple(self._servers)
+
     # -- running -------------------------------------------------------------------------------
 
     def __call__(
         self,
-        machine: Container,
+        machine: Container = None,  # type: ignore[assignment]
         userdata: Mapping[str, Any] | None = None,
         *,
         limit: float = LIMIT_S,
@@ -162,7 +171,8 @@ class MissionKit:
                 threads.
 
         Raises:
-            Deadlock: everything waits and nothing can ever go on.
+            TypeError: it is no container.
+            Deadlock: everything waits for something that can never come.
             TimeLimitError: it did not end in time, or with so many steps.
             SmachError: a state raised, or the machine does not hold together; as `execute`.
             AssertionError: a scripted server got a goal that the script does not provide for, or a
@@ -173,21 +183,38 @@ class MissionKit:
             UnfiredWarning: a preempt or interrupt of the test never came.
         """
         __tracebackhide__ = True
+        check_machine(machine, "mission")
         for name, make, made in self._replacements:
-            made.append(self._places.put(machine, name, make))  # type: ignore[arg-type]
+            made.append(self._places.put(machine, name, make))
         self._replacements.clear()
         for key, value in (userdata or {}).items():
             machine.userdata[key] = value
         record, whole = describe(machine), self._places.describe_whole(machine)
         triggers, self._triggers = self._triggers, []
-        watch = Watch(self.clock, machine, record, triggers, steps)
+        recorder = Recorder(self.clock, machine, record, triggers, steps)
         self.clock.limit, self.clock.most_turns = self.clock.now() + limit, steps // TURN_STEPS
         try:
-            with self.clock.patched(), watch.installed():
+            with self.clock.patched(), recorder.installed():
                 outcome, error = self._execute(machine)
         finally:
             self.clock.limit = self.clock.most_turns = None
-        run = self._finish(machine, record, whole, watch, outcome)
+        duration = self.clock.now() - recorder.started
+        if self._servers and error is None:
+            self.clock.sleep(SETTLE_S)
+        run = Run(
+            record,
+            outcome,
+            tuple(recorder.events),
+            {key: machine.userdata[key] for key in machine.userdata.keys()},  # noqa: SIM118
+            duration,
+            self.seed,
+            self._folder,
+            recorder.unfired(),
+            whole,
+            tuple(goal_id for server in self._servers for goal_id in server.left),
+        )
+        if self.on_run is not None:
+            self.on_run(run)
         errors, causes = self._take_errors()
         if error is not None:
             _reraise(self, error, run, limit, steps, errors)
@@ -202,8 +229,9 @@ class MissionKit:
         errors = [f"{name}: {type(error).__name__}: {error}" for name, error in failures]
         causes = [error for _, error in failures]
         for server in self._servers:
-            errors += server.take_errors()
-            causes += server.take_causes()
+            more, raised = server.take_errors()
+            errors += more
+            causes += raised
         return errors, causes
 
     def _execute(self, machine: Container) -> tuple[str | None, BaseException | None]:
@@ -226,32 +254,7 @@ class MissionKit:
             return None, error
         return found[0]
 
-    def _finish(
-        self,
-        machine: Container,
-        record: StateRecord,
-        whole: StateRecord | None,
-        watch: Watch,
-        outcome: str | None,
-    ) -> Run:
-        data = {key: machine.userdata[key] for key in machine.userdata.keys()}  # noqa: SIM118
-        duration = self.clock.now() - watch.started
-        run = Run(
-            record,
-            outcome,
-            tuple(watch.events),
-            data,
-            duration,
-            self.seed,
-            self._folder,
-            watch.unfired(),
-            whole,
-        )
-        if self.on_run is not None:
-            self.on_run(run)
-        return run
-
-    # -- stand-ins -----------------------------------------------------------------------------
+    # -- doubles -------------------------------------------------------------------------------
 
     def replace(
         self,
@@ -302,17 +305,12 @@ class MissionKit:
             at: So long [s] after its start.
             on: While this state (path, or the end of one) runs: as soon as it waits.
             after: With `on`: so long [s] after the state began.
-            visit: With `on`: at its how many-th visit.
+            visit: With `on`: at which of its visits, from 1.
 
         Raises:
             ValueError: neither or both of `at` and `on`.
         """
-
-        def preempt(machine: Container) -> None:
-            with asking("test"):
-                machine.request_preempt()
-
-        self._add("preempt", preempt, at, on, after, visit)
+        self._add_trigger("preempt", at, on, after, visit)
 
     def interrupt(
         self,
@@ -326,94 +324,116 @@ class MissionKit:
 
         Arguments and errors as `preempt`; with neither `at` nor `on` it comes at once.
         """
+        self._add_trigger("interrupt", 0.0 if at is None and on is None else at, on, after, visit)
 
-        def interrupt(machine: Container) -> None:
-            self.shutdown.request("interrupted by the test")
-            with asking("test", "", "interrupt"):
-                machine.request_preempt()
-
-        self._add(
-            "interrupt", interrupt, 0.0 if at is None and on is None else at, on, after, visit
-        )
-
-    def _add(
-        self,
-        what: str,
-        act: Callable[[Container], object],
-        at: float | None,
-        on: str | None,
-        after: float,
-        visit: int,
+    def _add_trigger(
+        self, what: str, at: float | None, on: str | None, after: float, visit: int
     ) -> None:
         if (at is None) == (on is None):
             raise ValueError(f"{what}: got at={at!r} and on={on!r}; expected one of them.")
+
+        def act(machine: Container) -> None:
+            if what == "interrupt":
+                self.shutdown.request("interrupted by the test")
+            with asking("test", "", "interrupt" if what == "interrupt" else ""):
+                machine.request_preempt()
+
         self._triggers.append(Trigger(what, act, at, on, after, visit))
 
     # -- the world around ----------------------------------------------------------------------
 
     def action_server(self, name: str, action_class: Any) -> ScriptedActionServer:
         """Offer an action that does what the test says."""
-        from smachpy.testing.action_servers import ScriptedActionServer
-
-        server = ScriptedActionServer(self, name, action_class)
-        self._servers.append(server)
-        return server
+        return ScriptedActionServer(self, name, action_class)
 
     def service_server(self, name: str, service_class: Any) -> ScriptedService:
         """Offer a service that does what the test says."""
-        from smachpy.testing.service_servers import ScriptedService
-
-        server = ScriptedService(self, name, service_class)
-        self._servers.append(server)
-        return server
+        return ScriptedService(self, name, service_class)
 
     def topic(self, name: str, message_class: Any) -> ScriptedTopic:
         """Write to a topic, and keep what comes on it."""
-        from smachpy.testing.topics import ScriptedTopic
+        return ScriptedTopic(self, name, message_class)
 
-        end = ScriptedTopic(self, name, message_class)
+    def add_end(self, end: ScriptedEnd) -> None:
+        """Take a scripted server or topic into the test, whose end closes it."""
         self._servers.append(end)
-        return end
 
     # -- all runs ------------------------------------------------------------------------------
 
     def explore(self, machine: Any, **options: Any) -> Exploration:
         """Run a mission over everything that can happen; see `exploration.explore`.
 
-        States that `replace` names have its doubles in every run.
+        States that `replace` names have its doubles in every run, and what stays as it is meets
+        servers and topics with the scripts that those of the test have now.
 
         Raises:
-            ValueError: the test asked for a preempt, or has servers or topics of its own, which no
-                run would meet.
+            TypeError: it is neither a container nor a function.
+            ValueError: the test asked for a preempt: every run chooses its own.
         """
-        from smachpy.testing.exploration import explore
+        from smachpy.testing.exploring.exploration import explore
 
-        self._check_no_world("explore")
-        return explore(
-            machine,
-            folder=self._folder,
-            on_run=self.on_run,
-            doubles=tuple(self._replacements),
-            **options,
-        )
+        options = {"folder": self._folder, "on_run": self.on_run, **options}
+        return explore(machine, **self._own_options("explore"), **options)
 
     def replay(self, machine: Any, choices: Sequence[str], **options: Any) -> Run:
         """Repeat a run of `explore`; see `exploration.replay`. Errors: those of both."""
-        from smachpy.testing.exploration import replay
+        from smachpy.testing.exploring.exploration import replay
 
-        self._check_no_world("replay")
-        return replay(machine, choices, doubles=tuple(self._replacements), **options)
+        return replay(machine, choices, **self._own_options("replay"), **options)
 
-    def _check_no_world(self, what: str) -> None:
-        """Refuse what the test prepared for `mission(...)`, and what explored runs never meet."""
-        got = ["a preempt or interrupt"] * bool(self._triggers)
-        got += [f"a {type(end).__name__} {end.name!r}" for end in self._servers]
-        if got:
+    def _own_options(self, what: str) -> dict[str, Any]:
+        """Return what explored runs take over from the test: no preempts, each chooses its own."""
+        if self._triggers:
+            got = ", ".join(map(str, self._triggers))
             raise ValueError(
-                f"mission.{what}: got {', '.join(got)} of the test's own; expected none: each run "
-                "has a network of its own and chooses its preempts. Try real_actions=True, or "
-                "mission(...)."
+                f"mission.{what}: got {got} of the test; expected none: every run chooses its own "
+                f"preempts. Try mission.{what}(..., preempts=1) without it."
             )
+        return {"doubles": tuple(self._replacements), "servers": tuple(self._servers)}
+
+
+class _MissionNode(Node):
+    """The mission's node, which tells of the action clients that are made on it.
+
+    Attributes:
+        on_client: Called with the full name and the type of an action, before its client joins.
+    """
+
+    on_client: Callable[[str, str], object] | None = None
+
+    def endpoint(self, kind: Kind, name: str, type_name: str, md5: str) -> Endpoint:
+        if kind is Kind.ACTION_CLIENT and self.on_client is not None:
+            self.on_client(name, type_name)
+        return super().endpoint(kind, name, type_name, md5)
+
+
+def check_machine(given: object, call: str, *, functions: bool = False) -> None:
+    """Check that a test runs a machine.
+
+    Args:
+        given: What it runs.
+        call: The call's name.
+        functions: Whether a function that makes one is fine, too.
+
+    Raises:
+        TypeError: it is something else.
+    """
+    if isinstance(given, Container):
+        return
+    if given is None or isinstance(given, MissionKit):
+        raise TypeError(
+            f"{call}: got {'no machine' if given is None else 'the fixture `mission` itself'}; "
+            "expected a machine. In a test the argument `mission` is the fixture, also where the "
+            "file has imported a function of the same name. Try `from your_file import mission as "
+            f"make_mission` and {call}(make_mission())."
+        )
+    if not callable(given) or isinstance(given, type):
+        raise TypeError(f"{call}: machine: got {given!r}; expected a container.")
+    if not functions:
+        name = getattr(given, "__name__", repr(given))
+        raise TypeError(
+            f"{call}: machine: got the function {name}; expected a container. Try to call it."
+        )
 
 
 def _reraise(

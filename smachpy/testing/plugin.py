@@ -16,11 +16,9 @@ from smachpy.testing import session
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from smachpy.testing.action_servers import ScriptedActionServer
     from smachpy.testing.coverage import Coverage
     from smachpy.testing.kit import MissionKit
-    from smachpy.testing.service_servers import ScriptedService
-    from smachpy.testing.topics import ScriptedTopic
+    from smachpy.testing.servers import ScriptedActionServer, ScriptedService, ScriptedTopic
 
 WORKER_KEY = "smachpy_mission_coverage"
 

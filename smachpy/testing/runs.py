@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 Pattern: TypeAlias = str | EllipsisType
 
+MOST_LINES = 60  # of a run's explanation
+
 
 class UnknownStateError(SmachError):
     """A test names a state that the machine does not have."""
@@ -69,6 +71,7 @@ class Run:
         folder: Gives the folder for pictures.
         unfired: The preempts and interrupts of the test that never came, and why.
         whole: The machine as it is without the test's doubles; None: without any, as `record`.
+        served: Ids of the goals that the test's servers still work on, whoever sent them.
     """
 
     record: StateRecord
@@ -80,6 +83,7 @@ class Run:
     folder: Callable[[], Path] = field(default=Path.cwd, repr=False)
     unfired: tuple[str, ...] = ()
     whole: StateRecord | None = field(default=None, repr=False)
+    served: tuple[str, ...] = ()
 
     # -- what happened -------------------------------------------------------------------------
 
@@ -110,10 +114,11 @@ class Run:
 
     @property
     def goals_left(self) -> tuple[str, ...]:
-        """Ids of the goals that were sent and have not ended."""
+        """Ids of the goals that states sent and that have not ended, and of those in `served`."""
         sent = {event.goal_id: None for event in self.events if isinstance(event, GoalSent)}
         done = {event.goal_id for event in self.events if isinstance(event, GoalDone)}
-        return tuple(goal_id for goal_id in sent if goal_id not in done)
+        left = [goal_id for goal_id in sent if goal_id not in done]
+        return tuple(dict.fromkeys([*left, *self.served]))
 
     def visits(self, state: str) -> int:
         """Return how often a state was entered; `state` is a path or the end of one."""
@@ -171,7 +176,7 @@ class Run:
         Args:
             expected: Paths or ends of paths; `...` stands for any leaves, also none.
         """
-        names = [x if isinstance(x, EllipsisType) else self._leaf(x) for x in expected]
+        names = [x if isinstance(x, EllipsisType) else find_path(self.record, x) for x in expected]
         if not _matches(self.path, names):
             lines = ["...   " if isinstance(x, EllipsisType) else x for x in names]
             diff = list(difflib.ndiff(lines, self.path))
@@ -234,9 +239,6 @@ class Run:
             lines.append(f"  seed {self.seed}")
         return "\n".join(lines)
 
-    def _leaf(self, name: str) -> str:
-        return find_path(self.record, name)
-
     def _fail(self, text: str) -> None:
         __tracebackhide__ = True
         picture = self.draw()
@@ -252,22 +254,19 @@ def _summary(events: Iterable[Event]) -> list[str]:
         start = event.t if start is None else start
         if isinstance(event, Left):
             lines.append(f"{event.t - start:8.3f}  {event.path} -{event.outcome}->")
-        elif not isinstance(event, Entered) and type(event).__name__ in _WORTH_TELLING:
+        elif not isinstance(event, Entered) and type(event).__name__ in _SHOWN:
             fields = ", ".join(
                 f"{k}={v}" for k, v in list(event._asdict().items())[3:] if k != "stack"
             )
             lines.append(
                 f"{event.t - start:8.3f}  {event.path} {type(event).__name__} {fields}".rstrip()
             )
-    most = 60
-    return (
-        [*lines[:20], f"   ... {len(lines) - 40} more", *lines[-20:]]
-        if len(lines) > most
-        else lines
-    )
+    if len(lines) > MOST_LINES:
+        lines[20:-20] = [f"   ... {len(lines) - 40} more"]
+    return lines
 
 
-_WORTH_TELLING = frozenset(
+_SHOWN = frozenset(
     {"Failed", "PreemptRequested", "Preempted", "Abandoned", "TimedOut", "Retried", "GoalDone"}
 )
 

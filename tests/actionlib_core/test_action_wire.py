@@ -6,15 +6,16 @@ import hypothesis.strategies as st
 import pytest
 from hypothesis import given
 
-from actionlib_core import _action_wire as wire
+from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from actionlib_core.interfaces.std_msgs.msg import Header
 from actionlib_core.time import Time
+from actionlib_core.wire import action_messages as wire
 
 stamps = st.integers(0, (2**32 - 1) * 10**9)
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=12)
-entries = st.builds(wire.StatusEntry, texts, stamps, st.integers(0, 9), texts)
+entries = st.builds(StatusEntry, texts, stamps, st.integers(0, 9), texts)
 
 
 def header(stamp_ns):
@@ -84,7 +85,7 @@ def test_single_status(entry):
 
 def test_a_frame_id_of_a_foreign_server_is_skipped():
     message = msg.TestActionResult(
-        header=Header(frame_id="map", seq=7), status=status(wire.StatusEntry("g", 1, 3, "fine"))
+        header=Header(frame_id="map", seq=7), status=status(StatusEntry("g", 1, 3, "fine"))
     )
     payload = message.to_bytes()
     entry, start = wire.unpack_report(payload)

@@ -6,8 +6,8 @@ import threading
 
 import pytest
 
-from actionlib_core._bursts import PAUSE_S, RAPID, RAPID_S, Bursts
 from actionlib_core.clock import RealClock, VirtualClock, use_clock
+from actionlib_core.wire.bursts import PAUSE_S, RAPID, RAPID_S, Bursts
 
 
 class Desk:

@@ -79,3 +79,12 @@ def test_the_end_is_told_with_the_exit_code(child):
         assert process.wait_ready(20.0)
     assert codes == [None, 3]
     assert sys.executable in process._command
+
+
+def test_a_module_in_the_current_folder_takes_no_other_s_place(child, tmp_path, monkeypatch):
+    folder = tmp_path / "here"
+    folder.mkdir()
+    (folder / "a_child.py").write_text("raise SystemExit('the wrong one')")
+    monkeypatch.chdir(folder)
+    with child("a_child") as process:
+        assert process.wait_ready(20.0), process.said

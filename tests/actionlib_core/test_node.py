@@ -9,15 +9,15 @@ import threading
 
 import pytest
 
-from actionlib_core.action_client import ActionClient
+from actionlib_core.action.client import ActionClient
+from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.clock import RealClock, VirtualClock, use_clock
 from actionlib_core.exceptions import InvalidNameError, NameSetupError, NodeError, TransportError
 from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.names import parse_arguments
 from actionlib_core.node import CLOSE_S, Node, get_node, use_node
-from actionlib_core.presence import Kind, list_endpoints
-from actionlib_core.simple_action_server import SimpleActionServer
 from actionlib_core.transport.faulty import FaultyTransport
+from actionlib_core.wire.presence import Kind, list_endpoints
 
 
 def test_names_of_a_node(network, clock):
@@ -229,7 +229,7 @@ def test_configuration_of_the_environment_is_used(tmp_path):
 
 
 def test_importing_loads_no_network():
-    done = run("import sys, actionlib_core, actionlib_core.node, actionlib_core.topic\n"
+    done = run("import sys, actionlib_core, actionlib_core.node, actionlib_core.pubsub.topic\n"
                "print([m for m in ('zenoh', 'rosbags', 'numpy', 'ruamel') if m in sys.modules])")  # fmt: skip
     assert done.stdout == "[]\n", done.stderr
 

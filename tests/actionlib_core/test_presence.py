@@ -7,7 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from actionlib_core.node import Node
-from actionlib_core.presence import (
+from actionlib_core.transport._keys import check_key, key_matches
+from actionlib_core.transport.memory import MemoryNetwork
+from actionlib_core.wire.presence import (
     Endpoint,
     Kind,
     find_mismatch,
@@ -16,8 +18,6 @@ from actionlib_core.presence import (
     token_key,
     token_pattern,
 )
-from actionlib_core.transport._keys import check_key, key_matches
-from actionlib_core.transport.memory import MemoryNetwork
 
 ROBOT = Endpoint(
     Kind.ACTION_SERVER,

@@ -21,8 +21,8 @@ from actionlib_core.exceptions import (
 from actionlib_core.interfaces import define_service
 from actionlib_core.interfaces.std_srvs.srv import Empty, SetBool, SetBoolResponse, Trigger
 from actionlib_core.node import Node
-from actionlib_core.service import Service
-from actionlib_core.service_proxy import ServiceProxy, wait_for_service
+from actionlib_core.pubsub.service import Service
+from actionlib_core.pubsub.service_proxy import ServiceProxy, wait_for_service
 from actionlib_core.transport.faulty import FaultyTransport
 from actionlib_core.transport.memory import MemoryNetwork
 
@@ -292,7 +292,7 @@ def test_handler_may_call_its_own_service(nodes):
 
 @pytest.mark.parametrize("names", [["a"], ["a", "b"]])
 def test_handlers_that_call_each_other_for_ever_end_in_an_error(nodes, caplog, monkeypatch, names):
-    monkeypatch.setattr("actionlib_core.service.CALLS_AT_ONCE", 20)
+    monkeypatch.setattr("actionlib_core.pubsub.service.CALLS_AT_ONCE", 20)
     server, caller = nodes
     runs = []
     for name, other in zip(names, names[1:] + names[:1], strict=True):
@@ -314,7 +314,7 @@ def test_handlers_that_call_each_other_for_ever_end_in_an_error(nodes, caplog, m
 @pytest.fixture
 def busy(nodes, clock, monkeypatch):
     """The service `b` runs all the calls it takes, for 100 s."""
-    monkeypatch.setattr("actionlib_core.service.CALLS_AT_ONCE", 1)
+    monkeypatch.setattr("actionlib_core.pubsub.service.CALLS_AT_ONCE", 1)
     server, caller = nodes
 
     def handler(_):

@@ -6,8 +6,8 @@ import threading
 
 import pytest
 
-from actionlib_core._core.server_goals import ServerGoal, ServerGoals
-from actionlib_core._status_publisher import GAP_S, PERIOD_S, StatusPublisher
+from actionlib_core.action.server import GAP_S, PERIOD_S, StatusPublisher
+from actionlib_core.goal.server import ServerGoal, ServerGoals
 
 
 class LateClock:

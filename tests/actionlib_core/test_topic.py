@@ -19,7 +19,7 @@ from actionlib_core.exceptions import (
 from actionlib_core.interfaces.geometry_msgs.msg import Point
 from actionlib_core.interfaces.std_msgs.msg import Int32, String
 from actionlib_core.node import Node, use_node
-from actionlib_core.topic import Publisher, Subscriber, wait_for_message
+from actionlib_core.pubsub.topic import Publisher, Subscriber, wait_for_message
 from actionlib_core.transport.memory import MemoryNetwork
 
 NODES = ("talker", "listener")

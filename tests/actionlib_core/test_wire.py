@@ -6,7 +6,7 @@ import pytest
 
 from actionlib_core.exceptions import TypeMismatchError
 from actionlib_core.interfaces.std_msgs.msg import Int32, String
-from actionlib_core.wire import check_encoding, encoding_of, parse_encoding
+from actionlib_core.wire.encoding import check_encoding, encoding_of, parse_encoding
 
 STRING = "ros1/std_msgs/String;md5=992ce8a1687cec8c8bd883ec73ca41d1"
 

@@ -10,19 +10,19 @@ import hypothesis.strategies as st
 import pytest
 from hypothesis import given, settings
 
-from actionlib_core._action_wire import pack_statuses
-from actionlib_core._core.client_goal import TEXT_NEVER_TAKEN
-from actionlib_core.action_client import ActionClient, CommState
-from actionlib_core.action_server import ActionServer
+from actionlib_core.action.client import ActionClient, CommState
+from actionlib_core.action.server import ActionServer
+from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.clock import VirtualClock, use_clock
+from actionlib_core.goal.client import TEXT_NEVER_TAKEN
 from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatusArray
 from actionlib_core.node import Node
-from actionlib_core.simple_action_server import SimpleActionServer
 from actionlib_core.time import Time
 from actionlib_core.transport.faulty import FaultyTransport, RandomFaults, ScriptedFaults
 from actionlib_core.transport.memory import MemoryNetwork
-from actionlib_core.wire import encoding_of
+from actionlib_core.wire.action_messages import pack_statuses
+from actionlib_core.wire.encoding import encoding_of
 
 ENDS = {"PREEMPTED", "SUCCEEDED", "ABORTED", "REJECTED", "RECALLED"}
 
@@ -80,7 +80,7 @@ class Bad:
             return
         result = msg.TestResult(len(self.fates) + 1)
         how(result, f"end {result.result}")
-        self.fates[goal_id] = (handle.status_tracker.record.status.name, result)
+        self.fates[goal_id] = (handle.record.status.name, result)
 
     def check(self, handles):
         """Both ends agree on every goal, and none has run twice."""
@@ -286,7 +286,7 @@ def test_result_is_dropped_at_the_server_once_acknowledged():
         assert only(pair)[0] == "SUCCEEDED"
         pair.clock.sleep(0.2)
         assert pair.server.status_list == []
-        assert len(pair.server._goals) == 0
+        assert len(pair.server.keeper.goals) == 0
 
 
 def test_result_comes_within_the_result_timeout_after_a_long_cut():

@@ -10,6 +10,7 @@ import time
 
 import pytest
 
+from actionlib_core.config import Config
 from actionlib_core.interfaces.actionlib.msg import TestAction as Action
 from actionlib_core.interfaces.actionlib.msg import TestGoal as Goal
 from actionlib_core.node import Node
@@ -54,7 +55,7 @@ def test_kill_9_ends_the_goal_at_once_and_a_new_server_is_used():
             assert machine.execute() == "aborted"
             took_s = time.monotonic() - killed_at[-1]
             process.wait(10.0)
-            assert took_s < 1.0, took_s
+            assert took_s < Config().lease / 2  # by its token, not by the silence of its link
             print(f"aborted {took_s * 1000:.1f} ms after kill -9")
     finally:
         process.kill()

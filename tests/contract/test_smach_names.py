@@ -197,7 +197,7 @@ def test_the_error_tree():
 
 def test_the_decorator_and_the_module_of_the_same_name():
     import smachpy.state
-    from smachpy.state import State
+    from smachpy.machines.state import State
 
     assert smachpy.state.State is State is smach.State
     assert callable(smachpy.state)

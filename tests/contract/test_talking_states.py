@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from actionlib_core.action_server import ActionServer
+from actionlib_core.action.server import ActionServer
+from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.interfaces.actionlib.msg import TestAction as Action
 from actionlib_core.interfaces.actionlib.msg import TestFeedback as Feedback
 from actionlib_core.interfaces.actionlib.msg import TestGoal as Goal
 from actionlib_core.interfaces.actionlib.msg import TestResult as Result
 from actionlib_core.interfaces.std_msgs.msg import Int32
 from actionlib_core.interfaces.std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
-from actionlib_core.service import Service
-from actionlib_core.simple_action_server import SimpleActionServer
-from actionlib_core.topic import Publisher
+from actionlib_core.pubsub.service import Service
+from actionlib_core.pubsub.topic import Publisher
 from smachpy import (
     ActionServerWrapper,
     CBState,

@@ -16,7 +16,7 @@ from actionlib_core import (
     Reject,
     server,
 )
-from actionlib_core.goal_server import GoalContext
+from actionlib_core.action.decorated import GoalContext
 from actionlib_core.interfaces.actionlib import msg
 
 LONG_S = 20.0

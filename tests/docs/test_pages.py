@@ -6,12 +6,16 @@ their output must hold the lines shown (`...` stands for anything). An HTML comm
 - `<!-- file: NAME -->`  the block is written to that file in the page's working directory
 - `<!-- exit: N -->`     the last command of the block ends with this code
 - `<!-- shown: WHY -->`  the block is only shown (it needs something a test cannot have)
+
+The ports 174xx of a page are others in each run: what listens there may not meet another run's.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
+import signal
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -20,6 +24,7 @@ from pathlib import Path
 import pytest
 
 from actionlib_core import node
+from tests.free_port import free_port
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -58,6 +63,8 @@ class Block:
 
 def blocks_of(page: Path) -> list[Block]:
     text = page.read_text(encoding="utf-8")
+    for port in set(re.findall(r"127\.0\.0\.1:(174\d\d)\b", text)):
+        text = text.replace(f"127.0.0.1:{port}", f"127.0.0.1:{free_port()}")
     return [
         Block(
             match["language"],
@@ -75,7 +82,7 @@ def run_python(page: Path, block: Block, namespace: dict) -> None:
     exec(code, namespace)
 
 
-def run_console(page: Path, block: Block, directory: Path) -> None:
+def run_console(page: Path, block: Block, directory: Path, groups: list[int]) -> None:
     parts = re.split(r"^\$ ", block.text, flags=re.MULTILINE)[1:]
     environment = {
         **os.environ,
@@ -84,20 +91,22 @@ def run_console(page: Path, block: Block, directory: Path) -> None:
     }
     for number, part in enumerate(parts, 1):
         command, _, shown = part.partition("\n")
-        done = subprocess.run(
+        shell = subprocess.Popen(
             command,
             shell=True,
             cwd=directory,
             env=environment,
-            capture_output=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
             text=True,
-            timeout=COMMAND_S,
             stdin=subprocess.DEVNULL,
+            start_new_session=True,
         )
+        groups.append(shell.pid)
+        output = "".join(shell.communicate(timeout=COMMAND_S))
         wanted = int(block.value) if block.directive == "exit" and number == len(parts) else 0
         where = f"{page.name}:{block.line}: $ {command}"
-        output = done.stdout + done.stderr
-        assert done.returncode == wanted, f"{where}\nexit code {done.returncode}\n{output}"
+        assert shell.returncode == wanted, f"{where}\nexit code {shell.returncode}\n{output}"
         check_output(where, shown, output)
 
 
@@ -124,11 +133,21 @@ def fresh_program(monkeypatch):
         default._node.close()
 
 
+@pytest.fixture
+def groups():
+    """The process groups of a page's commands; what still runs in them when it failed is ended."""
+    started = []
+    yield started
+    for group in started:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(group, signal.SIGKILL)
+
+
 @pytest.mark.zenoh
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize("page", MARKED, ids=lambda page: str(page.relative_to(ROOT)))
 @pytest.mark.usefixtures("fresh_program")
-def test_page(page, tmp_path, monkeypatch):
+def test_page(page, tmp_path, monkeypatch, groups):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
     namespace = {"__name__": "page"}
@@ -142,7 +161,7 @@ def test_page(page, tmp_path, monkeypatch):
         elif block.language == "python":
             run_python(page, block, namespace)
         elif block.language == "console":
-            run_console(page, block, tmp_path)
+            run_console(page, block, tmp_path, groups)
 
 
 def test_every_link_between_pages_leads_somewhere():

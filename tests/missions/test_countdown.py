@@ -2,15 +2,15 @@ from __future__ import annotations
 
 import pytest
 
+from actionlib_core.action.simple_client import SimpleActionClient
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.node import Node, use_node
-from actionlib_core.presence import Kind, list_endpoints
-from actionlib_core.simple_action_client import SimpleActionClient
 from actionlib_core.transport.memory import MemoryNetwork
-from missions.countdown import CountdownServer, countdown, main
-from missions.exceptions import MissionError
+from actionlib_core.wire.presence import Kind, list_endpoints
+from missions.course.countdown import CountdownServer, countdown, main
 from missions.interfaces import CountdownAction, CountdownGoal
 from smachpy import events as ev
+from smachpy.sim.exceptions import MissionError
 
 
 @pytest.fixture

@@ -10,14 +10,14 @@ from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.std_msgs.msg import Bool, String
 from actionlib_core.interfaces.std_srvs.srv import SetBool
 from actionlib_core.node import Node, use_node
-from actionlib_core.topic import Publisher, Subscriber
+from actionlib_core.pubsub.topic import Publisher, Subscriber
 from actionlib_core.transport.memory import MemoryNetwork
-from missions.delivery import delivery
-from missions.exceptions import InputFileError, MissionError
-from missions.maps import OFFICE_DOORS, OFFICE_MAP, OFFICE_ROBOT
-from missions.move_base.simulation import simulation
+from missions.delivery.delivery import delivery
 from smachpy import events as ev
 from smachpy.checks import check
+from smachpy.sim.exceptions import InputFileError, MissionError
+from smachpy.sim.maps import OFFICE_DOORS, OFFICE_MAP, OFFICE_ROBOT
+from smachpy.sim.simulation import simulation
 
 LAB, WAIT, HOME = (17.9, 5.4), (18.0, 7.7), (9.8, 7.1)
 
@@ -263,7 +263,7 @@ def test_every_problem_of_the_places_is_named(tmp_path):
 
 def test_a_check_finds_no_problems(machine):
     report = check(machine, name="DELIVERY")
-    assert report.ok, report
+    report.assert_ok()
 
 
 def hands_over_only_after_a_yes(run):
@@ -291,14 +291,14 @@ def test_whatever_happens_it_comes_home_or_says_so(mission, machine):
         max_runs=300,
         max_time=40,
     )
-    assert found.ok, found
+    found.assert_ok()
 
 
 def test_whatever_servers_do_it_ends(mission, machine):
     found = mission.explore(
         machine, real_actions=True, interleavings=False, max_runs=60, max_time=40
     )
-    assert found.ok, found
+    found.assert_ok()
 
 
 # -- in the simulated office -----------------------------------------------------------------------

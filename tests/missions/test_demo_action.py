@@ -2,19 +2,19 @@ from __future__ import annotations
 
 import pytest
 
-from actionlib_core.action_client import ActionClient, CommState
+from actionlib_core.action.client import ActionClient, CommState
+from actionlib_core.action.simple_client import SimpleActionClient
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.node import Node, use_node
-from actionlib_core.presence import Kind, list_endpoints
-from actionlib_core.simple_action_client import SimpleActionClient
 from actionlib_core.transport.memory import MemoryNetwork
-from missions.demo_action import NAME, SEVERAL, DemoActionServer, SeveralServer, demo_action
-from missions.demo_action import client as client_machine
-from missions.demo_action import server as server_machine
-from missions.exceptions import MissionError
+from actionlib_core.wire.presence import Kind, list_endpoints
+from missions.course.demo_action import NAME, SEVERAL, DemoActionServer, SeveralServer, demo_action
+from missions.course.demo_action import client as client_machine
+from missions.course.demo_action import server as server_machine
 from missions.interfaces import Demo_actionAction, Demo_actionGoal
 from smachpy import events as ev
 from smachpy.checks import check
+from smachpy.sim.exceptions import MissionError
 
 
 @pytest.fixture
@@ -202,7 +202,7 @@ def test_a_count_that_takes_too_long_is_called_off(mission, action_server):
 
 def test_whatever_happens_it_ends(mission):
     found = mission.explore(demo_action, max_time=40)
-    assert found.ok, found
+    found.assert_ok()
 
 
 def test_the_server_program_serves_until_it_is_preempted(clock, node):
@@ -233,4 +233,4 @@ def test_bad_arguments_are_refused_before_anything_moves(arguments, text):
 @pytest.mark.parametrize("machine", [demo_action, client_machine, server_machine])
 def test_a_check_finds_nothing(machine):
     report = check(machine())
-    assert report.ok, report
+    report.assert_ok()

@@ -5,15 +5,15 @@ import itertools
 import pytest
 
 from actionlib_core.node import Node, use_node
-from actionlib_core.presence import list_endpoints
-from actionlib_core.service_proxy import ServiceProxy
+from actionlib_core.pubsub.service_proxy import ServiceProxy
 from actionlib_core.transport.memory import MemoryNetwork
-from missions.demo_service import NAME, TOPIC, client, demo_service, server
-from missions.exceptions import MissionError
+from actionlib_core.wire.presence import list_endpoints
+from missions.course.demo_service import NAME, TOPIC, client, demo_service, server
 from missions.interfaces import DemoMsg
 from missions.interfaces.srv import DemoSrv
 from smachpy import events as ev
 from smachpy.checks import check
+from smachpy.sim.exceptions import MissionError
 
 
 @pytest.fixture
@@ -115,7 +115,7 @@ def test_silence_ends_it(mission):
 
 def test_whatever_happens_it_ends(mission):
     found = mission.explore(lambda: demo_service(calls=2), max_time=40, max_runs=400)
-    assert found.ok, found
+    found.assert_ok()
 
 
 @pytest.mark.parametrize(
@@ -134,4 +134,4 @@ def test_bad_arguments_are_refused(arguments, text):
 @pytest.mark.parametrize("machine", [demo_service, client, server])
 def test_a_check_finds_nothing(machine):
     report = check(machine())
-    assert report.ok, report
+    report.assert_ok()

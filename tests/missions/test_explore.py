@@ -8,12 +8,12 @@ from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.interfaces.sensor_msgs.msg import BatteryState, LaserScan
 from actionlib_core.time import Time
-from missions.exceptions import MissionError
-from missions.explore import IN_VAIN, explore, pose_at
-from missions.move_base.geometry import quaternion_of
-from missions.move_base.occupancy import FREE, load_map
+from missions.explore.explore import IN_VAIN, explore, pose_at
 from smachpy import events as ev
 from smachpy.checks import check
+from smachpy.sim.exceptions import MissionError
+from smachpy.sim.geometry import quaternion_of
+from smachpy.sim.occupancy import FREE, load_map
 from smachpy.testing import mission_kit
 
 RAYS = 180
@@ -241,7 +241,7 @@ def test_arguments_that_make_no_sense_are_refused(name, value, text):
 
 def test_a_check_finds_no_problems(path):
     report = check(explore(path), name="EXPLORE")
-    assert report.ok, report
+    report.assert_ok()
 
 
 def comes_back_whenever_it_set_out(run):
@@ -252,7 +252,7 @@ def test_whatever_happens_it_comes_back(mission, path):
     found = mission.explore(
         lambda: explore(path), invariants=[comes_back_whenever_it_set_out], max_runs=150
     )
-    assert found.ok, found
+    found.assert_ok()
 
 
 def test_the_simulated_robot_sees_the_rooms_around_it(simulation, path):

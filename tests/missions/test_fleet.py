@@ -13,30 +13,30 @@ from collections import Counter
 
 import pytest
 
+from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.interfaces.geometry_msgs.msg import PoseStamped
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseFeedback
 from actionlib_core.interfaces.sensor_msgs.msg import BatteryState
 from actionlib_core.node import Node, use_node
-from actionlib_core.presence import list_endpoints
-from actionlib_core.simple_action_server import SimpleActionServer
-from actionlib_core.topic import Publisher
+from actionlib_core.pubsub.topic import Publisher
 from actionlib_core.transport.faulty import DELIVERED, FaultyTransport
 from actionlib_core.transport.memory import MemoryNetwork
-from missions.exceptions import InputFileError, MissionError
-from missions.fleet import coordinator, fleet, make_orders, pose_message, pose_of
-from missions.fleet_book import Order, Stage
-from missions.fleet_crew import world_text
-from missions.fleet_desk import Desk, Robot
-from missions.fleet_robot import FleetRobot, deliver, recharge
-from missions.fleet_robot import main as robot_main
-from missions.interfaces import ChargeAction
+from actionlib_core.wire.presence import list_endpoints
+from missions.fleet.coordinator import coordinator, fleet, make_orders, pose_message
+from missions.fleet.dispatcher import Dispatcher, Robot
+from missions.fleet.order_book import Order, Stage
+from missions.fleet.processes import world_text
+from missions.fleet.robot import FleetRobot, deliver, recharge
+from missions.fleet.robot import main as robot_main
+from missions.fleet.site import load_site
 from missions.interfaces.srv import PermitRequest
-from missions.maps import OFFICE_FLEET
-from missions.move_base.geometry import Pose2D
-from missions.move_base.world_file import load_world
-from missions.serving import serve_during
-from missions.waypoint_file import Waypoint, load_site
 from smachpy.checks import check
+from smachpy.sim.exceptions import InputFileError, MissionError
+from smachpy.sim.geometry import Pose2D
+from smachpy.sim.interfaces import ChargeAction
+from smachpy.sim.maps import OFFICE_FLEET
+from smachpy.sim.world_file import load_world
+from smachpy.states import Waypoint, pose_of, serve_during
 
 SPEED = 1.0  # [m/s]
 STEP = 2.0  # [s] between two reports of a drive
@@ -151,7 +151,7 @@ class LightRobot:
 
 
 class Floor:
-    """Robots, yard, desk and the coordinator's machine."""
+    """Robots, yard, dispatcher and the coordinator's machine."""
 
     def __init__(self, clock, robots, orders, docks=(), low=0.0, **body):
         self.clock = clock
@@ -159,11 +159,11 @@ class Floor:
         self.yard = Yard(orders)
         self.yard.docks = docks
         self.on_permit = lambda _robot, _step: None
-        self.desk = Desk(
+        self.dispatcher = Dispatcher(
             robots, orders, docks, low=low, on_permit=lambda r, s: self.on_permit(r, s)
         )
-        self.machine = coordinator(self.desk, 0.9)
-        serve_during(self.machine, self.desk.serve)
+        self.machine = coordinator(self.dispatcher, 0.9)
+        serve_during(self.machine, self.dispatcher.serve)
         self.robots = [
             LightRobot(self.yard, self.network, clock, robot, **body) for robot in robots
         ]
@@ -176,13 +176,13 @@ class Floor:
     def ask_in_turn(self):
         """Let each robot's line ask for its first task a second after the one before it."""
         late = {robot.name: float(n) for n, robot in enumerate(self.robots)}
-        ask = self.desk.next_task
+        ask = self.dispatcher.next_task
 
         def next_task(robot):
             self.clock.sleep(late.pop(robot, 0.0))
             return ask(robot)
 
-        self.desk.next_task = next_task
+        self.dispatcher.next_task = next_task
 
     def at(self, seconds, do):
         """Do something `seconds` after the start."""
@@ -194,14 +194,14 @@ class Floor:
         self.clock.spawn(wait, name="test")
 
     def entry(self, name):
-        return self.desk.book.entries[name]
+        return self.dispatcher.book.entries[name]
 
     def stages(self):
-        return Counter(entry.stage for entry in self.desk.book.entries.values())
+        return Counter(entry.stage for entry in self.dispatcher.book.entries.values())
 
     def check(self):
         """What must hold whatever happened."""
-        book = self.desk.book
+        book = self.dispatcher.book
         assert not book.open
         for name, entry in book.entries.items():
             given = self.yard.given[name]
@@ -390,7 +390,7 @@ def test_a_fleet_that_is_stopped_says_where_the_parcels_are(clock, floor_of):
 def test_it_can_run_again(floor_of):
     floor = floor_of(team(2), make_orders([place("a", 5.0), place("b", 9.0)], 3, 1))
     assert floor.run() == "succeeded"
-    floor.yard.parcels.update({o.name: o.pickup.pose for o in floor.desk._orders})
+    floor.yard.parcels.update({o.name: o.pickup.pose for o in floor.dispatcher._orders})
     floor.yard.given.clear()
     assert floor.run() == "succeeded"
     floor.check()
@@ -408,7 +408,7 @@ def test_robots_wait_for_their_turn_at_the_dock(floor_of):
     floor = floor_of(team(4), orders, docks(1), low=0.5, charge=0.6, drain=0.005)
     assert floor.run() == "succeeded"
     floor.check()
-    assert floor.desk.docks.holders == {}
+    assert floor.dispatcher.docks.holders == {}
 
 
 def test_the_dock_of_a_robot_that_died_there_stays_taken(floor_of):
@@ -417,7 +417,7 @@ def test_the_dock_of_a_robot_that_died_there_stays_taken(floor_of):
     floor.at(30.0, lambda: next(r for r in floor.robots if r.pose.x == -5.0).kill())
     assert floor.run() == "undelivered"
     floor.check()
-    ((dock, robot),) = floor.desk.docks.blocked.items()
+    ((dock, robot),) = floor.dispatcher.docks.blocked.items()
     assert dock == "dock 0"
     assert f"dock 0: somebody has to look, {robot} had it" in floor.machine.userdata.report
 
@@ -429,8 +429,8 @@ def test_a_robot_that_cannot_charge_leaves_the_dock_and_its_duty(floor_of):
     broken.dock.execute_callback = lambda _goal: broken.dock.set_aborted()
     assert floor.run() == "succeeded"
     floor.check()
-    assert (floor.desk.docks.holders, floor.desk.docks.blocked) == ({}, {})
-    by = Counter(entry.robot for entry in floor.desk.book.entries.values())
+    assert (floor.dispatcher.docks.holders, floor.dispatcher.docks.blocked) == ({}, {})
+    by = Counter(entry.robot for entry in floor.dispatcher.book.entries.values())
     assert by == {"robot_0": 1, "robot_1": 2}  # its first, before anybody knew of its battery
     assert broken.pose == Pose2D(0.0, 0.0, 0.0)
     assert fine.charge == pytest.approx(0.9)
@@ -464,7 +464,7 @@ def test_fifty_robots(clock, floor_of):
     assert outcome == "succeeded"
     assert floor.stages() == {Stage.DELIVERED: 200}
     assert sum(floor.yard.given.values()) == 200
-    assert len({entry.robot for entry in floor.desk.book.entries.values()}) == 50
+    assert len({entry.robot for entry in floor.dispatcher.book.entries.values()}) == 50
     floor.close()
     assert list_endpoints(floor.network.session()) == []
 
@@ -508,7 +508,11 @@ def test_two_processes_of_which_one_is_killed_on_the_way(tmp_path):
     site = tmp_path / "site.yaml"
     site.write_text(SMALL_SITE.format(folder=OFFICE_FLEET.parent))
     words = ["--robots", "2", "--orders", "2", "--lose", "1", "--site", str(site)]
-    command = [sys.executable, "-c", "import sys; from smachpy.cli import main; sys.exit(main())"]
+    command = [
+        sys.executable,
+        "-c",
+        "import sys; from smachpy.command import main; sys.exit(main())",
+    ]
     done = subprocess.run(
         [*command, "run", "fleet", "--plain", "--out", str(tmp_path / "out"), "--", *words],
         capture_output=True,
@@ -560,7 +564,7 @@ def test_a_robot_that_cannot_be_says_why(words, text, capsys):
 )
 def test_a_check_finds_nothing(machine):
     report = check(machine())
-    assert report.ok, report
+    report.assert_ok()
 
 
 @pytest.mark.parametrize(

@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from missions.fleet_book import FINAL, MAX_ATTEMPTS, DockBook, Order, OrderBook, Stage
+from missions.fleet.order_book import FINAL, MAX_ATTEMPTS, DockBook, Order, OrderBook, Stage
 from missions.interfaces.srv import PermitRequest
-from missions.move_base.geometry import Pose2D
-from missions.waypoint_file import Waypoint
+from smachpy.sim.geometry import Pose2D
+from smachpy.states import Waypoint
 
 PICK_UP, DRIVE_OFF, HAND_OVER = (
     PermitRequest.PICK_UP,

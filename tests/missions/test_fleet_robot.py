@@ -7,16 +7,11 @@ import sys
 import pytest
 
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
-from missions.fleet import fleet
-from missions.fleet_robot import GentleHands, deliver, main, recharge
-from missions.interfaces import (
-    ChargeAction,
-    DeliverAction,
-    DeliverGoal,
-    RechargeAction,
-    RechargeGoal,
-)
+from missions.fleet.coordinator import fleet
+from missions.fleet.robot import GentleHands, deliver, main, recharge
+from missions.interfaces import DeliverAction, DeliverGoal, RechargeAction, RechargeGoal
 from missions.interfaces.srv import Permit, PermitRequest
+from smachpy.sim.interfaces import ChargeAction
 from smachpy.testing import mission_kit
 
 YES, NO = {"granted": True}, {"granted": False, "reason": "it is no longer yours"}
@@ -184,7 +179,7 @@ def test_whatever_happens_it_gives_nothing_without_a_yes(mission):
         max_runs=150,
         max_time=30,
     )
-    assert found.ok, found
+    found.assert_ok()
 
 
 def run_recharge(mission):

@@ -6,9 +6,9 @@ from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import Empty
-from missions.guided_recovery import guided_recovery
-from missions.move_base.geometry import Pose2D
+from missions.lesson_3_ask import guided_recovery
 from smachpy.checks import check
+from smachpy.sim.geometry import Pose2D
 
 GOAL, HOME = 17.9, 9.8
 
@@ -158,7 +158,7 @@ def test_a_second_run_begins_with_the_first_measure(mission, robot, costmap, ans
 
 def test_a_check_finds_no_problems():
     report = check(guided_recovery(), name="GUIDED_RECOVERY")
-    assert report.ok, report
+    report.assert_ok()
 
 
 def asks_only_when_all_else_was_tried(run):
@@ -178,12 +178,12 @@ def test_whatever_happens_it_ends_and_asks_last(mission):
         max_depth=12,
         max_time=40,
     )
-    assert found.ok, found
+    found.assert_ok()
 
 
 def test_whatever_servers_do_it_ends(mission):
-    here = {"/GUIDED_RECOVERY/REMEMBER": {"here": Pose2D(9.8, 7.1, 0.0)}}
+    here = {"/GUIDED_RECOVERY/REMEMBER": {"home": Pose2D(9.8, 7.1, 0.0)}}
     found = mission.explore(
         guided_recovery, real_actions=True, interleavings=False, writes=here, max_runs=60
     )
-    assert found.ok, found
+    found.assert_ok()

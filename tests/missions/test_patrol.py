@@ -5,11 +5,11 @@ import itertools
 import pytest
 
 from actionlib_core.clock import VirtualClock, use_clock
-from missions.exceptions import InputFileError, MissionError
-from missions.maps import OFFICE_WAYPOINTS
-from missions.patrol import patrol
-from missions.waypoint_file import load_route
+from missions.lesson_2_patrol import patrol
 from smachpy import events as ev
+from smachpy.sim.exceptions import InputFileError, MissionError
+from smachpy.sim.maps import OFFICE_WAYPOINTS
+from smachpy.states import load_route
 
 
 def record(machine):

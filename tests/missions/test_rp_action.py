@@ -4,25 +4,25 @@ import math
 
 import pytest
 
+from actionlib_core.action.simple_client import SimpleActionClient
 from actionlib_core.exceptions import InvalidNameError
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.interfaces.geometry_msgs.msg import Twist
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.node import Node, use_node
-from actionlib_core.presence import Kind, list_endpoints
-from actionlib_core.simple_action_client import SimpleActionClient
-from actionlib_core.topic import Publisher, Subscriber
+from actionlib_core.pubsub.topic import Publisher, Subscriber
 from actionlib_core.transport.memory import MemoryNetwork
-from missions.exceptions import MissionError
+from actionlib_core.wire.presence import Kind, list_endpoints
+from missions.course.rp_action import gotopose, rp_action, stopmove, turn
+from missions.course.turn_server import TurnServer
 from missions.interfaces import TurnAction, TurnGoal
-from missions.move_base.geometry import Pose2D, wrap_angle
-from missions.rp_action import gotopose, rp_action, stopmove, turn
-from missions.turn_server import TurnServer
-from missions.waypoint_file import goal_at
 from smachpy import events as ev
 from smachpy.checks import check
 from smachpy.exceptions import SmachError
+from smachpy.sim.exceptions import MissionError
+from smachpy.sim.geometry import Pose2D, wrap_angle
+from smachpy.states import goal_at
 
 DEGREE = math.radians(1.0)
 
@@ -298,7 +298,7 @@ def test_a_preempt_anywhere_ends_the_mission(mission, action_server, state):
 
 def test_whatever_happens_it_ends(mission):
     found = mission.explore(rp_action, max_time=40, max_runs=400)
-    assert found.ok, found
+    found.assert_ok()
 
 
 @pytest.mark.parametrize(
@@ -336,4 +336,4 @@ def test_bad_arguments_are_refused_before_anything_moves(make, text):
 )
 def test_a_check_finds_nothing(make):
     report = check(make())
-    assert report.ok, report
+    report.assert_ok()

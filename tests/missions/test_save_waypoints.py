@@ -11,11 +11,12 @@ import pytest
 from actionlib_core.exceptions import WaitTimeoutError
 from actionlib_core.interfaces.geometry_msgs.msg import Twist, Vector3
 from actionlib_core.interfaces.std_msgs.msg import String
-from actionlib_core.topic import Publisher
-from missions.exceptions import MissionError
-from missions.maps import OFFICE_MAP, OFFICE_TOUR
-from missions.save_waypoints import TOPIC, WaypointSaver
-from missions.waypoint_file import load_tour
+from actionlib_core.pubsub.topic import Publisher
+from missions.tour.save_waypoints import TOPIC, WaypointSaver, waypoints_text
+from missions.tour.tour_file import Stop, load_tour
+from smachpy.sim.exceptions import MissionError
+from smachpy.sim.geometry import Pose2D
+from smachpy.sim.maps import OFFICE_MAP, OFFICE_TOUR
 
 
 @pytest.fixture
@@ -49,6 +50,21 @@ def test_poses_driven_by_hand_become_a_list_that_missions_read(
     assert second.pose == pytest.approx(pose, abs=1e-3)
     assert said[0].startswith("1 dock, 'south': x 9.80 m, y 7.10 m")
     assert len(list(tmp_path.iterdir())) == 1
+
+
+NAMES = [
+    "#dock", "a\nb", "a\r\nb", "bell\x07", "\u2028x", "nul\x00", 'say "hi"', "a,b", "back\\slash",
+    "it's", "- x: 1", "7", "null", "\U0001f916", "caf\u00e9", "\x1b[31mred",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("file", ["w.yaml", "w.csv"])
+def test_every_name_is_read_as_it_was_saved(tmp_path, file):
+    path = tmp_path / file
+    saved = [Stop(name, Pose2D(float(i), 2.0, 0.0)) for i, name in enumerate(NAMES)]
+    with path.open("w", encoding="utf-8", newline="") as out:
+        out.write(waypoints_text(path, saved, None))
+    assert list(load_tour(path).waypoints) == saved
 
 
 def test_an_existing_file_is_never_overwritten(simulation, said):
@@ -103,8 +119,8 @@ def test_as_a_program_enter_saves_a_waypoint(tmp_path):
             [sys.executable, "-m", *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE
         )
 
-    robot = start("missions.move_base", "--child")
-    saver = start("missions.save_waypoints", str(path))
+    robot = start("smachpy.sim", "--child")
+    saver = start("missions.tour.save_waypoints", str(path))
     try:
         read_until(saver, "Enter saves")
         saver.stdin.write(b"home\n")

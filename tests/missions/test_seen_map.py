@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from actionlib_core.interfaces.sensor_msgs.msg import LaserScan
-from missions.map_file import write_map
-from missions.move_base.geometry import Pose2D
-from missions.move_base.occupancy import FREE, OCCUPIED, UNKNOWN, load_map
-from missions.move_base.raycast import Raycaster
-from missions.scans import rays_of
-from missions.seen_map import Frontier, SeenMap
+from missions.explore.map_file import write_map
+from missions.explore.scans import rays_of
+from missions.explore.seen_map import Frontier, SeenMap
+from smachpy.sim.geometry import Pose2D
+from smachpy.sim.occupancy import FREE, OCCUPIED, UNKNOWN, load_map
+from smachpy.sim.raycast import Raycaster
 
 
 def flat(*ranges, range_max=5.0):
@@ -91,8 +91,8 @@ def test_a_frontier_is_a_place_to_stand_that_looks_into_the_unseen(office, look)
     seen.add(look(here), here)
     frontier = seen.best_frontier(here)
     assert frontier.size >= 1.0
-    assert cell(seen.occupancy(), *frontier.goal[:2]) == FREE
-    assert math.dist(frontier.goal[:2], frontier.border) <= 1.5
+    assert cell(seen.occupancy(), *frontier.pose[:2]) == FREE
+    assert math.dist(frontier.pose[:2], frontier.border) <= 1.5
     x, y = frontier.border
     around = [
         cell(seen.occupancy(), x + dx, y + dy) for dx in (-0.1, 0, 0.1) for dy in (-0.1, 0, 0.1)
@@ -108,7 +108,7 @@ def test_looking_from_frontier_to_frontier_shows_the_whole_office(office, look):
     goals = 0
     while (frontier := seen.best_frontier(here)) is not None:
         goals += 1
-        here = frontier.goal
+        here = frontier.pose
         assert office.cells[office.cell(here.x, here.y)] == FREE
         seen.add(look(here), here)
         seen.leave(frontier, reached=True)
@@ -125,7 +125,7 @@ def test_a_place_out_of_reach_is_not_offered_again_but_another_for_the_same_bord
     while (frontier := seen.best_frontier(here)) is not None:
         tried.append(frontier)
         seen.leave(frontier, reached=False)
-    places = [frontier.goal[:2] for frontier in tried]
+    places = [frontier.pose[:2] for frontier in tried]
     assert 4 < len(places) < 30
     assert min(math.dist(a, b) for i, a in enumerate(places) for b in places[:i]) > 0.5
 

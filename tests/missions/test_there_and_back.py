@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from missions.exceptions import MissionError
-from missions.there_and_back import there_and_back
+from missions.lesson_1_errand import there_and_back
 from smachpy import events as ev
+from smachpy.sim.exceptions import MissionError
 
 
 def test_it_stops_after_three_seconds_and_drives_home(clock, simulation):

@@ -2,10 +2,11 @@ from __future__ import annotations
 
 import pytest
 
-from missions.exceptions import InputFileError
-from missions.maps import OFFICE_MAP, OFFICE_ROBOT, OFFICE_TOUR, OFFICE_WAYPOINTS
-from missions.move_base.config import load_config
-from missions.waypoint_file import Task, load_route, load_tour
+from missions.tour.tour_file import Task, load_tour
+from smachpy.sim.config import load_config
+from smachpy.sim.exceptions import InputFileError
+from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT, OFFICE_TOUR, OFFICE_WAYPOINTS
+from smachpy.states import load_route
 
 
 def test_the_office_route_lies_on_the_office_floor():
@@ -78,6 +79,14 @@ def test_csv_and_yaml_say_the_same(tmp_path):
     assert tour.waypoints[1].task.service == "cargo/loaded"
 
 
+def test_a_line_is_a_comment_only_outside_quotes(tmp_path):
+    path = tmp_path / "w.csv"
+    path.write_text('# list\nname,x,y\n"#dock",1,2\n # not this\n"two\n# lines",3,4\nz,q,5\n')
+    assert "7: waypoints[2].x: got 'q'" in problems(path)[0]
+    path.write_text(path.read_text().replace("q", "5"))
+    assert [w.name for w in load_tour(path).waypoints] == ["#dock", "two\n# lines", "z"]
+
+
 def test_a_csv_row_is_named_with_its_line_and_column(tmp_path):
     path = tmp_path / "w.csv"
     path.write_text(
@@ -108,6 +117,9 @@ def test_a_csv_row_is_named_with_its_line_and_column(tmp_path):
         ("kitchen,4.6,10.6\n", "1: got 'kitchen,4.6,10.6'; expected a header line"),
         ("x,y\n1,2,3\n", "2: got 3 cells; expected at most 2, as in line 1"),
         ("x,y,x\n1,2,3\n", "1: x: got two columns of this name"),
+        ('name,x,y\n"a,1,2\n', "got a mistake (unexpected end of data); expected valid CSV"),
+        (f"name,x,y\n{'a' * 140_000},1,2\n", "got a mistake (field larger than field limit"),
+        ("name,x,y\na,\u0663,2\n", "x: got '\u0663'; expected a number"),
         ("nme,x,y\na,1,2\n", "Did you mean 'name'?"),
         ("name,x,y\n", "waypoints: got []; expected a list with at least one entry"),
     ],

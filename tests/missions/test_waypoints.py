@@ -10,13 +10,13 @@ from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBas
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.interfaces.sensor_msgs.msg import LaserScan
 from actionlib_core.interfaces.std_srvs.srv import Trigger
-from missions.exceptions import InputFileError, MissionError
-from missions.maps import OFFICE_TOUR
-from missions.move_base.geometry import Pose2D
-from missions.waypoint_file import goal_at
-from missions.waypoints import waypoints
+from missions.tour.waypoints import waypoints
 from smachpy import events as ev
 from smachpy.checks import check
+from smachpy.sim.exceptions import InputFileError, MissionError
+from smachpy.sim.geometry import Pose2D
+from smachpy.sim.maps import OFFICE_TOUR
+from smachpy.states import goal_at
 
 LINE = "name,x,y,yaw,dwell,task,angle,service\n"
 THREE = LINE + "a,1,0\nb,2,0\nc,3,0\n"
@@ -324,7 +324,7 @@ def office():
 def test_a_check_finds_no_problems():
     for machine in (waypoints(), office()):
         report = check(machine, name="WAYPOINTS")
-        assert report.ok, report
+        report.assert_ok()
 
 
 def test_whatever_states_return_it_ends_and_skips_only_what_failed(mission, file, tmp_path):
@@ -343,7 +343,7 @@ def test_whatever_states_return_it_ends_and_skips_only_what_failed(mission, file
         max_runs=150,
         max_time=40,
     )
-    assert found.ok, found
+    found.assert_ok()
 
 
 def test_whatever_servers_do_it_ends(mission, file):
@@ -354,4 +354,4 @@ def test_whatever_servers_do_it_ends(mission, file):
         max_runs=60,
         max_time=40,
     )
-    assert found.ok, found
+    found.assert_ok()

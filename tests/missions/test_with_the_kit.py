@@ -13,16 +13,16 @@ from actionlib_core.interfaces.geometry_msgs.msg import Pose
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.interfaces.sensor_msgs.msg import BatteryState
-from missions.countdown import countdown
-from missions.interfaces import ChargeAction
-from missions.patrol import patrol
-from missions.there_and_back import there_and_back
+from missions.course.countdown import countdown
+from missions.lesson_1_errand import there_and_back
+from missions.lesson_2_patrol import patrol
 from smachpy.checks import check
+from smachpy.sim.interfaces import ChargeAction
 from smachpy.testing import mission_kit
-from smachpy.testing._core.search import Choice
 from smachpy.testing.coverage import Coverage
-from smachpy.testing.exploration import _Runner
-from smachpy.testing.explorers import Explorer, Options
+from smachpy.testing.exploring.exploration import Runner
+from smachpy.testing.exploring.explorer import Explorer
+from smachpy.testing.exploring.search import Choice
 
 PATROL = patrol()  # reading the waypoints takes longer than a run
 FULL, EMPTY = {"percentage": 1.0}, {"percentage": 0.05}
@@ -32,7 +32,7 @@ def run_patrol(mission, battery=(FULL, EMPTY, FULL, FULL)):
     mission.action_server("move_base", MoveBaseAction).default_result(duration=10)
     mission.action_server("charge", ChargeAction).default_result(duration=100)
     mission.topic("battery", BatteryState).publish_every(12.5, battery)
-    return mission(PATROL, userdata={"index": 0})
+    return mission(PATROL)
 
 
 def run_countdown(mission):
@@ -131,7 +131,7 @@ def test_a_hundred_dice_give_the_same_run_of_every_mission_twice(name, monkeypat
         run, error = runner.run(())
         return run.outcome, repr(error), [repr(event) for event in run.events]
 
-    with _Runner(machine, Options(), (), None, real_actions=False) as runner:
+    with Runner("explore", machine, {}) as runner:
         first = [verdict(seed) for seed in range(100)]
         assert [verdict(seed) for seed in range(100)] == first
     assert len({str(events) for _, _, events in first}) > 1
@@ -140,12 +140,12 @@ def test_a_hundred_dice_give_the_same_run_of_every_mission_twice(name, monkeypat
 @pytest.mark.parametrize("name", listed())
 def test_no_mission_has_problems_that_a_check_finds_in_any_folder(name):
     report = check(make(name))
-    assert report.ok, report
+    report.assert_ok()
 
 
 def test_whatever_states_return_the_patrol_ends(mission):
     found = mission.explore(PATROL, grace=30, max_time=40)
-    assert found.ok, found
+    found.assert_ok()
     assert found.exhaustive
 
 
@@ -153,19 +153,19 @@ def test_whatever_servers_do_the_patrol_ends(mission):
     found = mission.explore(
         PATROL, grace=30, real_actions=True, interleavings=False, max_runs=60, max_time=40
     )
-    assert found.ok, found
+    found.assert_ok()
 
 
 def test_whatever_happens_the_way_there_and_back_ends(mission):
-    assert mission.explore(there_and_back, max_time=40)
+    mission.explore(there_and_back, max_time=40).assert_ok()
     home = {"/THERE_AND_BACK/REMEMBER": {"home": Pose()}}
     found = mission.explore(there_and_back, real_actions=True, writes=home, max_runs=60)
-    assert found.ok, found
+    found.assert_ok()
 
 
 def test_the_countdown_ends_whatever_happens(mission):
     found = mission.explore(countdown, max_time=40)
-    assert found.ok, found
+    found.assert_ok()
     assert found.exhaustive
 
 

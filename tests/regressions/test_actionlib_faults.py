@@ -6,14 +6,14 @@ import threading
 
 import pytest
 
-from actionlib_core.action_client import ActionClient
-from actionlib_core.action_server import ActionServer
+from actionlib_core.action.client import ActionClient
+from actionlib_core.action.server import ActionServer
+from actionlib_core.action.simple_client import SimpleActionClient, SimpleGoalState
+from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.clock import RealClock
 from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.node import Node
-from actionlib_core.simple_action_client import SimpleActionClient, SimpleGoalState
-from actionlib_core.simple_action_server import SimpleActionServer
 from actionlib_core.transport.memory import MemoryNetwork
 
 LONG_S = 20.0
@@ -275,8 +275,8 @@ def test_three_goals_to_a_busy_server_with_the_texts_of_actionlib(pair):
 
 def test_goal_without_id_gets_one_and_cancel_of_an_unknown_id_is_listed(pair):
     """The observed behaviour of ROS 1 on the wire."""
-    from actionlib_core._action_wire import pack_goal, pack_goal_id, unpack_statuses
-    from actionlib_core.wire import encoding_of
+    from actionlib_core.wire.action_messages import pack_goal, pack_goal_id, unpack_statuses
+    from actionlib_core.wire.encoding import encoding_of
 
     runs = []
     ActionServer(

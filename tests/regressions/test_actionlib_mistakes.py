@@ -7,25 +7,26 @@ import threading
 
 import pytest
 
-from actionlib_core import goal_manager, shutdown
-from actionlib_core._core.client_goal import ClientGoal
-from actionlib_core.action_client import ActionClient, CommState
-from actionlib_core.action_server import ActionServer
+from actionlib_core import shutdown
+from actionlib_core.action import client as action_client
+from actionlib_core.action.client import ActionClient, CommState
+from actionlib_core.action.decorated import Reject
+from actionlib_core.action.server import ActionServer
+from actionlib_core.action.simple_client import SimpleActionClient, SimpleGoalState
+from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.clock import RealClock
 from actionlib_core.exceptions import ActionlibError
-from actionlib_core.goal_server import Reject
+from actionlib_core.goal.backlog import Backlog
+from actionlib_core.goal.client import ClientGoal
 from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import Trigger
 from actionlib_core.node import Node
-from actionlib_core.sent_goal import SentGoal
-from actionlib_core.service import Service
-from actionlib_core.service_proxy import ServiceProxy
-from actionlib_core.simple_action_client import SimpleActionClient, SimpleGoalState
-from actionlib_core.simple_action_server import SimpleActionServer
+from actionlib_core.pubsub.service import Service
+from actionlib_core.pubsub.service_proxy import ServiceProxy
+from actionlib_core.pubsub.topic import Publisher, Subscriber
 from actionlib_core.time import Duration
-from actionlib_core.topic import Publisher, Subscriber
 from actionlib_core.transport.memory import MemoryNetwork
 
 LONG_S = 20.0
@@ -61,7 +62,7 @@ def test_goal_that_ends_as_its_server_appears_is_not_sent(nodes, clock, monkeypa
     server_node, client_node = nodes
     client = ActionClient("demo", msg.TestAction, node=client_node)
     handle = client.send_goal(msg.TestGoal(1))
-    port = client.manager._port
+    port = client.manager.port
 
     def heard():
         """Somebody listens now; meanwhile another thread ends the goal."""
@@ -124,19 +125,16 @@ def test_loops_over_the_feedback_of_one_goal_all_end(node):
 def test_feedback_taken_by_another_loop_is_no_error(node):
     """Two loops: one saw the last feedback, the other took it, and the first one raised."""
 
-    class Shared(list):
+    class Shared(Backlog):
         """Feedback of which another loop takes the last just before we do."""
 
-        def popleft(self):
-            raise IndexError("pop from an empty deque")
+        def take(self):
+            super().take()
 
-    sent = SentGoal(node, "demo", timeout=None)
     client = ActionClient("demo", msg.TestAction, node=node)
-    client.manager.send(
-        "g", 1, b"", on_transition=sent.on_transition, on_feedback=None, created=sent.on_created
-    )
-    taken = Shared([msg.TestFeedback(1)])
-    sent._feedback = taken
+    sent = client.send(msg.TestGoal(1))
+    sent._handle.feedback = Shared()
+    sent._handle.feedback.add(msg.TestFeedback(1), 4)
     client.stop()
     assert sent.over
     assert list(sent.feedback()) == []
@@ -182,7 +180,7 @@ def test_preempt_callback_is_not_called_for_a_goal_that_has_ended(nodes, clock):
             server.action_server.callback_queue.call(clock.sleep, 1.0)
         client.cancel_goal()
         if late:
-            clock.sleep(0.5)
+            clock.sleep(0.01)  # less than a preempt callback waits for others
             server.set_succeeded()
         assert client.wait_for_result(LONG_S)
         expected = GoalStatus.SUCCEEDED if late else GoalStatus.PREEMPTED
@@ -230,7 +228,7 @@ def test_cancel_callback_is_not_called_for_a_goal_that_has_ended(nodes, clock):
     handle = client.send_goal(msg.TestGoal(1))
     clock.sleep(0.5)
     handle.cancel()
-    clock.sleep(0.5)
+    clock.sleep(0.01)  # less than a cancel callback waits for others
     taken[0].set_succeeded()
     assert handle.wait(LONG_S)
     clock.sleep(2.0)
@@ -338,7 +336,7 @@ def test_server_whose_session_is_closed_stops(nodes, clock):
         client.send_goal(msg.TestGoal(number))
     clock.sleep(1.0)
     taken = server.status_list
-    server.accept(taken[0])
+    taken[0].set_accepted()
     server_node.transport.close()
     server.stop()
     assert server.wait(LONG_S)
@@ -389,7 +387,7 @@ def test_goal_is_followed_once_by_one_client(nodes, clock, monkeypatch):
         both.wait()
         return ClientGoal(*args, **kwargs)
 
-    monkeypatch.setattr(goal_manager, "ClientGoal", meet)
+    monkeypatch.setattr(action_client, "ClientGoal", meet)
     handles, errors = [], []
 
     def attach():

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 import smachpy
+from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.node import Node, use_node
-from actionlib_core.simple_action_server import SimpleActionServer
 from actionlib_core.transport.memory import MemoryNetwork
 
 

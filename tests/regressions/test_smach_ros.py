@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from actionlib_core.action_server import ActionServer
+from actionlib_core.action.server import ActionServer
 from actionlib_core.interfaces.actionlib.msg import TestAction as Action
 from actionlib_core.interfaces.actionlib.msg import TestGoal as Goal
 from actionlib_core.interfaces.actionlib.msg import TestResult as Result

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
+from actionlib_core.action.simple_client import SimpleActionClient
 from actionlib_core.interfaces.actionlib.msg import TestAction as Action
 from actionlib_core.interfaces.actionlib.msg import TestFeedback as Feedback
 from actionlib_core.interfaces.actionlib.msg import TestGoal as Goal
 from actionlib_core.interfaces.actionlib.msg import TestResult as Result
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
-from actionlib_core.simple_action_client import SimpleActionClient
 from smachpy import CBState, InvalidStateError, State, StateMachine
-from smachpy.action_server_wrapper import ActionServerWrapper
+from smachpy.actions.action_server_wrapper import ActionServerWrapper
 from tests.two_nodes import TwoNodes
 
 ALL = ["done", "failed", "stopped"]

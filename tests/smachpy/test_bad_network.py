@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.interfaces.actionlib.msg import TestAction as Action
 from actionlib_core.interfaces.actionlib.msg import TestGoal as Goal
 from actionlib_core.interfaces.actionlib.msg import TestResult as Result
-from actionlib_core.simple_action_server import SimpleActionServer
 from actionlib_core.transport.faulty import FaultyTransport, RandomFaults
 from smachpy import SimpleActionState, StateMachine
 from tests.two_nodes import TwoNodes

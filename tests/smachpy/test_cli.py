@@ -6,7 +6,7 @@ from importlib.metadata import EntryPoint
 
 import pytest
 
-import smachpy.cli
+import smachpy.command
 from smachpy.exceptions import SmachError
 
 
@@ -34,12 +34,12 @@ def register_interrupted(subparsers):
 def commands(monkeypatch):
     """Only the commands of this file, plus one whose package is not installed."""
     names = ["ok", "bad", "interrupted"]
-    points = [EntryPoint(n, f"{__name__}:register_{n}", smachpy.cli.GROUP) for n in names]
-    points.append(EntryPoint("heavy", "a_package_nobody_has:register", smachpy.cli.GROUP))
+    points = [EntryPoint(n, f"{__name__}:register_{n}", smachpy.command.GROUP) for n in names]
+    points.append(EntryPoint("heavy", "a_package_nobody_has:register", smachpy.command.GROUP))
     loaders = {n: globals()[f"register_{n}"] for n in names}
-    monkeypatch.setattr(smachpy.cli, "entry_points", lambda **_: points)
-    load = smachpy.cli._load
-    monkeypatch.setattr(smachpy.cli, "_load", lambda p: loaders.get(p.name) or load(p))
+    monkeypatch.setattr(smachpy.command, "entry_points", lambda **_: points)
+    load = smachpy.command._load
+    monkeypatch.setattr(smachpy.command, "_load", lambda p: loaders.get(p.name) or load(p))
 
 
 @pytest.fixture
@@ -50,35 +50,35 @@ def add_late(monkeypatch):
         def register(subparsers):
             subparsers.add_parser("late").set_defaults(run=run)
 
-        points = [EntryPoint("late", "here:late", smachpy.cli.GROUP)]
-        monkeypatch.setattr(smachpy.cli, "entry_points", lambda **_: points)
-        monkeypatch.setattr(smachpy.cli, "_load", lambda _: register)
+        points = [EntryPoint("late", "here:late", smachpy.command.GROUP)]
+        monkeypatch.setattr(smachpy.command, "entry_points", lambda **_: points)
+        monkeypatch.setattr(smachpy.command, "_load", lambda _: register)
 
     return add
 
 
 def test_main_returns_what_the_command_returns():
-    assert smachpy.cli.main(["ok", "7"]) == 7
+    assert smachpy.command.main(["ok", "7"]) == 7
 
 
 def test_an_error_is_one_screen_on_stderr_and_exit_code_2(capsys):
-    assert smachpy.cli.main(["bad"]) == 2
+    assert smachpy.command.main(["bad"]) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
     assert captured.err == "smachpy: /PATROL: broken: got 'x'; expected 'y'.\n"
 
 
 def test_debug_shows_the_traceback(capsys):
-    assert smachpy.cli.main(["bad", "--debug"]) == 2
+    assert smachpy.command.main(["bad", "--debug"]) == 2
     assert "Traceback" in capsys.readouterr().err
 
 
 def test_ctrl_c_is_exit_code_130():
-    assert smachpy.cli.main(["interrupted"]) == 130
+    assert smachpy.command.main(["interrupted"]) == 130
 
 
 def test_a_missing_package_is_named_with_the_way_to_install_it(capsys):
-    assert smachpy.cli.main(["heavy"]) == 2
+    assert smachpy.command.main(["heavy"]) == 2
     captured = capsys.readouterr().err
     assert "'a_package_nobody_has' is missing" in captured
     assert "pip install" in captured
@@ -94,7 +94,7 @@ def test_a_package_of_an_extra_that_is_missing_later_is_named_with_it(
         raise ModuleNotFoundError(f"No module named {module!r}", name=module)
 
     add_late(run)
-    assert smachpy.cli.main(["late"]) == 2
+    assert smachpy.command.main(["late"]) == 2
     package = module.partition(".")[0]
     expected = f"smachpy: package {package!r} is missing. Try: pip install 'smachpy[{extra}]'\n"
     assert capsys.readouterr().err == expected
@@ -106,21 +106,21 @@ def test_a_module_of_no_extra_that_is_missing_is_a_mistake_and_shows_where(add_l
 
     add_late(run)
     with pytest.raises(ModuleNotFoundError, match="my_robot"):
-        smachpy.cli.main(["late"])
+        smachpy.command.main(["late"])
 
 
 def test_an_unknown_command_is_exit_code_2_and_names_the_commands(capsys, monkeypatch):
-    points = [p for p in smachpy.cli.entry_points() if p.name != "heavy"]
-    monkeypatch.setattr(smachpy.cli, "entry_points", lambda **_: points)
+    points = [p for p in smachpy.command.entry_points() if p.name != "heavy"]
+    monkeypatch.setattr(smachpy.command, "entry_points", lambda **_: points)
     with pytest.raises(SystemExit) as caught:
-        smachpy.cli.main(["okay"])
+        smachpy.command.main(["okay"])
     assert caught.value.code == 2
     assert "'ok'" in capsys.readouterr().err
 
 
 def test_only_the_command_asked_for_is_loaded(monkeypatch):
     loaded = []
-    load = smachpy.cli._load
-    monkeypatch.setattr(smachpy.cli, "_load", lambda p: loaded.append(p.name) or load(p))
-    smachpy.cli.main(["ok", "0"])
+    load = smachpy.command._load
+    monkeypatch.setattr(smachpy.command, "_load", lambda p: loaded.append(p.name) or load(p))
+    smachpy.command.main(["ok", "0"])
     assert loaded == ["ok"]

@@ -111,8 +111,8 @@ def test_an_end_is_reported_before_it_is_counted(clock, monkeypatch):
     class Watched(deque):
         def append(self, branch):
             def look():
-                if branch.group.container._lock.acquire(blocking=False):
-                    branch.group.container._lock.release()
+                if branch.run.lock.acquire(blocking=False):
+                    branch.run.lock.release()
                     free.append(branch)
 
             looker = threading.Thread(target=look)
@@ -120,7 +120,7 @@ def test_an_end_is_reported_before_it_is_counted(clock, monkeypatch):
             looker.join()
             super().append(branch)
 
-    monkeypatch.setattr("smachpy._runtime.branches.deque", Watched)
+    monkeypatch.setattr("smachpy.run.branches.deque", Watched)
     seen = []
     both = concurrence(lambda: None, lambda: None, child_termination_cb=seen.append)
     assert both.execute() == "ok"

@@ -6,11 +6,11 @@ import pytest
 
 from actionlib_core.interfaces.std_msgs.msg import Bool
 from actionlib_core.node import Node, use_node
+from actionlib_core.pubsub.topic import Publisher
 from actionlib_core.time import Duration
-from actionlib_core.topic import Publisher
 from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import InvalidStateError, StateMachine, UserData, cb_interface
-from smachpy.condition_state import ConditionState
+from smachpy.actions.condition_state import ConditionState
 
 
 class Answers:
@@ -69,9 +69,8 @@ def test_a_preempt_before_it_checks_nothing(clock):
     assert answers.calls == 0
 
 
-@pytest.mark.parametrize("rate", [0, -1])
-def test_a_poll_rate_of_nothing_still_lets_others_run(clock, rate):
-    state = ConditionState(Answers(False), poll_rate=rate, max_checks=-1)
+def test_a_poll_rate_of_nothing_still_lets_others_run(clock):
+    state = ConditionState(Answers(False), poll_rate=0, max_checks=-1)
     clock.call_later(0.5, state.request_preempt)
     assert state.execute(UserData()) == "preempted"
 

@@ -8,8 +8,8 @@ import threading
 import pytest
 
 import smachpy
-from smachpy.control import ControlError
 from smachpy.events import Entered, Jumped, OutcomeForced, Paused, Resumed
+from smachpy.events.control import ControlError
 
 
 class Work(smachpy.State):
@@ -343,11 +343,11 @@ def test_a_held_state_of_the_machine_itself_is_jumped_over(clock):
 def test_a_preempted_state_without_that_outcome_ends_its_container_preempted(clock, kind):
     class Deaf(Fire):
         def execute(self, userdata):
-            self._clock().sleep(1000.0)
+            self.clock().sleep(1000.0)
             return "ok"
 
     deaf = Deaf()
-    deaf.preempt_timeout = 1.0
+    smachpy.set_options(deaf, preempt_timeout=1.0)
     sm = held(kind, deaf)
     at(clock, (2.0, lambda: sm.control.preempt("/P/IN/FIRE")))
     assert sm.execute() == "ok"

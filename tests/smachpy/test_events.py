@@ -147,7 +147,7 @@ def test_scopes_publish_from_any_thread(clock):
 
     class Sends(smachpy.State):
         def execute(self, userdata):
-            scope = self._scope()
+            scope = self.scope()
             task = clock.spawn(
                 lambda: scope.emit(events.GoalSent, "move_base", "id-1", "there"), name="elsewhere"
             )

@@ -12,8 +12,10 @@ from actionlib_core.interfaces.smach_msgs.msg import (
     SmachContainerStructure,
 )
 from actionlib_core.interfaces.std_msgs.msg import Int32, String
-from actionlib_core.presence import list_endpoints
-from actionlib_core.topic import Publisher, Subscriber
+from actionlib_core.node import Node
+from actionlib_core.pubsub.topic import Publisher, Subscriber
+from actionlib_core.transport.memory import MemoryNetwork
+from actionlib_core.wire.presence import list_endpoints
 from smachpy import (
     Concurrence,
     InvalidStateError,
@@ -32,7 +34,7 @@ from smachpy.introspection import (
     IntrospectionClient,
     IntrospectionServer,
 )
-from smachpy.introspection_server import DESCRIPTION_TOPIC, EVENTS_TOPIC
+from smachpy.network.server import DESCRIPTION_TOPIC, EVENTS_TOPIC
 from tests.two_nodes import TwoNodes
 
 
@@ -326,7 +328,7 @@ def test_stop_sends_the_last_status_and_everything_that_waits(world):
     world.clock.sleep(0.1)
     assert json.loads(seen[-1].data)["kind"] == "Finished"
     assert [m for m in found if m.path == "/SM_ROOT"][-1].active_states == ["None"]
-    assert machine._listeners == ()
+    assert machine._smachpy.listeners == ()
     server.start()  # and again
     world.clock.sleep(0.1)
     assert IntrospectionClient(node=world.mission).get_servers() == ["/robot"]
@@ -386,3 +388,23 @@ def test_userdata_that_changes_while_it_is_read_is_shown_as_that(world):
     assert data == {"restless": "<Restless that changes>", "number": "<int that changes>"}
     client = IntrospectionClient(node=world.mission)
     assert client.set_initial_state("robot", "/SM_ROOT", ["LAST"], timeout=1.0) is True
+
+
+def test_a_server_that_cannot_start_leaves_nothing_on_the_network(clock, monkeypatch):
+    def fails(*_, **__):
+        raise RuntimeError("no feed")
+
+    monkeypatch.setattr("smachpy.network.server.Feed", fails)
+    session = MemoryNetwork(clock).session()
+    with Node("robot", transport=session, clock=clock) as node:
+        before = list_endpoints(session)
+        server = IntrospectionServer(
+            "robot", StateMachine(["done"]), "/SM", node=node, control=True
+        )
+        with pytest.raises(RuntimeError, match="no feed"):
+            server.start()
+        assert list_endpoints(session) == before
+        monkeypatch.undo()
+        server.start()
+        server.stop()
+        assert list_endpoints(session) == before

@@ -7,9 +7,9 @@ import threading
 import pytest
 
 from actionlib_core.interfaces.std_msgs.msg import Int32
-from actionlib_core.topic import Publisher
+from actionlib_core.pubsub.topic import Publisher
 from smachpy import StateMachine, UserData, cb_interface, events
-from smachpy.monitor_state import MonitorState
+from smachpy.actions.monitor_state import MonitorState
 from tests.two_nodes import TwoNodes
 
 
@@ -152,54 +152,7 @@ def test_a_preempt_at_any_moment_is_never_lost(seed):
             task.join()
 
 
-# -- conditions that only read and compare: see also _core/test_plain.py -----------------------
-
-
-def wakings(world, condition, *values, **options):
-    """Run a monitor beside a sender; return its outcome and how often its thread had a turn."""
-    turns = []
-    state = world.state(condition, **options)
-    ask = state.preempt_requested
-    state.preempt_requested = lambda: turns.append(1) or ask()
-    for number, value in enumerate(values, 1):
-        world.say(value, at=float(number))
-    return state.execute(UserData()), len(turns)
-
-
-def test_good_messages_do_not_wake_the_thread_of_a_plain_condition(world):
-    plain = lambda ud, message: message.data > 0  # noqa: E731  what the test is about
-    assert wakings(world, plain, *[1] * 50, -1) == ("invalid", 2)
-    assert wakings(world, plain, *[1] * 50, max_checks=50) == ("valid", 2)
-    called = lambda ud, message: bool(message.data > 0)  # noqa: E731  as above
-    assert wakings(world, called, *[1] * 50, -1)[1] > 50
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_a_plain_condition_ends_it_as_any_other_does(seed):
-    outcomes = []
-    for condition in (lambda ud, m: m.data > 0, lambda ud, m: bool(m.data > 0)):
-        with World(seed) as world:
-            world.say(1, 1, at=1.0)
-            world.say(1, *[-1] * (seed % 2), at=3.0)
-            state = world.state(condition, [-1, 3][seed // 2 % 2], timeout=3.0 + seed % 3)
-            outcomes.append((state.execute(UserData()), world.clock.now()))
-    assert outcomes[0] == outcomes[1]
-
-
-def test_a_plain_condition_that_raises_is_called_again_and_reported(world, caplog):
-    machine = StateMachine(["valid", "invalid", "preempted"])
-    with machine:
-        machine.add("WATCH", world.state(lambda ud, message: message.no_such_field > 0))
-    failures = []
-    machine.subscribe(lambda e: failures.append(e) if isinstance(e, events.CallbackFailed) else 0)
-    world.say(1, at=1.0)
-    assert machine.execute() == "invalid"
-    assert [e.path for e in failures] == ["/SM_ROOT/WATCH"]
-    assert "no_such_field" in failures[0].error
-    assert "Traceback" in caplog.text
-
-
-def test_what_cannot_be_read_where_the_message_arrives_is_read_by_the_state(world):
+def test_a_condition_may_wait_whatever_it_is_made_of(world):
     class Slow:
         @property
         def limit(self):
@@ -208,22 +161,9 @@ def test_what_cannot_be_read_where_the_message_arrives_is_read_by_the_state(worl
 
     slow = Slow()
     world.say(3, 4, 1, at=1.0)
-    assert world.state(lambda ud, message: message.data > slow.limit).execute(UserData()) == (
-        "invalid"
-    )
+    state = world.state(lambda ud, message: message.data > slow.limit)
+    assert state.execute(UserData()) == "invalid"
     assert world.clock.now() == 4.0  # each message was checked once to the end
-
-
-def test_a_plain_condition_reads_userdata(world):
-    machine = StateMachine(["valid", "invalid", "preempted"])
-    with machine:
-        watch = world.state(lambda ud, message: message.data < ud.limit, input_keys=["limit"])
-        machine.add("WATCH", watch)
-    machine.userdata.limit = 5
-    world.say(3, 4, at=1.0)
-    world.say(5, at=2.0)
-    assert machine.execute() == "invalid"
-    assert world.clock.now() == 2.0
 
 
 def test_it_describes_itself(world):

@@ -9,12 +9,12 @@ import threading
 import pytest
 
 import smachpy
+from actionlib_core.action.simple_client import SimpleActionClient
 from actionlib_core.clock import RealClock, use_clock
 from actionlib_core.interfaces.actionlib.msg import TestAction as Action
 from actionlib_core.interfaces.actionlib.msg import TestGoal as Goal
 from actionlib_core.node import Node
 from actionlib_core.shutdown import Shutdown, use_shutdown
-from actionlib_core.simple_action_client import SimpleActionClient
 from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import ActionServerWrapper, Concurrence, State, StateMachine
 from smachpy.events import (
@@ -27,7 +27,7 @@ from smachpy.events import (
     from_record,
     to_record,
 )
-from smachpy.run_state import RunState
+from smachpy.events.run_state import RunState
 
 
 class Work(State):
@@ -41,7 +41,7 @@ class Work(State):
     def execute(self, userdata):
         if self.sleep(self.seconds):
             self.service_preempt()
-            self._clock().sleep(self.tidy)
+            self.clock().sleep(self.tidy)
             return "preempted"
         return "ok"
 
@@ -62,7 +62,7 @@ class Deaf(State):
         self.seconds = seconds
 
     def execute(self, userdata):
-        self._clock().sleep(self.seconds)
+        self.clock().sleep(self.seconds)
         return "ok"
 
 
@@ -229,7 +229,7 @@ def test_an_operators_command_is_told(clock, command, why):
 
 
 def test_a_remote_operator_is_told_by_the_node(clock):
-    from smachpy.remote_control import ControlClient
+    from smachpy.network.remote_control import ControlClient
 
     network = MemoryNetwork(clock)
     robot = Node("robot", transport=network.session(), clock=clock)
@@ -273,7 +273,7 @@ def test_the_programs_end_is_told(clock):
 def in_real_time(sm, act):
     """Run `sm` in the main thread and call `act` when its leaf waits."""
     ready = threading.Event()
-    sm["A"].on_enter = lambda _userdata: ready.set()
+    smachpy.set_options(sm["A"], on_enter=lambda _userdata: ready.set())
     thread = threading.Thread(target=lambda: (ready.wait(10.0), act()))
     thread.start()
     with use_clock(RealClock()), use_shutdown(Shutdown()):

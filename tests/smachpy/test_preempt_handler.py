@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+import smachpy
 from actionlib_core.shutdown import Shutdown, use_shutdown
 from smachpy import Concurrence, State, StateMachine, set_preempt_handler
 
@@ -22,8 +23,8 @@ class Tidy(State):
 
     def execute(self, ud):
         self.wait_preempt()
-        self._clock().sleep(self.seconds)
-        self.ended.append(self._clock().now())
+        self.clock().sleep(self.seconds)
+        self.ended.append(self.clock().now())
         self.service_preempt()
         return "preempted"
 
@@ -156,8 +157,21 @@ print(machine.execute(), flush=True)
 )
 
 
+PLAIN = (
+    IN_MAIN.replace("smachpy.set_preempt_handler(machine)", "import signal")
+    + """
+assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+"""
+)
+
+
 @pytest.mark.parametrize(
-    ("program", "said"), [(TERMINATED, "stopped\n"), (IN_MAIN, "stopped\npreempted\n")]
+    ("program", "said"),
+    [
+        (TERMINATED, "stopped\n"),
+        (IN_MAIN, "stopped\npreempted\n"),
+        (PLAIN, "stopped\npreempted\n"),
+    ],
 )
 def test_sigterm_stops_the_machine_and_lets_the_program_end(program, said):
     with subprocess.Popen(
@@ -169,14 +183,17 @@ def test_sigterm_stops_the_machine_and_lets_the_program_end(program, said):
         assert process.returncode == 0
 
 
-DEAF = IN_MAIN.replace("self.wait_preempt()", "self._clock().sleep(60.0)").replace(
+DEAF = IN_MAIN.replace("self.wait_preempt()", "self.clock().sleep(60.0)").replace(
     "super().__init__(", "super().__init__(preempt_timeout=None, outcomes="
 )
 
 
-def test_a_second_sigterm_ends_the_process():
+@pytest.mark.parametrize(
+    "program", [DEAF, DEAF.replace("smachpy.set_preempt_handler(machine)", "")]
+)
+def test_a_second_sigterm_ends_the_process(program):
     with subprocess.Popen(
-        [sys.executable, "-c", DEAF], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
         assert process.stdout.readline() == "ready\n"
         while process.poll() is None:
@@ -186,3 +203,35 @@ def test_a_second_sigterm_ends_the_process():
             except subprocess.TimeoutExpired:
                 continue
         assert process.returncode == -signal.SIGTERM
+
+
+@pytest.mark.parametrize("own", ["lambda *_: print('own', flush=True)", "signal.SIG_IGN"])
+def test_a_program_that_handles_sigterm_itself_keeps_its_handler(own):
+    program = IN_MAIN.replace(
+        "smachpy.set_preempt_handler(machine)",
+        f"import signal; own = {own}; signal.signal(signal.SIGTERM, own)",
+    ).replace("self.wait_preempt()", "signal.raise_signal(signal.SIGTERM); self.sleep(0.01)")
+    program += "assert signal.getsignal(signal.SIGTERM) is own"
+    result = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=True
+    )
+    heard = "own\n" if "print" in own else ""
+    assert (result.stdout, result.stderr) == (f"ready\n{heard}stopped\npreempted\n", "")
+
+
+def test_sigterm_in_another_machine_of_the_main_thread_is_given_back(clock):
+    """The inner root takes no signal from the outer one, which has it."""
+    inner = machine_of(Tidy())
+
+    def run_inner(userdata):
+        taken = signal.getsignal(signal.SIGTERM)
+        assert taken is not signal.SIG_DFL
+        clock.call_later(1.0, inner.request_preempt)
+        inner.execute()
+        assert signal.getsignal(signal.SIGTERM) is taken
+        return "done"
+
+    outer = smachpy.StateMachine(["done"])
+    outer.add("INNER", smachpy.CBState(run_inner, outcomes=["done"]))
+    assert outer.execute() == "done"
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 import logging
 import os
 import signal
@@ -133,7 +134,7 @@ class CutAt:
         self.over = False  # the run is over: what comes now is for the next one
 
     def trace(self, frame, event, _arg):
-        if frame.f_code.co_name == "_forget_preempt":
+        if frame.f_code.co_name == "_forget_late_request":
             self.done = self.over = True
         if self.done or "/smachpy/" not in frame.f_code.co_filename:
             return None
@@ -195,9 +196,13 @@ def test_preempts_from_another_thread_at_any_moment_never_stick():
         sm = nested_and_deaf()
         go, asked = threading.Semaphore(0), threading.Semaphore(0)
 
+        over = False
+
         def ask():
-            for n in range(150):
+            for n in itertools.count():
                 go.acquire()
+                if over:
+                    return
                 for _ in range(n % 40):
                     pass
                 sm.request_preempt()
@@ -206,7 +211,8 @@ def test_preempts_from_another_thread_at_any_moment_never_stick():
         thread = threading.Thread(target=ask)
         thread.start()
         outcomes = Counter()
-        for _ in range(150):
+        # On a busy computer most requests come too late: go on until one was in time.
+        while outcomes.total() < 150 or not outcomes["preempted"]:
             go.release()
             outcome = sm.execute()
             asked.acquire()
@@ -216,10 +222,11 @@ def test_preempts_from_another_thread_at_any_moment_never_stick():
             outcomes[outcome] += 1
             assert_clean(sm)
             assert sm.execute() == "done"
+        over = True
+        go.release()
         thread.join()
     finally:
         sys.setswitchinterval(interval)
-    assert outcomes["preempted"]
 
 
 def test_preempt_before_execute_runs_no_child_and_holds_for_one_run():
@@ -493,7 +500,7 @@ def test_ignoring_branch_does_not_hold_the_others(seed, quiet):
 def test_no_grace_at_all(seed, quiet):
     with VirtualClock(seed) as clock, use_clock(clock):
         sm = mission()
-        sm.preempt_timeout = 0.0
+        smachpy.set_options(sm, preempt_timeout=0.0)
         for at in (0.0, 0.5, 1.0, 1.25, 2.5, 3.0):
             clock.spawn(lambda at=at: (clock.sleep(at), sm.request_preempt()), name="operator")
             begun = clock.now()
@@ -809,7 +816,7 @@ class Stone(smachpy.State):
         super().__init__(["ok"], output_keys=["k"], preempt_timeout=1.0)
 
     def execute(self, userdata):
-        clock = self._clock()
+        clock = self.clock()
         end = clock.now() + 500.0
         while clock.now() < end:
             with contextlib.suppress(BaseException):

@@ -9,19 +9,19 @@ import pytest
 from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import Trigger
 from actionlib_core.node import Node
-from actionlib_core.service_proxy import ServiceProxy
-from actionlib_core.topic import Subscriber
+from actionlib_core.pubsub.service_proxy import ServiceProxy
+from actionlib_core.pubsub.topic import Subscriber
 from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import IntrospectionServer, State, StateMachine
 from smachpy.events import PreemptRequested, to_record
-from smachpy.remote_control import (
+from smachpy.events.run_state import RunState
+from smachpy.network.remote_control import (
     STATE_TOPIC,
     CommandError,
     ControlClient,
     ControlServer,
     parse_command,
 )
-from smachpy.run_state import RunState
 
 
 class Wait(State):
@@ -161,6 +161,48 @@ def test_nobody_answers(clock):
         client.close()
 
 
+@pytest.mark.parametrize("how", ["stops", "dies"])
+def test_who_waits_for_an_answer_learns_at_once_that_none_will_come(clock, how):
+    class Stuck(StateMachine):
+        def set_initial_state(self, *_):
+            clock.sleep(60.0)
+
+    network = MemoryNetwork(clock)
+    session = network.session()
+    with (
+        Node("robot", transport=session, clock=clock) as robot,
+        Node("desk", transport=network.session(), clock=clock) as desk,
+    ):
+        machine = Stuck(outcomes=["done"], name="JOB")
+        server = ControlServer("/robot", machine, "/JOB", robot)
+        client = ControlClient("/robot", desk)
+        clock.call_later(0.5, server.close if how == "stops" else session.kill)
+        with pytest.raises(CommandError, match="no answer"):
+            client.send({"command": "initial", "path": "/JOB", "states": ["A"]})
+        assert clock.now() < 1.0
+        client.close()
+        server.close()
+
+
+def test_what_a_command_raises_reaches_who_sent_it(clock):
+    class Broken(StateMachine):
+        def set_initial_state(self, *_):
+            raise RuntimeError("jammed")
+
+    network = MemoryNetwork(clock)
+    with (
+        Node("robot", transport=network.session(), clock=clock) as robot,
+        Node("desk", transport=network.session(), clock=clock) as desk,
+    ):
+        server = ControlServer("/robot", Broken(outcomes=["done"], name="JOB"), "/JOB", robot)
+        client = ControlClient("/robot", desk)
+        with pytest.raises(CommandError, match="jammed"):
+            client.send({"command": "initial", "path": "/JOB", "states": ["A"]})
+        assert client.send({"command": "pause"})["paused"]
+        client.close()
+        server.close()
+
+
 def test_history_rebuilds_what_happened(world):
     machine, _, clock, desk = world
     clock.sleep(6.0)
@@ -242,15 +284,15 @@ def test_a_breakpoint_that_nothing_can_reach_is_refused(slashes, path, outcome, 
 
 def test_a_server_that_cannot_listen_leaves_nothing_at_the_machine(clock, monkeypatch):
     def fails(*_, **__):
-        raise RuntimeError("no subscriber")
+        raise RuntimeError("no service")
 
-    monkeypatch.setattr("smachpy.remote_control.Subscriber", fails)
+    monkeypatch.setattr("smachpy.network.remote_control.Service", fails)
     published = []
-    monkeypatch.setattr(ControlServer, "_tell_state", lambda _: published.append(1))
+    monkeypatch.setattr(ControlServer, "_publish_state", lambda _: published.append(1))
     machine = StateMachine(outcomes=["done"], name="JOB")
     session = MemoryNetwork(clock).session()
     with Node("robot", transport=session, clock=clock) as node:
-        with pytest.raises(RuntimeError, match="no subscriber"):
+        with pytest.raises(RuntimeError, match="no service"):
             ControlServer("robot", machine, "/JOB", node)
         machine.control.pause()
         clock.sleep(1.0)

@@ -12,10 +12,10 @@ from actionlib_core.interfaces.std_srvs.srv import (
     Trigger,
     TriggerResponse,
 )
-from actionlib_core.service import Service
+from actionlib_core.pubsub.service import Service
 from actionlib_core.time import Duration
 from smachpy import InvalidStateError, InvalidUserCodeError, StateMachine, UserData, cb_interface
-from smachpy.service_state import ServiceState
+from smachpy.actions.service_state import ServiceState
 from tests.two_nodes import TwoNodes
 
 OUTCOMES = ["succeeded", "aborted", "preempted"]

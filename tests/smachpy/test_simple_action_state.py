@@ -6,7 +6,8 @@ import threading
 
 import pytest
 
-from actionlib_core.action_server import ActionServer
+from actionlib_core.action.server import ActionServer
+from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.exceptions import ActionException, TypeMismatchError
 from actionlib_core.interfaces.actionlib.msg import (
     TestAction as Action,
@@ -26,7 +27,6 @@ from actionlib_core.interfaces.actionlib.msg import (
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.interfaces.geometry_msgs.msg import PoseStamped
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
-from actionlib_core.simple_action_server import SimpleActionServer
 from actionlib_core.time import Duration
 from smachpy import (
     Concurrence,
@@ -37,7 +37,7 @@ from smachpy import (
     cb_interface,
     events,
 )
-from smachpy.simple_action_state import SimpleActionState
+from smachpy.actions.simple_action_state import SimpleActionState
 from tests.two_nodes import TwoNodes
 
 OUTCOMES = ["succeeded", "aborted", "preempted"]
@@ -673,7 +673,7 @@ def test_a_new_node_gets_a_new_client(world):
 
 
 def test_states_of_one_action_share_a_client(world):
-    from actionlib_core.presence import Kind, list_endpoints
+    from actionlib_core.wire.presence import Kind, list_endpoints
 
     world.serve(count)
     for _ in range(5):

@@ -162,7 +162,7 @@ def test_a_root_that_was_asked_before_it_began_makes_no_attempt(clock, asks, wat
     if watched:
         sm.subscribe(events.append)
     if asks == "hook":
-        sm.on_enter = lambda _userdata: sm.request_preempt()
+        smachpy.set_options(sm, on_enter=lambda _userdata: sm.request_preempt())
     with use_shutdown(Shutdown()) as shutdown:
         if asks == "shutdown":
             shutdown.request()
@@ -171,7 +171,8 @@ def test_a_root_that_was_asked_before_it_began_makes_no_attempt(clock, asks, wat
         assert sm.execute() == "preempted"
     assert state.runs == 0
     assert not [e for e in events if isinstance(e, Retried)]
-    sm.on_enter, state.left = None, 0
+    smachpy.set_options(sm, on_enter=None)
+    state.left = 0
     assert sm.execute() == "ok"
 
 
@@ -206,7 +207,7 @@ def test_timeout_of_the_root_that_comes_too_late_does_not_end_the_next_run():
         sm.execute()
         over.set()
         assert asked.wait(20.0)
-        sm.timeout = None
+        smachpy.set_options(sm, timeout=None)
         assert sm.execute() == "ok"
 
 
@@ -357,8 +358,11 @@ def test_hooks_run_around_the_state():
     heard = []
     state = smachpy.State(["ok"])
     state.execute = lambda ud: heard.append("run") or "ok"
-    state.on_enter = lambda ud: heard.append("enter")
-    state.on_exit = lambda ud, outcome: heard.append(("exit", outcome))
+    smachpy.set_options(
+        state,
+        on_enter=lambda ud: heard.append("enter"),
+        on_exit=lambda ud, outcome: heard.append(("exit", outcome)),
+    )
     assert run(state)[0] == "ok"
     assert heard == ["enter", "run", ("exit", "ok")]
 

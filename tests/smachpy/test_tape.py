@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 import smachpy
 from actionlib_core.clock import RealClock, VirtualClock, use_clock
 from smachpy import Concurrence, Iterator, State, StateMachine
-from smachpy import tape as tapes
 from smachpy.events import Entered, Left, Started, UserdataWritten, to_record
-from smachpy.run_state import RunState
-from smachpy.tape import EventTape
+from smachpy.events import tape as tapes
+from smachpy.events.run_state import RunState
+from smachpy.events.tape import EventTape
 
 
 class Work(State):

@@ -8,8 +8,8 @@ from importlib.metadata import EntryPoint
 import pytest
 
 import smachpy
-import smachpy.targets
-from smachpy.targets import Target, TargetError, list_missions, load_target
+import smachpy.command.targets
+from smachpy.command.targets import Target, TargetError, list_missions, load_target
 
 FILE = '''
 import smachpy
@@ -50,16 +50,16 @@ def file(tmp_path, monkeypatch):
 
 @pytest.fixture(autouse=True)
 def missions(monkeypatch):
-    points = [EntryPoint("hello", f"{__name__}:make_mission", smachpy.targets.GROUP)]
+    points = [EntryPoint("hello", f"{__name__}:make_mission", smachpy.command.targets.GROUP)]
     monkeypatch.setattr(EntryPoint, "load", lambda _: make_mission)
-    monkeypatch.setattr(smachpy.targets, "entry_points", lambda **_: points)
+    monkeypatch.setattr(smachpy.command.targets, "entry_points", lambda **_: points)
 
 
 def test_a_mission_s_name_gives_its_factory():
     target = load_target("hello")
     assert (target.name, target.summary) == ("hello", "Say hello.")
     assert target.build().execute() == "done"
-    assert [t.name for t in list_missions()] == ["hello"]
+    assert list(list_missions()) == ["hello"]
 
 
 def test_an_unknown_mission_names_the_nearest():

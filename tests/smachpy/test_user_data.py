@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import smachpy
 from smachpy.events import UserdataWritten
-from smachpy.user_data import get_const
+from smachpy.userdata.user_data import get_const
 
 
 @dataclasses.dataclass
@@ -247,7 +247,7 @@ def test_read_only_views_equal_their_originals(value):
     assert view == value
     assert isinstance(view, type(value))
     assert copy.deepcopy(view) == value
-    from smachpy._core.readonly import writable
+    from smachpy.userdata.readonly import writable
 
     assert writable(view) == value
     assert get_const(view) == value
@@ -416,3 +416,78 @@ def test_userdata_type_without_fields_is_told():
     for kind in (Nothing, int):
         with pytest.raises(smachpy.InvalidStateError, match="userdata_type"):
             smachpy.StateMachine(["ok"], userdata_type=kind)
+
+
+@pytest.mark.parametrize(
+    ("value", "change"),
+    [
+        ([1], lambda v: v.append(2)),
+        ({"a": [{1}]}, lambda v: v["a"][0].add(2)),
+        ((Pose(tags=["a"]),), lambda v: v[0].tags.append("b")),
+        (Slotted(), lambda v: v.a.append(2)),
+        (OrderedDict(a=deque([[1]])), lambda v: v["a"][0].clear()),
+        (Pair([1], 2), lambda v: v.a.append(2)),
+    ],
+)
+def test_a_refused_change_names_the_key_and_the_state(value, change):
+    with pytest.raises(smachpy.ReadOnlyError) as raised:
+        through_a_state(value, change).execute()
+    assert (raised.value.key, raised.value.path) == ("v", "/SM_ROOT/A")
+    assert "/SM_ROOT/A" in str(raised.value)
+    with pytest.raises(smachpy.ReadOnlyError) as raised:
+        change(get_const(value))
+    assert (raised.value.key, raised.value.path) == ("", "")
+
+
+def test_a_value_of_a_wrong_type_names_the_state():
+    @dataclasses.dataclass
+    class Mission:
+        v: int = 0
+
+    def write(ud):
+        ud.v = "x"
+
+    sm = smachpy.StateMachine(["ok"], userdata_type=Mission)
+    sm.add("A", smachpy.CBState(write, outcomes=["ok"], output_keys=["v"]))
+    with pytest.raises(smachpy.UserDataTypeError) as raised:
+        sm.execute()
+    assert (raised.value.key, raised.value.path) == ("v", "/SM_ROOT/A")
+
+
+def test_a_list_is_copied_again_only_when_it_has_changed():
+    value = [(1.0, 2.0), "a", 3]
+    userdata = smachpy.UserData()
+    userdata.v = value
+    window = smachpy.Remapper(userdata, ["v"])
+    first = window.v
+    assert window.v is first
+    for change, wanted in [
+        (lambda: value.append(4), [(1.0, 2.0), "a", 3, 4]),
+        (lambda: value.__setitem__(2, 3.0), [(1.0, 2.0), "a", 3.0, 4]),
+        (lambda: value.reverse(), [4, 3.0, "a", (1.0, 2.0)]),
+        (lambda: setattr(userdata, "v", [1]), [1]),
+        (lambda: setattr(userdata, "v", [True]), [True]),
+    ]:
+        change()
+        assert list(map(repr, window.v)) == list(map(repr, wanted))
+        with pytest.raises(smachpy.ReadOnlyError):
+            window.v.append(1)
+    assert first == [(1.0, 2.0), "a", 3]
+
+
+@pytest.mark.parametrize("inner", [[1], {"a": 1}, Pose(), ([1],), {1}])
+def test_what_changes_inside_a_list_is_seen_at_the_next_read(inner):
+    userdata = smachpy.UserData()
+    userdata.v = [1, inner]
+    window = smachpy.Remapper(userdata, ["v"])
+    assert window.v == [1, inner]
+    target = inner[0] if isinstance(inner, tuple) else inner
+    if isinstance(target, Pose):
+        target.x = 9.0
+    elif isinstance(target, dict):
+        target["b"] = 2
+    elif isinstance(target, set):
+        target.add(5)
+    else:
+        target.append(2)
+    assert window.v == [1, inner]

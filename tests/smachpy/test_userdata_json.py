@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from actionlib_core.time import Duration, Time
-from smachpy.userdata_json import dumps, find_lost, loads
+from smachpy.userdata.json_text import dumps, find_lost, loads
 
 SCALARS = (
     st.none()

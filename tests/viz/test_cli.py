@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from smachpy.cli import main
+from smachpy.command import main
 
 MISSION = '''
 """A mission to draw."""

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from viz import curves
+from viz.pictures import curves
 
 LINE = "e,30,0 0,0 10,0 20,0 30,0"
 

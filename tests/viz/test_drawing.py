@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
-import time
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -16,7 +16,7 @@ import smachpy
 import viz
 from smachpy import events as ev
 from smachpy.introspection import RuleRecord, StateRecord, TransitionRecord, describe
-from viz import drawing, engine
+from viz.pictures import drawing, graphviz_process
 
 SVG = "{http://www.w3.org/2000/svg}"
 HOSTILE = [
@@ -98,7 +98,9 @@ def test_json_comes_back_as_the_same_record(patrol):
 
 def test_dot_text_can_be_laid_out_by_any_dot(patrol, tmp_path):
     file = viz.render(patrol, tmp_path / "m.dot")
-    done = subprocess.run([*engine.find_dot(), "-Tsvg", file], capture_output=True, check=True)
+    done = subprocess.run(
+        [*graphviz_process.find_dot(), "-Tsvg", file], capture_output=True, check=True
+    )
     assert sorted(states_of(done.stdout)) == sorted(state.path for state in patrol.walk())
     assert b"is inside" not in done.stderr
 
@@ -167,7 +169,7 @@ def test_hostile_names_are_harmless(build, form):
         assert b"<script" not in data
     if form == "dot":
         done = subprocess.run(
-            [*engine.find_dot(), "-Tsvg"], input=data, capture_output=True, check=True
+            [*graphviz_process.find_dot(), "-Tsvg"], input=data, capture_output=True, check=True
         )
         assert len(states_of(done.stdout)) == sum(1 for _ in record.walk())
 
@@ -256,13 +258,14 @@ def test_the_atlas_of_a_plain_state_is_its_one_page(build, tmp_path):
 
 def test_times_to_hold(large, tmp_path):
     def took(work):
-        began = time.perf_counter()
+        """Return the seconds that this process and those it started computed."""
+        began = os.times()
         work()
-        return time.perf_counter() - began
+        return sum(os.times()[:4]) - sum(began[:4])
 
     sixty, five_hundred = large(60), large(500)
     viz.picture(sixty, "svg")  # imports and font caches
-    busy = 5  # other work may share the cores
+    busy = 5  # other work may share the caches
     assert min(took(lambda: viz.picture(sixty, "svg", depth=99)) for _ in range(3)) < 0.5 * busy
     assert took(lambda: viz.atlas(five_hundred, tmp_path)) < 2 * busy
 

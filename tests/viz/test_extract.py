@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from viz.extract import UnknownPathError, extract, find, readable_depth
+from viz.model.extract import UnknownPathError, extract, find, readable_depth
 
 
 def child(node, label):

@@ -4,7 +4,8 @@ import threading
 from types import SimpleNamespace
 
 from smachpy import events as ev
-from viz.history import RAISED, History
+from smachpy.events.run_state import RAISED
+from viz.model.history import History
 
 
 def told(*events):
@@ -102,3 +103,20 @@ def test_threads_may_tell_at_the_same_time():
         thread.join()
     assert history.visits()["/M/A"].count == 2000
     assert history.visits()["/M/A"].outcomes == {"x": 2000}
+
+
+def test_a_new_run_ends_what_the_last_one_left_open():
+    """The first run was cut short: its process was killed, or its recording ends there."""
+    history = History()
+    for event in (
+        ev.Started("/M", 0.0, 0, ("A",)),
+        ev.Entered("/M/A", 0.0, 0),
+        ev.GoalSent("/M/A", 0.0, 0, "move", "g-1", SimpleNamespace()),
+        ev.Started("/MORE", 5.0, 5, ("A",)),
+        ev.Started("/M", 10.0, 10, ("B",)),
+        ev.Entered("/M/B", 10.0, 10),
+    ):
+        history.on_event(event)
+    assert sorted(history.active()) == ["/M", "/M/B", "/MORE"]
+    assert history.goals() == []
+    assert history.visits()["/M/A"].seconds == 0.0

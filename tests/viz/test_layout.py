@@ -7,10 +7,10 @@ import math
 
 import pytest
 
-from viz import curves, engine, graph, layout
-from viz.extract import extract
-from viz.model import Diagram
-from viz.theme import LIGHT
+from viz.model.extract import extract
+from viz.model.machine import Diagram
+from viz.pictures import curves, graphviz_process, layout, shapes
+from viz.pictures.theme import LIGHT
 
 DOT = 4.5
 ARROW = 9.0
@@ -20,8 +20,8 @@ class Picture:
     """Boxes and ends of arrows by name, in points."""
 
     def __init__(self, record, **options):
-        self.root = graph.draw(Diagram(extract(record, **options)), LIGHT)
-        self.geometry = engine.lay_out(lambda run: layout.compose(self.root, LIGHT, run))
+        self.root = shapes.shapes_of(Diagram(extract(record, **options)), LIGHT)
+        self.geometry = graphviz_process.lay_out(lambda run: layout.compose(self.root, LIGHT, run))
         self.boxes = {box.name: self._box(box) for box in self._all(self.root)}
 
     def _all(self, box):
@@ -187,7 +187,7 @@ def test_arrows_back_into_their_container_go_round_it(looping):
 
 
 def test_a_page_that_makes_dot_crash_is_laid_out_simpler(looping):
-    root = graph.draw(Diagram(extract(looping)), LIGHT)
+    root = shapes.shapes_of(Diagram(extract(looping)), LIGHT)
 
     def work(run):
         def fragile(texts):
@@ -197,10 +197,10 @@ def test_a_page_that_makes_dot_crash_is_laid_out_simpler(looping):
 
         return layout.compose(root, LIGHT, fragile)
 
-    assert engine.lay_out(work)[root.name]["bb"]
+    assert graphviz_process.lay_out(work)[root.name]["bb"]
 
 
 def test_a_page_that_always_crashes_is_told(looping):
-    root = graph.draw(Diagram(extract(looping)), LIGHT)
+    root = shapes.shapes_of(Diagram(extract(looping)), LIGHT)
     with pytest.raises(layout.LayoutError, match="/M/INNER"):
         layout.compose(root, LIGHT, lambda texts: [None for _ in texts])

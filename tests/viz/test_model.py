@@ -1,25 +1,6 @@
 from __future__ import annotations
 
-import pytest
-
-from viz.model import Marks, Node, outcome_class
-
-
-@pytest.mark.parametrize(
-    ("outcome", "kind"),
-    [
-        ("succeeded", "success"),
-        ("DONE", "success"),
-        ("aborted", "failure"),
-        ("timed_out", "failure"),
-        ("preempted", "preempted"),
-        ("cancelled", "preempted"),
-        ("low_battery", "other"),
-        ("", "other"),
-    ],
-)
-def test_outcome_names_tell_how_something_ended(outcome, kind):
-    assert outcome_class(outcome) == kind
+from viz.model.machine import Marks, Node
 
 
 def test_walk_goes_parents_first():

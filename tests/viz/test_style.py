@@ -4,10 +4,10 @@ import itertools
 
 import pytest
 
-from viz import style
-from viz.model import Diagram, Marks, Node
-from viz.theme import DARK, LIGHT, THEMES
-from viz.words import shorten
+from viz.model.labels import shorten
+from viz.model.machine import Diagram, Marks, Node
+from viz.pictures import style
+from viz.pictures.theme import DARK, LIGHT, THEMES
 
 STATE = Node("/M/A", "A", "action", details=(("action", "move_base"),), doc="Drives.")
 

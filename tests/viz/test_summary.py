@@ -5,8 +5,8 @@ import io
 from rich.console import Console
 
 from smachpy import events as ev
-from viz.history import History
-from viz.summary import summary
+from viz.model.history import History
+from viz.terminal.summary import summary
 
 
 def printed(record, history, outcome, rows=40):

@@ -5,29 +5,30 @@ The page's counterpart of ROS's axclient. Only goals that were sent from here ar
 
 from __future__ import annotations
 
+import itertools
 import logging
 import threading
 from dataclasses import dataclass, field
+from functools import partial
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core._core.states import CommState, Status
-from actionlib_core.action_client import ActionClient
+from actionlib_core.action.client import ActionClient
 from actionlib_core.exceptions import ActionlibError, FieldError, InterfaceError
+from actionlib_core.goal.states import CommState, Status
 from actionlib_core.interfaces import get_action
-from actionlib_core.presence import Kind, parse_token, token_pattern
+from actionlib_core.wire.presence import Kind, parse_token, token_pattern
 from smachpy.exceptions import SmachError
-from viz.feedback import Progress, progress_of
-from viz.history import Goal
 from viz.live.forms import fields_of, problems_of, sensible, values_of, yaml_of
+from viz.model.progress import progress_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from actionlib_core.action_client import ClientGoalHandle
+    from actionlib_core.action.client import ClientGoalHandle
     from actionlib_core.node import Node
-    from actionlib_core.presence import Endpoint
-    from actionlib_core.transport import Presence
+    from actionlib_core.transport import Closable, Presence
+    from actionlib_core.wire.presence import Endpoint
 
 logger = logging.getLogger("viz.live")
 
@@ -81,7 +82,7 @@ class SentAction:
 
     def to_json(self) -> dict[str, Any]:
         """Return what the page shows."""
-        progress = self._progress()
+        progress = progress_of(self.goal, self.feedback, self.first)
         return {
             "id": self.id,
             "action": self.action,
@@ -98,17 +99,14 @@ class SentAction:
             **self.texts,
         }
 
-    def _progress(self) -> Progress:
-        since = self.sent_ns / 1e9
-        shown = (self.goal, self.feedback, self.first)
-        return progress_of(Goal("", self.action, self.id, since, *shown))
-
 
 class Actions:
-    """Knows the actions on the network and sends goals to them.
+    """Knows the actions on the network, or on several, and sends goals to them.
+
+    An action that is called as one of another network has a number after its name.
 
     Args:
-        node: Where.
+        node: Where; `join` adds others.
         on_change: Called when there is something new to show.
 
     Threads: every method may be called from any thread; `on_change` is called from any.
@@ -119,12 +117,29 @@ class Actions:
         self._on_change = on_change
         self._lock = threading.Lock()
         self._servers: dict[str, dict[str, Endpoint]] = {}
+        self._nodes: dict[str, Node] = {}  # by the name that is shown
         self._goals: dict[str, SentAction] = {}
-        self._clients: dict[tuple[str, str], ActionClient[Any]] = {}
+        self._clients: dict[tuple[Node, str, str], ActionClient[Any]] = {}
         self._searched = False
         self.revision = 0
-        pattern = token_pattern(Kind.ACTION_SERVER)
-        self._watch = node.transport.watch_alive(pattern, self._on_presence)
+        self._watches: dict[Node, Closable] = {}
+        self.join(node)
+
+    def join(self, node: Node) -> None:
+        """Look where `node` is too."""
+        pattern, on_presence = token_pattern(Kind.ACTION_SERVER), partial(self._on_presence, node)
+        self._watches[node] = node.transport.watch_alive(pattern, on_presence)
+
+    def leave(self, node: Node) -> None:
+        """Look where `node` is no more."""
+        self._watches.pop(node).close()
+        with self._lock:
+            for name in [name for name, owner in self._nodes.items() if owner is node]:
+                del self._nodes[name], self._servers[name]
+            clients = [self._clients.pop(key) for key in list(self._clients) if key[0] is node]
+        for client in clients:
+            client.stop()
+        self._changed()
 
     def listen(self, on_change: Callable[[], object]) -> None:
         """Call `on_change` from now on."""
@@ -132,7 +147,8 @@ class Actions:
 
     def close(self) -> None:
         """Leave the network; goals that run go on. A second call does nothing."""
-        self._watch.close()
+        for watch in self._watches.values():
+            watch.close()
         with self._lock:
             clients = list(self._clients.values())
             self._clients.clear()
@@ -207,7 +223,7 @@ class Actions:
                 f"{running} goals run already; expected fewer than {MOST_RUNNING}. Cancel some."
             )
         try:
-            client = self._client(end)
+            client = self._client(name, end)
             if not client.wait_for_server(SERVER_S):
                 raise GoalRefusedError(_gone(name))
             sent = SentAction("", name, end.type.removesuffix("Action"), goal, self._now())
@@ -273,12 +289,14 @@ class Actions:
 
     # -- the network -----------------------------------------------------------------------------
 
-    def _on_presence(self, presence: Presence) -> None:
+    def _on_presence(self, node: Node, presence: Presence) -> None:
         end = parse_token(presence.key)
         if end is None:
             return
         with self._lock:
-            servers = self._servers.setdefault(end.name, {})
+            names = (f"{end.name} ({i})" if i > 1 else end.name for i in itertools.count(1))
+            shown = next(name for name in names if self._nodes.setdefault(name, node) is node)
+            servers = self._servers.setdefault(shown, {})
             if presence.alive:
                 servers[presence.key] = end
             else:
@@ -336,13 +354,16 @@ class Actions:
             except Exception:  # a package that is broken hides only its own definitions
                 logger.exception("interfaces of %s cannot be loaded", point.value)
 
-    def _client(self, end: Endpoint) -> ActionClient[Any]:
+    def _client(self, name: str, end: Endpoint) -> ActionClient[Any]:
         spec = self._action_class(end)
         with self._lock:
-            client = self._clients.get((end.name, end.md5))
+            node = self._nodes.get(name)
+            if node is None:
+                raise GoalRefusedError(_gone(name))
+            client = self._clients.get((node, end.name, end.md5))
             if client is None:
-                client = ActionClient(f"/{end.name}", spec, node=self._node)
-                self._clients[end.name, end.md5] = client
+                client = ActionClient(f"/{end.name}", spec, node=node)
+                self._clients[node, end.name, end.md5] = client
             return client
 
     def _read(self, cls: Any, text: str) -> Any:

@@ -23,6 +23,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import re
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -33,7 +34,7 @@ from starlette.responses import JSONResponse, PlainTextResponse, Response, Strea
 from starlette.routing import Route
 
 from smachpy.exceptions import SmachError
-from viz.live import page
+from viz.live import assets as page
 from viz.live.actions import GoalRefusedError
 from viz.live.machines import KEPT_EVENTS
 from viz.live.security import Guard, refuse_command
@@ -63,6 +64,8 @@ FARTHEST = 3_000
 MOST_PAGES = 64
 LONGEST_COMMAND = 1_000_000
 """Bytes of a command."""
+
+_LAST_EVENT = re.compile(r"(.*:[0-9]{1,18})?", re.DOTALL)
 
 PICTURES = {
     "svg": "image/svg+xml",
@@ -245,7 +248,7 @@ class Viewer:
         form = request.query_params.get("format", "svg")
         if machine is None or machine.record is None or form not in PICTURES:
             return _unknown(request)
-        from viz.drawing import picture
+        from viz.pictures.drawing import picture
 
         asked = set(request.query_params.getlist("active"))
         paths = {state.path for state in machine.record.walk()}
@@ -265,10 +268,10 @@ class Viewer:
         form = request.query_params.get("format", "html")
         if machine is None or machine.record is None or form not in {"html", "jsonl"}:
             return _unknown(request)
-        from viz.runs.recording import recording_lines
+        from smachpy.events.recording import recording_lines
 
         if form == "jsonl":
-            base, events = machine.told()
+            base, events = machine.history()
             lines = recording_lines(machine.record, events, base)
             return _download("".join(lines).encode(), "application/jsonl", "run.jsonl")
         run = {"model": page.model(machine.record), "snap": json.loads(machine.snapshot()[1])}
@@ -318,10 +321,14 @@ class Viewer:
     async def _events(self, request: Request) -> Response:
         if len(self._pages) >= MOST_PAGES:
             return PlainTextResponse(f"{MOST_PAGES} pages are open already", status_code=503)
+        last = request.headers.get("last-event-id") or request.query_params.get("last", "")
+        if not _LAST_EVENT.fullmatch(last):
+            text = f"last: got {last!r}; expected EPOCH:NUMBER, the id of an event, or nothing."
+            return PlainTextResponse(text, status_code=400)
         one = _Page(
             self._machines,
             request.query_params.get("machine", ""),
-            request.headers.get("last-event-id") or request.query_params.get("last", ""),
+            last,
             {
                 "follow": self._follow,
                 "control": self._token is not None,
@@ -360,16 +367,16 @@ class _Page:
         self._machines = machines
         self._name = name
         self._settings = settings
-        epoch, _, seq = last_id.partition(":")
+        epoch, _, seq = last_id.rpartition(":")
         self._epoch = epoch
-        self._seq = int(seq) if seq.isdigit() else 0
+        self._seq = int(seq or 0)
         self._facts: dict[str, Any] = {}
         self._list = ""
         self._listed = 0.0
         self._beaten = 0.0
         self._actions = actions
-        self._told = -1  # revision of the actions
-        self._told_at = 0.0
+        self._actions_revision = -1  # revision of the actions
+        self._actions_sent = 0.0
 
     async def messages(self) -> AsyncIterator[str]:
         """Yield what to send, for ever."""
@@ -393,10 +400,10 @@ class _Page:
                 self._beaten = loop.time()
                 yield f"event: beat\ndata: {time.time_ns() // 1_000_000}\n\n"
             due = min(due, self._beaten + BEAT_S - loop.time())
-            if self._actions is not None and self._told != self._actions.revision:
-                wait = self._told_at + ACTIONS_S - loop.time()
+            if self._actions is not None and self._actions_revision != self._actions.revision:
+                wait = self._actions_sent + ACTIONS_S - loop.time()
                 if wait <= 0:
-                    yield self._tell_actions(self._actions, loop.time())
+                    yield self._actions_text(self._actions, loop.time())
                 else:
                     due = min(due, wait)
             try:
@@ -406,17 +413,15 @@ class _Page:
                 continue
             await asyncio.sleep(COALESCE_S)
 
-    def _tell_actions(self, actions: Actions, now: float) -> str:
-        self._told, self._told_at = actions.revision, now
+    def _actions_text(self, actions: Actions, now: float) -> str:
+        self._actions_revision, self._actions_sent = actions.revision, now
         return f"event: actions\ndata: {json.dumps(actions.summary())}\n\n"
 
     def _choose(self) -> Machine | None:
         """The machine that the page shows: the one it names, else the first there is."""
-        if not self._name:
-            there = self._machines.summaries()
-            live = [one for one in there if one["stale"] is None] or there
-            self._name = live[0]["name"] if live else ""
-        machine = self._machines.get(self._name)
+        machine = self._machines.get(self._name) if self._name else self._machines.first()
+        if machine is not None:
+            self._name = machine.name
         return None if machine is None or machine.record is None else machine
 
     def _update(self, machine: Machine) -> list[str]:
@@ -462,8 +467,8 @@ def _no_command() -> Response:
 
 def _compared(old: tuple[str, Any, Any], new: tuple[str, Any, Any]) -> dict[str, Any]:
     """Two machines, each with name, record and events, in one drawing."""
+    from viz.runs.compare import Side, unite
     from viz.runs.statistics import Statistics
-    from viz.runs.union import Side, unite
 
     sides = []
     for name, record, events in (old, new):

@@ -2,23 +2,33 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import sys
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+
+from actionlib_core.clock import SerialExecutor
 
 if TYPE_CHECKING:
     import argparse
+    from collections.abc import Iterator, Sequence
 
+    from actionlib_core.node import Node
+    from viz.live.actions import Actions
     from viz.live.machines import Machines
+    from viz.live.network import Network
     from viz.runs.statistics import StatisticsOfFiles
 
 EXAMPLES = """examples:
-  smachpy view                         every machine that runs on this network
+  smachpy view                         every machine on this network, and your private runs
   smachpy view --control               with pause, step, jump, preempt, and goals to actions
   smachpy view run.jsonl               a recorded run
   smachpy view --runs runs/            with the statistics of recorded runs on the graph
 """
 PORT = 8080
 HIGHEST_PORT = 65_535
+LEAVE_S: Final = 2.0  # longest wait at the end until all networks are left
 
 
 def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -63,6 +73,7 @@ def _port(text: str) -> int:
 
 def _run(args: argparse.Namespace) -> int:
     from actionlib_core.node import get_node
+    from viz.live.actions import Actions
     from viz.live.machines import Machines
     from viz.live.network import Network
     from viz.runs.statistics import StatisticsOfFiles
@@ -71,25 +82,30 @@ def _run(args: argparse.Namespace) -> int:
     _load(machines, args.files)
     runs = StatisticsOfFiles(args.runs)
     network = Network(get_node(), machines, control=args.control)
+    actions = None if args.tui else Actions(get_node())
     try:
-        if args.tui:
-            return _show_in_terminal(machines, network, control=args.control)
-        return _serve(args, machines, runs, network)
+        with private_runs(get_node(), [network] if actions is None else [network, actions]):
+            if actions is None:
+                return _show_in_terminal(machines, network, control=args.control)
+            return _serve(args, machines, runs, network, actions)
     finally:
+        if actions is not None:
+            actions.close()
         network.close()
 
 
 def _serve(
-    args: argparse.Namespace, machines: Machines, runs: StatisticsOfFiles, network: Any
+    args: argparse.Namespace,
+    machines: Machines,
+    runs: StatisticsOfFiles,
+    network: Network,
+    actions: Actions,
 ) -> int:
-    from actionlib_core.node import get_node
-    from viz.live.actions import Actions
     from viz.live.app import Viewer
     from viz.live.security import make_token
     from viz.live.server import PageServer
 
     token = make_token() if args.control else None
-    actions = Actions(get_node())
     viewer = Viewer(
         machines,
         token=token,
@@ -104,15 +120,50 @@ def _serve(
     print(server.address + (f"#token={token}" if token else ""), flush=True)
     if args.child:
         _end_with_parent(server)
-    try:
-        server.serve_here()
-    finally:
-        actions.close()
+    server.serve_here()
     return 0
 
 
+@contextlib.contextmanager
+def private_runs(node: Node, parts: Sequence[Network | Actions]) -> Iterator[None]:
+    """Let `parts` look at this user's private networks too, unless the environment names one.
+
+    Threads: they are joined and left on a thread of their own, one after the other.
+    """
+    from actionlib_core.config import Config
+    from actionlib_core.node import Node
+    from actionlib_core.private_network import network_is_chosen, watch_private_networks
+
+    if network_is_chosen():
+        yield
+        return
+    joined: dict[int, Node] = {}
+    executor = SerialExecutor(node.clock, "private networks")
+
+    def follow(domain: int, alive: bool) -> None:
+        if alive and domain not in joined:
+            joined[domain] = Node(f"view_{os.getpid()}", config=Config(domain=domain))
+            for part in parts:
+                part.join(joined[domain])
+        elif not alive and domain in joined:
+            for part in parts:
+                part.leave(joined[domain])
+            joined.pop(domain).close()
+
+    watch = watch_private_networks(
+        node.transport, lambda domain, alive: executor.submit(lambda: follow(domain, alive))
+    )
+    try:
+        yield
+    finally:
+        watch.close()
+        for domain in list(joined):
+            executor.submit(partial(follow, domain, alive=False))
+        executor.join(LEAVE_S)
+
+
 def _load(machines: Machines, files: list[str]) -> None:
-    from viz.runs.recording import find_recordings, read_recording
+    from smachpy.events.recording import find_recordings, read_recording
 
     paths = list(dict.fromkeys(find_recordings(files)))
     names = [path.name for path in paths]

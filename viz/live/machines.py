@@ -7,12 +7,13 @@ import json
 import threading
 import uuid
 from collections import deque
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from smachpy.events import record_text
+from smachpy.events.run_state import RunState
 from smachpy.introspection import StateRecord
-from smachpy.run_state import RunState
-from viz.live.progress import annotate
+from viz.model.progress import progress_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -68,7 +69,7 @@ class Machine:
         return self._seq
 
     def reset(self, history: dict[str, Any], *, limit: int = KEPT_EVENTS) -> None:
-        """Begin anew with what a server tells (`smachpy.feed`), or a file."""
+        """Begin anew with what a server tells (`smachpy.network.feed`), or a file."""
         record = StateRecord.from_json(json.dumps(history["description"]))
         with self._lock:
             self.epoch = str(history["epoch"])
@@ -99,7 +100,7 @@ class Machine:
     def add(self, records: Iterable[dict[str, Any]]) -> bool:
         """Take events in, each with its `seq`; False when some are missing before them.
 
-        Those that the machine itself has dropped (`smachpy.tape`) are not missed.
+        Those that the machine itself has dropped (`smachpy.events.tape`) are not missed.
         """
         with self._lock:
             for record in records:
@@ -149,11 +150,7 @@ class Machine:
         with self._lock:
             return [record for _, record, _ in self._events]
 
-    def base(self) -> dict[str, Any]:
-        """Return a copy of what happened before the kept events."""
-        return self.told()[0]
-
-    def told(self) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    def history(self) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         """Return a copy of what happened before the kept events, and those, of one instant."""
         with self._lock:
             copy: dict[str, Any] = json.loads(json.dumps(self._base.data))
@@ -202,7 +199,7 @@ class Machine:
             self.revision += 1
 
     def _append(self, record: dict[str, Any], limit: int) -> None:
-        record = annotate(record, self._now.data["goals"])
+        record = with_progress(record, self._now.data["goals"])
         self._now.fold(record)
         self._seq = record["seq"]
         text = record_text(record)
@@ -212,6 +209,24 @@ class Machine:
             self._folded, old, text = self._events.popleft()
             self._bytes -= len(text)
             self._base.fold(old)
+
+
+def with_progress(record: dict[str, Any], goals: dict[str, Any]) -> dict[str, Any]:
+    """Return `record`, with `progress` if it is feedback: fraction, distance [m] and text.
+
+    Args:
+        record: A record of an event.
+        goals: The goals of `RunState`, before that event.
+    """
+    if record["kind"] != "GoalFeedback" or "progress" in record:
+        return record
+    goal = goals.get(record["goal_id"])
+    if goal is None:
+        return record
+    first = goal["first_feedback"]
+    feedback = record["feedback"]
+    progress = progress_of(goal["goal"], feedback, feedback if first is None else first)
+    return {**record, "progress": asdict(progress)}
 
 
 class Machines:
@@ -228,6 +243,12 @@ class Machines:
     def get(self, name: str) -> Machine | None:
         """Return the machine of that name."""
         return self._machines.get(name)
+
+    def first(self) -> Machine | None:
+        """Return the first by name of those that are there, else of those that have gone."""
+        known = self.summaries()
+        there = [one for one in known if one["stale"] is None] or known
+        return self.get(there[0]["name"]) if there else None
 
     def obtain(self, name: str) -> Machine:
         """Return the machine of that name, a new one if there is none."""

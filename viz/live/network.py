@@ -11,26 +11,27 @@ import json
 import logging
 import threading
 from collections import deque
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.clock import SerialExecutor
 from actionlib_core.exceptions import ActionlibError
 from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import Trigger
-from actionlib_core.presence import Kind, parse_token, token_key, token_pattern
-from actionlib_core.service_proxy import ServiceProxy
-from actionlib_core.wire import encoding_of
-from smachpy.feed import DESCRIPTION_TOPIC, EVENTS_TOPIC, HISTORY_SERVICE
+from actionlib_core.pubsub.service_proxy import ServiceProxy
+from actionlib_core.wire.encoding import encoding_of
+from actionlib_core.wire.presence import Kind, parse_token, token_key, token_pattern
 from smachpy.introspection import StateRecord
-from smachpy.remote_control import STATE_TOPIC, CommandError, ControlClient
-from smachpy.value_server import VALUE_SERVICE, ReadValue
+from smachpy.network.feed import DESCRIPTION_TOPIC, EVENTS_TOPIC, HISTORY_SERVICE
+from smachpy.network.remote_control import STATE_TOPIC, CommandError, ControlClient
+from smachpy.network.values import VALUE_SERVICE, ReadValue
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from actionlib_core.node import Node
-    from actionlib_core.presence import Endpoint
     from actionlib_core.transport import Closable, Presence, Reply, Sample
+    from actionlib_core.wire.presence import Endpoint
     from viz.live.machines import Machine, Machines
 
 logger = logging.getLogger("viz.live")
@@ -45,10 +46,10 @@ SETTLE_S = 0.3
 
 
 class Network:
-    """Keeps `machines` up to date with what runs on the network.
+    """Keeps `machines` up to date with what runs on the network, or on several.
 
     Args:
-        node: Where to look.
+        node: Where to look; `join` adds others.
         machines: What to keep.
         control: Whether commands may be sent.
 
@@ -56,22 +57,47 @@ class Network:
     """
 
     def __init__(self, node: Node, machines: Machines, *, control: bool = False) -> None:
-        self._node = node
         self._machines = machines
         self._control = control
         self._lock = threading.Lock()
         self._links: dict[str, Link] = {}
-        self._ears: dict[str, _Ear] = {}
+        self._subscriptions: dict[tuple[Node, str], _Subscription] = {}
+        self._watches: dict[Node, Closable] = {}
+        self.join(node)
+
+    def join(self, node: Node) -> None:
+        """Look where `node` is too."""
         pattern = token_pattern(Kind.PUBLISHER, f"**{EVENTS_TOPIC}")
-        self._watch = node.transport.watch_alive(pattern, self._on_presence)
+        on_presence = partial(self._on_presence, node)
+        self._watches[node] = node.transport.watch_alive(pattern, on_presence)
+
+    def leave(self, node: Node) -> None:
+        """Look where `node` is no more: its machines have gone."""
+        self._watches.pop(node).close()
+        with self._lock:
+            subscriptions = [
+                self._subscriptions.pop(key) for key in list(self._subscriptions) if key[0] is node
+            ]
+            links = {name: link for name, link in self._links.items() if link.on(node)}
+            for name in links:
+                del self._links[name]
+        for link in links.values():
+            link.lose()
+        parts: list[Link | _Subscription] = [*subscriptions, *links.values()]
+        for part in parts:
+            part.close()
 
     def close(self) -> None:
         """Follow nothing any more; a second call does nothing."""
-        self._watch.close()
+        for watch in self._watches.values():
+            watch.close()
         with self._lock:
-            parts: list[Link | _Ear] = [*self._ears.values(), *self._links.values()]
+            parts: list[Link | _Subscription] = [
+                *self._subscriptions.values(),
+                *self._links.values(),
+            ]
             self._links.clear()
-            self._ears.clear()
+            self._subscriptions.clear()
         for part in parts:
             part.close()
 
@@ -86,7 +112,7 @@ class Network:
         link = self._link(name)
         with self._lock:
             links = list(self._links.values())
-        twins = [one for one in links if one.server == link.server and one.alive]
+        twins = [one for one in links if one.alive and one.is_twin(link)]
         if len(twins) > 1:
             raise CommandError(
                 f"{name}: {len(twins)} machines are called {link.server!r}, and a command would "
@@ -111,17 +137,17 @@ class Network:
             raise CommandError(f"{name}: no such machine; expected one of {known}.")
         return link
 
-    def _on_presence(self, presence: Presence) -> None:
+    def _on_presence(self, node: Node, presence: Presence) -> None:
         endpoint = parse_token(presence.key)
         if endpoint is None or not endpoint.name.endswith(EVENTS_TOPIC):
             return
         server = endpoint.name.removesuffix(EVENTS_TOPIC)
         with self._lock:
-            if presence.alive and server not in self._ears:
-                self._ears[server] = _Ear(server, self._node, self._on_sample)
+            if presence.alive and (node, server) not in self._subscriptions:
+                self._subscriptions[node, server] = _Subscription(server, node, self._on_sample)
             link = self._of(server, endpoint.session)
             if link is None and presence.alive:
-                link = self._take_in(server, endpoint)
+                link = self._take_in(server, endpoint, node)
         if link is not None:
             link.on_presence(presence.key, alive=presence.alive)
 
@@ -130,16 +156,16 @@ class Network:
         links = self._links.values()
         return next((o for o in links if (o.server, o.session) == (server, session)), None)
 
-    def _take_in(self, server: str, endpoint: Endpoint) -> Link:
+    def _take_in(self, server: str, endpoint: Endpoint, node: Node) -> Link:
         """The link for a server that is new: that of one that has gone, else another one."""
         for number in itertools.count(1):
             name = server if number == 1 else f"{server} ({number})"
             link = self._links.get(name)
             if link is None:
                 machine = self._machines.obtain(name)
-                link = Link(server, machine, self._node, control=self._control)
+                link = Link(server, machine, node, control=self._control)
                 self._links[name] = link
-            if not link.alive:
+            if not link.alive and link.on(node):
                 link.adopt(endpoint)
                 return link
         raise AssertionError  # numbers do not end
@@ -148,11 +174,11 @@ class Network:
         with self._lock:
             link = self._of(server, sample.source)
         if link is not None:
-            link.hear(sample)
+            link.on_sample(sample)
 
 
-class _Ear:
-    """Hears all servers of one name, and knows which of them speaks; a `Subscriber` does not."""
+class _Subscription:
+    """Receives from all servers of one name, and from which of them; a `Subscriber` does not."""
 
     def __init__(self, server: str, node: Node, on_sample: Callable[[str, Sample], None]) -> None:
         transport = node.transport
@@ -166,7 +192,7 @@ class _Ear:
             ]
 
     def close(self) -> None:
-        """Hear nothing any more."""
+        """Receive nothing any more."""
         for part in self._parts:
             part.close()
 
@@ -174,8 +200,8 @@ class _Ear:
 class Link:
     """Follows one server at a time: when it has gone, the next one of its name.
 
-    What it hears is worked off in order, one at a time, so that nothing is between the history and
-    the events after it.
+    What it receives is worked off in order, one at a time, so that nothing is between the history
+    and the events after it.
     """
 
     def __init__(self, server: str, machine: Machine, node: Node, *, control: bool) -> None:
@@ -186,7 +212,7 @@ class Link:
         self._executor = SerialExecutor(node.clock, f"link to {server}")
         self._alive: set[str] = set()
         self._closed = False
-        self._heard: deque[str] = deque()
+        self._received: deque[str] = deque()
         self._client = ControlClient(f"/{server}", node) if control else None
         self._values = ServiceProxy(
             f"/{server}{VALUE_SERVICE}", ReadValue, timeout=HISTORY_S, node=node
@@ -196,6 +222,14 @@ class Link:
     def alive(self) -> bool:
         """Whether its server is there."""
         return bool(self._alive)
+
+    def on(self, node: Node) -> bool:
+        """Tell whether its servers are where `node` is."""
+        return self._node is node
+
+    def is_twin(self, other: Link) -> bool:
+        """Tell whether a command to one of the two would reach both."""
+        return self.server == other.server and self._node is other._node
 
     def adopt(self, endpoint: Endpoint) -> None:
         """Follow another server from now on."""
@@ -236,7 +270,7 @@ class Link:
             self._alive.discard(key)
             self._executor.submit(self._go)
 
-    def hear(self, sample: Sample) -> None:
+    def on_sample(self, sample: Sample) -> None:
         """Take what the server has sent."""
         if sample.key.endswith(DESCRIPTION_TOPIC):
             self._executor.submit(lambda: self._describe(_text(sample)))
@@ -244,9 +278,14 @@ class Link:
         if sample.key.endswith(STATE_TOPIC):
             self._executor.submit(lambda: self._machine.set_control(json.loads(_text(sample))))
             return
-        self._heard.append(_text(sample))
-        if len(self._heard) == 1:  # the others go with the first
+        self._received.append(_text(sample))
+        if len(self._received) == 1:  # the others go with the first
             self._executor.submit(self._add)
+
+    def lose(self) -> None:
+        """Its network has gone."""
+        self._alive.clear()
+        self._executor.submit(self._go)
 
     def _come(self) -> None:
         self._read_history()
@@ -259,12 +298,12 @@ class Link:
 
     def _add(self) -> None:
         self._node.clock.sleep(GATHER_S)
-        texts = list(self._heard)
+        texts = list(self._received)
         for _ in texts:
-            self._heard.popleft()
+            self._received.popleft()
         if not self._machine.add([json.loads(text) for text in texts]):
             self._read_history()
-        if self._heard:
+        if self._received:
             self._executor.submit(self._add)
 
     def _describe(self, text: str) -> None:

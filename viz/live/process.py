@@ -36,7 +36,7 @@ class ViewerProcess(ChildProcess):
 
     def __init__(self, arguments: Sequence[str] = ()) -> None:
         super().__init__(
-            "smachpy.cli",
+            "smachpy.command",
             ("view", "--child", *arguments),
             environment={PATH_VARIABLE: _interface_path()},
         )

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from starlette.responses import PlainTextResponse
 
-from viz.live.page import script_hash
+from viz.live.assets import script_hash
 
 if TYPE_CHECKING:
     from collections.abc import MutableMapping

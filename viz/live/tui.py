@@ -14,11 +14,11 @@ from textual.containers import Horizontal, Vertical
 from textual.widgets import DataTable, Footer, Input, RichLog, Static, Tree
 
 from smachpy.events import asker_text
+from smachpy.events.run_state import RunState
 from smachpy.exceptions import SmachError
-from smachpy.run_state import RunState
-from viz.model import outcome_class
-from viz.narration import STYLES
-from viz.words import GLYPHS, shorten
+from smachpy.outcome_classes import outcome_class
+from viz.model.labels import GLYPHS, shorten
+from viz.terminal.lines import STYLES
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -114,7 +114,7 @@ class MissionApp(App[None]):
         """Draw what has changed."""
         if not self.query("#status"):  # at the end the widgets go before the timer does
             return
-        machine = self._machine or self._first()
+        machine = self._machine or self._machines.first()
         self._machine = machine
         if machine is None or machine.record is None:
             self.query_one("#status", Static).update("waiting for a machine on the network")
@@ -133,16 +133,11 @@ class MissionApp(App[None]):
         self._draw_tree(now)
         self._draw_goals()
 
-    def _first(self) -> Machine | None:
-        there = self._machines.summaries()
-        live = [one for one in there if one["stale"] is None] or there
-        return self._machines.get(live[0]["name"]) if live else None
-
     def _begin(self, machine: Machine, record: StateRecord) -> None:
         self._shown = (machine.epoch, machine.revision)
         self._until, self._mark = None, (0, "")
         tree = self.query_one(Tree)
-        tree.reset(Text(record.label), record)
+        tree.reset(Text(shorten(record.label)), record)
         self._places = {record.path: tree.root}
         self._grow(tree.root, record)
         tree.root.expand()
@@ -150,7 +145,7 @@ class MissionApp(App[None]):
 
     def _fold_anew(self, machine: Machine) -> None:
         """Fold what is known of the machine."""
-        base, events = machine.told()
+        base, events = machine.history()
         self._state, self._seq = RunState(base), 0
         self._mark = 0, ""
         self._fold(events)
@@ -159,7 +154,7 @@ class MissionApp(App[None]):
 
     def _look_back(self, machine: Machine, until: int) -> None:
         """Fold as far as event `until`, from the mark if that is one of those before it."""
-        base, events = machine.told()
+        base, events = machine.history()
         events = [event for event in events if event["seq"] <= until]
         number, text = self._mark
         at = sum(event["seq"] <= number for event in events)
@@ -179,7 +174,7 @@ class MissionApp(App[None]):
     def _grow(self, node: TreeNode[Any], record: StateRecord) -> None:
         for child in record.children:
             add = node.add if child.children else node.add_leaf
-            self._places[child.path] = added = add(Text(child.label), child)
+            self._places[child.path] = added = add(Text(shorten(child.label)), child)
             self._grow(added, child)
 
     def _catch_up(self, machine: Machine) -> None:
@@ -216,9 +211,10 @@ class MissionApp(App[None]):
     def _draw_userdata(self) -> None:
         table = self.query_one(DataTable)
         table.clear()
-        entries = list(self._state.data["userdata"].values())
+        written = self._state.data["userdata"]
+        entries = [written[name] for name in sorted(written)]
         for entry in entries[:MOST_VALUES]:
-            words = entry["key"], shorten(str(entry["value"]), 34), _name(entry["writer"])
+            words = shorten(entry["key"]), shorten(str(entry["value"]), 34), _name(entry["writer"])
             table.add_row(*map(Text, words))
         if len(entries) > MOST_VALUES:
             table.add_row(Text(f"and {len(entries) - MOST_VALUES} more", "dim"))
@@ -409,7 +405,7 @@ def _user() -> str:
 
 
 def _name(path: str) -> str:
-    return path.rpartition("/")[2]
+    return shorten(path.rpartition("/")[2])
 
 
 def _running(goals: list[dict[str, Any]]) -> int:
@@ -441,7 +437,7 @@ def _label(record: StateRecord, state: dict[str, Any] | None, now: int) -> Text:
         text = Text.assemble((name, style), (f"  {(now - state['since']) / 1e9:.1f} s", "dim"))
         if not state.get("preempt"):
             return text
-        word = "takes its preempt up" if state.get("serviced") else "asked to stop"
+        word = "preempt serviced" if state.get("serviced") else "asked to stop"
         return text.append(f"  {word}", "yellow")
     text = Text(name)
     if state["outcome"]:
@@ -455,8 +451,8 @@ def _line(event: dict[str, Any]) -> Text:
     if event["kind"] == "PreemptRequested":
         words, style = f"asked to stop by {_asker(event)}", "yellow"
     words = {
-        "PreemptServiced": "takes its preempt up",
-        "Abandoned": "left behind",
+        "PreemptServiced": "preempt serviced",
+        "Abandoned": "abandoned",
         "Started": "started",
     }.get(str(words), words)
     clock = time.strftime("%H:%M:%S", time.localtime(event["stamp_ns"] / 1e9))

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from smachpy.cli import UsageError
+from actionlib_core.output import printable
+from smachpy.command import UsageError
 
 if TYPE_CHECKING:
     import argparse
@@ -13,8 +14,8 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from viz.runs.recording import Recording
-    from viz.runs.union import Side
+    from smachpy.events.recording import Recording
+    from viz.runs.compare import Side
 
 EXAMPLES = """examples:
   smachpy run patrol --record runs/1.jsonl    record a run
@@ -80,13 +81,13 @@ def _list(args: argparse.Namespace) -> int:
     from rich.table import Table
     from rich.text import Text
 
-    from viz.runs.recording import each_recording
+    from smachpy.events.recording import each_recording
 
     table = Table(box=None, pad_edge=False)
     for title in ("file", "machine", "began", "time", "outcome", "events"):
         table.add_column(title, no_wrap=True, justify="right" if title == "events" else "left")
     for recording in each_recording(args.places):
-        table.add_row(*map(Text, _line(recording)))
+        table.add_row(*(Text(printable(word)) for word in _line(recording)))
     _console().print(table)
     return 0
 
@@ -112,7 +113,7 @@ def _line(recording: Recording) -> tuple[str, ...]:
 
 def _each(places: Iterable[str]) -> Iterator[Recording]:
     """Yield the recordings of places, each of which must have some."""
-    from viz.runs.recording import each_recording
+    from smachpy.events.recording import each_recording
 
     for place in places:
         empty = True
@@ -133,7 +134,8 @@ def _show(args: argparse.Namespace) -> int:
     for label, (record, statistics, lost) in count_by_machine(_each(args.places)).items():
         ended = ", ".join(f"{outcome} x{n}" for outcome, n in statistics.outcomes.items())
         console.print(
-            f"{label}: {statistics.runs} run(s); {ended or 'none has ended'}", markup=False
+            printable(f"{label}: {statistics.runs} run(s); {ended or 'none has ended'}"),
+            markup=False,
         )
         if lost:
             console.print(f"{lost} events are missing: visits and outcomes are at least these")
@@ -142,13 +144,14 @@ def _show(args: argparse.Namespace) -> int:
             table.add_column(title, justify="left" if title in {"state", "outcomes"} else "right")
         for state in record.walk():
             if state.path in statistics.states:
-                table.add_row(*map(Text, _row(state.path, statistics.states[state.path].to_json())))
+                row = _row(state.path, statistics.states[state.path].to_json())
+                table.add_row(*(Text(printable(word)) for word in row))
         console.print(table)
         untaken = never_taken(record, statistics)
         if untaken:
             console.print(f"never taken: {len(untaken)} transition(s)")
             for path, outcome in untaken[:MOST_PROBLEMS]:
-                console.print(f"  {path}  {outcome}", markup=False)
+                console.print(printable(f"  {path}  {outcome}"), markup=False)
     return 0
 
 
@@ -168,7 +171,7 @@ def _seconds(value: float | None) -> str:
 
 
 def _compare(args: argparse.Namespace) -> int:
-    from viz.runs.union import unite
+    from viz.runs.compare import unite
 
     old, new = _side(args.first), _side(args.second)
     if args.output:
@@ -179,16 +182,16 @@ def _compare(args: argparse.Namespace) -> int:
         f"{signs[one['change']]} {one['path']}  {one['text']}".rstrip()
         for one in unite(old, new).listed()
     ]
-    _console().print("\n".join(lines or ["no notable difference"]), markup=False)
+    _console().print(printable("\n".join(lines or ["no notable difference"])), markup=False)
     return 0
 
 
 def _draw_both(args: argparse.Namespace, old: Side, new: Side) -> None:
     import sys
 
-    from viz import drawing
-    from viz.runs.union import drawing as drawn
-    from viz.runs.union import unite
+    from viz.pictures import drawing
+    from viz.runs.compare import drawing as drawn
+    from viz.runs.compare import unite
 
     form = "svg" if args.output == "-" else Path(args.output).suffix.lstrip(".").lower()
     diagram = drawn(unite(old, new), old, new, depth=args.depth)
@@ -201,8 +204,8 @@ def _draw_both(args: argparse.Namespace, old: Side, new: Side) -> None:
 
 def _side(place: str) -> Side:
     """What is to be compared: recordings, or a machine that has not run."""
+    from viz.runs.compare import Side
     from viz.runs.statistics import count_by_machine
-    from viz.runs.union import Side
 
     if not place.endswith(".jsonl") and not Path(place).is_dir():
         from viz.cli import read_record
@@ -219,7 +222,7 @@ def _side(place: str) -> Side:
 
 
 def _export(args: argparse.Namespace) -> int:
-    from viz.runs.recording import read_recording
+    from smachpy.events.recording import read_recording
 
     recording = read_recording(args.file)
     output = Path(args.output)
@@ -245,8 +248,8 @@ def _write(recording: Recording, output: Path, runs: list[str]) -> None:
         write_mcap(recording, output)
     else:
         from smachpy.events import from_record
-        from viz.drawing import render
-        from viz.history import History
+        from viz.model.history import History
+        from viz.pictures.drawing import render
 
         history = History()
         for event in recording.events:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
-from viz.live import page
+from viz.live import assets as page
 from viz.live.machines import Machine
 from viz.runs.statistics import StatisticsOfFiles
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from pathlib import Path
 
-    from viz.runs.recording import Recording
+    from smachpy.events.recording import Recording
 
 
 def standalone_page(recording: Recording, runs: Iterable[str | Path] = ()) -> str:

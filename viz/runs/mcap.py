@@ -23,14 +23,14 @@ from actionlib_core.interfaces.std_msgs.msg import Header, String
 from actionlib_core.time import Time
 from smachpy import log
 from smachpy.events import was_cut
-from smachpy.run_state import RunState
-from smachpy.userdata_json import dumps
+from smachpy.events.run_state import RunState
+from smachpy.userdata.json_text import dumps
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from smachpy.events.recording import Recording
     from smachpy.introspection import StateRecord
-    from viz.runs.recording import Recording
 
 GOAL_PARTS = {"GoalSent": "goal", "GoalFeedback": "feedback", "GoalDone": "result"}
 _NO_NUMBERS = {"nan", "inf", "-inf"}

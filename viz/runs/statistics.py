@@ -7,16 +7,17 @@ import threading
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from smachpy.run_state import RAISED
-from viz.model import Marks, outcome_class
-from viz.runs.recording import each_recording, find_recordings
+from smachpy.events.recording import each_recording, find_recordings
+from smachpy.events.run_state import RAISED
+from smachpy.outcome_classes import outcome_class
+from viz.model.machine import Marks
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from pathlib import Path
 
+    from smachpy.events.recording import Recording
     from smachpy.introspection import StateRecord
-    from viz.runs.recording import Recording
 
 
 @dataclass(slots=True)

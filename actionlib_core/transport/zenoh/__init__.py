@@ -37,9 +37,14 @@ from actionlib_core.transport._access import (
     find_permissions,
 )
 from actionlib_core.transport._inlet import Gate, inside
-from actionlib_core.transport._keys import check_key, compile_pattern
+from actionlib_core.transport._keys import check_key, compile_pattern, key_mark
 from actionlib_core.transport._refusal import check_interface, explain_refusal
-from actionlib_core.transport._zenoh_config import zenoh_settings
+from actionlib_core.transport._zenoh_config import (
+    RETRY_S,
+    SCOUT_S,
+    new_session_id,
+    zenoh_settings,
+)
 from actionlib_core.transport.zenoh._callbacks import direct, held
 from actionlib_core.transport.zenoh._declared import (
     Asking,
@@ -94,7 +99,7 @@ class ZenohTransport:
         self._closed = False
         self._declared: dict[Declared, None] = {}
         self._permissions: Permissions | None = None
-        self.session = _open(self.config)
+        self.session = _open(self.config, new_session_id(self.clock.time_ns()))
         self._session_id = str(self.session.zid())
         self.loopback = SerialExecutor(self.clock, f"transport-{self._session_id[:8]}")
         _loopbacks.add(self.loopback)
@@ -108,6 +113,12 @@ class ZenohTransport:
     def session_id(self) -> str:
         """This session's id."""
         return self._session_id
+
+    @property
+    def rediscovery(self) -> float:
+        """What zenoh takes: peers look around every 8 s, clients try their router each second."""
+        looks = self.config.mode == "peer" and self.config.discovery != "off"
+        return SCOUT_S if looks else 2 * RETRY_S
 
     def publisher(self, key: str, encoding: str = "", quality: Quality = DEFAULT) -> Publisher:
         kind = LatchedPublisher if quality.latch else Publisher
@@ -173,6 +184,7 @@ class ZenohTransport:
                     express=True,
                     payload=payload,
                     encoding=encoding or None,
+                    source_info=zenoh.SourceInfo(self.session.id, key_mark(key)),
                     cancellation_token=token,
                 )
         except zenoh.ZError as error:
@@ -298,13 +310,13 @@ class ZenohTransport:
             )
 
 
-def _open(config: Config) -> zenoh.Session:
+def _open(config: Config, session_id: str) -> zenoh.Session:
     process.check("joining the network")
     check_interface(config)
     process.opened = True
     raw = zenoh.Config()
     try:
-        for path, value in zenoh_settings(config).items():
+        for path, value in {"id": session_id, **zenoh_settings(config)}.items():
             raw.insert_json5(path, json.dumps(value))
         return zenoh.open(raw)
     except zenoh.ZError as error:

@@ -6,6 +6,8 @@ Each keeps its zenoh objects until it is closed, so that no finalizer undeclares
 from __future__ import annotations
 
 import contextlib
+import logging
+import struct
 import threading
 from functools import partial
 from threading import get_ident
@@ -17,7 +19,7 @@ from actionlib_core.clock._ending import ending
 from actionlib_core.exceptions import TransportError
 from actionlib_core.transport import Presence, Quality, Reply, Sample
 from actionlib_core.transport._inlet import Inlet, inside
-from actionlib_core.transport._latch import LatchFilter, pack_numbers
+from actionlib_core.transport._keys import is_for_another_key, key_mark
 from actionlib_core.transport.zenoh._callbacks import direct
 from actionlib_core.transport.zenoh._process import process
 
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
     from actionlib_core.transport.zenoh import ZenohTransport
 
 T = TypeVar("T")
+
+log = logging.getLogger("actionlib_core")
 
 LATCH_RETRIES = 5  # how often a latched publisher that cannot be reached yet is asked
 LATCH_RETRY_S = 0.1
@@ -75,10 +79,8 @@ class Publisher(Declared):
             express=quality.express,
             congestion_control=blocking if quality.block else dropping,
         )
-        self._source = zenoh.SourceInfo(self._port.id, 0)
+        self._source = zenoh.SourceInfo(self._port.id, key_mark(key))
         self._users: list[None] = []  # one per call in progress; list operations are atomic
-        self._watched = False
-        self._matched = False  # as zenoh has told; asking it costs 5 us and more
         self._keep(self._port)
 
     def close(self) -> None:
@@ -117,16 +119,12 @@ class Publisher(Declared):
 
     def matching(self) -> bool:
         process.check(self._key)
-        if self._matched and not self._inlet.closed:
-            return True
         self._users.append(None)
         try:
             with inside:
                 if self._inlet.closed:
                     return False
-                if not self._watched:
-                    self._watched = True
-                    self._keep(self._port.declare_matching_listener(direct(self._on_matching)))
+                # Asked anew, which costs 2 us: what a listener is told comes too late.
                 status: Any = self._port.matching_status  # zenoh's stub says bool
                 return bool(status.matching)
         except zenoh.ZError:  # the session is closed
@@ -136,9 +134,51 @@ class Publisher(Declared):
             if self._inlet.closed:
                 self.close()
 
-    def _on_matching(self, status: zenoh.MatchingStatus) -> None:
-        # Inline is right here: it calls nothing foreign and takes no lock.
-        self._matched = status.matching
+
+# A latched publisher's messages carry its number in its session and their own number, counted from
+# 1; 0 answers whoever asks before the first. A subscriber gets the last message live, by asking, or
+# both ways in either order. (zenoh.ext's advanced publisher keeps a last message too, but sends no
+# source information of ours, so its messages could not carry the mark of their key.)
+_NUMBERS = struct.Struct("<IQ")
+
+
+def _pack_numbers(publisher: int, message: int) -> bytes:
+    """Return what a latched message carries beside its payload."""
+    return _NUMBERS.pack(publisher, message)
+
+
+class _LatchFilter:
+    """Remembers the newest message of every latched publisher of a key."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._newest: dict[tuple[str, int], int] = {}
+        self._asked: dict[tuple[str, int], int] = {}
+
+    def take_live(self, session: str, numbers: bytes) -> bool:
+        """Tell whether a message that came by itself is to be delivered."""
+        if len(numbers) != _NUMBERS.size:
+            return True
+        who, message = _unpack(session, numbers)
+        with self._lock:
+            self._newest[who] = max(message, self._newest.get(who, 0))
+            return message > self._asked.get(who, 0)
+
+    def take_asked(self, session: str, numbers: bytes) -> bool:
+        """Tell whether the answer of a latched publisher is to be delivered."""
+        if len(numbers) != _NUMBERS.size:
+            return False
+        who, message = _unpack(session, numbers)
+        with self._lock:
+            if message <= self._newest.get(who, 0):
+                return False  # it came by itself, or nothing was sent yet
+            self._newest[who] = self._asked[who] = message
+            return True
+
+
+def _unpack(session: str, numbers: bytes) -> tuple[tuple[str, int], int]:
+    publisher, message = _NUMBERS.unpack(numbers)
+    return (session, int(publisher)), int(message)
 
 
 class LatchedPublisher(Publisher):
@@ -157,7 +197,7 @@ class LatchedPublisher(Publisher):
         self._encoding = encoding
         self._lock = threading.Lock()
         self._count = 0
-        self._last: tuple[bytes, bytes] = b"", pack_numbers(self._number, 0)
+        self._last: tuple[bytes, bytes] = b"", _pack_numbers(self._number, 0)
         self._own_key = f"{key}/@latch/{transport.session_id}/{self._number}"
         session = transport.session
         self._keep(session.declare_queryable(self._own_key, direct(self._on_query)))
@@ -166,7 +206,7 @@ class LatchedPublisher(Publisher):
     def put(self, payload: bytes, attachment: bytes | None = None) -> None:
         with self._lock:
             self._count += 1
-            attachment = pack_numbers(self._number, self._count)
+            attachment = _pack_numbers(self._number, self._count)
             self._last = payload, attachment
         super().put(payload, attachment)
 
@@ -192,8 +232,9 @@ class Subscriber(Declared):
     ) -> None:
         super().__init__(transport)
         self._key = key
+        self._mark = key_mark(key)
         self._callback = callback
-        self._filter = LatchFilter() if history else None
+        self._filter = _LatchFilter() if history else None
         self._encoding = zenoh.Encoding("")
         self._encoding_text = ""
         self._latched: set[str] = set()
@@ -212,16 +253,20 @@ class Subscriber(Declared):
         payload = raw.payload.to_bytes()
         if not payload and raw.kind != zenoh.SampleKind.PUT:
             return
+        info = raw.source_info
+        if _is_astray(info, self._mark, self._key):
+            return
         encoding = raw.encoding
         if encoding != self._encoding:  # comparing is cheaper than converting
             self._encoding_text = _convert_encoding(encoding)
             self._encoding = encoding
-        sample = Sample(self._key, payload, self._encoding_text, _source_of(raw))
+        source = "" if info is None else str(info.source_id.zid)
+        sample = Sample(self._key, payload, self._encoding_text, source)
         if self._filter is None or self._is_news(self._filter, raw, sample.source):
             self._callback(sample)
 
     @staticmethod
-    def _is_news(latched: LatchFilter, raw: zenoh.Sample, source: str) -> bool:
+    def _is_news(latched: _LatchFilter, raw: zenoh.Sample, source: str) -> bool:
         numbers = raw.attachment
         return numbers is None or latched.take_live(source, numbers.to_bytes())
 
@@ -301,6 +346,8 @@ class Queryable(Declared):
         self, transport: ZenohTransport, key: str, callback: Callable[[Query], None]
     ) -> None:
         super().__init__(transport)
+        self._key = key
+        self._mark = key_mark(key)
         self._callback = callback
         self._keep(transport.session.declare_queryable(key, direct(self._on_query)))
 
@@ -313,6 +360,9 @@ class Queryable(Declared):
             raw.drop()  # type: ignore[no-untyped-call]  # zenoh's stub
 
     def _answer(self, raw: zenoh.Query) -> None:
+        if _is_astray(raw.source_info, self._mark, self._key):
+            self._refuse(raw)
+            return
         query = ZenohQuery(raw)
         try:
             self._callback(query)
@@ -399,9 +449,16 @@ def _convert_encoding(raw: zenoh.Encoding) -> str:
     return "" if text == _PLAIN else text
 
 
-def _source_of(raw: zenoh.Sample) -> str:
-    info = raw.source_info
-    return "" if info is None else str(info.source_id.zid)
+def _is_astray(info: zenoh.SourceInfo | None, mark: int, key: str) -> bool:
+    """Tell whether a message or question was for another key than `key`, whose mark is given."""
+    if info is None or not is_for_another_key(info.source_sn, mark):
+        return False
+    log.warning(
+        "%s: dropped what session %s sent on another key: its link was just lost or found.",
+        key,
+        info.source_id.zid,
+    )
+    return True
 
 
 def _convert_reply(raw: zenoh.Reply) -> Reply | None:

@@ -11,12 +11,12 @@ import threading
 import pytest
 
 from actionlib_core import Abort, Preempted, Reject, server
-from actionlib_core.action_server import ActionServer
+from actionlib_core.action.server import ActionServer
+from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.cli import main
 from actionlib_core.clock import RealClock
 from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.node import Node
-from actionlib_core.simple_action_server import SimpleActionServer
 from actionlib_core.transport.memory import MemoryNetwork
 
 
@@ -237,7 +237,7 @@ def test_unknown_command_exits_with_2(shell, capsys):
 
 
 def test_goals_are_listed_shown_and_cancelled(shell, network, clock):
-    from actionlib_core.action_client import ActionClient
+    from actionlib_core.action.client import ActionClient
 
     node = Node("keeper", transport=network.session(), clock=clock)
     ActionServer(
@@ -320,8 +320,8 @@ def test_echo_ends_after_enough(shell, counting, clock):
 
 
 def test_server_by_hand(capsys, monkeypatch):
+    from actionlib_core.action.simple_client import SimpleActionClient
     from actionlib_core.cli import server as module
-    from actionlib_core.simple_action_client import SimpleActionClient
 
     clock = RealClock()
     network = MemoryNetwork(clock)
@@ -343,14 +343,14 @@ def test_server_by_hand(capsys, monkeypatch):
             done.wait(10)
             yield "quit\n"
 
-    class Watched(module.Desk):
+    class Watched(module.Operator):
         def on_goal(self, handle):
             super().on_goal(handle)
             came.set()
 
     seen, done = [], threading.Event()
     monkeypatch.setattr("sys.stdin", Operator())
-    monkeypatch.setattr(module, "Desk", Watched)
+    monkeypatch.setattr(module, "Operator", Watched)
     client = SimpleActionClient(
         "byhand", msg.TestAction, node=Node("c", transport=network.session(), clock=clock)
     )

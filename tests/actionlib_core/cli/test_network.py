@@ -6,8 +6,8 @@ import pytest
 
 from actionlib_core.cli import UsageError, _network
 from actionlib_core.interfaces.std_msgs.msg import String
-from actionlib_core.presence import Kind
-from actionlib_core.topic import Publisher
+from actionlib_core.pubsub.topic import Publisher
+from actionlib_core.wire.presence import Kind
 
 NODES = ("cli", "robot")
 
@@ -37,7 +37,8 @@ def test_a_network_that_never_rests_is_taken_as_it_is(nodes, clock):
 def test_a_name_is_waited_for_and_ends_of_other_kinds_are_not_it(nodes, clock):
     cli, robot = nodes
     start = clock.now()
-    clock.call_later(0.5, lambda: Publisher("chatter", String, node=robot))
+    there = []  # a publisher that the program drops leaves its topic
+    clock.call_later(0.5, lambda: there.append(Publisher("chatter", String, node=robot)))
     assert _network.find_by_name(cli, "chatter", (Kind.SERVICE,)) == []
     assert clock.now() - start == pytest.approx(_network.FIND_S)
     (end,) = _network.find_by_name(cli, "chatter", (Kind.PUBLISHER,))

@@ -10,7 +10,7 @@ import pytest
 
 from actionlib_core.cli import main
 from actionlib_core.interfaces.std_srvs.srv import SetBool, Trigger
-from actionlib_core.service import Service
+from actionlib_core.pubsub.service import Service
 
 NODES = ("cli", "robot")
 

@@ -14,7 +14,7 @@ from actionlib_core.cli._message_text import flatten, shorten, split_path, to_ya
 from actionlib_core.interfaces.geometry_msgs.msg import Point, PoseStamped
 from actionlib_core.interfaces.sensor_msgs.msg import LaserScan
 from actionlib_core.interfaces.std_msgs.msg import Int32, String
-from actionlib_core.topic import Publisher, Subscriber
+from actionlib_core.pubsub.topic import Publisher, Subscriber
 
 NODES = ("cli", "robot")
 
@@ -69,7 +69,11 @@ def test_info_and_type(cli, robot, capsys):
 
 
 def test_unknown_topic_is_named_with_those_there_are(cli, robot, capsys):
-    Publisher("chatter", String, node=robot)
+    with Publisher("chatter", String, node=robot):
+        check_unknown_topic(cli, capsys)
+
+
+def check_unknown_topic(cli, capsys):
     for words in (("type", "nope"), ("info", "nope"), ("echo", "nope")):
         assert cli(*words) == 2
         error = capsys.readouterr().err
@@ -277,8 +281,8 @@ def test_numbers_that_are_no_use(cli, capsys, words, expected):
 def test_a_name_nearby_is_suggested(cli, robot, capsys):
     assert cli("type", "chatter") == 2
     assert "not there; expected one, but there is none at all." in capsys.readouterr().err
-    Publisher("chatter", String, node=robot)
-    assert cli("type", "chater") == 2
+    with Publisher("chatter", String, node=robot):
+        assert cli("type", "chater") == 2
     assert "Did you mean '/chatter'?" in capsys.readouterr().err
 
 

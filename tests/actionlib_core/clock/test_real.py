@@ -64,8 +64,8 @@ def test_a_raising_signal_handler_leaves_no_waiter_behind():
     event = RealClock().event()
     previous = signal.signal(signal.SIGALRM, handler)
     try:
-        signal.setitimer(signal.ITIMER_REAL, 0.001)
         with contextlib.suppress(Interrupt):
+            signal.setitimer(signal.ITIMER_REAL, 0.001)  # under load it rings before the wait
             event.wait(5)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
@@ -96,3 +96,26 @@ def test_hand_over_to_cached_threads_under_load():
         tasks = [clock.spawn(lambda: count.append(1), name="t") for _ in range(4)]
         assert all(task.join(5) for task in tasks)
     assert len(count) == 1200
+
+
+def test_what_is_spawned_while_the_program_ends_waits_for_a_thread_that_was_kept(monkeypatch):
+    """As in Python 3.12, which starts no thread once the main thread has ended."""
+    clock, other, done = RealClock(), RealClock(), []
+    clock.keep_threads(2)
+    main = threading.Thread(target=int)
+    main.start()
+    main.join()
+
+    def refuse(_thread):
+        raise RuntimeError("can't create new thread at interpreter shutdown")
+
+    monkeypatch.setattr(threading, "main_thread", lambda: main)
+    monkeypatch.setattr(threading.Thread, "start", refuse)
+    timer = clock.event()
+    clock.call_later(0.0, timer.set)
+    tasks = [clock.spawn(lambda i=i: done.append(i), name="t") for i in range(50)]
+    assert all(task.join(20.0) for task in tasks)
+    assert sorted(done) == list(range(50))
+    assert timer.wait(20.0)
+    with pytest.raises(RuntimeError, match="can't create new thread"):
+        other.spawn(int, name="nobody asked for threads at the end")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 
@@ -9,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from actionlib_core.clock import Deadlock, TimeLimit, VirtualClock
+from actionlib_core.clock import Deadlock, TimeLimit, VirtualClock, use_clock
 
 
 def test_time_jumps_to_the_next_deadline(clock):
@@ -105,7 +106,7 @@ def test_close_ends_a_participant_that_never_started():
 
 def test_set_by_a_foreign_thread_just_before_the_wait_begins_is_seen(clock, monkeypatch):
     event = clock.event()
-    wait = clock._wait
+    wait = clock.wait_for
 
     def wait_late(*args):
         thread = threading.Thread(target=event.set)
@@ -113,7 +114,7 @@ def test_set_by_a_foreign_thread_just_before_the_wait_begins_is_seen(clock, monk
         thread.join()
         return wait(*args)
 
-    monkeypatch.setattr(clock, "_wait", wait_late)
+    monkeypatch.setattr(clock, "wait_for", wait_late)
     assert event.wait()
     event.clear()
     assert event.wait(5.0)
@@ -265,3 +266,13 @@ def test_a_deadlock_on_an_event_without_a_name_names_the_line(clock):
     with pytest.raises(Deadlock) as caught:
         clock.event().wait()
     assert f"an event at {__file__}:" in caught.value.waits["MainThread"]
+
+
+def test_a_closed_clock_holds_no_file_however_long_it_is_kept():
+    kept = []
+    before = len(os.listdir("/proc/self/fd"))
+    for _ in range(20):
+        with VirtualClock() as clock, use_clock(clock):
+            clock.spawn(lambda: None, name="another").join()
+        kept.append(clock)
+    assert len(os.listdir("/proc/self/fd")) - before < 20

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from actionlib_core.exceptions import InterfaceError
-from actionlib_core.interfaces._definition import did_you_mean, parse
+from actionlib_core.interfaces._definition import parse
 
 
 def error_of(text: str) -> str:
@@ -111,8 +111,3 @@ def test_any_text_is_read_or_refused(text: str) -> None:
         parse("my_pkg/Thing", text)
     except InterfaceError:
         return
-
-
-def test_did_you_mean() -> None:
-    assert did_you_mean("String", ["string", "int8"]) == " Did you mean 'string'?"
-    assert did_you_mean("xyz", ["string"]) == ""

@@ -7,7 +7,7 @@ import warnings
 import pytest
 
 from actionlib_core.exceptions import InterfaceError, InterfaceWarning
-from actionlib_core.interfaces._sections import ACTION_PARTS, SERVICE_PARTS, action_messages, split
+from actionlib_core.interfaces._sources import ACTION_PARTS, SERVICE_PARTS, action_messages, split
 
 
 def test_three_parts_and_their_lines() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import socket
+import ssl
 
 import pytest
 from cryptography import x509
@@ -16,6 +17,7 @@ from actionlib_core.exceptions import AccessDeniedError, TransportError
 from actionlib_core.transport import Quality
 from actionlib_core.transport._refusal import explain_refusal
 from actionlib_core.transport.zenoh import ZenohTransport
+from tests.free_port import free_port
 
 pytestmark = pytest.mark.zenoh
 
@@ -33,9 +35,7 @@ RULES = (
 def endpoint(tmp_path_factory):
     users = tmp_path_factory.mktemp("users") / "users.txt"
     users.write_text("alice:secret\nbob:hunter2\n")
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
     router = ZenohTransport(
         Config(
             mode="router", listen=(endpoint,), discovery="off", users_file=str(users), access=RULES
@@ -146,16 +146,21 @@ def test_who_does_not_ask_is_stopped_all_the_same(join):
 # -- certificates that cannot be used ------------------------------------------------------------
 
 
-def write_certificate(folder, name, password=b""):
-    """Write `name`.pem and its key `name`.key; the key needs `password`."""
+def write_certificate(folder, name, password=b"", issuer=None):
+    """Write `name`.pem and its key `name`.key, which needs `password`; return name and key.
+
+    The certificate has no extension that tells whose key signed it, which zenoh does not mind.
+    """
     key = ec.generate_private_key(ec.SECP256R1())
     subject = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, name)])
+    issuer_name, issuer_key = issuer or (subject, key)
     now = dt.datetime.now(dt.UTC)
     certificate = (
-        x509.CertificateBuilder(subject, subject, key.public_key(), x509.random_serial_number())
-        .not_valid_before(now)
+        x509.CertificateBuilder(issuer_name, subject, key.public_key(), x509.random_serial_number())
+        .not_valid_before(now - dt.timedelta(minutes=5))
         .not_valid_after(now + dt.timedelta(days=1))
-        .sign(key, hashes.SHA256())
+        .add_extension(x509.BasicConstraints(ca=issuer is None, path_length=None), critical=True)
+        .sign(issuer_key, hashes.SHA256())
     )
     (folder / f"{name}.pem").write_bytes(certificate.public_bytes(serialization.Encoding.PEM))
     locked = serialization.BestAvailableEncryption(password) if password else None
@@ -166,13 +171,14 @@ def write_certificate(folder, name, password=b""):
             locked or serialization.NoEncryption(),
         )
     )
+    return subject, key
 
 
 @pytest.fixture(scope="module")
 def certificates(tmp_path_factory):
     folder = tmp_path_factory.mktemp("certificates")
-    write_certificate(folder, "ca")
-    write_certificate(folder, "robot")
+    ca = write_certificate(folder, "ca")
+    write_certificate(folder, "robot", issuer=ca)
     write_certificate(folder, "locked", b"secret")
     (folder / "text.pem").write_text("no certificate\n")
     (folder / "empty.pem").write_text("")
@@ -215,3 +221,36 @@ def test_certificates_that_cannot_be_used_are_told(
     assert "expected a" in text
     assert "nothing answers" not in text
     assert explain_refusal(config) in text
+
+
+def test_a_certificate_that_zenoh_takes_is_not_told_to_be_wrong(certificates, monkeypatch):
+    """Python 3.13 asks more of a certificate than zenoh: here it is asked on every Python."""
+
+    def strict(*args, make=ssl.create_default_context, **kwargs):
+        context = make(*args, **kwargs)
+        context.verify_flags |= ssl.VERIFY_X509_STRICT
+        return context
+
+    monkeypatch.setattr(ssl, "create_default_context", strict)
+    files = [certificates / "robot.pem", certificates / "robot.key"]
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(*files)
+
+    def serve():
+        plain, _ = listener.accept()
+        with plain, context.wrap_socket(plain, server_side=True) as secure:
+            secure.recv(1)
+
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        listener.settimeout(WAIT_S)
+        server = CLOCK.spawn(serve, name="server")
+        config = Config(
+            mode="client",
+            connect=(f"tls/127.0.0.1:{listener.getsockname()[1]}",),
+            discovery="off",
+            tls=Tls(ca=str(certificates / "ca.pem"), verify_name=False),
+        )
+        text = explain_refusal(config)
+        assert server.join(WAIT_S)
+    assert "does not let us in: got no user" in text
+    assert "not trusted" not in text

@@ -19,6 +19,7 @@ from actionlib_core.exceptions import ConfigError, TransportError
 from actionlib_core.transport import Quality
 from actionlib_core.transport._inlet import Inside
 from actionlib_core.transport.zenoh import ZenohTransport
+from tests.free_port import free_port
 
 pytestmark = pytest.mark.zenoh
 
@@ -214,12 +215,6 @@ def test_close_does_not_wait_for_a_process_that_does_not_read():
         assert CLOCK.now() - start < 1.0
         process.kill()
         assert task.join(WAIT_S)
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from smachpy._core.goal_run import OUTCOMES, GoalRun, Step
+from smachpy.actions.goal_run import OUTCOMES, GoalRun, Step
 
 FINAL = ["PREEMPTED", "SUCCEEDED", "ABORTED", "REJECTED", "RECALLED", "LOST"]
 

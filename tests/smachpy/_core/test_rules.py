@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from smachpy._core.rules import Rule, all_of, any_of, as_rules, decide, n_of
 from smachpy.exceptions import InvalidStateError
+from smachpy.machines.rules import Rule, all_of, any_of, as_rules, decide, n_of
 
 LABELS = st.sampled_from("ABCD")
 OUTCOMES = st.sampled_from(["x", "y", "z"])

@@ -214,7 +214,7 @@ def test_keys_set_beforehand_given_by_the_caller_or_by_containers_are_written():
     )
     sm.userdata.a = 1
     assert check(sm).ok
-    inner._input_keys = ("a",)
+    inner._smachpy.input_keys = ("a",)
     assert the(check(sm), "unset-key").path == "/M/IN/READ"
 
 
@@ -335,10 +335,12 @@ def test_a_wait_without_a_timeout():
             return "done"
 
     sm = machine(("A", Waits(["done"]), {}))
-    assert "self.event.wait()" in the(check(sm), "no-timeout").message
-    assert check(machine(("A", Waits(["done"], timeout=5), {"aborted": "done"}))).ok
+    assert "self.event.wait()" in the(check(sm, enable=["no-timeout"]), "no-timeout").message
+    limited = machine(("A", Waits(["done"], timeout=5), {"aborted": "done"}))
+    assert check(limited, enable=["no-timeout"]).ok
     assert check(
-        machine(("A", machine(("B", Waits(["done"]), {}), timeout=9), {"aborted": "done"}))
+        machine(("A", machine(("B", Waits(["done"]), {}), timeout=9), {"aborted": "done"})),
+        enable=["no-timeout"],
     ).ok
 
 
@@ -347,9 +349,21 @@ def test_an_action_state_without_a_timeout():
     ends = {"succeeded": "done", "aborted": "done", "preempted": "preempted"}
     outcomes = ["done", "preempted"]
     sm = machine(("A", SimpleActionState("move_base", MoveBaseAction), ends), outcomes=outcomes)
-    assert the(check(sm), "no-timeout").path == "/M/A"
+    assert the(check(sm, enable=["no-timeout"]), "no-timeout").path == "/M/A"
     limited = SimpleActionState("move_base", MoveBaseAction, exec_timeout=60.0)
-    assert check(machine(("A", limited, ends), outcomes=outcomes)).ok
+    assert check(machine(("A", limited, ends), outcomes=outcomes), enable=["no-timeout"]).ok
+
+
+def test_a_rule_that_is_off_is_looked_for_when_somebody_asks():
+    ends = {"succeeded": "done", "aborted": "done", "preempted": "preempted"}
+    sm = machine(
+        ("A", SimpleActionState("move_base", MoveBaseAction), ends), outcomes=["done", "preempted"]
+    )
+    assert [rule.name for rule in RULES.values() if not rule.is_on] == ["no-timeout"]
+    assert check(sm).problems == ()
+    assert rules(check(sm, enable=["no-timeout"])) == ["no-timeout"]
+    with pytest.raises(IgnoreError, match="Did you mean 'no-timeout'"):
+        check(sm, enable=["no-timeouts"])
 
 
 def test_a_loop_that_never_looks_at_the_preempt():
@@ -529,14 +543,16 @@ def test_switching_a_rule_off_with_a_reason():
             self.event.wait()
             return "done"
 
-    found = check(machine(("A", Waits(["done"]), {})))
+    found = check(machine(("A", Waits(["done"]), {})), enable=["no-timeout"])
     assert found.ok
     assert [reason for _, reason in found.ignored] == ["the operator decides"]
     state = ignore(WaitsToo(["done"]), "no-timeout", "bounded by hardware")
     assert check(machine(("A", state, {}))).ok
     sm = machine(("A", WaitsToo(["done"]), {}))
-    assert check(sm, ignores=[Ignore("no-timeout", "why not", "/M/*")]).ok
-    assert not check(sm, ignores=[Ignore("no-timeout", "why not", "/OTHER/*")]).ok
+    assert check(sm, ignores=[Ignore("no-timeout", "why not", "/M/*")], enable=["no-timeout"]).ok
+    assert not check(
+        sm, ignores=[Ignore("no-timeout", "why not", "/OTHER/*")], enable=["no-timeout"]
+    ).ok
 
 
 def test_a_rule_is_not_switched_off_without_a_reason_or_by_a_wrong_name():
@@ -569,7 +585,7 @@ def test_a_problem_without_a_place_of_its_own_has_none_in_any_format():
     sm = StateMachine(["succeeded", "aborted", "preempted"], name="M")
     with sm:
         sm.add("DRIVE", SimpleActionState("move_base", MoveBaseAction))
-    report = check(sm)
+    report = check(sm, enable=["no-timeout"])
     assert [problem.rule for problem in report.problems] == ["no-timeout"]
     assert json.loads(FORMATS["json"]([report]))[0]["problems"][0]["place"] is None
     assert FORMATS["github"]([report]).startswith("::warning title=no-timeout::")
@@ -593,6 +609,17 @@ def test_a_check_takes_milliseconds():
     assert time.process_time() - begun < 0.2
 
 
+def test_a_report_is_true_when_it_is_ok_and_gives_its_problems():
+    noted = check(machine(("WRITE", Leaf(output_keys=["junk"]), {})))
+    assert (bool(noted), len(noted), [p.severity for p in noted]) == (True, 1, ["note"])
+    noted.assert_ok()
+    bad = check(machine(("A", Leaf(), {}), ("B", Leaf(), {"done": "A"})))
+    assert (bool(bad), list(bad)) == (False, list(bad.problems))
+    with pytest.raises(AssertionError) as error:
+        bad.assert_ok()
+    assert str(error.value) == str(bad)
+
+
 def test_the_function_of_the_package():
     assert smachpy.check(patrol()).ok
 
@@ -605,3 +632,32 @@ def work(ud):
 def test_the_callback_of_a_callback_state_is_looked_at():
     found = check(machine(("A", CBState(work), {"odd": "done"})))
     assert "'odd'" in the(found, "impossible-outcome").message
+
+
+def test_an_execute_that_cannot_be_called_is_found():
+    class Yields(smachpy.State):
+        def execute(self, userdata):
+            yield "done"
+
+    class Good(smachpy.State):
+        def execute(self, userdata):
+            return "done"
+
+    class Nothing(smachpy.State):
+        pass
+
+    def callback(userdata):
+        yield
+
+    exchanged, bound = Good(["done"]), Good(["done"])
+    states = [
+        *(Good(["done"]), Yields(["done"]), Nothing(["done"]), exchanged, bound),
+        smachpy.CBState(callback, outcomes=["done"]),
+    ]
+    sm = smachpy.Concurrence(["done"], "done", name="M")
+    for number, state in enumerate(states):
+        sm.add(f"S{number}", state)
+    exchanged.execute = lambda: "done"
+    bound.execute = lambda userdata: "done"
+    found = [p.path for p in smachpy.check(sm) if p.rule == "wrong-signature"]
+    assert found == ["/M/S1", "/M/S2", "/M/S3", "/M/S5"]

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from smachpy.cli import main
+from smachpy.command import main
 
 MISSION = """
 import smachpy
@@ -49,6 +49,25 @@ def test_pyproject_switches_off_with_a_reason_and_adds_properties(folder, capsys
     assert json.loads(capsys.readouterr().out)[0]["problems"][0]["rule"] == "property"
 
 
+def test_a_rule_that_is_off_is_switched_on_here_or_in_pyproject(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "go.py").write_text(
+        "import smachpy\n"
+        "from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction\n"
+        "def mission():\n"
+        "    sm = smachpy.StateMachine(['succeeded', 'aborted', 'preempted'], name='M')\n"
+        "    with sm:\n"
+        "        sm.add('GO', smachpy.SimpleActionState('move_base', MoveBaseAction))\n"
+        "    return sm\n"
+    )
+    assert main(["check", "go.py"]) == 0
+    assert main(["check", "go.py", "--enable", "no-timeout"]) == 1
+    (tmp_path / "pyproject.toml").write_text('[tool.smachpy.check]\nenable = ["no-timeout"]\n')
+    capsys.readouterr()
+    assert main(["check", "go.py", "--format", "json"]) == 1
+    assert json.loads(capsys.readouterr().out)[0]["problems"][0]["rule"] == "no-timeout"
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -56,6 +75,9 @@ def test_pyproject_switches_off_with_a_reason_and_adds_properties(folder, capsys
         ('ignore = [{rule = "unreachable-stat", reason = "x"}]', "unreachable-state"),
         ("ignore = [1]", "table"),
         ("ignored = []", "'ignored'"),
+        ('enable = "no-timeout"', "enable: got 'no-timeout'; expected a list of rules"),
+        ('enable = ["no-timeouts"]', "Did you mean 'no-timeout'?"),
+        ("enable = [[]]", "enable: rule: got []"),
         ('properties = "never(B)"', "properties: got 'never(B)'; expected a table"),
         ('properties = {M = "never(B)"}', "M: got 'never(B)'; expected a list of texts. Try ['ne"),
         ("properties = {M = [1]}", "M: got [1]; expected a list of texts"),

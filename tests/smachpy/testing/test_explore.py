@@ -4,23 +4,28 @@ from __future__ import annotations
 
 import gc
 import itertools
+import subprocess
+import sys
 import time
 import weakref
 
 import pytest
 
+from actionlib_core.action.simple_client import SimpleActionClient
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
-from actionlib_core.simple_action_client import SimpleActionClient
-from smachpy import CBState, Concurrence, Iterator, SimpleActionState, State, StateMachine
-from smachpy.testing import (
-    TimeLimitError,
-    UnknownStateError,
-    exploration,
-    explore,
-    mission_kit,
-    replay,
+from actionlib_core.interfaces.std_msgs.msg import Empty
+from smachpy import (
+    CBState,
+    Concurrence,
+    Iterator,
+    MonitorState,
+    SimpleActionState,
+    State,
+    StateMachine,
 )
-from smachpy.testing.explorers import Explorer
+from smachpy.testing import TimeLimitError, UnknownStateError, explore, mission_kit, replay
+from smachpy.testing.exploring import exploration
+from smachpy.testing.exploring.explorer import Explorer
 
 
 class Leaf(State):
@@ -29,6 +34,14 @@ class Leaf(State):
 
     def execute(self, ud):
         raise AssertionError("the explorer has put a double in my place")
+
+
+class Makes:
+    def __init__(self, what):
+        self.what = what
+
+    def make(self):
+        return sound()
 
 
 def sound():
@@ -42,7 +55,7 @@ def sound():
 def test_a_sound_machine_is_explored_to_the_end():
     found = explore(sound())
     assert found
-    assert found.ok, found
+    found.assert_ok()
     assert found.exhaustive
     assert found.stopped_by == ""
     assert found.runs > 8
@@ -67,7 +80,7 @@ def test_bounds_say_that_there_is_more():
         "max_runs",
     )
     found = explore(sound(), max_time=0.0)
-    assert (found.exhaustive, found.stopped_by) == (False, "max_time")
+    assert (found.exhaustive, found.runs, found.stopped_by) == (False, 1, "max_time")
     found = explore(sound(), max_depth=1)
     assert (found.exhaustive, found.stopped_by) == (False, "max_depth")
 
@@ -102,7 +115,6 @@ def test_the_script_repeats_the_run(tmp_path):
         found.counterexample.script
     )
     space = {}
-    import sys
     import types
 
     module = types.ModuleType("planted")
@@ -148,11 +160,11 @@ def test_a_loop_in_which_no_time_passes(outcomes):
     sm = StateMachine(outcomes, name="M")
     with sm.opened(check=False):
         sm.add("A", CBState(lambda _: "again", outcomes=["again"]), {"again": "A"})
-    begun = time.monotonic()
+    begun = time.process_time()
     found = explore(sm, keep=["A"], max_time=0.5, steps=10_000)
     assert reason(found).startswith("it never ends: /M: it took 10000 steps at 0 s, in /M/A")
     assert "or try explore(..., steps=...)" in reason(found)
-    assert time.monotonic() - begun < 30
+    assert time.process_time() - begun < 30
 
 
 def through(item, count):
@@ -199,7 +211,7 @@ def test_a_kept_leaf_may_take_hours_if_the_test_says_so():
 def test_a_watcher_that_nobody_calls_off():
     both = Concurrence(["done", "preempted"], "done", name="C")
     watcher = Leaf("heard", "preempted")
-    watcher.__class__ = type("Watcher", (Leaf,), {"kind": "monitor"})
+    watcher.__class__ = type("Watcher", (Leaf,), {"_smachpy_kind": "monitor"})
     with both:
         both.add("GO", Leaf())
         both.add("WATCH", watcher)
@@ -313,7 +325,7 @@ def drive():
 
 def test_everything_that_servers_do():
     found = explore(drive, real_actions=True, preempts=0, interleavings=False)
-    assert found.ok, found
+    found.assert_ok()
     assert found.exhaustive
     assert found.runs == 9
 
@@ -329,6 +341,20 @@ def test_everything_that_servers_do():
 def test_an_unknown_fault():
     with pytest.raises(ValueError, match="deaf"):
         explore(sound(), faults=["gremlins"])
+    with pytest.raises(ValueError, match=r"replay: faults: got \['gremlins'\]"):
+        replay(sound(), [], faults=["gremlins"])
+
+
+def test_an_unknown_option(mission):
+    with pytest.raises(TypeError, match="Did you mean 'preempts'"):
+        explore(sound(), prempts=0)
+    with pytest.raises(TypeError, match=r"replay: unknown arguments \['max_run'\]"):
+        mission.replay(sound(), [], max_run=3)
+
+
+def test_options_may_be_iterators():
+    found = explore(sleeps, keep=iter(["X"]), faults=iter(["hang"]), preempts=0)
+    assert found.ok
 
 
 def test_a_machine_that_has_changed_cannot_be_replayed():
@@ -474,13 +500,13 @@ def test_a_loop_of_long_leaves_is_no_run_that_never_ends(monkeypatch):
 
     def choose(self, where, options, situation=None):
         if "again" in options:
-            rounds.append(self.now())
+            rounds.append(self._clock.now())
             return options.index("again" if len(rounds) < 25 else "done")
         return options.index("outlasts the others") if "outlasts the others" in options else 0
 
     monkeypatch.setattr(Explorer, "choose", choose)
     found = explore(sm, preempts=0, max_runs=1)
-    assert found.ok, found
+    found.assert_ok()
     assert rounds[-1] > 3600
 
 
@@ -491,7 +517,7 @@ def test_a_leaf_that_outlasts_others_after_a_preempt_takes_no_grace():
         stop.add("WORK", Leaf(), {"preempted": "TIDY"})
         stop.add("TIDY", sm)
     found = explore(stop)
-    assert found.ok, found
+    found.assert_ok()
     assert found.exhaustive
 
 
@@ -615,7 +641,7 @@ def test_a_counterexample_says_when_the_computer_s_clock_ended_its_shortening(mo
     found = explore(sound, invariants=[no_c_before_e])
     assert not found.counterexample.is_cut
     assert "max_time ended" not in str(found)
-    monkeypatch.setattr(exploration._COMPUTER, "now", lambda: next(seconds))
+    monkeypatch.setattr(exploration.COMPUTER, "now", lambda: next(seconds))
     slow = explore(sound, invariants=[no_c_before_e], max_time=4)
     assert slow.counterexample.is_cut
     told = "(max_time ended its shortening: a faster computer may find a shorter one)"
@@ -790,7 +816,7 @@ def test_doubles_of_the_test_stay_where_they_are(mission):
     before = dict(sm.get_children())
     for machine in (sm, sound):
         found = mission.explore(machine, invariants=[lambda run: run.outcomes("A") == ("failed",)])
-        assert found.ok, found
+        found.assert_ok()
         assert len(made) == 1
     assert sm.get_children() == before
     assert mission(sm).outcomes("A") == ("failed",)
@@ -807,16 +833,164 @@ def test_a_run_with_doubles_of_the_test_is_repeated_by_the_test(mission):
     assert run.outcomes("B")[0] == "again"
 
 
-def test_what_no_explored_run_would_meet_is_refused(mission):
+def test_a_preempt_of_the_test_is_refused(mission):
     mission.preempt(on="A")
-    with pytest.raises(ValueError, match=r"mission\.explore: got a preempt"):
+    with pytest.raises(ValueError, match=r"mission\.explore: got preempt\(on='A'\)"):
         mission.explore(sound())
 
 
-def test_servers_of_the_test_are_refused(mission, action_server):
-    action_server("move_base", MoveBaseAction)
-    with pytest.raises(ValueError, match=r"ScriptedActionServer 'move_base'.*real_actions=True"):
-        mission.explore(drive, keep=["DRIVE"])
+def test_what_is_no_machine_is_refused(mission):
+    for call, wrong in [
+        (mission, ()),
+        (mission, (mission,)),
+        (mission, (sound,)),
+        (mission, (5,)),
+        (mission.explore, (mission,)),
+        (mission.explore, (5,)),
+        (mission.explore, (StateMachine,)),
+        (explore, (None,)),
+    ]:
+        with pytest.raises(TypeError, match=r"expected a (machine|container)"):
+            call(*wrong)
+
+
+def drive_with_a_client():
+    """ASK is code of the user's own that sends a goal, and SEE waits for a message."""
+
+    def ask(userdata):
+        client = SimpleActionClient("move_base", MoveBaseAction)
+        if not client.wait_for_server(5.0):
+            return "no_server"
+        client.send_goal_and_wait(MoveBaseGoal())
+        return client.get_goal_status_text() or "no_text"
+
+    sm = StateMachine(["seen", "not_seen", "no_server"], name="M")
+    with sm:
+        outcomes = ["first", "second", "no_server", "no_text"]
+        ends = {"first": "ASK", "second": "SEE", "no_text": "no_server"}
+        sm.add("ASK", CBState(ask, outcomes=outcomes), ends)
+        sm.add(
+            "SEE",
+            MonitorState("seen", Empty, lambda ud, message: False, timeout=5.0),
+            {"invalid": "seen", **dict.fromkeys(["valid", "aborted", "preempted"], "not_seen")},
+        )
+    return sm
+
+
+def test_servers_and_topics_of_the_test_are_in_each_run(mission, action_server, topic):
+    server = action_server("move_base", MoveBaseAction)
+    server.reply(text="first", duration=1)
+    server.reply(text="second", duration=1)
+    topic("seen", Empty).publish_at(4.0)
+    outcomes = []
+    for machine in (drive_with_a_client, drive_with_a_client()):
+        found = mission.explore(
+            machine,
+            keep=["ASK", "SEE"],
+            preempts=0,
+            on_run=lambda run: outcomes.append(run.outcome),
+        )
+        found.assert_ok()
+    assert set(outcomes) == {"seen"}
+    assert server.goals == []
+    mission(drive_with_a_client()).assert_outcome("seen")
+
+
+def test_a_run_with_servers_of_the_test_is_repeated_by_the_test(mission, action_server):
+    action_server("move_base", MoveBaseAction).default_result(status="aborted", text="second")
+    options = {"keep": ["ASK"], "preempts": 0}
+    found = mission.explore(
+        drive_with_a_client, invariants=[lambda run: run.outcome != "not_seen"], **options
+    )
+    assert "mission.replay(" in found.counterexample.script
+    run = mission.replay(drive_with_a_client, found.counterexample.choices, **options)
+    run.assert_outcome("not_seen")
+
+
+def test_what_a_server_still_has_to_do_is_part_of_the_situation(mission, action_server):
+    """PICK is entered in one situation but for the server: its second goal is bad for LEFT."""
+
+    def ask(userdata):
+        client = SimpleActionClient("move_base", MoveBaseAction)
+        client.send_goal_and_wait(MoveBaseGoal())
+        return client.get_goal_status_text()
+
+    def left(userdata):
+        text = ask(userdata)
+        if text == "second":
+            raise ValueError(text)
+        return "done" if text == "end" else "again"
+
+    def right(userdata):
+        return "done" if ask(userdata) == "end" else "again"
+
+    def asks():
+        sm = StateMachine(["done", "preempted"], name="M")
+        with sm:
+            sm.add("PICK", Leaf("left", "right"), {"left": "LEFT", "right": "RIGHT"})
+            for label, function in (("LEFT", left), ("RIGHT", right)):
+                sm.add(label, CBState(function, outcomes=["again", "done"]), {"again": "PICK"})
+        return sm
+
+    server = action_server("move_base", MoveBaseAction)
+    for text in ("first", "second"):
+        server.reply(text=text)
+    server.default_result(text="end")
+    found = mission.explore(asks, keep=["LEFT", "RIGHT"], preempts=0, interleavings=False)
+    assert "ValueError" in reason(found)
+
+
+# -- what a counterexample says --------------------------------------------------------------------
+
+
+def never_ends_well(run):
+    return False
+
+
+of_a_line = lambda: sound()  # noqa: E731  a name for a lambda is what is tested
+
+
+@pytest.mark.parametrize(
+    "make", [sound, of_a_line, lambda: sound(), Makes("of a class").make, sound()]
+)
+def test_a_script_is_a_program_whatever_made_the_machine(make):
+    found = explore(
+        make, invariants=[never_ends_well], writes={"A": {}}, userdata={"pose": object()}
+    )
+    script = found.counterexample.script
+    compile(script, "script", "exec")
+    assert ("import sound as machine" in script) == (make is sound)
+    assert ("import of_a_line as machine" in script) == (make is of_a_line)
+    assert "userdata=...,  # as it was given to explore: {'pose': <object" in script
+
+
+def test_a_program_s_own_function_is_imported_from_its_file(tmp_path):
+    (tmp_path / "night.py").write_text(
+        "from smachpy import CBState, StateMachine\n"
+        "from smachpy.testing import explore\n"
+        "def make():\n"
+        "    sm = StateMachine(['done'])\n"
+        "    with sm:\n"
+        "        sm.add('A', CBState(print, outcomes=['done']))\n"
+        "    return sm\n"
+        "if __name__ == '__main__':\n"
+        "    print(explore(make, invariants=[lambda run: False]).counterexample.script)\n"
+    )
+    words = [sys.executable, "night.py"]
+    script = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    assert "from night import make as machine" in script
+    words = [sys.executable, "-c", script]
+    shown = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    assert "-done->" in shown
+
+
+def test_assert_ok_fails_with_the_whole_counterexample():
+    explore(sound).assert_ok()
+    found = explore(sound, invariants=[never_ends_well])
+    with pytest.raises(AssertionError) as error:
+        found.assert_ok()
+    assert str(error.value) == str(found)
+    assert found.counterexample.script in str(error.value)
 
 
 # -- what is found with real actions ---------------------------------------------------------------
@@ -850,6 +1024,44 @@ def test_a_goal_that_is_left_running():
     ).outcome
 
 
+class Sends(State):
+    """Sends a goal, and cancels it if it is told so; it ends before either has arrived."""
+
+    def __init__(self, *, cancels):
+        super().__init__(["done"])
+        self.cancels = cancels
+
+    def execute(self, ud):
+        client = SimpleActionClient("move_base", MoveBaseAction)
+        client.wait_for_server(5.0)
+        client.send_goal(MoveBaseGoal())
+        if self.cancels:
+            client.cancel_goal()
+        return "done"
+
+
+def sends(*, cancels):
+    sm = StateMachine(["done"], name="M")
+    with sm:
+        sm.add("SEND", Sends(cancels=cancels))
+    return sm
+
+
+@pytest.mark.parametrize("cancels", [False, True])
+def test_a_goal_of_plain_code_that_the_mission_leaves_to_a_server(cancels):
+    found = explore(lambda: sends(cancels=cancels), keep=["SEND"], real_actions=True)
+    assert found.ok == cancels
+    assert cancels or "goals are left running: /mission-" in reason(found)
+    with mission_kit() as mission:
+        server = mission.action_server("move_base", MoveBaseAction)
+        server.default_result(duration=600)
+        run = mission(sends(cancels=cancels))
+        assert (len(server.goals), len(server.cancelled)) == (1, int(cancels))
+        assert len(run.goals_left) == (not cancels)
+        assert run.goals_left == server.left
+        assert run.duration < 1
+
+
 def test_preempts_come_while_a_server_works():
     outcomes = set()
     found = explore(
@@ -858,7 +1070,7 @@ def test_preempts_come_while_a_server_works():
         interleavings=False,
         on_run=lambda run: outcomes.update(run.outcomes("DRIVE")),
     )
-    assert found.ok, found
+    found.assert_ok()
     assert found.exhaustive
     assert found.runs == 11
     assert "preempted" in outcomes

@@ -23,6 +23,7 @@ from smachpy import (
     SimpleActionState,
     State,
     StateMachine,
+    set_options,
 )
 from smachpy.testing import (
     DoubleError,
@@ -129,9 +130,7 @@ def test_user_code_that_waits_by_itself_is_in_virtual_time(mission):
     sm = StateMachine(["done"])
     with sm:
         sm.add("A", CBState(wait, outcomes=["done"]))
-    begun = time.monotonic()
     assert mission(sm).duration == 7200
-    assert time.monotonic() - begun < 60
     assert isinstance(RealClock().now(), float)
 
 
@@ -178,9 +177,7 @@ def test_a_double_keeps_options_and_details_of_its_state(mission):
     sm = StateMachine(["done", "late"], name="M")
     with sm:
         sm.add("A", Wait(1), {"preempted": "done"})
-        sm["A"].timeout = 5.0
-        sm["A"].timeout_outcome = "late"
-        sm["A"].register_outcomes(["late"])
+        set_options(sm["A"], timeout=5.0, timeout_outcome="late")
     mission.replace("A", outcomes=["done"], duration=60)
     run = mission(sm)
     assert run.outcome == "late"
@@ -235,7 +232,7 @@ def test_a_trigger_changes_nothing_before_it_acts(mission):
 
     class Look(Wait):
         def execute(self, ud):
-            hearing.append(len(sm._listeners))
+            hearing.append(len(sm._smachpy.listeners))
             return super().execute(ud)
 
     def machine():
@@ -545,7 +542,7 @@ def test_a_double_of_a_sub_machine_is_no_machine_of_its_own_in_the_coverage():
         explored = Coverage()
         mission.on_run = explored.add
         mission.replace("IN", outcomes=["failed"])
-        assert mission.explore(sm)
+        mission.explore(sm).assert_ok()
     assert [m.record for m in explored.machines] == [machine.record]
     assert machine.taken["states"] == {"/TWO": 3, "/TWO/IN": 3, "/TWO/IN/A": 1, "/TWO/IN/B": 1}
     assert machine.missed("states") == []

@@ -9,11 +9,15 @@ import sys
 
 import pytest
 
-from smachpy.cli import main
-from smachpy.testing import MissionTestCase, session
+from smachpy.command import main
+from smachpy.testing import MissionTestCase, mission_kit, session
 from smachpy.testing import cli as testing_cli
+from smachpy.testing.coverage import Coverage
 
 pytest_plugins = ["pytester"]
+
+# Most of these start further Pythons, which a busy computer takes its time for.
+pytestmark = pytest.mark.timeout(300)
 
 TESTS = """
 import pytest
@@ -42,7 +46,7 @@ def test_preempt(mission, state):
 """
 
 OPTIONS = ["-p", "no:cacheprovider"]
-ALIAS = "import sys; from smachpy.cli import main; sys.exit(main(sys.argv[1:]))"
+ALIAS = "import sys; from smachpy.command import main; sys.exit(main(sys.argv[1:]))"
 
 
 def test_the_fixtures_need_no_conftest(pytester):
@@ -106,15 +110,38 @@ def test_coverage_of_nothing_fails(pytester):
     result.stdout.fnmatch_lines(["no mission ran"])
 
 
-def test_coverage_is_merged_over_workers(pytester):
+def test_coverage_is_merged_over_workers(pytester, monkeypatch):
+    # Without the other plugins here a worker starts in a fifth of the time.
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
     pytester.makepyfile(TESTS)
-    result = pytester.runpytest_subprocess(
-        *OPTIONS, "-n", "2", "--mission-coverage", "--mission-coverage-json=c.json"
+    result = pytester.runpytest_inprocess(
+        *OPTIONS,
+        *("-p", "xdist", "-p", "smachpy.testing.plugin"),
+        *("-n", "1", "--mission-coverage", "--mission-coverage-json=c.json"),
     )
     assert result.ret == 0
     (machine,) = json.loads((pytester.path / "c.json").read_text())["machines"]
     assert machine["runs"] == 3
     assert machine["preempts"]["run"] == 2
+
+
+def test_what_several_workers_measured_is_added_up():
+    with mission_kit() as mission:
+        run = mission(machine_of_tests())
+    workers = [Coverage(), Coverage()]
+    total = Coverage()
+    for coverage in workers:
+        coverage.add(run)
+        total.merge(Coverage.from_json(coverage.to_json()))
+    (machine,) = total.summary()["machines"]
+    assert machine["runs"] == 2
+    assert machine["states"]["times"] == {"/M": 2, "/M/A": 2, "/M/B": 2}
+
+
+def machine_of_tests():
+    space = {}
+    exec(TESTS, space)
+    return space["machine"]()
 
 
 def test_a_seed_for_all_missions(pytester):
@@ -137,7 +164,7 @@ def test_unittest_runs_it(pytester):
         cwd=pytester.path,
         capture_output=True,
         text=True,
-        timeout=50,
+        timeout=250,
         check=False,
     )
     assert done.returncode == 0, done.stderr
@@ -291,7 +318,7 @@ def test_the_command_line_alias(pytester):
         cwd=pytester.path,
         capture_output=True,
         text=True,
-        timeout=50,
+        timeout=250,
         check=False,
     )
     assert "1 passed" in done.stdout, done.stderr
@@ -329,7 +356,7 @@ def test_loading_the_plugin_loads_neither_network_nor_numbers():
         "print(sorted(heavy & set(sys.modules)))"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=50, check=True
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=250, check=True
     )
     assert done.stdout.strip() == "[]"
 

@@ -384,6 +384,14 @@ def test_a_service_that_never_answers(mission, service_server):
     assert (run.outcome, run.duration) == ("aborted", 12)
 
 
+def test_a_service_that_never_answers_ends_with_the_test_in_silence(caplog):
+    with mission_kit() as mission:
+        mission.service_server("dock", Trigger).never_answer()
+        mission(call(timeout=12.0)).assert_outcome("aborted")
+        caplog.clear()
+    assert caplog.records == []
+
+
 # -- topics ----------------------------------------------------------------------------------------
 
 

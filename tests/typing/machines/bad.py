@@ -16,6 +16,7 @@ both.add("A", State(["done"]), {"x": 1})  # error: dict-item
 Iterator.set_contained_state("A", StateMachine)  # error: arg-type
 State(["done"], timeout="soon")  # error: arg-type
 State(["done"], timeuot=1.0)  # error: call-arg
+State(["done"], retry=(3, "x"))  # error: arg-type
 State([1])  # error: list-item
 sm.control.pause(running="stop")  # error: arg-type
 sm.execute().missing()  # error: attr-defined

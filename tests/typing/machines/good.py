@@ -85,12 +85,32 @@ def build() -> StateMachine:
         StateMachine.add("DRIVE", Drive(), {"arrived": "LOOK", "aborted": None}, {"goals": "goals"})
         StateMachine.add("LOOK", look, transitions={"done": "CALL"}, constants={"level": 1})
         StateMachine.add_auto("CALL", CBState(callback, [2]), ["done"])
-    sm.add("LAST", smachpy.state.State(["done"]))
+    sm.add("LAST", smachpy.machines.state.State(["done"]))
     sm.subscribe(listen)()
     sm.control.pause(running="cancel")
     record: StateRecord = describe(sm)
     print(record.children)
     return sm
+
+
+class Named(State):
+    """With the argument's name of the documentation, which is not the library's."""
+
+    def execute(self, userdata: UserData) -> str:
+        return str(userdata.level)
+
+
+def with_options() -> smachpy.Options:
+    kind: smachpy.Kind = "state"
+    again = Retry(3, 0.5, ["aborted"])
+    state = State([kind], retry=(3, 1.0, ["aborted", OSError]), timeout=3)
+    State(["ok"], retry=(3, 1.0, OSError), preempt_timeout="inherit")
+    State(["ok"], retry=(3, 1.0, ("aborted", "failed")), preempt_timeout=None)
+    State(["ok"], retry=(3, 1.0), on_exception={OSError: "failed"})
+    State(["ok"], retry=3)
+    smachpy.set_options(state, retry=again)
+    smachpy.set_options(Named(["ok"]), retry=None)
+    return smachpy.get_options(state)
 
 
 def build_others() -> str:

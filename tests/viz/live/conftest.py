@@ -65,7 +65,7 @@ def start_robot(*arguments):
 
 
 def start_simulation():
-    child = Child("-m", "missions.move_base", "--child")
+    child = Child("-m", "smachpy.sim", "--child")
     assert "ready" in child.said
     return child
 
@@ -75,7 +75,7 @@ class View(Child):
 
     def __init__(self, *arguments, port=0):
         super().__init__(
-            "-m", "smachpy.cli", "view", "--child", "--port", str(port), *map(str, arguments)
+            "-m", "smachpy.command", "view", "--child", "--port", str(port), *map(str, arguments)
         )
         self.address = self.said
         self.base, _, self.token = self.address.partition("#token=")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.interfaces import define_action, get_action
 from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.node import Node
-from actionlib_core.simple_action_server import SimpleActionServer
 from actionlib_core.transport.memory import MemoryNetwork
 from viz.live.actions import KEPT_GOALS, MOST_RUNNING, Actions, GoalRefusedError
 
@@ -194,7 +194,7 @@ def test_ended_goals_are_forgotten_and_running_ones_are_limited(world):
         world.actions.send("count", "{goal: 0}")
         world.clock.sleep(0.2)
     assert len(world.actions.summary()["goals"]) == KEPT_GOALS
-    from actionlib_core.action_server import ActionServer
+    from actionlib_core.action.server import ActionServer
 
     ActionServer("many", msg.TestAction, lambda handle: handle.set_accepted(), node=world.robot)
     world.clock.sleep(0.5)
@@ -202,3 +202,31 @@ def test_ended_goals_are_forgotten_and_running_ones_are_limited(world):
         world.actions.send("many", "{goal: 1}")
     with pytest.raises(GoalRefusedError, match=f"expected fewer than {MOST_RUNNING}"):
         world.actions.send("many", "{goal: 1}")
+
+
+def test_actions_of_two_networks_are_told_apart(world):
+    world.serve()
+    elsewhere = MemoryNetwork(world.clock)
+    viewer, robot = (
+        Node(name, transport=elsewhere.session(), clock=world.clock) for name in ("viewer", "robot")
+    )
+    done = []
+    server = SimpleActionServer(
+        "count",
+        msg.TestAction,
+        lambda goal: (done.append(goal.goal), server.set_succeeded()),
+        auto_start=False,
+        node=robot,
+    )
+    server.start()
+    world.actions.join(viewer)
+    world.clock.sleep(0.5)
+    assert [one["name"] for one in world.actions.summary()["actions"]] == ["count", "count (2)"]
+    world.actions.send("count (2)", "goal: 7")
+    world.clock.sleep(1.0)
+    assert done == [7]
+    world.actions.leave(viewer)
+    assert [one["name"] for one in world.actions.summary()["actions"]] == ["count"]
+    viewer.close()
+    robot.close()
+    world.clock.sleep(60.0)

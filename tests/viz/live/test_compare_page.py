@@ -7,7 +7,7 @@ import time
 import pytest
 
 from smachpy import CBState, StateMachine
-from viz.runs.recording import Recorder
+from smachpy.events.recording import Recorder
 
 pytestmark = [pytest.mark.browser, pytest.mark.zenoh]
 

@@ -145,7 +145,7 @@ def test_numbers_are_texts_as_javascript_cannot_hold_them_all():
         ),
         ("{spede: 1}", [("$.spede", "no such field in form_msgs/PaintGoal; expected speed,")]),
         ("[1]", [("", "got [1]; expected a YAML mapping")]),
-        ("{a: [", [("", "malformed YAML: while parsing")]),
+        ("{a: [", [("", "malformed YAML: line 1: ")]),
     ],
 )
 def test_problems_know_their_field(text, found):

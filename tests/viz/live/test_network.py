@@ -9,8 +9,10 @@ import pytest
 
 from actionlib_core.node import Node
 from actionlib_core.transport.memory import MemoryNetwork
-from smachpy import IntrospectionServer, State, StateMachine, feed, tape
+from smachpy import IntrospectionServer, State, StateMachine
+from smachpy.events import tape
 from smachpy.introspection import describe
+from smachpy.network import feed
 from viz.live.machines import Machine, Machines
 from viz.live.network import Network
 
@@ -59,7 +61,7 @@ def watch(clock):
         clock.sleep(2.0)
         return machines.get("robot")
 
-    watch.viewer, watch.machines, watch.robot = viewer, machines, robot
+    watch.viewer, watch.machines, watch.robot, watch.desk = viewer, machines, robot, desk
     watch.servers = servers
     yield watch
     for server in servers:
@@ -113,7 +115,7 @@ def test_who_comes_late_is_told_what_the_kept_events_do_not_tell(clock, watch, m
     assert job.execute() == "done"
     clock.sleep(1.0)
     other = Machines()
-    late = Network(watch.viewer._node, other)
+    late = Network(watch.desk, other)
     clock.sleep(2.0)
     late.close()
     assert other.get("robot").summary()["outcome"] == "done"
@@ -128,7 +130,7 @@ def test_who_pauses_does_not_matter(clock, watch):
     job = spinning(1)
     seen = watch(job)
     looks = Machines()
-    other = Network(watch.viewer._node, looks)
+    other = Network(watch.desk, looks)
     clock.sleep(2.0)
     paused = {"paused": True, "breakpoints": []}
     going = {"paused": False, "breakpoints": []}
@@ -154,7 +156,7 @@ def test_who_pauses_does_not_matter(clock, watch):
 
 def test_a_machine_that_obeys_nobody_tells_nobody(clock, watch):
     job = spinning(1)
-    server = IntrospectionServer("free", job, "/FREE", node=watch.viewer._node)
+    server = IntrospectionServer("free", job, "/FREE", node=watch.desk)
     server.start()
     watch(spinning(1))
     job.control.pause()
@@ -245,3 +247,29 @@ def test_an_answer_that_is_read_late_does_not_undo_what_was_told_since(clock, wa
     assert seen.facts()["control"]["paused"]
     job.control.resume()
     assert mission.join(60.0)
+
+
+def test_machines_of_two_networks_are_told_apart(clock, watch):
+    seen = watch(spinning(1))
+    elsewhere = MemoryNetwork(clock)
+    desk, robot = (
+        Node(name, transport=elsewhere.session(), clock=clock) for name in ("desk", "robot")
+    )
+    job = spinning(1)
+    server = IntrospectionServer("robot", job, "/JOB", node=robot, control=True)
+    server.start()
+    watch.viewer.join(desk)
+    clock.sleep(2.0)
+    other = watch.machines.get("robot (2)")
+    assert job.execute() == "done"
+    clock.sleep(1.0)
+    assert (seen.summary()["outcome"], other.summary()["outcome"]) == (None, "done")
+    watch.viewer.send("robot (2)", {"command": "pause"})  # it reaches one only
+    clock.sleep(1.0)
+    assert (other.control["paused"], seen.control["paused"]) == (True, False)
+    watch.viewer.leave(desk)
+    clock.sleep(1.0)
+    assert (seen.summary()["stale"], other.summary()["stale"] is None) == (None, False)
+    server.stop()
+    desk.close()
+    robot.close()

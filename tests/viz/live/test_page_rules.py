@@ -68,6 +68,18 @@ def test_single_events_back_and_on_though_they_share_an_instant(served, look):
 GOAL = ("GoalSent", "/JOB/A", {"action": "drive", "goal_id": "1", "goal": {"x": 1}})
 
 
+def test_progress_is_as_wide_as_the_feedback_tells(served, look):
+    told = {"action": "drive", "goal_id": "1", "feedback": {}}
+    machine = served.add("one", events=[*run()[:2], GOAL])
+    page = look(served.start())
+    width = "() => document.querySelector('g[data-path=\"/JOB/A\"] .progress').getBoundingClientRect().width"
+    assert page.evaluate(width) == 0
+    part = {"progress": {"fraction": 0.5, "distance": None, "text": ""}}
+    machine.add(served.events([("GoalFeedback", "/JOB/A", {**told, **part})], after=3))
+    frame = "document.querySelector('g[data-path=\"/JOB/A\"] .frame').getBoundingClientRect().width"
+    wait_for(page, f"Math.abs(({width})() / {frame} - 0.4) < 0.1")
+
+
 def test_links_and_summaries_keep_their_keys(served, look, tmp_path):
     served.add("one", events=[*run()[:2], GOAL], control={"paused": False, "breakpoints": []})
     page = look(f"{served.start(token='t')}#token=t")
@@ -174,7 +186,7 @@ def test_a_page_that_was_cut_off_goes_on_where_it_was(served, look):
     machine = served.add("one", events=run()[:2])
     page = look(served.start())
     page.keyboard.press(",")
-    page.evaluate("async () => (await import('viewer/source')).reconnect()")
+    page.evaluate("async () => (await import('#core/connection.js')).reconnect()")
     wait_for(page, "smachpy.store.connection.value === 'live'")
     machine.add(served.events(run()[2:4], after=2))
     wait_for(page, "smachpy.store.run.events.length === 4")
@@ -200,7 +212,7 @@ def test_the_machine_chosen_last_is_shown_however_late_the_first_answers(served,
     page = look(served.start())
     held = []
     page.route("**/api/model?machine=one*", lambda route: held.append(route))
-    choose = "async (name) => (await import('viewer/source')).choose(name)"
+    choose = "async (name) => (await import('#core/connection.js')).choose(name)"
     page.evaluate(choose, "two")
     page.wait_for_selector('g[data-path="/TWO/Z"]')
     page.evaluate(choose, "one")
@@ -225,10 +237,19 @@ def test_a_structure_that_could_not_be_fetched_is_asked_for_again(served, look):
     page.wait_for_selector('g[data-path="/ONE/A"]')
 
 
+def test_a_page_without_its_layout_worker_says_so(served, look):
+    served.add("one")
+    address = served.start()
+    page = look("about:blank", drawn=False)
+    page.route("**/elk-worker.min.js", lambda route: route.abort())
+    page.goto(address)
+    page.wait_for_selector("text=could not be laid out")
+
+
 def test_what_the_server_answers_is_told_as_it_is(served, look):
     served.add("one")
     page = look(served.start())
-    ask = "async (address) => (await import('viewer/source')).ask(address)"
+    ask = "async (address) => (await import('#core/connection.js')).ask(address)"
     gone = page.evaluate(ask, "/api/compare?machine=one&with=gone")
     assert gone["ok"] is False
     assert "404" in gone["text"]
@@ -301,7 +322,7 @@ def test_a_page_that_could_not_follow_says_so_and_keeps_the_preempt(served, look
     page.wait_for_selector(".preempt-banner >> text=operator me")
     page.wait_for_selector(".waterfall button:text-is('A')")
     machine.add(served.events([("PreemptServiced", "/JOB/A")], after=3_103))
-    wait_for(page, "document.querySelector('.waterfall').textContent.includes('cleans up')")
+    wait_for(page, "document.querySelector('.waterfall').textContent.includes('cleaning up')")
 
 
 def test_events_that_the_mission_had_to_drop_are_missed(served, look):
@@ -354,7 +375,7 @@ def test_the_saved_page_of_a_run_that_goes_on_says_that_it_ends_there(served, lo
 
 def test_what_the_page_keeps_has_an_end(served, look):
     """The newest events can be wound back; what was before them counts on."""
-    from smachpy.run_state import RunState
+    from smachpy.events.run_state import RunState
 
     page = look(served.start(), drawn=False)
     there = served.events(
@@ -369,8 +390,8 @@ def test_what_the_page_keeps_has_an_end(served, look):
     )
     kept = page.evaluate(
         """async (events) => {
-          const { Run, emptyState } = await import('viewer/fold');
-          const run = new Run(emptyState(), []);
+          const { Run } = await import('#core/run.js');
+          const run = new Run(null, []);
           let gone = 0;
           for (let i = 0; i < events.length; i += 10) {
             run.push(events.slice(i, i + 10));

@@ -7,11 +7,11 @@ import asyncio
 from textual.widgets import DataTable, RichLog, Static, Tree
 
 from smachpy import CBState, StateMachine
-from smachpy.run_state import RunState
+from smachpy.events.recording import Recorder, read_recording
+from smachpy.events.run_state import RunState
 from viz.live import tui
 from viz.live.machines import Machine, Machines
 from viz.live.tui import MissionApp
-from viz.runs.recording import Recorder, read_recording
 
 
 def recorded(tmp_path):

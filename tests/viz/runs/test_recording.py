@@ -14,19 +14,19 @@ from types import SimpleNamespace
 import pytest
 
 from actionlib_core.interfaces import define_action
-from smachpy import CBState, State, StateMachine, describe, tape
-from smachpy.events import GoalDone, GoalFeedback, GoalSent, to_record
-from viz.live import machines
-from viz.live.machines import Machine, Machines
-from viz.runs import recording as recording_module
-from viz.runs.html import standalone_page
-from viz.runs.recording import (
+from smachpy import CBState, State, StateMachine, describe
+from smachpy.events import GoalDone, GoalFeedback, GoalSent, tape, to_record
+from smachpy.events import recording as recording_module
+from smachpy.events.recording import (
     Recorder,
     RecordingError,
     find_recordings,
     read_recording,
     recording_lines,
 )
+from viz.live import machines
+from viz.live.machines import Machine, Machines
+from viz.runs.html import standalone_page
 from viz.runs.statistics import StatisticsOfFiles, count_by_machine, never_taken, quantile
 
 
@@ -185,7 +185,7 @@ def test_more_events_than_can_be_written_end_as_the_run_did(
     assert recording.events[-1]["seq"] == 2 + 2 * 3000
     assert f"{recorder.dropped} events are missing" in caplog.text
     assert "disk" not in caplog.text
-    from smachpy.cli import main
+    from smachpy.command import main
 
     assert main(["runs", "list", str(tmp_path / "run.jsonl")]) == 0
     assert "of 6002" in capsys.readouterr().out
@@ -344,7 +344,7 @@ def test_runs_are_found_in_folders(record, tmp_path):
 
 
 def test_the_command_line(record, tmp_path, capsys):
-    from smachpy.cli import main
+    from smachpy.command import main
 
     path = str(record("run.jsonl"))
     assert main(["runs", "list", path]) == 0
@@ -499,7 +499,7 @@ def test_mcap_does_not_bring_a_goal_back_that_has_ended(record, tmp_path):
 
 
 def test_progress_of_goals_that_come_as_plain_data():
-    from viz.live.progress import annotate
+    from viz.live.machines import with_progress
 
     goals = {"id": SimpleNamespace()}
     goals = {
@@ -515,12 +515,12 @@ def test_progress_of_goals_that_come_as_plain_data():
         "goal_id": "id",
         "feedback": {"$msg": "x/F", "fields": {"seconds_left": 4}},
     }
-    assert annotate(record, goals)["progress"]["fraction"] == pytest.approx(0.6)
-    assert annotate({**record, "goal_id": "other"}, goals) == {**record, "goal_id": "other"}
+    assert with_progress(record, goals)["progress"]["fraction"] == pytest.approx(0.6)
+    assert with_progress({**record, "goal_id": "other"}, goals) == {**record, "goal_id": "other"}
 
 
 def test_a_folder_with_a_file_that_is_no_recording(record, tmp_path, capsys, caplog):
-    from smachpy.cli import main
+    from smachpy.command import main
 
     record("a.jsonl")
     (tmp_path / "empty.jsonl").write_text("")
@@ -533,7 +533,7 @@ def test_a_folder_with_a_file_that_is_no_recording(record, tmp_path, capsys, cap
 
 
 def test_names_with_brackets_are_shown_as_they_are(tmp_path, clock, capsys):
-    from smachpy.cli import main
+    from smachpy.command import main
 
     sm = StateMachine(outcomes=["[/red]"], name="M[/x]")
     with sm:
@@ -550,7 +550,7 @@ def test_names_with_brackets_are_shown_as_they_are(tmp_path, clock, capsys):
 
 @pytest.mark.parametrize("name", ["x.html", "x.mcap"])
 def test_an_export_to_nowhere_is_told(record, tmp_path, capsys, name):
-    from smachpy.cli import main
+    from smachpy.command import main
 
     path = str(record("run.jsonl"))
     assert main(["runs", "export", path, "-o", str(tmp_path / "none" / name)]) == 2
@@ -624,7 +624,7 @@ def test_files_of_one_name_are_two_machines(record, tmp_path):
     ],
 )
 def test_a_viewer_that_cannot_be_started_says_why(words, text, capsys):
-    from smachpy.cli import main
+    from smachpy.command import main
 
     try:
         code = main(["view", *words])

@@ -1,0 +1,1 @@
+"""Action clients and servers: threads and messages around the rules of `goal`."""

@@ -1,0 +1,125 @@
+"""Where user callbacks run: off the network's thread, in order, knowing their clock and node."""
+
+from __future__ import annotations
+
+import contextvars
+import threading
+from collections import deque
+from functools import partial
+from threading import get_ident
+from typing import TYPE_CHECKING
+
+from actionlib_core.clock import SerialExecutor, use_clock
+from actionlib_core.clock._serial import report_thread_exception
+from actionlib_core.node import use_node
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.clock import Task, Timer
+    from actionlib_core.node import Node
+
+
+PATIENCE_S = 0.02  # what is urgent waits no longer for callbacks that were there before it
+HELPERS = 8  # threads at most for what is urgent, when callbacks do not return
+
+
+class CallbackQueue:
+    """Runs the callbacks of one client or server, one at a time, in the order they were given.
+
+    They run with the owner's clock and node as the current ones. No thread exists while idle.
+    What is urgent overtakes callbacks that take longer than `PATIENCE_S`, in another thread.
+
+    Threads: any; `call` never waits, so it may be used under a lock.
+    """
+
+    def __init__(self, node: Node, name: str) -> None:
+        with use_clock(node.clock), use_node(node):
+            self._context = contextvars.copy_context()
+        self._clock = node.clock
+        self._name = name
+        self._executor = SerialExecutor(_Marking(self), name)
+        self._thread: int | None = None
+        self._lock = threading.Lock()
+        self._urgent: deque[_Once] = deque()
+        self._helpers = 0
+
+    def call(self, function: Callable[..., object], *args: object) -> None:
+        """Run `function(*args)` after everything given before."""
+        self._executor.submit(partial(function, *args) if args else function)
+
+    def call_urgently(self, function: Callable[..., object], *args: object) -> None:
+        """As `call`; but if other callbacks hold it up, run it beside them in another thread."""
+        once = _Once(partial(function, *args))
+        once.timer = self._clock.call_later(PATIENCE_S, partial(self._overtake, once))
+        self._executor.submit(once)
+
+    def _overtake(self, once: _Once) -> None:
+        with self._lock:
+            self._urgent.append(once)
+            if self._helpers >= HELPERS:
+                return
+            self._helpers += 1
+        self.spawn(self._help, self._name)
+
+    def _help(self) -> None:
+        while True:
+            with self._lock:
+                if not self._urgent:
+                    self._helpers -= 1
+                    return
+                once = self._urgent.popleft()
+            try:
+                once()
+            except Exception:  # noqa: BLE001  a border: reported, the next one still runs
+                report_thread_exception()
+            except BaseException:  # `sys.exit`, which ends this thread
+                with self._lock:
+                    self._helpers -= 1
+                raise
+
+    def spawn(self, target: Callable[[], object], name: str) -> Task:
+        """Run `target` in a thread of its own, with the owner's clock and node."""
+        return self._context.copy().run(partial(self._clock.spawn, target, name=name))
+
+    def is_inside(self) -> bool:
+        """Tell whether the calling thread is running one of the callbacks."""
+        return self._thread == get_ident()
+
+    def mark(self, target: Callable[[], object]) -> None:
+        """Run `target`, and know that this thread runs callbacks meanwhile."""
+        me = self._thread = get_ident()
+        try:
+            target()
+        finally:
+            if self._thread == me:  # else the next one has begun
+                self._thread = None
+
+
+class _Once:
+    """Runs a function in whichever thread comes first."""
+
+    __slots__ = ("_functions", "timer")
+
+    def __init__(self, function: Callable[[], object]) -> None:
+        self._functions = [function]
+        self.timer: Timer | None = None
+
+    def __call__(self) -> None:
+        try:
+            function = self._functions.pop()
+        except IndexError:  # another thread has taken it
+            return
+        if self.timer is not None:
+            self.timer.cancel()
+        function()
+
+
+class _Marking:
+    """Starts the thread that runs the callbacks of a queue."""
+
+    def __init__(self, queue: CallbackQueue) -> None:
+        self._queue = queue
+
+    def spawn(self, target: Callable[[], object], *, name: str) -> Task:
+        return self._queue.spawn(partial(self._queue.mark, target), name)

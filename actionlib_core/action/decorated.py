@@ -1,0 +1,259 @@
+"""An action server as one decorated function.
+
+    @server("dock", DockAction)
+    def dock(goal, ctx):
+        if goal.bay > 3:
+            raise Reject("there are three bays")
+        for metres in approach(goal.bay):
+            ctx.feedback(DockFeedback(distance=metres))
+            if ctx.sleep(0.1):
+                raise Preempted("stopped before the bay")
+        return DockResult(docked=True)
+
+    with dock.start() as running:
+        running.wait()
+
+The function can still be called as it is, which is how to test it.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from actionlib_core.action.simple_server import TEXT_ACCEPTED, SimpleActionServer
+from actionlib_core.exceptions import ActionlibError
+from actionlib_core.goal.states import Status
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Self
+
+    from actionlib_core.action._action_spec import ActionSpec
+    from actionlib_core.action.server import OnClientLost, ServerGoalHandle
+    from actionlib_core.goal.single import Policy
+    from actionlib_core.node import Node
+
+G = TypeVar("G")
+R = TypeVar("R")
+F = TypeVar("F")
+
+
+class GoalEnd(Exception):  # noqa: N818  an end is not always an error
+    """Ends the goal that is being executed; raise one of the three kinds.
+
+    Attributes:
+        text: Why, for people; the client sees it.
+        result: The result to send; None sends one with default values.
+    """
+
+    def __init__(self, text: str = "", result: Any = None) -> None:
+        self.text = text
+        self.result = result
+        super().__init__(text)
+
+
+class Abort(GoalEnd):
+    """The goal failed: ABORTED."""
+
+
+class Preempted(GoalEnd):
+    """The goal was stopped as asked: PREEMPTED."""
+
+
+class Reject(GoalEnd):
+    """The goal is refused: REJECTED; ABORTED when the context was used before."""
+
+
+class GoalContext(Generic[F]):
+    """What the function of `server` has besides the goal.
+
+    The goal is accepted when the function first uses the context, at the latest when it returns.
+
+    Attributes:
+        goal_id: The goal's id.
+    """
+
+    def __init__(self, runner: _Runner, handle: ServerGoalHandle) -> None:
+        self._runner = runner
+        self._handle = handle
+        self.goal_id: str = handle.record.id
+
+    def accept(self, text: str = TEXT_ACCEPTED) -> None:
+        """Accept the goal, if that has not happened: from now on it cannot be rejected."""
+        if self._handle.record.status in {Status.PENDING, Status.RECALLING}:
+            self._handle.set_accepted(text)
+
+    def feedback(self, message: F) -> None:
+        """Send feedback to the client.
+
+        Raises:
+            ActionException: `message` is not of the action's type.
+            FieldError: a field of it has a wrong type.
+        """
+        self.accept()
+        self._runner.publish_feedback(message)
+
+    @property
+    def preempted(self) -> bool:
+        """Whether the goal is asked to stop, by a cancel or a newer goal."""
+        self.accept()
+        return self._runner.is_preempt_requested()
+
+    def wait_preempt(self, timeout: float | None = None) -> bool:
+        """Wait until the goal is asked to stop; return whether it is.
+
+        Blocks: until then, `timeout` [s] at most; None: no limit.
+        """
+        self.accept()
+        return self._runner.wait_preempt(timeout)
+
+    def sleep(self, seconds: float) -> bool:
+        """Let time pass, less of it when the goal is asked to stop.
+
+        Returns:
+            Whether the sleep ended early because of that.
+
+        Blocks: for `seconds`, or until the goal is asked to stop.
+        """
+        return self.wait_preempt(seconds)
+
+
+class _Runner(SimpleActionServer):
+    """A simple action server that accepts goals when their function says so."""
+
+    def __init__(self, function: Any, **kwargs: Any) -> None:
+        self._function = function
+        super().__init__(execute_cb=function, **kwargs)
+
+    def _run_next(self) -> None:
+        handle = self._take_next()
+        if handle is not None:
+            self._run(partial(self._execute, handle, GoalContext(self, handle)))
+
+    def _execute(self, handle: ServerGoalHandle, context: GoalContext[Any]) -> None:
+        try:
+            result = self._function(handle.get_goal(), context)
+        except Reject as end:
+            accepted = handle.record.status in {Status.ACTIVE, Status.PREEMPTING}
+            self._end("raise Reject", "abort" if accepted else "reject", end.result, end.text)
+        except Preempted as end:
+            context.accept()
+            self._end("raise Preempted", "cancel", end.result, end.text)
+        except Abort as end:
+            context.accept()
+            self._end("raise Abort", "abort", end.result, end.text)
+        except Exception:
+            context.accept()
+            raise
+        else:
+            context.accept()
+            self._end("return", "succeed", result, "")
+
+
+class RunningServer:
+    """A started `GoalServer`; a context manager that stops it."""
+
+    def __init__(self, runner: _Runner) -> None:
+        self._runner = runner
+
+    @property
+    def name(self) -> str:
+        """The action's full name."""
+        return self._runner.action_server.ns
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait until the server has stopped; return whether it has.
+
+        Raises:
+            ServerConflictError: it stopped because an older server has the name.
+
+        Blocks: until then, `timeout` [s] at most; None: no limit.
+        """
+        return self._runner.wait(timeout)
+
+    def stop(self) -> None:
+        """Stop the running goal and leave the name; see `SimpleActionServer.stop`."""
+        self._runner.stop()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+
+class GoalServer(Generic[G, R, F]):
+    """A function that can be offered as an action. Made by `server`."""
+
+    def __init__(
+        self,
+        function: Callable[[G, GoalContext[F]], R],
+        name: str,
+        spec: type[ActionSpec[G, R, F]],
+        options: dict[str, Any],
+    ) -> None:
+        self._function = function
+        self._options = options
+        self.name = name
+        self.spec = spec
+        self.__doc__ = function.__doc__
+
+    def __call__(self, goal: G, ctx: GoalContext[F]) -> R:
+        """Call the function itself."""
+        return self._function(goal, ctx)
+
+    def start(self, name: str | None = None, *, node: Node | None = None) -> RunningServer:
+        """Offer the action.
+
+        Args:
+            name: Another name than that of the decorator.
+            node: Where; the current node when None.
+
+        Raises:
+            ServerConflictError: the name has a server already.
+            InvalidNameError: the name breaks the ROS rules.
+            TransportError: the network session is closed.
+
+        Blocks: until the network has said who has the name, 1 s at most.
+        """
+        return RunningServer(
+            _Runner(
+                self._function,
+                name=name if name is not None else self.name,
+                ActionSpec=self.spec,
+                node=node,
+                **self._options,
+            )
+        )
+
+
+def server(
+    name: str,
+    ActionSpec: type[ActionSpec[G, R, F]],  # noqa: N803  as everywhere
+    *,
+    policy: Policy = "preempt",
+    on_client_lost: OnClientLost = "continue",
+) -> Callable[[Callable[[G, GoalContext[F]], R]], GoalServer[G, R, F]]:
+    """Make an action server of a function `execute(goal, ctx) -> result`.
+
+    The function returns the result (SUCCEEDED) or raises `Abort`, `Preempted` or `Reject`; any
+    other exception aborts the goal with its text.
+
+    Args:
+        name: The action's name.
+        ActionSpec: The action class (XAction).
+        policy: What a new goal does while one runs; see `SimpleActionServer`.
+        on_client_lost: What happens to the goal of a client that died; see `SimpleActionServer`.
+
+    Returns:
+        Makes a `GoalServer` of the function; `start` it.
+    """
+
+    def decorate(function: Callable[[G, GoalContext[F]], R]) -> GoalServer[G, R, F]:
+        if not callable(function):
+            raise ActionlibError(f"server {name!r}: got {function!r}; expected a function")
+        options = {"policy": policy, "on_client_lost": on_client_lost}
+        return GoalServer(function, name, ActionSpec, options)
+
+    return decorate

@@ -1,0 +1,884 @@
+"""`ActionServer`: any number of goals at once, each accepted, refused and ended by your code.
+
+Three objects hold a goal at its server: `ServerGoal` is its place in the life cycle, about which
+`ServerGoals` decides (`actionlib_core.goal.server`), the `ServerGoalHandle` around it is what
+programs hold, and the server's `GoalKeeper` brings decisions, network and time together, under one
+lock.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import threading
+from typing import TYPE_CHECKING, Any, Literal
+
+from actionlib_core._arguments import check_delay, check_function, check_seconds
+from actionlib_core.action._callbacks import CallbackQueue
+from actionlib_core.action.goal_id_generator import GoalIDGenerator
+from actionlib_core.exceptions import (
+    ActionException,
+    IllegalTransitionError,
+    ServerConflictError,
+    TransportError,
+)
+from actionlib_core.goal.ports import StatusEntry
+from actionlib_core.goal.server import (
+    FUTURE_NS,
+    RESULT_TIMEOUT_S,
+    Arrival,
+    ServerGoal,
+    ServerGoals,
+)
+from actionlib_core.goal.states import TERMINAL, Status
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus
+from actionlib_core.node import get_node
+from actionlib_core.time import Time
+from actionlib_core.wire.action_messages import ActionTypes
+from actionlib_core.wire.server_port import ActionServerPort
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.clock import Clock, Event, Timer
+    from actionlib_core.goal.ports import ServerPort
+    from actionlib_core.node import Node
+    from actionlib_core.time import Duration
+
+log = logging.getLogger(__name__)
+
+DRAIN_S = 0.7  # how long `stop` waits for acknowledgements; less as one of many on a node
+FAREWELL_S = 0.1  # it says farewell again after so long
+
+PERIOD_S = 1.0  # the status list is sent so often while goals are tracked
+GAP_S = 0.02  # changes that follow each other faster share a list
+SHORT = 8  # goals; a longer list is not sent before its time
+GAP_PER_GOAL_S = 100e-6  # a long list is sent less often
+
+TEXT_STOPPED = "The action server was stopped"
+TEXT_CLIENT_LOST = "The client that sent this goal is gone"
+
+OnClientLost = Literal["continue", "cancel"]
+
+
+class ServerGoalHandle:
+    """One goal of an `ActionServer`. Two handles are equal when they are of one goal.
+
+    ROS's attribute `status_tracker` is the handle itself, with a tracker's `goal`, `goal_id` and
+    `status`.
+
+    Args:
+        keeper: The server's goals.
+        record: The goal's place in the life cycle.
+        content: The goal message (XGoal).
+
+    Attributes:
+        record: See above.
+        begun: The goal callback has begun with it.
+        cancel_waits: It was asked to stop before that.
+
+    Threads: every method may be called from any thread and any callback.
+    """
+
+    __slots__ = ("__weakref__", "_content", "_keeper", "begun", "cancel_waits", "record")
+
+    def __init__(self, keeper: GoalKeeper, record: ServerGoal, content: Any) -> None:
+        self._keeper = keeper
+        self._content = content
+        self.record = record
+        self.begun = False
+        self.cancel_waits = False
+
+    @property
+    def goal(self) -> Any:
+        """The XActionGoal message that brought the goal."""
+        return self._keeper.types.action_goal(goal_id=self.goal_id, goal=self._content)
+
+    @property
+    def goal_id(self) -> GoalID:
+        """Id and stamp, as a message of its own."""
+        return GoalID(stamp=Time(0, self.record.stamp_ns), id=self.record.id)
+
+    @property
+    def status(self) -> GoalStatus:
+        """The status now, as a message of its own."""
+        record = self.record
+        return GoalStatus(goal_id=self.goal_id, status=int(record.status), text=record.text)
+
+    @property
+    def status_tracker(self) -> ServerGoalHandle:
+        """The handle itself."""
+        return self
+
+    def get_default_result(self) -> Any:
+        """Return a new result message with default values."""
+        return self._keeper.types.result()
+
+    def set_accepted(self, text: str = "") -> None:
+        """Accept the goal: PENDING becomes ACTIVE, RECALLING becomes PREEMPTING.
+
+        Raises:
+            IllegalTransitionError: the goal is in another state.
+            ActionException: `text` is not a string.
+        """
+        self._keeper.accept(self, text)
+
+    def set_canceled(self, result: Any = None, text: str = "") -> None:
+        """End the goal as asked: RECALLED when it was never accepted, else PREEMPTED.
+
+        Args:
+            result: The result message; None sends one with default values.
+            text: Why, for people.
+
+        Raises:
+            IllegalTransitionError: the goal has ended.
+            ActionException: `result` is not of the action's type, or `text` is not a string; the
+                goal goes on.
+        """
+        self._keeper.finish(self, "cancel", "set_canceled()", result, text)
+
+    def set_rejected(self, result: Any = None, text: str = "") -> None:
+        """Refuse the goal; arguments and errors as `set_canceled`, allowed before acceptance."""
+        self._keeper.finish(self, "reject", "set_rejected()", result, text)
+
+    def set_aborted(self, result: Any = None, text: str = "") -> None:
+        """End the goal in failure; arguments and errors as `set_canceled`."""
+        self._keeper.finish(self, "abort", "set_aborted()", result, text)
+
+    def set_succeeded(self, result: Any = None, text: str = "") -> None:
+        """End the goal in success; arguments and errors as `set_canceled`."""
+        self._keeper.finish(self, "succeed", "set_succeeded()", result, text)
+
+    def set_cancel_requested(self) -> bool:
+        """Note that the goal is asked to stop; False when it has ended or was asked before."""
+        return self._keeper.request_cancel(self)
+
+    def publish_feedback(self, feedback: Any) -> None:
+        """Send feedback to the goal's client.
+
+        Raises:
+            FieldError: `feedback` does not fit the action.
+            TransportError: the server's node is closed.
+        """
+        self._keeper.send_feedback(_entry(self.record), feedback)
+
+    def get_goal(self) -> Any:
+        """Return the goal message (XGoal)."""
+        return self._content
+
+    def get_goal_id(self) -> GoalID:
+        """Return the goal's id and stamp."""
+        return self.goal_id
+
+    def get_goal_status(self) -> GoalStatus:
+        """Return a copy of the goal's status."""
+        return self.status
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, ServerGoalHandle):
+            return NotImplemented
+        return self.record.id == other.record.id
+
+    def __hash__(self) -> int:
+        return hash(self.record.id)
+
+    def __repr__(self) -> str:
+        return f"<ServerGoalHandle {self.record.id} {self.record.status.name}>"
+
+
+def nop_cb(goal_handle: ServerGoalHandle) -> None:
+    """Do nothing; the default callback."""
+
+
+def _entry(goal: ServerGoal) -> StatusEntry:
+    """Return what the status list says of a goal."""
+    return StatusEntry(goal.id, goal.stamp_ns, goal.status, goal.text)
+
+
+def _past_entry(goal_id: str, status: Status) -> StatusEntry:
+    """Return what is said of a goal of which only its end is remembered, or nothing (LOST)."""
+    text = (
+        "The action server does not know this goal"
+        if status is Status.LOST
+        else f"The goal ended {status.name}; its result is no longer kept"
+    )
+    return StatusEntry(goal_id, 0, status, text)
+
+
+class StatusPublisher:
+    """Sends the list of goals, and lets goals expire, with one timer that exists while needed.
+
+    The first change after a pause is sent at once; those that follow within `GAP_S` go together.
+
+    Args:
+        clock: Gives time and the timer.
+        lock: The server's lock, which guards `goals`.
+        goals: The server's goals.
+        send: Sends a list of goals; called without the lock.
+
+    Threads: any; the timer's calls come on the clock's thread.
+    """
+
+    def __init__(
+        self,
+        clock: Clock,
+        lock: threading.RLock,
+        goals: ServerGoals,
+        send: Callable[[list[ServerGoal]], None],
+    ) -> None:
+        self._clock = clock
+        self._lock = lock
+        self._goals = goals
+        self._send = send
+        self._published = clock.now() - PERIOD_S
+        self._timer: Timer | None = None
+        self._due = 0.0
+        self._change_waits = False
+        self._closed = False
+
+    def close(self) -> None:
+        """Send nothing more."""
+        with self._lock:
+            self._closed = True
+            if self._timer is not None:
+                self._timer.cancel()
+
+    def publish(self) -> None:
+        """Send the list now."""
+        with self._lock:
+            if self._closed:
+                return
+            self._change_waits = False
+            now = self._clock.now()
+            self._published = now
+            listed = self._goals.listed()
+            self._arm(now + PERIOD_S)
+        self._send(listed)
+
+    def on_change(self) -> None:
+        """Note that a goal has changed: send the list now or soon."""
+        if self._change_waits:  # the list is made after this is reset, so this change is in it
+            return
+        with self._lock:
+            due = self._published + GAP_S + GAP_PER_GOAL_S * len(self._goals)
+            if due > self._clock.now():
+                if not self._closed:
+                    self._change_waits = True
+                    if self._timer is None or due < self._due:
+                        self._arm(due)
+                return
+        self.publish()
+
+    def hurry(self) -> None:
+        """Send a change that waits for others now, unless the list is long."""
+        if self._change_waits and len(self._goals) <= SHORT:
+            self.publish()
+
+    def _arm(self, due: float) -> None:
+        """Let the timer run at `due`. Needs the lock."""
+        if self._timer is not None:
+            self._timer.cancel()
+        self._due = due
+        self._timer = self._clock.call_later(due - self._clock.now(), self._on_timer)
+
+    def _on_timer(self) -> None:
+        with self._lock:
+            self._timer = None
+            if self._closed:
+                return
+            now = self._clock.now()
+            soonest = self._goals.expire(now)
+            quiet = not self._change_waits and now - self._published > PERIOD_S / 2
+            if quiet and not self._goals.listed():  # an empty list is not repeated
+                if soonest is not None:
+                    self._arm(soonest)
+                return
+        self.publish()
+
+
+class GoalKeeper:
+    """The goals of one action server: what arrives is decided upon, sent and handed to its code.
+
+    Args:
+        node: On whose clock.
+        name: The action's full name.
+        types: Its message classes.
+        port: The way to the network.
+        on_client_lost: See `ActionServer`, also for `result_timeout` [s].
+        deliver_goal: Called with the handle of each new goal, on the network's thread.
+        deliver_cancel: Called with the handle of each goal that is asked to stop, likewise.
+        on_stopped: Called when the server has stopped by itself.
+
+    Attributes:
+        lock: Guards the goals.
+        error: Why the server stopped by itself, None while all is well.
+        stopped: The server has left its name.
+        left: Set then.
+
+    Threads: every method may be called from any thread.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        name: str,
+        types: ActionTypes,
+        port: ServerPort,
+        *,
+        on_client_lost: OnClientLost,
+        result_timeout: float,
+        deliver_goal: Callable[[ServerGoalHandle], object],
+        deliver_cancel: Callable[[ServerGoalHandle], object],
+        on_stopped: Callable[[], object],
+    ) -> None:
+        self.node = node
+        self.name = name
+        self.types = types
+        self.port = port
+        self.lock = threading.RLock()
+        self.error: ServerConflictError | None = None
+        self.stopped = False
+        self.left: Event = node.clock.event(f"the end of action server {name}")
+        self.goals = ServerGoals(name, result_timeout=result_timeout)
+        self.status = StatusPublisher(node.clock, self.lock, self.goals, self._send_status)
+        self._clock = node.clock
+        self._cancels_lost = on_client_lost == "cancel"
+        self._deliver_goal = deliver_goal
+        self._deliver_cancel = deliver_cancel
+        self._on_stopped = on_stopped
+        self._ids = GoalIDGenerator(f"/{node.full_name}", clock=node.clock)
+        self._drained: Event | None = None
+
+    # -- what the server's code does -----------------------------------------------------------
+
+    def accept(self, handle: ServerGoalHandle, text: str = "") -> None:
+        """Accept a goal; see `ServerGoalHandle.set_accepted`."""
+        text = self._as_text(text, "set_accepted()")
+        with self.lock:
+            self.goals.step(handle.record, "accept", "set_accepted()", text)
+        self.status.on_change()
+
+    def request_cancel(self, handle: ServerGoalHandle) -> bool:
+        """Mark a goal as asked to stop; see `ServerGoalHandle.set_cancel_requested`."""
+        with self.lock:
+            changed = self.goals.request_cancel(handle.record)
+        if changed:
+            self.status.on_change()
+        return changed
+
+    def finish(
+        self,
+        handle: ServerGoalHandle,
+        event: str,
+        call: str,
+        result: Any,
+        text: str,
+        *,
+        wait: bool = True,
+    ) -> None:
+        """End a goal by an event of the server's table: move it, keep its result, send it.
+
+        Args:
+            handle: The goal.
+            event: See `server_life_cycle`.
+            call: What the user called, for the error.
+            result: None sends one with default values.
+            text: Why, for people.
+            wait: For room on a link that is full; not on the network's thread, which others need.
+
+        Raises:
+            IllegalTransitionError: the goal's state does not allow it.
+            ActionException: `result` is not of the action's type, or `text` is no text.
+            FieldError: a field of `result` has a wrong type.
+        """
+        # Whatever can fail comes first: a goal that has ended must have a result.
+        body = self._pack(result, self.types.result, call)
+        text = self._as_text(text, call)
+        record = handle.record
+        with self.lock:
+            self.goals.step(record, event, call, text)
+            record.result = body
+            self.goals.finish(record, self._clock.now())
+            stopped = self.stopped
+        if not stopped:
+            self.port.send_result(_entry(record), body, wait=wait)
+            self.status.on_change()
+
+    def give_up(self, handle: ServerGoalHandle, text: str) -> None:
+        """End a goal that its code has left without an end; one that has ended stays."""
+        status = handle.record.status
+        if status not in TERMINAL:
+            event = "abort" if status in {Status.ACTIVE, Status.PREEMPTING} else "reject"
+            try:
+                self.finish(handle, event, "the end of its callback", None, text)
+            except IllegalTransitionError:
+                return  # another thread has just ended it
+            except TransportError:
+                if not self.goals.closed:  # else the server stops after its session was closed
+                    raise
+
+    def release(self, record: ServerGoal) -> None:
+        """Give up a goal that nobody will end; its client learns that it is LOST."""
+        with self.lock:
+            self.goals.release(record, self._clock.now())
+        self.status.on_change()
+
+    def send_result(self, entry: StatusEntry, result: Any) -> None:
+        """Send a result under any status; errors as `finish`."""
+        self.port.send_result(entry, self._pack(result, self.types.result, "publish_result()"))
+
+    def send_feedback(self, entry: StatusEntry, feedback: Any) -> None:
+        """Send feedback for a goal; errors as `finish`."""
+        body = self._pack(feedback, self.types.feedback, "publish_feedback()")
+        self.port.send_feedback(entry, body)
+
+    def _pack(self, message: Any, expected: Any, call: str) -> bytes:
+        if message is None:
+            message = expected()
+        elif not isinstance(message, expected):
+            raise ActionException(
+                f"action '{self.name}': {call}: got {message!r}; expected a message of type "
+                f"{expected._type}."
+            )
+        body: bytes = message.to_bytes()
+        return body
+
+    def _as_text(self, text: Any, call: str) -> str:
+        """Return `text` as it can be sent; characters that UTF-8 does not have are escaped."""
+        if not isinstance(text, str):
+            raise ActionException(
+                f"action '{self.name}': {call}: text: got {text!r}; expected a string. "
+                "Try str(...)."
+            )
+        return text if text.isascii() else text.encode("utf-8", "backslashreplace").decode()
+
+    def _send_status(self, goals: list[ServerGoal]) -> None:
+        try:
+            self.port.send_status([_entry(goal) for goal in goals])
+        except TransportError:
+            if not self.goals.closed:  # else `stop` came in between
+                raise
+
+    # -- the end -------------------------------------------------------------------------------
+
+    def close_to_goals(self) -> None:
+        """Take no more goals: what comes from now on is for the next server."""
+        with self.lock:
+            self.goals.close()
+
+    def stop(self) -> None:
+        """End all goals, tell the clients, and leave the name; see `ActionServer.stop`.
+
+        Blocks: until the clients have heard all that, `DRAIN_S` at most.
+        """
+        with self.lock:
+            self.goals.close()
+            running = [goal for goal in self.goals.listed() if goal.status not in TERMINAL]
+        try:
+            for goal in running:
+                if isinstance(goal.tag, ServerGoalHandle):
+                    self.give_up(goal.tag, TEXT_STOPPED)
+            self._say_farewell()
+        finally:
+            self.leave()
+
+    def _say_farewell(self) -> None:
+        """Name the goals that were ever taken, so that clients know which were not.
+
+        Stays until they have that and the results: the end of the token may overtake them.
+        """
+        with self.lock:
+            drained = self._drained = self._clock.event("clients that take their results")
+            taken = [
+                _past_entry(goal_id, status) if goal is None else _entry(goal)
+                for goal_id, status, goal in self.goals.taken()
+            ]
+        until = self._clock.now() + self.node.time_to_leave(DRAIN_S)
+        with contextlib.suppress(TransportError):  # the session is closed: nobody can be told
+            listened = self.port.begin_farewell()
+            while listened:
+                self.port.send_farewell(taken)
+                left = until - self._clock.now()
+                if self._is_drained() or left <= 0 or drained.wait(min(left, FAREWELL_S)):
+                    return
+
+    def _is_drained(self) -> bool:
+        if not self.port.has_clients():
+            return True
+        with self.lock:
+            return self.port.is_farewell_heard() and not self.goals.has_unacknowledged()
+
+    def leave(self) -> None:
+        """Leave the name at once."""
+        with self.lock:
+            self.stopped = True
+            self.status.close()
+        try:
+            self.port.close()
+        finally:
+            self.left.set()
+
+    # -- what arrives (on the network's thread) ------------------------------------------------
+
+    def on_goal(self, goal_id: str, stamp_ns: int, content: Any, client: str) -> None:
+        """Handle a goal: a new one goes to the server's code, of a known one is said what is known.
+
+        Nothing here waits for a link that is full: a client that misses the answer asks again.
+        """
+        if not goal_id:
+            goal_id, stamp_ns = self._ids.generate()
+        record = ServerGoal(goal_id, stamp_ns or self._clock.time_ns(), client=client)
+        with self.lock:
+            if self.stopped:
+                return
+            arrival, known = self.goals.on_goal(record, self._clock.now())
+            if arrival is Arrival.LATE:
+                return
+            handle = record.tag = ServerGoalHandle(self, record, content)
+            if arrival is Arrival.RECALLED:
+                record.result = self.types.result().to_bytes()
+            past = self.goals.past_status(goal_id) or Status.LOST
+        if arrival is Arrival.NEW:
+            self._deliver_goal(handle)
+            return
+        if known is None:
+            self.port.send_status([_past_entry(goal_id, past)])
+        elif isinstance(known.result, bytes):
+            self.port.send_result(_entry(known), known.result, wait=False)
+        self.status.on_change()
+
+    def on_cancel(self, goal_id: str, stamp_ns: int) -> None:
+        """Handle a cancel."""
+        now_ns = self._clock.time_ns()
+        with self.lock:
+            asked = self.goals.on_cancel(goal_id, stamp_ns, self._clock.now(), now_ns)
+        if stamp_ns > now_ns + FUTURE_NS:
+            log.warning(
+                "action '%s': a cancel of goals up to %.1f s in the future counts as one up to "
+                "now: a clock is wrong. Try setting the clocks of all computers by NTP.",
+                self.name,
+                (stamp_ns - now_ns) / 1e9,
+            )
+        self._cancel(asked)
+
+    def on_client_lost(self, client: str) -> None:
+        """Handle the death of a client."""
+        if self._cancels_lost:
+            with self.lock:
+                asked = self.goals.on_client_lost(client)
+                for goal in asked:
+                    goal.text = TEXT_CLIENT_LOST
+            self._cancel(asked)
+
+    def _cancel(self, asked: list[ServerGoal]) -> None:
+        for goal in asked:
+            if isinstance(goal.tag, ServerGoalHandle):
+                self._deliver_cancel(goal.tag)
+        self.status.on_change()
+
+    def on_acknowledged(self, goal_ids: list[str]) -> None:
+        """Handle acknowledgements."""
+        with self.lock:
+            self.goals.on_acknowledged(goal_ids, self._clock.now())
+            if self._drained is not None and self._is_drained():
+                self._drained.set()
+
+    def on_conflict(self, error: ServerConflictError) -> None:
+        """Leave the name to the older server."""
+        with self.lock:
+            if self.error is not None or self.stopped:
+                return
+            self.error = error
+            self.goals.close()
+        log.error("%s", error)
+        self.leave()
+        self._on_stopped()
+
+    def list_goals(self) -> list[StatusEntry]:
+        """Return the status list."""
+        with self.lock:
+            return [_entry(goal) for goal in self.goals.listed()]
+
+    def find_end(self, goal_id: str) -> tuple[StatusEntry, bytes | None]:
+        """Return the status of a goal, and its result if it has one."""
+        with self.lock:
+            goal = self.goals.find(goal_id)
+            if goal is None:
+                return _past_entry(goal_id, self.goals.past_status(goal_id) or Status.LOST), None
+            return _entry(goal), goal.result if isinstance(goal.result, bytes) else None
+
+    def find_goal(self, goal_id: str) -> tuple[int, Any] | None:
+        """Return stamp [ns] and message of a goal; None when it is not known any more."""
+        with self.lock:
+            goal = self.goals.find(goal_id)
+        if goal is None or not isinstance(goal.tag, ServerGoalHandle):
+            return None
+        return goal.stamp_ns, goal.tag.get_goal()
+
+
+class ActionServer:
+    """Offers an action; every goal is a `ServerGoalHandle` that your callbacks accept and end.
+
+    Args:
+        ns: The action's name.
+        ActionSpec: The action class (XAction).
+        goal_cb: Called with the handle of each new goal; it or later code accepts or rejects it.
+        cancel_cb: Called with the handle of each goal that is asked to stop.
+        auto_start: Start at once. With False, call `start` when everything is ready.
+        node: Where; the current node when None.
+        on_client_lost: What happens to the goals of a client that died: "continue" as in ROS, or
+            "cancel", as if the client had cancelled them.
+        result_timeout: How long a result waits for a client that lost its link [s]; 0 or more.
+        direct: The callbacks take no time and may be called on the network's thread.
+        on_stopped: Called when the server has stopped by itself; must take no time either.
+
+    Attributes:
+        lock: Guards the server's data. Holding it keeps goals as they are; never wait with it.
+        keeper: The server's goals.
+
+    Raises:
+        ActionException: `ActionSpec` is not an action class.
+        ActionlibError: a callback is no function, or `result_timeout` no length of time.
+        InvalidNameError: the name breaks the ROS rules.
+        ServerConflictError: the name has a server already (from `start`).
+        TransportError: the network session is closed.
+
+    Threads: callbacks run one at a time, in order, on a thread of their own, without any lock. A
+        cancel callback waits 20 ms at most for callbacks that do not return, but not before the
+        goal callback of its goal has begun; then it runs beside them, in another thread.
+    """
+
+    def __init__(
+        self,
+        ns: str,
+        ActionSpec: Any,  # noqa: N803  actionlib's name
+        goal_cb: Callable[[ServerGoalHandle], object] = nop_cb,
+        cancel_cb: Callable[[ServerGoalHandle], object] = nop_cb,
+        auto_start: bool = True,
+        *,
+        node: Node | None = None,
+        on_client_lost: OnClientLost = "continue",
+        result_timeout: float | Duration = RESULT_TIMEOUT_S,
+        direct: bool = False,
+        on_stopped: Callable[[], object] | None = None,
+    ) -> None:
+        if on_client_lost not in {"continue", "cancel"}:
+            raise ActionException(
+                f"action {ns!r}: on_client_lost: got {on_client_lost!r}; "
+                "expected 'continue' or 'cancel'."
+            )
+        check_function(f"action {ns!r}", "goal_cb", goal_cb)
+        check_function(f"action {ns!r}", "cancel_cb", cancel_cb)
+        keep = check_seconds(f"action {ns!r}", "result_timeout", result_timeout)
+        self.node = node if node is not None else get_node()
+        self.types = ActionTypes.of(ActionSpec)
+        self.ns = self.node.resolve(ns, "action name")
+        self.goal_callback = goal_cb
+        self.cancel_callback = cancel_cb
+        self.callback_queue = CallbackQueue(self.node, f"{self.ns} callbacks")
+        self.keeper = GoalKeeper(
+            self.node,
+            self.ns,
+            self.types,
+            ActionServerPort(self.node, self.ns, self.types),
+            on_client_lost=on_client_lost,
+            result_timeout=keep,
+            deliver_goal=goal_cb if direct else self._deliver_goal,
+            deliver_cancel=cancel_cb if direct else self._deliver_cancel,
+            on_stopped=self._note_stopped,
+        )
+        self._on_stopped = on_stopped
+        self.lock = self.keeper.lock
+        self._forget: Callable[[], None] | None = None
+        self._started = False
+        if auto_start:
+            self.start()
+
+    def start(self) -> None:
+        """Offer the action; a second call does nothing.
+
+        Raises:
+            ServerConflictError: the name has a server already.
+            TransportError: the network session is closed.
+            ActionException: the server was stopped.
+
+        Blocks: until the network has said who has the name, 1 s at most.
+        """
+        with self.lock:
+            if self.keeper.stopped:
+                raise ActionException(
+                    f"action '{self.ns}': start(): the server was stopped; expected one that was "
+                    "not. Try making a new one."
+                )
+            if self._started:
+                return
+            self._started = True
+        self._forget = self.node.on_close(self.stop)
+        try:
+            self.initialize()
+        except BaseException:
+            self._forget()
+            self._started = False
+            raise
+
+    def initialize(self) -> None:
+        """Declare the action's keys; `start` does it."""
+        self.keeper.port.open(self.keeper)
+
+    def stop(self) -> None:
+        """End all goals (ABORTED, or REJECTED when not yet accepted) and leave the name.
+
+        Clients see the result of each goal, then the server's absence; what they sent too late goes
+        to the next server. A second call does nothing, nor does one before `start`. A server that
+        was stopped is not started again.
+
+        Blocks: until the clients have heard all that, 0.7 s at most.
+        """
+        with self.lock:
+            if self.keeper.stopped or not self._started:
+                return
+        try:
+            self.keeper.stop()
+        finally:
+            if self._forget is not None:
+                self._forget()
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait until the server has stopped; for programs that do nothing else.
+
+        Returns:
+            Whether it has stopped.
+
+        Raises:
+            ServerConflictError: it stopped because an older server has the name.
+
+        Blocks: until then, `timeout` [s] at most; None: no limit.
+        """
+        left = self.keeper.left.wait(check_delay(f"action '{self.ns}'", "timeout", timeout))
+        if self.error is not None:
+            raise self.error
+        return left
+
+    @property
+    def error(self) -> ServerConflictError | None:
+        """Why the server stopped by itself, None while all is well."""
+        return self.keeper.error
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the server has left its name."""
+        return self.keeper.stopped
+
+    @property
+    def ActionSpec(self) -> Any:  # noqa: N802  actionlib's names
+        """The action class."""
+        return self.types.action
+
+    @property
+    def ActionGoal(self) -> Any:  # noqa: N802
+        """The class XActionGoal."""
+        return self.types.action_goal
+
+    @property
+    def ActionResult(self) -> Any:  # noqa: N802
+        """The class XActionResult."""
+        return self.types.action_result
+
+    @property
+    def ActionResultType(self) -> Any:  # noqa: N802
+        """The class XResult."""
+        return self.types.result
+
+    @property
+    def ActionFeedback(self) -> Any:  # noqa: N802
+        """The class XActionFeedback."""
+        return self.types.action_feedback
+
+    @property
+    def status_list(self) -> list[ServerGoalHandle]:
+        """The goals that the status list names now."""
+        with self.lock:
+            tags = [goal.tag for goal in self.keeper.goals.listed()]
+        return [tag for tag in tags if isinstance(tag, ServerGoalHandle)]
+
+    def register_goal_callback(self, cb: Callable[[ServerGoalHandle], object] | None) -> None:
+        """Replace the goal callback; None takes it away."""
+        check_function(f"action '{self.ns}'", "cb", cb)
+        self.goal_callback = cb if cb is not None else nop_cb
+
+    def register_cancel_callback(
+        self, cancel_cb: Callable[[ServerGoalHandle], object] | None
+    ) -> None:
+        """Replace the cancel callback; None takes it away."""
+        check_function(f"action '{self.ns}'", "cancel_cb", cancel_cb)
+        self.cancel_callback = cancel_cb if cancel_cb is not None else nop_cb
+
+    def publish_result(self, status: GoalStatus, result: Any) -> None:
+        """Send a result under any status. Handles do it for you.
+
+        Raises:
+            FieldError: `result` does not fit the action.
+        """
+        self.keeper.send_result(_entry_of(status), result)
+
+    def publish_feedback(self, status: GoalStatus, feedback: Any) -> None:
+        """Send feedback for the goal that `status` names.
+
+        Raises:
+            FieldError: `feedback` does not fit the action.
+        """
+        self.keeper.send_feedback(_entry_of(status), feedback)
+
+    def publish_status(self) -> None:
+        """Send the list of all goals now."""
+        self.keeper.status.publish()
+
+    def publish_status_async(self, event: object = None) -> None:  # noqa: ARG002  actionlib's
+        """Send the list of all goals; the form that ROS timers call."""
+        self.publish_status()
+
+    # -- callbacks -----------------------------------------------------------------------------
+
+    def _note_stopped(self) -> None:
+        """Note that another server has the name."""
+        if self._forget is not None:
+            self._forget()
+        if self._on_stopped is not None:
+            self._on_stopped()
+
+    def _deliver_goal(self, handle: ServerGoalHandle) -> None:
+        self.callback_queue.call(self._run_goal_callback, handle)
+        self.keeper.status.on_change()
+
+    def _run_goal_callback(self, handle: ServerGoalHandle) -> None:
+        """Give a goal to the user's code; one that it raises on is ended, not forgotten."""
+        with self.lock:
+            handle.begun = True
+            cancelled = handle.cancel_waits
+        if cancelled:
+            self.callback_queue.call_urgently(self._run_cancel_callback, handle)
+        try:
+            self.goal_callback(handle)
+        except BaseException as error:  # also `sys.exit`, which ends this thread
+            text = str(error) if isinstance(error, Exception) else repr(error)
+            self.keeper.give_up(handle, f"Exception in goal callback: {text}")
+            raise
+
+    def _deliver_cancel(self, handle: ServerGoalHandle) -> None:
+        """Tell the user's code of a cancel, once it has been told of the goal."""
+        with self.lock:
+            if not handle.begun:
+                handle.cancel_waits = True
+                return
+        self.callback_queue.call_urgently(self._run_cancel_callback, handle)
+
+    def _run_cancel_callback(self, handle: ServerGoalHandle) -> None:
+        """Tell the user's code of a cancel, unless the goal has ended since."""
+        if handle.record.status not in TERMINAL:
+            self.cancel_callback(handle)
+
+
+def _entry_of(status: GoalStatus) -> StatusEntry:
+    """Return what a status message says."""
+    goal_id = status.goal_id
+    return StatusEntry(goal_id.id, goal_id.stamp.to_nsec(), status.status, status.text)

@@ -1,0 +1,337 @@
+"""`SimpleActionClient`: one goal at a time, three states."""
+
+from __future__ import annotations
+
+import threading
+from functools import partial
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from actionlib_core._arguments import check_function, check_limit, check_wait
+from actionlib_core.action.client import ActionClient
+from actionlib_core.goal.known_servers import STATUS_LIST_TIMEOUT_S
+from actionlib_core.goal.states import CommState, SimpleGoalState, Status
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.action.client import ClientGoalHandle
+    from actionlib_core.node import Node
+    from actionlib_core.time import Duration, Time
+
+__all__ = ["SimpleActionClient", "SimpleGoalState"]
+
+A = TypeVar("A")
+
+_RUNNING = frozenset({CommState.ACTIVE, CommState.PREEMPTING})
+_OVER = frozenset({CommState.DONE, CommState.LOST})
+_SHOWN = {
+    CommState.WAITING_FOR_GOAL_ACK: Status.PENDING,
+    CommState.PENDING: Status.PENDING,
+    CommState.RECALLING: Status.PENDING,
+    CommState.ACTIVE: Status.ACTIVE,
+    CommState.PREEMPTING: Status.ACTIVE,
+}
+
+
+class SimpleActionClient(Generic[A]):
+    """Sends one goal at a time and waits for it.
+
+    Args:
+        ns: The action's name.
+        ActionSpec: The action class (XAction).
+        node: Where; the current node when None.
+        server_lost_timeout: How long the server may be away before the goal is LOST [s].
+        status_list_timeout: How long a server that shows no token may be silent; see
+            `ActionClient`.
+
+    Attributes:
+        action_client: The `ActionClient` beneath.
+
+    Raises:
+        ActionException: `ActionSpec` is not an action class.
+        ActionlibError: one of the timeouts is no time, negative or without end.
+        InvalidNameError: the name breaks the ROS rules.
+        TransportError: the network session is closed.
+
+    Threads: every method may be called from any thread and any callback, those of this client
+        included. Callbacks run one at a time, in the order active, feedback, done, on a thread of
+        their own, without any lock.
+    """
+
+    def __init__(
+        self,
+        ns: str,
+        ActionSpec: type[A],  # noqa: N803  actionlib's name
+        *,
+        node: Node | None = None,
+        server_lost_timeout: float | Duration = 0.0,
+        status_list_timeout: float | Duration = STATUS_LIST_TIMEOUT_S,
+    ) -> None:
+        self.action_client: ActionClient[A] = ActionClient(
+            ns,
+            ActionSpec,
+            node=node,
+            server_lost_timeout=server_lost_timeout,
+            status_list_timeout=status_list_timeout,
+        )
+        self._handle: ClientGoalHandle | None = None
+        self._condition: threading.Condition | None = None
+
+    # -- actionlib's attributes ----------------------------------------------------------------
+
+    @property
+    def gh(self) -> ClientGoalHandle | None:
+        """The handle of the goal that is followed."""
+        return self._handle
+
+    @property
+    def simple_state(self) -> SimpleGoalState:
+        """PENDING, ACTIVE or DONE; DONE also when no goal was sent."""
+        handle = self._handle
+        if handle is None or handle.goal.over:
+            return SimpleGoalState.DONE
+        begun = handle.goal.begun
+        return SimpleGoalState.ACTIVE if begun else SimpleGoalState.PENDING
+
+    @property
+    def done_condition(self) -> threading.Condition:
+        """A condition that is notified when a goal is over. `wait_for_result` is the better way."""
+        if self._condition is None:
+            self._condition = threading.Condition()
+        return self._condition
+
+    # -- the server ----------------------------------------------------------------------------
+
+    def wait_for_server(self, timeout: float | Duration | None = 0.0) -> bool:
+        """Wait until the action has a server.
+
+        Args:
+            timeout: Longest wait [s]; 0 and None wait for ever, as in actionlib.
+
+        Returns:
+            Whether there is one; False also when the client was stopped or, without a limit, when
+            the program is to end (`actionlib_core.shutdown`).
+
+        Raises:
+            TypeMismatchError: there is one, but of another type.
+
+        Blocks: until then.
+        """
+        return self.action_client.wait_for_server(timeout)
+
+    def stop(self) -> None:
+        """Leave the name. A goal that runs goes on at the server; here it is LOST.
+
+        A server with `on_client_lost="cancel"` cancels it, unless another client of the action is
+        left in this session.
+        """
+        self.action_client.stop()
+
+    # -- goals ---------------------------------------------------------------------------------
+
+    def send_goal(
+        self,
+        goal: Any,
+        done_cb: Callable[[int, Any], object] | None = None,
+        active_cb: Callable[[], object] | None = None,
+        feedback_cb: Callable[[Any], object] | None = None,
+        *,
+        ack_timeout: float | Duration | None = None,
+    ) -> None:
+        """Send a goal; the former one is followed no more (if no error is raised), not cancelled.
+
+        Args:
+            goal: The goal message (XGoal).
+            done_cb: Called with the terminal status (`GoalStatus`) and the result message; the
+                result is None when the goal is LOST. It may send the next goal.
+            active_cb: Called when the goal starts to run.
+            feedback_cb: Called with each XFeedback message. When it is slower than they come, up to
+                100,000 messages of 32 MiB together wait and then the oldest are dropped. Once the
+                goal is over, a call that takes longer than 0.5 s is the last one. What was dropped
+                is logged and counted in `dropped_feedback`.
+            ack_timeout: When no server has taken the goal after so long [s], it is LOST; None: it
+                waits as long as it takes; 0: it is LOST at once.
+
+        Raises:
+            ActionException: `goal` is not of the action's type.
+            ActionlibError: `ack_timeout` is no time, or negative.
+            FieldError: a field of `goal` has a wrong type.
+            TypeMismatchError: the action's server has another type.
+            TransportError: the client is stopped.
+        """
+        limit = check_limit(f"action '{self.action_client.ns}'", "ack_timeout", ack_timeout)
+        handle = self.action_client.make_goal(goal, limit)
+        self._begin(handle, done_cb, active_cb, feedback_cb)
+
+    def attach(
+        self,
+        goal_id: str,
+        done_cb: Callable[[int, Any], object] | None = None,
+        active_cb: Callable[[], object] | None = None,
+        feedback_cb: Callable[[Any], object] | None = None,
+        *,
+        ack_timeout: float | Duration | None = None,
+    ) -> None:
+        """Follow a goal by its id: an earlier life of this program sent it, or it was let go of.
+
+        The former goal is followed no more, as with `send_goal`, unless an error is raised. See
+        `ActionClient.attach`; the other arguments are those of `send_goal`.
+        """
+        limit = check_limit(f"action '{self.action_client.ns}'", "ack_timeout", ack_timeout)
+        handle = self.action_client.find_goal(goal_id, limit)
+        self._begin(handle, done_cb, active_cb, feedback_cb)
+
+    def _begin(
+        self,
+        handle: ClientGoalHandle,
+        done_cb: Callable[[int, Any], object] | None,
+        active_cb: Callable[[], object] | None,
+        feedback_cb: Callable[[Any], object] | None,
+    ) -> None:
+        """Send a goal, or ask for it, and follow it instead of the former one."""
+        where = f"action '{self.action_client.ns}'"
+        check_function(where, "done_cb", done_cb)
+        check_function(where, "active_cb", active_cb)
+        check_function(where, "feedback_cb", feedback_cb)
+        callbacks = handle.manager.callbacks
+        handle.calls_back = (done_cb or active_cb or feedback_cb or self._condition) is not None
+
+        def on_state(state: CommState) -> None:  # under the manager's lock
+            nonlocal active_cb
+            if state in _RUNNING and active_cb is not None:
+                handle.call(state, active_cb)
+                active_cb = None  # once
+            elif state in _OVER:
+                if done_cb is not None:
+                    handle.call(state, done_cb, int(handle.goal.status), handle.goal.result)
+                if handle.calls_back or self._condition is not None:
+                    callbacks.call(self._settle, handle)
+                else:
+                    handle.settle()
+
+        handle.on_state = on_state
+        if feedback_cb is not None:
+            handle.on_feedback = partial(handle.call_with_feedback, feedback_cb)
+        # It is the client's goal before anything can come back: a callback sees its own goal.
+        former, self._handle = self._handle, handle
+        begun = False
+        try:
+            handle.manager.begin(handle)
+            begun = True
+        finally:
+            if not begun and self._handle is handle:
+                self._handle = former
+        if former is not None:
+            former.manager.forget(former)
+
+    def _settle(self, handle: ClientGoalHandle) -> None:
+        """Note that the last callback of a goal has returned."""
+        handle.settle()
+        if self._condition is not None:
+            with self._condition:
+                self._condition.notify_all()
+
+    def send_goal_and_wait(
+        self,
+        goal: Any,
+        execute_timeout: float | Duration = 0.0,
+        preempt_timeout: float | Duration = 0.0,
+    ) -> int:
+        """Send a goal and wait for its end; past `execute_timeout`, cancel it and wait again.
+
+        Args:
+            goal: The goal message (XGoal).
+            execute_timeout: Longest run [s]; 0 sets no limit.
+            preempt_timeout: Longest wait for the end after the cancel [s]; 0 sets no limit.
+
+        Returns:
+            The status (`GoalStatus`), not yet a final one when `preempt_timeout` was too short.
+
+        Blocks: until the goal is over or both times have passed.
+        """
+        where = f"action '{self.action_client.ns}'"
+        check_wait(where, "execute_timeout", execute_timeout)  # before the robot moves
+        check_wait(where, "preempt_timeout", preempt_timeout)
+        self.send_goal(goal)
+        if not self.wait_for_result(execute_timeout):
+            self.cancel_goal()
+            self.wait_for_result(preempt_timeout)
+        return self.get_state()
+
+    def wait_for_result(self, timeout: float | Duration | None = 0.0) -> bool:
+        """Wait until the goal is over and `done_cb` has returned.
+
+        Called from a callback of this client, it does not wait for callbacks. Nor does it wait
+        longer than 1 s after the goal's end for another callback than `done_cb` to return.
+
+        Args:
+            timeout: Longest wait [s]; 0 and None wait as long as it takes, as in actionlib: until
+                the goal is over, or its server dies, or the client is stopped. That the program is
+                to end does not end it, as the goal runs on: `shutdown.on_shutdown(cancel_goal)`.
+
+        Returns:
+            Whether the goal is over; False also when no goal was sent.
+
+        Raises:
+            InvalidDurationError: `timeout` is no time, or negative.
+
+        Blocks: until then.
+        """
+        limit = check_wait(f"action '{self.action_client.ns}'", "timeout", timeout)
+        handle = self.gh
+        if handle is None:
+            return False
+        return handle.manager.wait(handle, limit)
+
+    def get_result(self) -> Any:
+        """Return the result message, None while there is none."""
+        handle = self.gh
+        return None if handle is None else handle.get_result()
+
+    @property
+    def dropped_feedback(self) -> int:
+        """How many feedback messages were dropped, as `feedback_cb` was slower than they came."""
+        handle = self.gh
+        return 0 if handle is None else handle.dropped_feedback
+
+    def get_state(self) -> int:
+        """Return the goal's status (`GoalStatus`).
+
+        RECALLING is shown as PENDING, PREEMPTING as ACTIVE, no goal as LOST. While an answer to a
+        cancel is awaited, it is the last status the server gave.
+        """
+        handle = self._handle
+        if handle is None:
+            return int(Status.LOST)
+        shown = _SHOWN.get(handle.get_comm_state())
+        if shown is not None:
+            return int(shown)
+        status = handle.get_goal_status()
+        if status == Status.PREEMPTING:
+            return int(Status.ACTIVE)
+        return int(Status.PENDING) if status == Status.RECALLING else status
+
+    def get_goal_status_text(self) -> str:
+        """Return what the server said about the status, or why the goal is lost."""
+        handle = self.gh
+        return "" if handle is None else handle.get_goal_status_text()
+
+    def cancel_all_goals(self) -> None:
+        """Ask the server to end all goals, also those of other clients."""
+        self.action_client.cancel_all_goals()
+
+    def cancel_goals_at_and_before_time(self, time: Time | float) -> None:
+        """Ask the server to end the goals with a stamp at or before `time`, of all clients."""
+        self.action_client.cancel_goals_at_and_before_time(time)
+
+    def cancel_goal(self) -> None:
+        """Ask for the end of the goal; without one, nothing happens."""
+        handle = self.gh
+        if handle is not None:
+            handle.cancel()
+
+    def stop_tracking_goal(self) -> None:
+        """Follow the goal no more; it is not cancelled. Callbacks already due may still run."""
+        handle, self._handle = self._handle, None
+        if handle is not None:
+            handle.manager.forget(handle)

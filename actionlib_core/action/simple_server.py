@@ -1,0 +1,494 @@
+"""`SimpleActionServer`: one goal at a time, run by one callback."""
+
+from __future__ import annotations
+
+import logging
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core._arguments import check_delay, check_function
+from actionlib_core.action.server import TEXT_STOPPED, ActionServer, OnClientLost
+from actionlib_core.exceptions import ActionException
+from actionlib_core.goal.server import FUTURE_NS, RESULT_TIMEOUT_S
+from actionlib_core.goal.single import ANNOUNCE, Policy, SingleGoal
+from actionlib_core.goal.states import TERMINAL, Status
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.action.server import ServerGoalHandle
+    from actionlib_core.clock import Event, Task
+    from actionlib_core.goal.single import Decision
+    from actionlib_core.node import Node
+    from actionlib_core.time import Duration
+
+log = logging.getLogger(__name__)
+
+LINGER_S = 0.1  # the thread that runs goals waits so long for another one
+STOP_GRACE_S = 0.4  # how long `stop` waits for the execute callback to notice
+
+TEXT_ACCEPTED = "This goal has been accepted by the simple action server"
+TEXT_NEWER = "This goal was canceled because another goal was received by the simple action server"
+TEXT_CANCELLED_WAITING = "This goal was canceled before it was started"
+TEXT_BUSY = "This goal was rejected because the simple action server is busy"
+TEXT_NO_STATUS = "No terminal state was set."
+
+
+class SimpleActionServer:
+    """Offers an action whose goals run one at a time.
+
+    With `execute_cb`, each goal is run by calling it, in a thread that exists while there are
+    goals. Without, register a goal callback and call `accept_new_goal` yourself.
+
+    Args:
+        name: The action's name.
+        ActionSpec: The action class (XAction).
+        execute_cb: Called with the goal message (XGoal); it must call `set_succeeded`,
+            `set_aborted` or `set_preempted` before it returns. The goal is accepted before, as in
+            ROS, so it can be aborted and not rejected any more; `server` offers both.
+        auto_start: Start at once; a goal may then come before the constructor has returned. When
+            the callback uses the server, pass False and call `start` afterwards.
+        node: Where; the current node when None.
+        policy: What a new goal does while one runs: "preempt" asks the running one to stop, as in
+            ROS; "queue" waits its turn; "reject" is turned away.
+        on_client_lost: What happens to the goal of a client that died: "continue" as in ROS, or
+            "cancel", as if the client had cancelled it.
+        result_timeout: How long a result waits for a client that lost its link [s]; 0 or more.
+
+    Attributes:
+        action_server: The `ActionServer` beneath.
+        execute_callback: `execute_cb`.
+
+    Raises:
+        ActionException: `ActionSpec` is not an action class.
+        ActionlibError: a callback is no function, or `result_timeout` no length of time.
+        InvalidNameError: the name breaks the ROS rules.
+        ServerConflictError: the name has a server already (from `start`).
+        TransportError: the network session is closed.
+
+    Threads: every method may be called from any thread and any callback. User callbacks run
+        without any lock.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        ActionSpec: Any,  # noqa: N803  actionlib's name
+        execute_cb: Callable[[Any], object] | None = None,
+        auto_start: bool = True,
+        *,
+        node: Node | None = None,
+        policy: Policy = "preempt",
+        on_client_lost: OnClientLost = "continue",
+        result_timeout: float | Duration = RESULT_TIMEOUT_S,
+    ) -> None:
+        check_function(f"action {name!r}", "execute_cb", execute_cb)
+        self.execute_callback = execute_cb
+        self.goal_callback: Callable[[], object] | None = None
+        self.preempt_callback: Callable[[], object] | None = None
+        self._policy: SingleGoal[ServerGoalHandle] = SingleGoal(policy)
+        self._task: Task | None = None
+        self._idle: Event | None = None
+        self._stopping = False
+        self._grace_ends: float | None = None
+        # Its callbacks only note what came; direct calls save each goal a change of threads.
+        self.action_server = ActionServer(
+            name,
+            ActionSpec,
+            self.internal_goal_callback,
+            self.internal_preempt_callback,
+            False,  # noqa: FBT003  actionlib's flag
+            node=node,
+            on_client_lost=on_client_lost,
+            result_timeout=result_timeout,
+            direct=True,
+            on_stopped=self._ask_to_stop,
+        )
+        self._keeper = self.action_server.keeper
+        self._clock = self.action_server.node.clock
+        self.lock = self.action_server.lock
+        self._name = self.action_server.ns
+        self._queue = self.action_server.callback_queue
+        self._preempted: Event = self._clock.event()
+        self._forget: Callable[[], None] | None = None
+        if auto_start:
+            self.start()
+
+    # -- life ----------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Offer the action; a second call does nothing.
+
+        Raises:
+            ServerConflictError: the name has a server already.
+            TransportError: the network session is closed.
+            ActionException: the server was stopped.
+
+        Blocks: until the network has said who has the name, 1 s at most.
+        """
+        self.action_server.start()
+        with self.lock:
+            if self._forget is None:
+                node = self.action_server.node
+                self._forget = node.on_close(self.stop, ask=self._begin_to_stop)
+
+    def stop(self) -> None:
+        """Ask the running goal to stop, end all goals, leave the name.
+
+        A second call does nothing, nor does one before `start`. A stopped server is not started
+        again.
+
+        Blocks: until `execute_cb` has returned, 0.4 s at most (then its goal is ABORTED), and then
+            until the clients have heard the ends of all goals, 0.7 s at most.
+        """
+        forget, self._forget = self._forget, None
+        if forget is None:
+            return
+        forget()
+        task = self._task
+        grace_ends = self._begin_to_stop()
+        if task is not None:
+            task.join(max(0.0, grace_ends - self._clock.now()))
+        self.action_server.stop()
+
+    def _begin_to_stop(self) -> float:
+        """Ask everything to end; return until when it may take its time [s, clock].
+
+        A node that closes does this for all its servers before it stops the first.
+        """
+        if self._grace_ends is None:
+            self._grace_ends = self._clock.now() + STOP_GRACE_S
+            self._keeper.close_to_goals()
+            self._ask_to_stop()
+        return self._grace_ends
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait until the server has stopped; for programs that do nothing else.
+
+        Returns:
+            Whether it has stopped.
+
+        Raises:
+            ServerConflictError: it stopped because an older server has the name.
+
+        Blocks: until then, `timeout` [s] at most; None: no limit.
+        """
+        return self.action_server.wait(timeout)
+
+    def _ask_to_stop(self) -> None:
+        with self.lock:
+            self._stopping = True
+            waiting = self._policy.on_stop()
+            if self._idle is not None:
+                self._idle.set()
+        self._preempted.set()
+        for handle in waiting:
+            self._keeper.give_up(handle, TEXT_STOPPED)
+
+    # -- goals ---------------------------------------------------------------------------------
+
+    @property
+    def current_goal(self) -> ServerGoalHandle | None:
+        """The goal that was accepted last."""
+        return self._policy.current
+
+    @property
+    def next_goal(self) -> ServerGoalHandle | None:
+        """The goal that waits to be accepted next."""
+        return self._policy.next
+
+    @property
+    def preempt_request(self) -> bool:
+        """Whether the current goal is asked to stop."""
+        return self._policy.preempt_requested
+
+    def accept_new_goal(self) -> Any:
+        """Accept the waiting goal; one that still runs becomes PREEMPTED.
+
+        Returns:
+            The goal message; None when no goal waits (check `is_new_goal_available` before).
+        """
+        new = self._take_next()
+        if new is None:
+            log.error(
+                "action '%s': accept_new_goal(): no goal waits. Try is_new_goal_available().",
+                self._name,
+            )
+            return None
+        new.set_accepted(TEXT_ACCEPTED)
+        return new.get_goal()
+
+    def _take_next(self) -> ServerGoalHandle | None:
+        """Make the waiting goal the current one, not yet accepted; None when none waits."""
+        with self.lock:
+            new, pushed = self._policy.accept()
+            if new is None:
+                return None
+            self._preempted.clear()
+            if self._policy.preempt_requested:
+                self._preempted.set()
+        if pushed is not None and pushed.record.status not in TERMINAL:
+            pushed.set_canceled(None, TEXT_NEWER)
+        return new
+
+    def is_new_goal_available(self) -> bool:
+        """Tell whether a goal waits to be accepted."""
+        return self._policy.waiting
+
+    def is_preempt_requested(self) -> bool:
+        """Tell whether the current goal is asked to stop, by a cancel or a newer goal."""
+        return self._policy.preempt_requested
+
+    def wait_preempt(self, timeout: float | None = None) -> bool:
+        """Wait until the current goal is asked to stop.
+
+        Args:
+            timeout: Longest wait [s]; None waits for ever, a negative one does not wait.
+
+        Returns:
+            Whether it is asked to stop.
+
+        Raises:
+            InvalidDurationError: `timeout` is no time.
+
+        Blocks: until then.
+        """
+        limit = check_delay(f"action '{self._name}'", "timeout", timeout)
+        if not self._preempted.is_set():
+            self._keeper.status.hurry()  # a goal that waits is not over in a moment
+        return self._preempted.wait(limit)
+
+    def is_active(self) -> bool:
+        """Tell whether a goal was accepted and has not ended."""
+        goal = self._policy.current
+        if goal is None:
+            return False
+        return goal.record.status in {Status.ACTIVE, Status.PREEMPTING}
+
+    def set_succeeded(self, result: Any = None, text: str = "") -> None:
+        """End the current goal in success.
+
+        Args:
+            result: The result message (XResult); None sends one with default values.
+            text: Why, for people.
+
+        Raises:
+            IllegalTransitionError: the goal has ended already.
+            ActionException: no goal was accepted, `result` is not of the action's type, or `text`
+                is not a string; the goal goes on.
+            FieldError: a field of `result` has a wrong type.
+        """
+        self._end("set_succeeded()", "succeed", result, text)
+
+    def set_aborted(self, result: Any = None, text: str = "") -> None:
+        """End the current goal in failure; see `set_succeeded`."""
+        self._end("set_aborted()", "abort", result, text)
+
+    def set_preempted(self, result: Any = None, text: str = "") -> None:
+        """End the current goal because it was asked to stop; see `set_succeeded`."""
+        self._end("set_preempted()", "cancel", result, text)
+
+    def set_rejected(self, result: Any = None, text: str = "") -> None:
+        """Turn away the goal that waits; see `set_succeeded`.
+
+        From a goal callback only: `execute_cb` runs with a goal already accepted, which it can end
+        with `set_aborted`.
+        """
+        with self.lock:
+            handle = self._policy.withdraw()
+        if handle is None and self.execute_callback is not None:
+            raise ActionException(
+                f"action '{self._name}': set_rejected(): the goal that runs is accepted already; "
+                "expected one that waits. Try set_aborted(), or @server, whose function may raise "
+                "Reject."
+            )
+        if handle is None:
+            raise ActionException(
+                f"action '{self._name}': set_rejected(): got no waiting goal; expected one. Try "
+                "calling it from the goal callback, before accept_new_goal()."
+            )
+        handle.set_rejected(result, text)
+
+    def _end(self, call: str, event: str, result: Any, text: str) -> None:
+        goal = self._policy.current
+        if goal is None:
+            raise ActionException(
+                f"action '{self._name}': {call}: got no goal; expected one that was accepted."
+            )
+        self._keeper.finish(goal, event, call, result, text)
+        with self.lock:
+            self._policy.on_ended(goal)
+
+    def publish_feedback(self, feedback: Any) -> None:
+        """Send feedback (XFeedback) to the current goal's client.
+
+        Raises:
+            ActionException: no goal was accepted, or `feedback` is not of the action's type.
+            FieldError: a field of `feedback` has a wrong type.
+        """
+        goal = self._policy.current
+        if goal is None:
+            raise ActionException(
+                f"action '{self._name}': publish_feedback(): got no goal; expected one that was "
+                "accepted."
+            )
+        goal.publish_feedback(feedback)
+
+    def get_default_result(self) -> Any:
+        """Return a new result message with default values."""
+        return self.action_server.ActionResultType()
+
+    def register_goal_callback(self, cb: Callable[[], object] | None) -> None:
+        """Call `cb` when a goal has come that waits to be accepted.
+
+        Raises:
+            ActionException: the server has an `execute_cb`, which gets the goals.
+        """
+        if self.execute_callback is not None and cb is not None:
+            raise ActionException(
+                f"action '{self._name}': register_goal_callback(): got a callback beside "
+                "execute_cb; expected one of the two."
+            )
+        check_function(f"action '{self._name}'", "cb", cb)
+        self.goal_callback = cb
+
+    def register_preempt_callback(self, cb: Callable[[], object] | None) -> None:
+        """Call `cb` when the current goal is asked to stop."""
+        check_function(f"action '{self._name}'", "cb", cb)
+        self.preempt_callback = cb
+
+    # -- what arrives (on the network's thread) ------------------------------------------------
+
+    def internal_goal_callback(self, goal: ServerGoalHandle) -> None:
+        """Take a new goal; the `ActionServer` beneath calls it."""
+        if self._stopping:
+            self._turn_away(goal, "reject", TEXT_STOPPED)
+            return
+        with self.lock:
+            stamp_ns = goal.record.stamp_ns
+            now_ns = self._clock.time_ns()
+            if stamp_ns > now_ns + FUTURE_NS:  # else it would hold up all others until then
+                log.warning(
+                    "action '%s': goal %s has a stamp %.1f s in the future and counts as sent now: "
+                    "a clock is wrong. Try setting the clocks of all computers by NTP.",
+                    self._name,
+                    goal.record.id,
+                    (stamp_ns - now_ns) / 1e9,
+                )
+                stamp_ns = now_ns
+            decision = self._policy.on_goal(goal, stamp_ns)
+            if decision.preempt:  # under the lock: the next goal clears it there
+                self._preempted.set()
+            if decision.announce:
+                self._start_execution()
+        if decision is not ANNOUNCE or self.goal_callback is not None:
+            self._carry_out(decision, TEXT_NEWER)
+
+    def internal_preempt_callback(self, preempt: ServerGoalHandle) -> None:
+        """Take a cancel; the `ActionServer` beneath calls it."""
+        with self.lock:
+            goal = self._policy.find(preempt)
+            decision = self._policy.on_cancel(
+                goal, recall_waiting=self.execute_callback is not None
+            )
+            if decision.preempt:
+                self._preempted.set()
+        self._carry_out(decision, TEXT_CANCELLED_WAITING)
+
+    def _carry_out(self, decision: Decision[ServerGoalHandle], text: str) -> None:
+        for older in decision.recall:
+            self._turn_away(older, "cancel", text)
+        if decision.reject is not None:
+            self._turn_away(decision.reject, "reject", TEXT_BUSY)
+        if decision.preempt and self.preempt_callback is not None:
+            self._queue.call_urgently(self._call_preempt_callback)
+        if decision.announce and self.goal_callback is not None:
+            self._queue.call(self._call_goal_callback)
+
+    def _turn_away(self, goal: ServerGoalHandle, event: str, text: str) -> None:
+        """End a goal that never began; on the network's thread, which must not wait for a link."""
+        self._keeper.finish(
+            goal, event, f"the policy {self._policy.policy!r}", None, text, wait=False
+        )
+
+    # In ROS these run as the message comes. Here others may run before, so look again.
+
+    def _call_preempt_callback(self) -> None:
+        callback, goal = self.preempt_callback, self._policy.current
+        over = goal is None or goal.record.status in TERMINAL
+        if callback is not None and self._policy.preempt_requested and not over:
+            callback()
+
+    def _call_goal_callback(self) -> None:
+        callback = self.goal_callback
+        if callback is not None and self._policy.waiting:
+            callback()
+
+    # -- execution -----------------------------------------------------------------------------
+
+    def _start_execution(self) -> None:
+        """Wake or start the thread that runs goals, unless it is busy. Needs the lock."""
+        if self._idle is not None:
+            self._idle.set()
+        elif self.execute_callback is not None and self._task is None:
+            self._task = self._queue.spawn(self.executeLoop, f"{self._name} execute")
+
+    def executeLoop(self) -> None:  # noqa: N802  actionlib's name
+        """Run the goals that wait, until none has come for `LINGER_S`."""
+        try:
+            self._run_waiting()
+        except BaseException:  # `sys.exit` in a callback: another thread goes on with the rest
+            with self.lock:
+                self._task = self._idle = None
+                if self._policy.waiting:
+                    self._start_execution()
+            raise
+
+    def _run_waiting(self) -> None:
+        come = self._clock.event(f"a goal for {self._name}")
+        while True:
+            with self.lock:
+                waiting = self._policy.waiting
+                self._idle = None if waiting else come
+                come.clear()
+            if waiting:
+                self._run_next()
+            elif self._stopping or not come.wait(LINGER_S):
+                with self.lock:
+                    self._idle = None
+                    if self._stopping or not self._policy.waiting:
+                        self._task = None
+                        return
+
+    def _run_next(self) -> None:
+        """Accept the goal that waits and run it."""
+        goal = self._take_next()
+        if goal is not None and self.execute_callback is not None:
+            goal.set_accepted(TEXT_ACCEPTED)
+            self._run(partial(self.execute_callback, goal.get_goal()))
+
+    def _run(self, execute: Callable[[], object]) -> None:
+        """Run one goal and make sure that it ends."""
+        handle = self._policy.current
+        assert handle is not None
+        text = TEXT_NO_STATUS
+        try:
+            execute()
+        except Exception as error:  # noqa: BLE001  a border: told to the client and logged
+            if handle.record.text == TEXT_STOPPED:
+                return  # `stop` has ended the goal, which the callback found out the hard way
+            text = self._report(error)
+        except BaseException as error:
+            self._abort(handle, f"Exception in execute callback: {error!r}")
+            raise
+        self._abort(handle, text)
+
+    def _report(self, error: Exception) -> str:
+        log.error("action '%s': exception in execute callback", self._name, exc_info=error)
+        return f"Exception in execute callback: {error}"
+
+    def _abort(self, handle: ServerGoalHandle, text: str) -> None:
+        """End a goal that its callback has left without an end."""
+        self._keeper.give_up(handle, text)
+        with self.lock:
+            self._policy.on_ended(handle)

@@ -1,0 +1,92 @@
+"""What every command has: a parser, numbers that are in range, and output as YAML or JSON."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import math
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.output import discard_output
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+
+def add_command(
+    verbs: Any, name: str, run: Callable[[argparse.Namespace], int], help_: str, **more: Any
+) -> argparse.ArgumentParser:
+    """Add a command with its `--json` to an argparse subparsers object; returns its parser."""
+    parser: argparse.ArgumentParser = verbs.add_parser(name, help=help_, **more)
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.set_defaults(run=run)
+    return parser
+
+
+# -- numbers: what cannot be used is refused with the range that can -------------------------------
+
+
+def seconds(text: str) -> float:
+    """Read a length of time [s], above 0."""
+    return _positive(text, "seconds above 0")
+
+
+def rate(text: str) -> float:
+    """Read a rate [Hz], above 0."""
+    return _positive(text, "a rate above 0 [Hz]")
+
+
+def count(text: str) -> int:
+    """Read how many, 1 at least."""
+    try:
+        number = int(text)
+    except ValueError:
+        number = 0
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"got {text!r}; expected a whole number above 0")
+    return number
+
+
+def size(text: str) -> int:
+    """Read how many, 0 at least."""
+    return 0 if text == "0" else count(text)
+
+
+def _positive(text: str, wanted: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not (math.isfinite(number) and number > 0):
+        raise argparse.ArgumentTypeError(f"got {text!r}; expected {wanted}")
+    return number
+
+
+# -- output ----------------------------------------------------------------------------------------
+
+
+def print_json(**fields: Any) -> None:
+    """Print one JSON object on a line, at once."""
+    print(json.dumps(fields), flush=True)
+
+
+def print_message(title: str, message: Any) -> None:
+    """Print a message as YAML, indented under a title, and an empty line."""
+    print(f"{title}\n{textwrap.indent(message.to_yaml().rstrip() or '{}', '    ')}\n", flush=True)
+
+
+def print_progress(args: argparse.Namespace, text: str) -> None:
+    """Print what a command does now, for people only."""
+    if not args.json:
+        print(text, flush=True)
+
+
+@contextlib.contextmanager
+def while_read() -> Iterator[None]:
+    """Leave the block when the reader of the output has gone, and discard what is printed then."""
+    try:
+        yield
+    except BrokenPipeError:
+        discard_output()

@@ -1,0 +1,69 @@
+"""`list` and `type`, which actions, topics and services have in common."""
+
+from __future__ import annotations
+
+import json
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.cli._command import add_command
+from actionlib_core.cli._network import find_ends, list_names, open_node, types_of
+
+if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Callable, Collection
+
+    from actionlib_core.wire.presence import Endpoint, Kind
+
+
+def add_list(
+    verbs: Any,
+    what: str,
+    kinds: Collection[Kind],
+    record: Callable[[str, list[Endpoint]], dict[str, Any]],
+) -> argparse.ArgumentParser:
+    """Add the command `list`.
+
+    Args:
+        verbs: Where to.
+        what: What the names are, in the plural.
+        kinds: The ends that count.
+        record: Makes a name and its ends into what `--json` prints.
+    """
+    run = partial(_list, kinds, record)
+    parser = add_command(verbs, "list", run, f"list the {what} there are")
+    parser.add_argument("-t", "--show-types", action="store_true", help="with their types")
+    parser.add_argument(
+        "-c", f"--count-{what}", dest="count", action="store_true", help="only how many"
+    )
+    return parser
+
+
+def _list(
+    kinds: Collection[Kind],
+    record: Callable[[str, list[Endpoint]], dict[str, Any]],
+    args: argparse.Namespace,
+) -> int:
+    with open_node(args) as node:
+        found = list_names(node, kinds)
+    if args.json:
+        print(json.dumps([record(name, ends) for name, ends in found.items()]))
+    elif args.count:
+        print(len(found))
+    else:
+        for name, ends in found.items():
+            print(f"/{name} [{', '.join(types_of(ends))}]" if args.show_types else f"/{name}")
+    return 0
+
+
+def add_type(verbs: Any, what: str, kinds: Collection[Kind]) -> None:
+    """Add the command `type`."""
+    parser = add_command(verbs, "type", partial(_type, kinds), f"print the type of {what}")
+    parser.add_argument("name", metavar="NAME")
+
+
+def _type(kinds: Collection[Kind], args: argparse.Namespace) -> int:
+    with open_node(args) as node:
+        types = types_of(find_ends(node, args.name, kinds))
+    print(json.dumps(types) if args.json else "\n".join(types))
+    return 0

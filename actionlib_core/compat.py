@@ -1,0 +1,60 @@
+"""ROS 1's module names: `from actionlib_core.simple_action_client import SimpleActionClient`.
+
+Programs written for actionlib, SMACH and smach_ros import from their modules, and move by changing
+the package's name only. `alias_modules` maps such a name to the module that holds its classes here.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from types import ModuleType
+
+MODULES: Final = {
+    "actionlib_core.action_client": "actionlib_core.action.client",
+    "actionlib_core.action_server": "actionlib_core.action.server",
+    "actionlib_core.goal_id_generator": "actionlib_core.action.goal_id_generator",
+    "actionlib_core.handle_tracker_deleter": "actionlib_core.action.compat",
+    "actionlib_core.server_goal_handle": "actionlib_core.action.server",
+    "actionlib_core.simple_action_client": "actionlib_core.action.simple_client",
+    "actionlib_core.simple_action_server": "actionlib_core.action.simple_server",
+    "actionlib_core.status_tracker": "actionlib_core.action.compat",
+}
+"""actionlib's module names, under this package's name -> module here."""
+
+
+class _Aliases(MetaPathFinder, Loader):
+    """Finds modules by other names."""
+
+    def __init__(self) -> None:
+        self.homes: dict[str, str] = {}
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Return a spec for an alias; None for any other name."""
+        del path, target
+        return ModuleSpec(fullname, self) if fullname in self.homes else None
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Put the module itself in place of the empty one."""
+        sys.modules[module.__name__] = import_module(self.homes[module.__name__])
+
+
+_aliases: Final = _Aliases()
+
+
+def alias_modules(homes: Mapping[str, str]) -> None:
+    """Make each name importable: the module of that name is the one it maps to.
+
+    Nothing is imported before a program asks for it.
+    """
+    _aliases.homes.update(homes)
+    if _aliases not in sys.meta_path:
+        sys.meta_path.append(_aliases)

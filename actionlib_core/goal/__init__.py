@@ -1,0 +1,1 @@
+"""A goal's rules, as pure tables: no threads, time, keys or logging."""

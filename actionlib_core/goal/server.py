@@ -1,0 +1,284 @@
+"""What a server knows about its goals, and what it does when something arrives.
+
+One `ServerGoals` per action server. It decides; the shell sends, calls back and keeps time.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections import deque
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from actionlib_core.goal.life_cycle import server_life_cycle
+from actionlib_core.goal.states import TERMINAL, Status
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+LISTED_S = (
+    5.0  # a finished goal and an early cancel stay in the status list (ROS: status_list_timeout)
+)
+RESULT_TIMEOUT_S = 60.0  # a result nobody acknowledged is kept this long
+FUTURE_NS = 1_000_000_000  # clocks of two computers may differ by so much; more is a mistake
+MEMORY_S = 3600.0  # ids of finished goals are remembered this long, so that a late copy is dropped
+MEMORY_GOALS = 100_000  # and no more than these, the oldest forgotten first
+
+TEXT_CANCELLED_BEFORE = (
+    "This goal handle was canceled by the action server because its timestamp is before the "
+    "timestamp of the last cancel request"
+)
+TEXT_CANCEL_CAME_FIRST = "This goal was canceled before it arrived"
+
+
+class Arrival(enum.Enum):
+    """What a goal that arrived is to the server."""
+
+    NEW = enum.auto()
+    """Run it."""
+    RECALLED = enum.auto()
+    """A cancel came first: answer RECALLED, never run it."""
+    REPEAT = enum.auto()
+    """Known: say again what is known of it."""
+    LATE = enum.auto()
+    """The server takes no more goals: say nothing, the next server may have it."""
+
+
+@dataclass(slots=True, eq=False)
+class ServerGoal:
+    """One goal as its server sees it.
+
+    Attributes:
+        id: The goal's id, unique on the network.
+        stamp_ns: When the client sent it [ns since the epoch]; cancels and preemption go by it.
+        status: Where it stands.
+        text: What the server says about that.
+        client: Session id of its sender; "" when unknown.
+        arrived: False while only a cancel has come for this id.
+        result: What is sent as the result, once there is one.
+        listed_until: End of its time in the status list [s, clock]; None: no end yet.
+        kept_until: End of its result's time [s, clock]; None: no end yet.
+        tag: What the shell keeps beside it.
+    """
+
+    id: str
+    stamp_ns: int
+    status: Status = Status.PENDING
+    text: str = ""
+    client: str = ""
+    arrived: bool = True
+    result: object = None
+    listed_until: float | None = None
+    kept_until: float | None = None
+    tag: object = None
+
+
+class ServerGoals:
+    """The goals of one action server.
+
+    Args:
+        name: The action's name, for errors.
+        result_timeout: How long a result waits for its acknowledgement [s].
+
+    Attributes:
+        closed: No more goals are taken.
+
+    Threads: none of its own, no lock; the owner calls it under its lock.
+    """
+
+    def __init__(self, name: str, *, result_timeout: float = RESULT_TIMEOUT_S) -> None:
+        self.name = name
+        self.result_timeout = result_timeout
+        self._goals: dict[str, ServerGoal] = {}
+        # Status, when it was forgotten, whether acknowledged; plain numbers: nothing to collect.
+        self._past: dict[str, tuple[int, float, bool]] = {}
+        self._oldest: deque[str] = deque()  # its ids; a dict is slow to tell its first one
+        self.closed = False
+        self._last_cancel_ns = 0
+        self._steps = server_life_cycle()
+
+    def __len__(self) -> int:
+        return len(self._goals)
+
+    def find(self, goal_id: str) -> ServerGoal | None:
+        """Return the goal that is tracked under this id."""
+        goal = self._goals.get(goal_id)
+        return goal if goal is not None and goal.arrived else None
+
+    def past_status(self, goal_id: str) -> Status | None:
+        """Return how a goal ended whose result is no longer kept; None: never heard of it."""
+        past = self._past.get(goal_id)
+        return None if past is None else Status(past[0])
+
+    def on_goal(self, arrived: ServerGoal, now: float) -> tuple[Arrival, ServerGoal | None]:
+        """Take a goal that arrived, for the first time or again.
+
+        Returns:
+            What it is, and the goal as it is tracked; None for a repeat of one that ended long ago,
+            and for one that comes too late.
+        """
+        known = self._goals.get(arrived.id)
+        if known is not None and known.arrived:
+            return Arrival.REPEAT, known
+        if known is None and arrived.id in self._past:
+            return Arrival.REPEAT, None
+        if self.closed:
+            return Arrival.LATE, None
+        self._goals[arrived.id] = arrived
+        if known is not None:
+            text = TEXT_CANCEL_CAME_FIRST
+        elif 0 < arrived.stamp_ns <= self._last_cancel_ns:
+            text = TEXT_CANCELLED_BEFORE
+        else:
+            return Arrival.NEW, arrived
+        self.step(arrived, "cancel", "the cancel that came first", text)
+        self.finish(arrived, now)
+        return Arrival.RECALLED, arrived
+
+    def on_cancel(self, goal_id: str, stamp_ns: int, now: float, now_ns: int) -> list[ServerGoal]:
+        """Apply the four cancel rules; `now_ns` is the time since the epoch, which stamps tell.
+
+        Neither id nor stamp: all goals. Stamp only: goals at or before it. Id only: that goal.
+        Both: that goal and those at or before the stamp. A cancel for an unknown id is remembered
+        for a while; a goal with that id that comes later is recalled. So is a goal with a stamp at
+        or before that of a cancel; but a cancel from more than `FUTURE_NS` in the future, by a
+        clock that is wrong, counts as one from now.
+
+        Returns:
+            The goals that are now asked to stop and were not before.
+        """
+        everything = not goal_id and not stamp_ns
+        asked = [
+            goal
+            for goal in self._goals.values()
+            if (everything or goal.id == goal_id or 0 < goal.stamp_ns <= stamp_ns)
+            and self.request_cancel(goal)
+        ]
+        if goal_id and goal_id not in self._goals and goal_id not in self._past:
+            self._goals[goal_id] = ServerGoal(
+                goal_id, 0, Status.RECALLING, arrived=False, listed_until=now + LISTED_S
+            )
+        until_ns = stamp_ns if stamp_ns <= now_ns + FUTURE_NS else now_ns
+        self._last_cancel_ns = max(self._last_cancel_ns, until_ns)
+        return asked
+
+    def on_client_lost(self, client: str) -> list[ServerGoal]:
+        """Ask the goals of a client that died to stop; return those that were not asked before."""
+        return [
+            goal
+            for goal in self._goals.values()
+            if goal.client == client and self.request_cancel(goal)
+        ]
+
+    def request_cancel(self, goal: ServerGoal) -> bool:
+        """Mark a goal as asked to stop; False when it cannot be, or was already."""
+        path = self._steps.steps.get((goal.status, "request_cancel"))
+        if path is None or not goal.arrived:
+            return False
+        goal.status = path[-1]
+        return True
+
+    def step(self, goal: ServerGoal, event: str, call: str, text: str = "") -> None:
+        """Move a goal along its life cycle.
+
+        Args:
+            goal: The goal.
+            event: Event of the server's table.
+            call: What the user called, for the error.
+            text: What the status says from now on.
+
+        Raises:
+            IllegalTransitionError: its status does not allow the event.
+        """
+        path = self._steps.steps.get((goal.status, event))
+        if path is None:
+            where = f"goal {goal.id} on '{self.name}'"
+            path = self._steps.step(goal.status, event, goal=where, call=call)
+        goal.status = path[-1]
+        goal.text = text
+
+    def finish(self, goal: ServerGoal, now: float) -> None:
+        """Start the time after which a goal in a terminal status is forgotten."""
+        assert goal.status in TERMINAL
+        goal.listed_until = now + LISTED_S
+        goal.kept_until = now + self.result_timeout
+
+    def on_acknowledged(self, goal_ids: Iterable[str], now: float) -> None:
+        """Forget the results that their clients have."""
+        for goal_id in goal_ids:
+            goal = self._goals.get(goal_id)
+            if goal is not None and goal.kept_until is not None:
+                self._forget(goal, now, acknowledged=True)
+
+    def has_unacknowledged(self) -> bool:
+        """Tell whether a result waits for its acknowledgement."""
+        return any(goal.kept_until is not None for goal in self._goals.values())
+
+    def release(self, goal: ServerGoal, now: float) -> None:
+        """Note that nobody will ever end this goal: it is LOST once its time in the list is up."""
+        if goal.status not in TERMINAL:
+            goal.listed_until = now + LISTED_S
+
+    def close(self) -> None:
+        """Take no more goals."""
+        self.closed = True
+
+    def taken(self) -> Iterator[tuple[str, Status, ServerGoal | None]]:
+        """Return the goals ever taken, without those whose clients have acknowledged their end.
+
+        Each with its id and status; None for one whose result is no longer kept.
+        """
+        for goal in self._goals.values():
+            if goal.arrived:
+                yield goal.id, goal.status, goal
+        for goal_id, (status, _, acknowledged) in self._past.items():
+            if not acknowledged:
+                yield goal_id, Status(status), None
+
+    def listed(self) -> list[ServerGoal]:
+        """Return the goals of the status list."""
+        return [
+            goal
+            for goal in self._goals.values()
+            if goal.listed_until is not None or goal.status not in TERMINAL
+        ]
+
+    def expire(self, now: float) -> float | None:
+        """Forget what is past its time; return when the next thing is [s, clock]."""
+        soonest: float | None = None
+        for goal in list(self._goals.values()):
+            due = self._expire(goal, now)
+            if due is not None and (soonest is None or due < soonest):
+                soonest = due
+        self._trim(now)
+        return soonest
+
+    def _expire(self, goal: ServerGoal, now: float) -> float | None:
+        if goal.listed_until is not None and goal.listed_until <= now:
+            goal.listed_until = None
+            if not goal.arrived:
+                del self._goals[goal.id]
+                return None
+            if goal.status not in TERMINAL:
+                goal.status = Status.LOST
+                self._forget(goal, now)
+                return None
+        if goal.kept_until is not None and goal.kept_until <= now:
+            self._forget(goal, now)
+            return None
+        return goal.listed_until if goal.listed_until is not None else goal.kept_until
+
+    def _forget(self, goal: ServerGoal, now: float, *, acknowledged: bool = False) -> None:
+        del self._goals[goal.id]
+        self._past[goal.id] = (int(goal.status), now, acknowledged)
+        self._oldest.append(goal.id)
+        if len(self._past) > MEMORY_GOALS:
+            self._trim(now)
+
+    def _trim(self, now: float) -> None:
+        """Drop remembered ids beyond the limits; the oldest come first."""
+        while self._oldest:
+            oldest = self._oldest[0]
+            if len(self._past) <= MEMORY_GOALS and self._past[oldest][1] + MEMORY_S > now:
+                return
+            del self._past[self._oldest.popleft()]

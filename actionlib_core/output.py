@@ -1,0 +1,157 @@
+"""What command line programs write: no write that failed stays unnoticed, no text moves the cursor.
+
+A full disk or a closed standard output ends a program with exit code 2 and a line on standard
+error. A reader that has seen enough (`... | head`) is no error.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import logging
+import os
+import sys
+import threading
+import traceback
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from _typeshed import ReadableBuffer
+
+EXIT_OUTPUT: Final = 2
+_LAST_OWN_CODE: Final = 2  # codes above it say which signal ended the program
+_KEPT: Final = frozenset("\n\t")
+
+
+def printable(text: object) -> str:
+    """Return a text for a terminal: characters that are not shown are escaped, lines stay."""
+    words = str(text)
+    if words.isprintable():
+        return words
+    return "".join(c if c.isprintable() or c in _KEPT else ascii(c)[1:-1] for c in words)
+
+
+class _Checked(io.FileIO):
+    """The file behind standard output; it remembers the first error, whoever catches it."""
+
+    failed: OSError | None = None
+
+    def write(self, data: ReadableBuffer, /) -> int:
+        try:
+            return super().write(data)
+        except OSError as error:
+            self.failed = self.failed or error
+            raise
+
+
+class _Escaping(io.TextIOWrapper):
+    """Standard output of a program that draws nothing: what is not shown is escaped."""
+
+    def write(self, text: str, /) -> int:
+        super().write(printable(text))
+        return len(text)
+
+
+def run_program(name: str, run: Callable[[], int], *, draws: bool = False) -> int:
+    """Run a program whose output is checked; returns its exit code.
+
+    Log messages that go to standard error, and tracebacks of threads, are escaped.
+
+    Args:
+        name: The program, for the error text.
+        run: The program; it returns its exit code, or raises SystemExit.
+        draws: It writes control sequences to standard output, and escapes texts by itself.
+
+    Raises:
+        SystemExit: as `run`.
+    """
+    if sys.stdout is None:
+        tell(name, "standard output: it is closed; expected an open one. Try: > /dev/null")
+        return EXIT_OUTPUT
+    real = sys.stdout is sys.__stdout__ and isinstance(sys.stdout, io.TextIOWrapper)
+    before = sys.stdout
+    file = _replace_output(io.TextIOWrapper if draws else _Escaping) if real else None
+    if real:
+        _escape_errors()
+    end: SystemExit | None = None
+    code = 0
+    try:
+        code = run()
+    except SystemExit as asked:
+        end = asked
+    except BrokenPipeError:
+        pass
+    except OSError:
+        if file is None or file.failed is None:
+            raise
+    with contextlib.suppress(OSError, ValueError):
+        sys.stdout.flush()
+    if file is not None and file.failed is not None:
+        discard_output()  # first: what is still buffered is written when the wrapper is freed
+    sys.stdout = before
+    if file is not None and file.failed is not None:
+        if not isinstance(file.failed, BrokenPipeError):
+            reason = file.failed.strerror or str(file.failed)
+            tell(name, f"standard output: got '{reason}'; expected to write all of it.")
+            return max(code, EXIT_OUTPUT)
+        return code  # the reader has seen enough; SystemExit is how `rich` takes that
+    if end is not None:
+        raise end
+    return code
+
+
+def tell(name: str, text: str) -> None:
+    """Write a line about what went wrong to standard error, if there is one."""
+    if sys.stderr is not None:
+        with contextlib.suppress(OSError):
+            sys.stderr.write(f"{name}: {printable(text)}\n")
+            sys.stderr.flush()
+
+
+def _escape_errors() -> None:
+    if logging.lastResort is not None:
+        logging.lastResort.setFormatter(_Formatter())
+    threading.excepthook = _tell_thread_exception
+
+
+class _Formatter(logging.Formatter):
+    def format(self, record: logging.LogRecord) -> str:
+        return printable(super().format(record))
+
+
+def _tell_thread_exception(what: threading.ExceptHookArgs) -> None:
+    """Write what `threading.excepthook` does, escaped."""
+    if issubclass(what.exc_type, SystemExit) or sys.stderr is None:
+        return
+    name = what.thread.name if what.thread is not None else "unknown"
+    lines = traceback.format_exception(what.exc_type, what.exc_value, what.exc_traceback)
+    text = "".join([f"Exception in thread {name}:\n", *lines])
+    with contextlib.suppress(OSError):
+        sys.stderr.write(printable(text))
+        sys.stderr.flush()
+
+
+def _replace_output(kind: type[io.TextIOWrapper]) -> _Checked:
+    """Put a checked file in the place of `sys.stdout`; returns it."""
+    before = sys.stdout
+    assert isinstance(before, io.TextIOWrapper)
+    before.flush()
+    file = _Checked(before.fileno(), "w", closefd=False)
+    sys.stdout = kind(
+        io.BufferedWriter(file),
+        encoding=before.encoding,
+        errors="backslashreplace",  # half a surrogate pair, or a terminal that is not UTF-8
+        newline="\n",
+        line_buffering=before.line_buffering,
+        write_through=before.write_through,
+    )
+    return file
+
+
+def discard_output() -> None:
+    """Write to nowhere from now on, so that the interpreter does not fail at it in the end."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)

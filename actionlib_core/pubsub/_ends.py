@@ -1,0 +1,215 @@
+"""One end of a topic or service, and what it knows of the other ends of its name."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from typing import TYPE_CHECKING
+
+from actionlib_core.node import get_node
+from actionlib_core.shutdown import current_shutdown
+from actionlib_core.wire.presence import Endpoint, Kind, find_mismatch, parse_token, token_pattern
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection
+    from typing import Self
+
+    from actionlib_core.clock import Event
+    from actionlib_core.exceptions import TypeMismatchError
+    from actionlib_core.interfaces import Message, ServiceType
+    from actionlib_core.node import Node
+    from actionlib_core.transport import Closable, Presence
+
+logger = logging.getLogger("actionlib_core")
+
+
+class End:
+    """What publisher, subscriber, service and proxy share: a name, a type, an eye on the others.
+
+    A subclass sets `_ends` and, in `_parts`, what it has declared.
+    """
+
+    _what: str
+    _kind: Kind
+    _ends: NameWatch
+    _forget: Callable[[], None]
+
+    def __init__(
+        self, name: str, interface: type[Message | ServiceType], node: Node | None
+    ) -> None:
+        self.node = get_node() if node is None else node
+        self.resolved_name = self.node.resolve(name, f"{self._what} name")
+        self.type = interface._type
+        self.md5sum = interface._md5sum
+        self._own = self.node.endpoint(self._kind, self.resolved_name, self.type, self.md5sum)
+        self._parts: list[Closable] = []
+        self._closed = False
+
+    @property
+    def mismatches(self) -> list[TypeMismatchError]:
+        """The ends of this name that have another type, as errors; each was logged once."""
+        return self._ends.mismatches
+
+    def _leave(self) -> None:
+        if not self._closed:
+            self._closed = True
+            self._forget()
+            close_all(self._parts)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._leave()
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} /{self.resolved_name} [{self.type}]>"
+
+
+def close_all(parts: list[Closable]) -> None:
+    """Close what was declared, the newest first."""
+    for part in reversed(parts):
+        part.close()
+
+
+class NameWatch:
+    """Knows the ends of a name that are there, from their tokens.
+
+    An end with another type than ours is logged as an error, once, and kept in `mismatches`.
+
+    Args:
+        node: Where we are.
+        own: Our own end; it is not counted.
+        kinds: Which ends concern us.
+        any_type: Another type than our own is no error.
+        on_new: Gets each end that appears, on the network's thread.
+
+    Threads: every method may be called from any thread; `wait` not from a transport callback.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        own: Endpoint,
+        kinds: Collection[Kind],
+        *,
+        any_type: bool = False,
+        on_new: Callable[[Endpoint], object] | None = None,
+    ) -> None:
+        self._node = node
+        self._own = own
+        self._kinds = frozenset(kinds)
+        self._any_type = any_type
+        self._on_new = on_new
+        self._lock = threading.Lock()
+        self._ends: dict[str, Endpoint] = {}
+        self._mismatches: dict[Endpoint, TypeMismatchError] = {}
+        self._waiters: list[Event] = []
+        self._closed = False
+        kind = next(iter(self._kinds)) if len(self._kinds) == 1 else None
+        self._watch: Closable | None = None
+        self._forget = node.on_close(self.close)
+        try:
+            pattern = token_pattern(kind, own.name)
+            self._watch = node.transport.watch_alive(pattern, self._on_presence)
+        except BaseException:
+            self._forget()
+            raise
+
+    def ends(self, kind: Kind | None = None, *, any_type: bool = False) -> list[Endpoint]:
+        """Return the ends there are now: of `kind` or all, of our type or any."""
+        with self._lock:
+            ends = list(self._ends.values())
+        wanted = self._own.type, self._own.md5
+        return [
+            end
+            for end in ends
+            if kind in {None, end.kind} and (any_type or (end.type, end.md5) == wanted)
+        ]
+
+    @property
+    def mismatches(self) -> list[TypeMismatchError]:
+        """The errors of the ends of another type that are there now, or sent to us."""
+        with self._lock:
+            return list(self._mismatches.values())
+
+    def note(self, error: TypeMismatchError, end: Endpoint) -> None:
+        """Keep and log that `end` has another type, unless it is known already."""
+        with self._lock:
+            if end in self._mismatches:
+                return
+            self._mismatches[end] = error
+        logger.error("%s %s", self._own.kind.value, error)
+        self.wake()
+
+    def wait(
+        self, condition: Callable[[], bool], timeout: float | None, changed: Event | None = None
+    ) -> bool:
+        """Wait until `condition` holds, looking again whenever an end appears or vanishes.
+
+        Args:
+            condition: What is waited for.
+            timeout: Longest wait [s]; None: no limit.
+            changed: Its owner sets it when the condition may hold, which wakes this wait alone.
+
+        Returns:
+            Whether it holds.
+
+        Blocks: until then, `timeout` [s] at most, or until the node closes; without a time-out
+            until the program is to end, too.
+        """
+        clock = self._node.clock
+        deadline = None if timeout is None else clock.now() + timeout
+        changed = clock.event() if changed is None else changed
+        with self._lock:
+            self._waiters.append(changed)
+        forget = current_shutdown().on_shutdown(changed.set)
+        try:
+            while not condition():
+                left = None if deadline is None else deadline - clock.now()
+                over = current_shutdown().requested() if left is None else left <= 0
+                if over or self._closed:
+                    return False
+                changed.wait(left)
+                changed.clear()
+            return True
+        finally:
+            forget()
+            with self._lock:
+                self._waiters.remove(changed)
+
+    def wake(self) -> None:
+        """Let those who wait look at their condition again."""
+        with self._lock:
+            waiters = list(self._waiters)
+        for waiter in waiters:
+            waiter.set()
+
+    def close(self) -> None:
+        """Stop following; those who wait are woken."""
+        self._closed = True
+        self._forget()
+        if self._watch is not None:
+            self._watch.close()
+        self.wake()
+
+    def _on_presence(self, presence: Presence) -> None:
+        end = parse_token(presence.key)
+        if end is None or end.kind not in self._kinds or end == self._own:
+            return
+        with self._lock:
+            if presence.alive:
+                self._ends[presence.key] = end
+            else:
+                self._ends.pop(presence.key, None)
+                self._mismatches.pop(end, None)
+        error = self._find_mismatch(end) if presence.alive else None
+        if error is not None:
+            self.note(error, end)
+        else:
+            self.wake()
+        if presence.alive and self._on_new is not None:
+            self._on_new(end)
+
+    def _find_mismatch(self, end: Endpoint) -> TypeMismatchError | None:
+        return None if self._any_type else find_mismatch([end], self._own)

@@ -1,0 +1,294 @@
+"""Services: call a function in another program and get its answer, in rospy's shape.
+
+A handler's exception travels to the caller as a `ServiceException`; a server that dies, is absent
+or does not answer in time ends the call with an error of its own. No call waits for ever by
+default.
+
+Source:
+    rospy.Service for names, arguments and meaning.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+import threading
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core._arguments import check_function
+from actionlib_core.action._callbacks import CallbackQueue
+from actionlib_core.exceptions import (
+    ServiceBusyError,
+    ServiceConflictError,
+    ServiceException,
+    TypeMismatchError,
+)
+from actionlib_core.pubsub._ends import NameWatch
+from actionlib_core.pubsub.service_proxy import ServiceEnd, handler_raised, is_from
+from actionlib_core.wire.encoding import check_encoding, encoding_of, parse_encoding
+from actionlib_core.wire.presence import (
+    Endpoint,
+    Kind,
+    in_conflict,
+    is_younger,
+    list_endpoints,
+    token_key,
+    with_age,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.interfaces import Message, ServiceType
+    from actionlib_core.node import Node
+    from actionlib_core.transport import Query
+
+logger = logging.getLogger("actionlib_core")
+
+CALLS_AT_ONCE = 500  # of one service; each has a thread
+BUSY_LOG_S = 10.0  # shortest time between two words in the log that calls are refused
+
+
+class Service(ServiceEnd):
+    """Answers the calls of a service.
+
+    Args:
+        name: Service name, relative, absolute or private.
+        service_class: The service's class, `SetBool` for example.
+        handler: Gets the request; returns the response, or what makes one: a dict of its fields, a
+            tuple or list of all of them, or the value of its only field.
+        node: Where it lives; the node in force when None.
+        alone: False when others may have the name too: each of them runs its handler for every
+            call, and the caller takes the first answer.
+
+    Attributes:
+        error: Why it stopped by itself: an older server has the name; None while all is well.
+
+    Raises:
+        InvalidNameError: the name breaks the ROS rules.
+        NodeError: the node is closed.
+        ServiceConflictError: the name has a server already.
+
+    Blocks: until the network has said who has the name, 1 s at most.
+
+    Threads: each call of the handler has a thread of the node's clock, so calls may overlap, block,
+        and call services themselves. An exception goes to the caller, and to the log. A caller that
+        finds `CALLS_AT_ONCE` under way, or no thread left, gets a `ServiceBusyError`, which the log
+        tells of every `BUSY_LOG_S` at most.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        service_class: type[ServiceType],
+        handler: Callable[[Any], Any],
+        *,
+        node: Node | None = None,
+        alone: bool = True,
+    ) -> None:
+        check_function(f"service {name!r}", "handler", handler)
+        super().__init__(name, service_class, node)
+        self._own = with_age(self._own, self.node.clock.time_ns())
+        self.handler = handler
+        self.error: ServiceConflictError | None = None
+        self._alone = alone
+        self._lock = threading.Lock()
+        self._running = 0
+        self._busy_logged = -math.inf  # clock time [s]
+        self._shown = False
+        self._refuse_second()
+        self._ends = self._watch()
+        self._parts.append(self._ends)
+        self._forget = self.node.on_close(self.close)
+        self._calls = CallbackQueue(self.node, f"service /{self.resolved_name}")
+        transport = self.node.transport
+        try:
+            self._parts.append(transport.queryable(self.resolved_name, self._on_query))
+            self._parts.append(transport.declare_alive(token_key(self._own)))
+            self._meet_servers()
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Stop answering; a second call does nothing."""
+        self._leave()
+
+    def shutdown(self, reason: str = "") -> None:
+        """Stop answering; as `close`.
+
+        Args:
+            reason: For the log.
+        """
+        logger.info("service /%s is shut down: %s", self.resolved_name, reason or "requested")
+        self.close()
+
+    def spin(self) -> None:
+        """Answer until the service is closed or the program is to end.
+
+        Raises:
+            ServiceConflictError: it stopped because an older server has the name.
+
+        Blocks: until then.
+        """
+        self._ends.wait(lambda: self._closed, None)
+        if self.error is not None:
+            raise self.error
+
+    # -- other servers -------------------------------------------------------------------------
+
+    def _watch(self) -> NameWatch:
+        return NameWatch(self.node, self._own, {Kind.SERVICE}, on_new=self._on_server)
+
+    def _refuse_second(self) -> None:
+        if not self._alone:
+            return
+        there = list_endpoints(self.node.transport, kind=Kind.SERVICE, name=self.resolved_name)
+        if there:
+            raise self._conflict(there[0])
+
+    def _meet_servers(self) -> None:
+        """Look at the servers that were found while this one was made, and from now on at all."""
+        self._shown = True
+        for other in self._ends.ends(any_type=True):
+            self._on_server(other)
+        if self.error is not None:
+            raise self.error
+
+    def _on_server(self, other: Endpoint) -> None:
+        """Stop when `other` is older: a session that has just been opened hears of it late."""
+        if not (self._alone and self._shown) or self._closed:
+            return
+        if not is_younger(self._own, other):
+            logger.error("%s", self._conflict(other, stays=True))
+            return
+        self.error = self._conflict(other)
+        logger.error("%s", self.error)
+        self.close()
+
+    def _conflict(self, other: Endpoint, *, stays: bool = False) -> ServiceConflictError:
+        return ServiceConflictError(self.resolved_name, *in_conflict(self._own, other, stays=stays))
+
+    # -- calls ---------------------------------------------------------------------------------
+
+    def _on_query(self, query: Query) -> None:
+        try:
+            check_encoding(query.encoding, self.service_class, name=self.resolved_name)
+        except TypeMismatchError as error:
+            self._ends.note(error, _caller_of(query))
+            _fail(query, error)
+            return
+        if not self._begin_call():
+            # Without an end, handlers that call themselves would take all threads there are.
+            self._refuse(query, _BUSY.format(CALLS_AT_ONCE))
+            return
+        try:
+            self._calls.spawn(partial(self._answer, query), f"service /{self.resolved_name}")
+        except BaseException as error:
+            self._end_call()
+            if not isinstance(error, RuntimeError):
+                raise
+            self._refuse(query, f"no thread is left: {error}.")
+
+    def _refuse(self, query: Query, reason: str) -> None:
+        error = ServiceBusyError(self.resolved_name, reason)
+        self._log_busy(error)
+        _fail(query, error)
+
+    def _pass_on(self, query: Query, text: str) -> None:
+        """Answer with the very words of a busy service: handlers that call each other add none."""
+        kind = ServiceBusyError.__name__
+        if not is_from(self.resolved_name, text):  # else it was logged when it came up
+            self._log_busy(handler_raised(self.resolved_name, kind, text))
+        _send_error(query, kind, text)
+
+    def _log_busy(self, error: ServiceException) -> None:
+        """Log that calls fail because a service is busy: once in a while, as there may be many."""
+        now = self.node.clock.now()
+        with self._lock:
+            if now < self._busy_logged + BUSY_LOG_S:
+                return
+            self._busy_logged = now
+        logger.error("%s", error)
+
+    def _begin_call(self) -> bool:
+        with self._lock:
+            if self._running >= CALLS_AT_ONCE:
+                return False
+            self._running += 1
+            return True
+
+    def _end_call(self) -> None:
+        with self._lock:
+            self._running -= 1
+
+    def _answer(self, query: Query) -> None:
+        try:
+            self._reply(query)
+        finally:
+            self._end_call()
+
+    def _reply(self, query: Query) -> None:
+        try:
+            response = self._respond(self.handler(self.request_class.from_bytes(query.payload)))
+            query.reply(response.to_bytes(), encoding_of(self.service_class))
+        except BaseException as error:  # sys.exit() too: the caller waits for an answer
+            busy = _find_busy(error)
+            if busy:
+                self._pass_on(query, busy)
+            else:
+                if isinstance(error, Exception | SystemExit):  # not the end of a test's clock
+                    logger.exception("service /%s: the handler raised", self.resolved_name)
+                _fail(query, error)
+            if not isinstance(error, Exception):
+                raise
+        finally:
+            query.finish()
+
+    def _respond(self, result: object) -> Message:
+        if isinstance(result, self.response_class):
+            return result
+        make: Callable[..., Message] = self.response_class
+        if isinstance(result, dict):
+            return make(**result)
+        if isinstance(result, (tuple, list)):
+            return make(*result)
+        if result is None and self.response_class.__slots__:
+            name = self.response_class.__name__
+            raise ServiceException(
+                self.resolved_name,
+                f"the handler returned None; expected {name}, a dict or its field values",
+            )
+        return make() if result is None else make(result)
+
+
+_BUSY = (
+    "{} calls are under way; expected fewer. Try looking whether the handler calls its own "
+    "service, directly or through another, or ending calls sooner."
+)
+
+
+def _fail(query: Query, error: BaseException) -> None:
+    _send_error(query, type(error).__name__, str(error))
+
+
+def _send_error(query: Query, kind: str, text: str) -> None:
+    query.reply_error(json.dumps({"type": kind, "text": text}))
+    query.finish()
+
+
+def _find_busy(error: BaseException) -> str:
+    """Return what a busy service has said, this one or one that the handler called, or ""."""
+    if isinstance(error, ServiceBusyError):
+        return str(error)
+    if isinstance(error, ServiceException) and error.remote_type == ServiceBusyError.__name__:
+        return error.remote_text
+    return ""
+
+
+def _caller_of(query: Query) -> Endpoint:
+    """Return the end that a call of another type came from; callers have no token."""
+    encoding = parse_encoding(query.encoding)
+    return Endpoint(Kind.SERVICE, query.key, encoding.type, encoding.md5, "", "", 0)

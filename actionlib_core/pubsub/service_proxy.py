@@ -1,0 +1,343 @@
+"""The caller's end of a service, in rospy's shape.
+
+Source:
+    rospy.ServiceProxy and rospy.wait_for_service for names, arguments and meaning.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core._arguments import check_class, check_limit
+from actionlib_core.exceptions import (
+    ActionlibError,
+    NodeError,
+    ServiceBusyError,
+    ServiceException,
+    ServiceLostError,
+    ServiceTimeoutError,
+    ServiceUnavailableError,
+    TypeMismatchError,
+    WaitTimeoutError,
+)
+from actionlib_core.node import get_node
+from actionlib_core.pubsub._ends import End, NameWatch
+from actionlib_core.shutdown import requested
+from actionlib_core.wire.encoding import check_encoding, encoding_of
+from actionlib_core.wire.presence import Kind
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.clock import Event
+    from actionlib_core.interfaces import Message, ServiceType
+    from actionlib_core.node import Node
+    from actionlib_core.time import Duration
+    from actionlib_core.transport import Reply
+
+CALL_TIMEOUT_S = 60.0  # default limit of a call
+APPEAR_S = 2.0  # how much of it a call gives a server to appear
+FOREVER_S = 1e8  # for the network, which wants a number: three years
+STALE_S = 0.2  # a server that vanishes so soon after a call may have been gone before it
+MARGIN_S = 1.0  # the network gives up after the call itself has
+
+
+class ServiceEnd(End):
+    """What server and proxy share."""
+
+    _what = "service"
+    _kind = Kind.SERVICE
+
+    def __init__(self, name: str, service_class: type[ServiceType], node: Node | None) -> None:
+        kind = "service class, such as SetBool"
+        check_class(f"service {name!r}", service_class, "_request_class", kind)
+        super().__init__(name, service_class, node)
+        self.service_class = service_class
+        self.request_class = service_class._request_class
+        self.response_class = service_class._response_class
+
+    def _watch(self) -> NameWatch:
+        return NameWatch(self.node, self._own, {Kind.SERVICE})
+
+
+def is_from(name: str, text: str) -> bool:
+    """Tell whether `text` is that of an error of the service `name`."""
+    return text.startswith(f"service /{name}: ")
+
+
+def handler_raised(name: str, remote_type: str, remote_text: str) -> ServiceException:
+    """Return the error for a handler that raised."""
+    return ServiceException(
+        name,
+        f"the handler raised {remote_type or 'an error'}: {remote_text}",
+        remote_type=remote_type,
+        remote_text=remote_text,
+    )
+
+
+class ServiceProxy(ServiceEnd):
+    """Calls a service: `proxy(request)`, `proxy(data=True)`, `proxy(True)`.
+
+    Args:
+        name: Service name, relative, absolute or private.
+        service_class: The service's class, `SetBool` for example.
+        persistent: As rospy takes it; there is no connection to keep here.
+        headers: As rospy takes it; not sent.
+        timeout: Longest time of a call [s], waiting for the server to appear included; None waits
+            until the server has answered or died.
+        node: Where it lives; the node in force when None.
+
+    Raises:
+        InvalidDurationError: `timeout` is no time, or negative.
+        InvalidNameError: the name breaks the ROS rules.
+        NodeError: the node is closed.
+
+    Threads: any number of threads may call at the same time; a transport callback may not.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        service_class: type[ServiceType],
+        persistent: bool = False,
+        headers: dict[str, str] | None = None,
+        *,
+        timeout: float | Duration | None = CALL_TIMEOUT_S,
+        node: Node | None = None,
+    ) -> None:
+        super().__init__(name, service_class, node)
+        self.persistent = persistent
+        self.headers = headers
+        self.timeout = check_limit(f"service {name!r}", "timeout", timeout)
+        # Programs make proxies as they need them and never close them, so they share what lasts.
+        key = ("service", self.resolved_name, self.type, self.md5sum)
+        self._ends = self.node.shared(key, self._watch)
+
+    def close(self) -> None:
+        """Make later calls fail, and those under way at once; a second call does nothing."""
+        self._leave()
+
+    def _leave(self) -> None:
+        self._closed = True
+        self._ends.wake()
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Call the service; see `call`."""
+        return self.call(*args, **kwargs)
+
+    def call(self, *args: Any, **kwargs: Any) -> Any:
+        """Send a request, or one made from the arguments, and return the response.
+
+        Raises:
+            FieldError: a value does not fit its field of the request.
+            ServiceException: the handler raised; type and text are on the error.
+            ServiceUnavailableError: there is no server.
+            ServiceTimeoutError: the server did not answer in time.
+            ServiceLostError: the server died or left during the call.
+            ServiceBusyError: too many calls are under way there, its handler calls itself, or no
+                thread is left.
+            TypeMismatchError: the server has another type.
+            NodeError: the node is closed, or the program is to end.
+
+        Blocks: until the answer, `timeout` at most.
+        """
+        if len(args) == 1 and not kwargs and isinstance(args[0], self.request_class):
+            request = args[0]
+        else:
+            request = self.request_class(*args, **kwargs)
+        clock = self.node.clock
+        start = clock.now()
+        self._find_server()
+        left = None if self.timeout is None else max(self.timeout - (clock.now() - start), 0.0)
+        return self._read(self._ask(request.to_bytes(), left))
+
+    def wait_for_service(self, timeout: float | Duration | None = None) -> None:
+        """Wait until there is a server.
+
+        Args:
+            timeout: Longest wait [s]; None waits until the node closes or the program is to end.
+
+        Raises:
+            InvalidDurationError: `timeout` is no time, or negative.
+            WaitTimeoutError: there is none in time.
+            TypeMismatchError: there is one, but of another type.
+            NodeError: the node was closed, or the program is to end.
+
+        Blocks: see `timeout`.
+        """
+        seconds = check_limit(f"service /{self.resolved_name}", "timeout", timeout)
+        if not self._wait_for_server(seconds):
+            raise WaitTimeoutError(
+                f"/{self.resolved_name}: no server: got none in {_show(seconds)}; expected one of "
+                f"type {self.type}. Try 'actionlib service list'."
+            )
+
+    def _wait_for_server(self, timeout: float | None) -> bool:
+        self._ends.wait(lambda: self._closed or bool(self._ends.ends(any_type=True)), timeout)
+        if self._closed:
+            raise NodeError(f"/{self.resolved_name}: not called: the proxy is closed.")
+        if self._ends.ends():
+            return True
+        if self.mismatches:
+            raise self.mismatches[0]
+        if self.node.closed or (timeout is None and requested()):
+            raise NodeError(
+                f"/{self.resolved_name}: not called: the node was closed or the program is to end."
+            )
+        return False
+
+    def _find_server(self) -> None:
+        longest = APPEAR_S if self.timeout is None else min(self.timeout, APPEAR_S)
+        if not self._wait_for_server(longest):
+            raise ServiceUnavailableError(
+                self.resolved_name,
+                f"no server: got none in {longest:g} s; expected one of type {self.type}. Try "
+                "starting it, or wait_for_service() first.",
+            )
+
+    def _ask(self, payload: bytes, timeout: float | None) -> Reply:
+        """Return the first reply.
+
+        Blocks: until the first, or until none can come any more.
+        """
+        replies: list[Reply] = []
+        done: list[bool] = []
+        news = self.node.clock.event(f"the answer of service /{self.resolved_name}")
+
+        def on_reply(reply: Reply) -> None:
+            replies.append(reply)
+            news.set()
+
+        def on_done() -> None:
+            done.append(True)
+            news.set()
+
+        query = self.node.transport.query(
+            self.resolved_name,
+            payload,
+            encoding=encoding_of(self.service_class),
+            timeout=FOREVER_S if timeout is None else timeout + MARGIN_S,
+            on_reply=on_reply,
+            on_done=on_done,
+        )
+
+        def settled() -> bool:
+            return bool(replies or done or self._closed)
+
+        try:
+            in_time = self._wait_for_answer(settled, timeout, news)
+        finally:
+            query.close()
+        if replies:
+            return replies[0]
+        raise self._explain_silence(timeout, in_time=in_time)
+
+    def _wait_for_answer(
+        self, settled: Callable[[], bool], timeout: float | None, news: Event
+    ) -> bool:
+        """Wait until a call is settled, or whoever may have got it is gone; return whether.
+
+        When the servers that were known at the call go right after it, a new one that has just
+        taken the name has got it: its token may be later here than the answer.
+        """
+        now, servers = self.node.clock.now, self._ends
+        start = now()
+        asked = set(servers.ends())
+
+        def over() -> bool:
+            return settled() or asked.isdisjoint(servers.ends())
+
+        in_time = servers.wait(over, timeout, news)
+        stale = start + STALE_S - now()
+        if in_time and stale > 0:
+            servers.wait(lambda: settled() or bool(servers.ends()), stale, news)
+            asked = set(servers.ends())
+            left = None if timeout is None else start + timeout - now()
+            in_time = servers.wait(over, left, news)
+        return in_time
+
+    def _explain_silence(self, timeout: float | None, *, in_time: bool) -> ActionlibError:
+        if self._closed:
+            return NodeError(f"/{self.resolved_name}: no answer: the proxy was closed.")
+        if in_time:
+            return ServiceLostError(
+                self.resolved_name, "the server died or left before it answered."
+            )
+        if self.node.closed or timeout is None:
+            return NodeError(
+                f"/{self.resolved_name}: no answer: the node was closed or the program is to end."
+            )
+        return ServiceTimeoutError(
+            self.resolved_name,
+            f"no answer: got none in {self.timeout:g} s; expected one from the server that is "
+            "there. Try a longer timeout.",
+        )
+
+    def _read(self, reply: Reply) -> Message:
+        if not reply.error:
+            check_encoding(reply.encoding, self.service_class, name=self.resolved_name)
+            return self.response_class.from_bytes(reply.payload)
+        text = reply.payload.decode(errors="replace")
+        try:
+            told = json.loads(text)
+            remote_type, remote_text = str(told["type"]), str(told["text"])
+        except (ValueError, TypeError, KeyError):  # a server that is not ours says it its own way
+            remote_type, remote_text = "", text
+        if remote_type == TypeMismatchError.__name__:
+            self._raise_mismatch(remote_text)
+        busy = remote_type == ServiceBusyError.__name__
+        if busy and is_from(self.resolved_name, remote_text):  # else it is one that it called
+            _, _, reason = remote_text.partition(": ")
+            raise ServiceBusyError(self.resolved_name, reason)
+        raise handler_raised(self.resolved_name, remote_type, remote_text)
+
+    def _raise_mismatch(self, remote_text: str) -> None:
+        """Raise the mismatch that the tokens show, rather than the server's words."""
+        if self.mismatches:
+            raise self.mismatches[0]
+        raise ServiceException(
+            self.resolved_name,
+            f"the server has another type: {remote_text}",
+            remote_type=TypeMismatchError.__name__,
+            remote_text=remote_text,
+        )
+
+
+def wait_for_service(
+    service: str, timeout: float | Duration | None = None, *, node: Node | None = None
+) -> None:
+    """Wait until a service of that name has a server, of whatever type.
+
+    Args:
+        service: Service name, relative, absolute or private.
+        timeout: Longest wait [s]; None waits until the node closes or the program is to end.
+        node: Where to look; the node in force when None.
+
+    Raises:
+        InvalidDurationError: `timeout` is no time, or negative.
+        WaitTimeoutError: there is none in time.
+        NodeError: the node was closed, or the program is to end.
+
+    Blocks: see `timeout`.
+    """
+    node = get_node() if node is None else node
+    name = node.resolve(service, "service name")
+    seconds = check_limit(f"service {service!r}", "timeout", timeout)
+    anybody = node.endpoint(Kind.SERVICE, name, "", "")
+    watch = NameWatch(node, anybody, {Kind.SERVICE}, any_type=True)
+    try:
+        if watch.wait(lambda: bool(watch.ends(any_type=True)), seconds):
+            return
+    finally:
+        watch.close()
+    if seconds is None or node.closed:
+        raise NodeError(f"/{name}: not there: the node was closed or the program is to end.")
+    raise WaitTimeoutError(
+        f"/{name}: no server: got none in {seconds:g} s; expected one. "
+        "Try 'actionlib service list'."
+    )
+
+
+def _show(seconds: float | None) -> str:
+    return "all the time" if seconds is None else f"{seconds:g} s"

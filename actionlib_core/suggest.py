@@ -1,0 +1,25 @@
+"""The hint of an error text that names what may have been meant."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+def did_you_mean(word: object, known: Iterable[object], most: int = 1) -> str:
+    """Return " Did you mean 'x' or 'y'?" for the nearest of `known`, "" when nothing is near.
+
+    Args:
+        word: What was given.
+        known: What could have been.
+        most: How many of them are shown.
+    """
+    import difflib  # errors are rare, imports are not
+
+    names, text = [str(name) for name in known], str(word)
+    near = [name for name in names if name.lower() == text.lower()]
+    near += difflib.get_close_matches(text, names, n=most, cutoff=0.5)
+    shown = list(dict.fromkeys(near))[:most]
+    return f" Did you mean {' or '.join(map(repr, shown))}?" if shown else ""

@@ -1,0 +1,166 @@
+"""Who is there: the liveliness tokens of action servers, clients, services and topics.
+
+Every end of a name shows one token while it lives. The token's key carries everything that tools
+and clients need to know, so nothing is asked and nothing polls:
+
+    @smachpy/<kind>/<session>/<entity>/<node>/<type>/<md5>/<name ...>
+
+`session` is the network session's id, `entity` a number within it, `node` the node's full name;
+slashes in `node` and `type` are written `%`, an empty word is written `-`. The name comes last with
+its own slashes, so `@smachpy/*/*/*/*/*/*/robot_1/**` is everything of one robot.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
+
+from actionlib_core.exceptions import TypeMismatchError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from actionlib_core.transport import Transport
+
+ROOT = "@smachpy"
+WORDS_BEFORE_NAME = 7
+LIST_TIMEOUT_S = 1.0  # longest wait for the network to say who is there
+
+
+class Kind(StrEnum):
+    """What an end of a name does there."""
+
+    ACTION_SERVER = "action_server"
+    ACTION_CLIENT = "action_client"
+    SERVICE = "service"
+    PUBLISHER = "publisher"
+    SUBSCRIBER = "subscriber"
+
+
+class Endpoint(NamedTuple):
+    """One end of a name, as its token says.
+
+    Attributes:
+        kind: What it does.
+        name: Full name of the action, service or topic, no slash in front.
+        type: "pkg/Type".
+        md5: Checksum of the type.
+        session: Id of its network session.
+        node: Full name of its node.
+        entity: Its number within the session.
+    """
+
+    kind: Kind
+    name: str
+    type: str
+    md5: str
+    session: str
+    node: str
+    entity: int = 0
+
+    @property
+    def age(self) -> tuple[int, str]:
+        """The greater, the later the end came; see `with_age`."""
+        return self.entity, self.session
+
+
+def with_age(endpoint: Endpoint, now_ns: int) -> Endpoint:
+    """Return `endpoint` with a number that tells its age: milliseconds, then its own number.
+
+    For names that only one may have: of two, the older stays.
+    """
+    entity = now_ns // 1_000_000 * 1_000_000 + endpoint.entity % 1_000_000
+    return endpoint._replace(entity=entity)
+
+
+def is_younger(endpoint: Endpoint, other: Endpoint) -> bool:
+    """Tell whether `endpoint` came after `other`; both sides say the same."""
+    return endpoint.age > other.age
+
+
+@lru_cache(maxsize=1024)  # every goal names its server
+def token_key(endpoint: Endpoint) -> str:
+    """Return the key of the token that shows `endpoint`."""
+    kind, name, type_name, md5, session, node, entity = endpoint
+    words = (kind.value, session, str(entity), node, type_name, md5)
+    return "/".join((ROOT, *(_pack(word) for word in words), name))
+
+
+def parse_token(key: str) -> Endpoint | None:
+    """Return what a token's key says, None when it is none of ours."""
+    words = key.split("/", WORDS_BEFORE_NAME)
+    if len(words) <= WORDS_BEFORE_NAME or words[0] != ROOT:
+        return None
+    _, kind, session, entity, node, type_name, md5, name = words
+    try:
+        return Endpoint(
+            Kind(kind),
+            name,
+            _unpack(type_name),
+            _unpack(md5),
+            session,
+            _unpack(node),
+            int(entity),
+        )
+    except ValueError:
+        return None
+
+
+def token_pattern(kind: Kind | None = None, name: str = "**", *, session: str = "*") -> str:
+    """Return the pattern of the tokens of a kind and a name, to watch or list them.
+
+    Args:
+        kind: None for every kind.
+        name: Full name, or a pattern: "**" is every name, "robot_1/**" those of one robot.
+        session: Only those of this session.
+    """
+    return f"{ROOT}/{kind.value if kind else '*'}/{session}/*/*/*/*/{name}"
+
+
+def in_conflict(
+    own: Endpoint, other: Endpoint, *, stays: bool = False
+) -> tuple[tuple[str, str], tuple[str, str]]:
+    """Return (node, session) of the one of two servers that gives way, and of the one that stays.
+
+    `own` gives way; `stays`: the other one does.
+    """
+    gives, keeps = (other, own) if stays else (own, other)
+    return (gives.node, gives.session), (keeps.node, keeps.session)
+
+
+def list_endpoints(
+    transport: Transport,
+    *,
+    kind: Kind | None = None,
+    name: str = "**",
+    timeout: float = LIST_TIMEOUT_S,
+) -> list[Endpoint]:
+    """Return the ends that are there now, sorted.
+
+    Blocks: until the network has answered, `timeout` [s] at most.
+    """
+    keys = transport.list_alive(token_pattern(kind, name), timeout)
+    found = (parse_token(key) for key in keys)
+    return sorted(endpoint for endpoint in found if endpoint is not None)
+
+
+def find_mismatch(endpoints: Iterable[Endpoint], own: Endpoint) -> TypeMismatchError | None:
+    """Return the error of the first end that has another type than `own`, None when all agree."""
+    for other in endpoints:
+        if (other.type, other.md5) != (own.type, own.md5):
+            return TypeMismatchError(
+                own.name,
+                (own.type, own.md5),
+                (other.type, other.md5),
+                by=f"{other.kind} in node {other.node!r}",
+            )
+    return None
+
+
+def _pack(word: str) -> str:
+    return word.replace("/", "%") or "-"
+
+
+def _unpack(word: str) -> str:
+    return "" if word == "-" else word.replace("%", "/")

@@ -1,0 +1,274 @@
+"""Demo action: a server that counts to n, one step a second, made of two callbacks.
+
+    DEMO_ACTION
+      COUNT     counts to n and waits for the end
+      PREEMPT   counts to 10 and is preempted on the way
+      SEVERAL   counts to 1, 2 and 3 at once, on the server that runs any number of goals
+
+Run all of it: `smachpy run demo_action`. As two programs:
+
+    smachpy run demo_action.server
+    smachpy run demo_action.client -- 10 4
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import smachpy
+from actionlib_core.action.server import ActionServer
+from actionlib_core.action.simple_server import SimpleActionServer
+from actionlib_core.clock import current_clock
+from missions.interfaces import (
+    Demo_actionAction,
+    Demo_actionFeedback,
+    Demo_actionGoal,
+    Demo_actionResult,
+)
+from smachpy import Concurrence, SimpleActionState, StateMachine
+from smachpy.states import MissionError, serve_during, serving_machine
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.action.server import ServerGoalHandle
+    from actionlib_core.clock import Clock, Event, Task
+    from actionlib_core.node import Node
+
+NAME = "demo_action"
+SEVERAL = "demo_action_several"
+STEP = 1.0  # [s]
+MARGIN = 5.0  # [s] a count may take so much longer than it should
+
+
+def count_steps(
+    clock: Clock, number: int, stop: Event, show: Callable[[int], object]
+) -> tuple[int, bool]:
+    """Count from 1 to `number`, one step a second.
+
+    Args:
+        clock: Time.
+        number: Where to stop.
+        stop: Ends it early, at once.
+        show: Called with each number.
+
+    Returns:
+        The last number, and whether it was stopped before it came to the end.
+
+    Blocks: `number` seconds at most.
+    """
+    start = clock.now()
+    for current in range(1, number + 1):
+        if stop.wait(start + current * STEP - clock.now()):
+            return current - 1, True
+        show(current)
+    return number, False
+
+
+class DemoActionServer:
+    """Counts for one client at a time: a newer goal preempts the older, as in ROS 1.
+
+    Args:
+        node: Where it is on the network; None takes the node in force.
+
+    Threads: the two callbacks run one at a time, in a thread of the server's; the count in
+        another, so that the callbacks are free to stop it.
+    """
+
+    def __init__(self, *, node: Node | None = None) -> None:
+        self._clock = current_clock() if node is None else node.clock
+        self._stop = self._clock.event("a reason to stop counting")
+        self._counting: Task | None = None
+        self._last = 0
+        self._closing = False
+        self._server = SimpleActionServer(NAME, Demo_actionAction, auto_start=False, node=node)
+        self._server.register_goal_callback(self.on_goal)
+        self._server.register_preempt_callback(self.on_preempt)
+        self._server.start()
+
+    def on_goal(self) -> None:
+        """The goal callback: accept the goal and begin to count."""
+        waiting = self._server.next_goal
+        if waiting is None or self._closing:  # a still newer goal has taken its place
+            return
+        trouble = _trouble(waiting.get_goal().count)
+        if trouble:
+            self._server.set_rejected(text=trouble)
+            return
+        goal = self._server.accept_new_goal()
+        self._stop.clear()
+        self._last = 0
+        if self._server.is_preempt_requested():  # cancelled in the same moment
+            self._server.set_preempted(Demo_actionResult(0), "stopped at 0")
+            return
+        self._counting = self._clock.spawn(lambda: self._count(goal.count), name=NAME)
+
+    def on_preempt(self) -> None:
+        """The preempt callback: stop counting and say how far it got."""
+        self._stop.set()
+        if self._counting is not None:
+            self._counting.join()
+        if self._server.is_active():  # it had not come to its end
+            self._server.set_preempted(Demo_actionResult(self._last), f"stopped at {self._last}")
+
+    def close(self) -> None:
+        """Leave the network; a count that runs is stopped."""
+        self._closing = True
+        self.on_preempt()
+        self._server.stop()
+
+    def _count(self, number: int) -> None:
+        self._last, stopped = count_steps(self._clock, number, self._stop, self._show)
+        if not stopped:
+            self._server.set_succeeded(Demo_actionResult(self._last), f"counted to {number}")
+
+    def _show(self, current: int) -> None:
+        self._server.publish_feedback(Demo_actionFeedback(current))
+
+
+class SeveralServer:
+    """Counts for any number of goals at once: each has a handle and a thread of its own.
+
+    Args:
+        node: Where it is on the network; None takes the node in force.
+    """
+
+    def __init__(self, *, node: Node | None = None) -> None:
+        self._clock = current_clock() if node is None else node.clock
+        self._stops: dict[str, Event] = {}
+        self._server = ActionServer(
+            SEVERAL, Demo_actionAction, self.on_goal, self.on_cancel, auto_start=False, node=node
+        )
+        self._server.start()
+
+    def on_goal(self, handle: ServerGoalHandle) -> None:
+        """Accept a goal and count for it in a thread of its own."""
+        number = handle.get_goal().count
+        trouble = _trouble(number)
+        if trouble:
+            handle.set_rejected(text=trouble)
+            return
+        handle.set_accepted()
+        stop = self._clock.event("a reason to stop counting")
+        self._stops[handle.get_goal_id().id] = stop
+        self._clock.spawn(lambda: self._count(handle, number, stop), name=SEVERAL)
+
+    def on_cancel(self, handle: ServerGoalHandle) -> None:
+        """Stop the count of one goal; the others go on."""
+        stop = self._stops.get(handle.get_goal_id().id)
+        if stop is not None:
+            stop.set()
+
+    def close(self) -> None:
+        """Leave the network; all counts are stopped."""
+        for stop in tuple(self._stops.values()):
+            stop.set()
+        self._server.stop()
+
+    def _count(self, handle: ServerGoalHandle, number: int, stop: Event) -> None:
+        def show(current: int) -> None:
+            handle.publish_feedback(Demo_actionFeedback(current))
+
+        last, stopped = count_steps(self._clock, number, stop, show)
+        del self._stops[handle.get_goal_id().id]
+        if stopped:
+            handle.set_canceled(Demo_actionResult(last), f"stopped at {last}")
+        else:
+            handle.set_succeeded(Demo_actionResult(last), f"counted to {number}")
+
+
+def _trouble(count: int) -> str:
+    return "" if count >= 0 else f"count: got {count}; expected 0 or more"
+
+
+# -- the mission -----------------------------------------------------------------------------------
+
+
+@smachpy.mission(serves=[NAME, SEVERAL])
+def demo_action(count: int = 3, preempt_after: float = 2.5) -> StateMachine:
+    """Count to n; be preempted; count for several goals at once.
+
+    Args:
+        count: Where the first count ends.
+        preempt_after: When the second is preempted [s].
+    """
+    sm = StateMachine(outcomes=["succeeded", "aborted", "preempted"], name="DEMO_ACTION")
+    serve_during(sm, DemoActionServer, SeveralServer)
+    with sm:
+        sm.add("COUNT", count_to(count), {"succeeded": "PREEMPT"})
+        preempt = {"stopped": "SEVERAL", "succeeded": "SEVERAL"}
+        sm.add("PREEMPT", count_to(10, preempt_after), preempt)
+        sm.add("SEVERAL", several())
+    return sm
+
+
+def count_to(count: int, preempt_after: float | None = None) -> SimpleActionState:
+    """Send one goal and wait for its end; with `preempt_after` [s], it is 'stopped' then.
+
+    Raises:
+        MissionError: nobody can count to that number, or preempt then.
+    """
+    check_count(count)
+    if preempt_after is None:
+        return SimpleActionState(
+            NAME, Demo_actionAction, Demo_actionGoal(count), exec_timeout=count * STEP + MARGIN
+        )
+    if preempt_after <= 0.0:
+        raise MissionError(f"preempt_after: got {preempt_after:g}; expected more than 0 [s].")
+    return SimpleActionState(
+        NAME,
+        Demo_actionAction,
+        Demo_actionGoal(count),
+        timeout=preempt_after,
+        timeout_outcome="stopped",
+    )
+
+
+def several(counts: tuple[int, ...] = (1, 2, 3)) -> Concurrence:
+    """Send several goals at once; all of them run side by side."""
+    all_done = {f"TO_{count}": "succeeded" for count in counts}
+    both = Concurrence(
+        outcomes=["succeeded", "aborted", "preempted"],
+        default_outcome="aborted",
+        outcome_map={"succeeded": all_done},
+    )
+    with both:
+        for count in counts:
+            limit = count * STEP + MARGIN
+            state = SimpleActionState(
+                SEVERAL, Demo_actionAction, Demo_actionGoal(count), exec_timeout=limit
+            )
+            both.add(f"TO_{count}", state)
+    return both
+
+
+def check_count(count: int) -> None:
+    """Refuse a number that no server would count to.
+
+    Raises:
+        MissionError: it is negative, or larger than an int32.
+    """
+    if not 0 <= count < 2**31:
+        raise MissionError(f"count: got {count}; expected 0 to 2147483647.")
+
+
+# -- the two programs ------------------------------------------------------------------------------
+
+
+def server() -> StateMachine:
+    """Offer the action until Ctrl-C."""
+    return serving_machine("DEMO_ACTION_SERVER", DemoActionServer)
+
+
+def client(count: int = 10, preempt_after: float = 0.0) -> StateMachine:
+    """Count to n at a server that runs.
+
+    Args:
+        count: Where to stop.
+        preempt_after: When to preempt it [s]; 0: never.
+    """
+    sm = StateMachine(["succeeded", "aborted", "preempted"], name="DEMO_ACTION_CLIENT")
+    stop = {"stopped": "succeeded"} if preempt_after else {}
+    with sm:
+        sm.add("COUNT", count_to(count, preempt_after or None), stop)
+    return sm

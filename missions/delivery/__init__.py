@@ -1,0 +1,1 @@
+"""A delivery: through a door, to a person, and back whatever happens."""

@@ -1,0 +1,1 @@
+"""Exploring: drive to where the seen floor ends until all of it is on the map."""

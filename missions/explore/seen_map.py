@@ -1,0 +1,230 @@
+"""A map of what a robot's scanner has seen so far, and where the unseen begins."""
+
+from __future__ import annotations
+
+import math
+import threading
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from scipy import ndimage
+
+from missions.explore.scans import rays_of
+from smachpy.sim.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyMap
+from smachpy.states import Pose2D
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from actionlib_core.interfaces.sensor_msgs.msg import LaserScan
+
+    Cells = NDArray[np.bool_]
+
+RESOLUTION: Final = 0.1  # [m]
+_CHUNK: Final = 64  # cells by which the map grows at least
+_HIT_WEIGHT: Final = 3  # a hit counts as much as this many misses
+_NEAR: Final = 10  # cells between a border and a place to look at it from
+_DETOUR: Final = 1.0  # [m] added to a way, so that a small gap next to the robot can wait
+_LOOKED_AT: Final = 8  # cells around the border's nearest point that are not looked at twice
+_SPARE: Final = 0.1  # [m] of room besides, where the robot is to stop and turn
+_EIGHT: Final = np.ones((3, 3), dtype=np.bool_)  # neighbours, corners included
+
+
+@dataclass(frozen=True, slots=True)
+class Frontier:
+    """A place from which something unseen can be looked at.
+
+    Attributes:
+        pose: Where to stand, looking there.
+        border: The nearest point of the border to the unseen, x and y [m].
+        size: How long that border is [m].
+    """
+
+    pose: Pose2D
+    border: tuple[float, float]
+    size: float
+
+
+class SeenMap:
+    """A grid of what scans showed; it grows as needed.
+
+    Args:
+        robot_radius: Room that the robot needs around its centre on its way [m].
+        smallest: Borders shorter than this are no frontiers: gaps between rays, say [m].
+
+    Threads: every method may be called from any thread.
+    """
+
+    def __init__(self, robot_radius: float = 0.3, smallest: float = 1.0) -> None:
+        self._radius = robot_radius
+        self._smallest = smallest
+        self._lock = threading.Lock()
+        self._hits = np.zeros((0, 0), dtype=np.int32)
+        self._misses = np.zeros((0, 0), dtype=np.int32)
+        self._left = np.zeros((0, 0), dtype=np.bool_)  # borders that were looked at
+        self._refused = np.zeros((0, 0), dtype=np.bool_)  # places that could not be got to
+        self._x0 = self._y0 = 0  # cell numbers of the lower left cell
+
+    def add(self, scan: LaserScan, pose: Pose2D) -> None:
+        """Take in a scan made at `pose` (map frame)."""
+        rays = rays_of(scan, pose)
+        if not rays.ranges.size:
+            return
+        steps = np.arange(0.0, rays.ranges.max(), RESOLUTION / 2.0)
+        distances, angles = np.meshgrid(steps, rays.angles)
+        passed = distances < rays.ranges[:, None]
+        distances, angles = distances[passed], angles[passed]
+        xs, ys = pose.x + distances * np.cos(angles), pose.y + distances * np.sin(angles)
+        ends_x, ends_y = rays.ends(math.inf)
+        hit = rays.hits
+        with self._lock:
+            # The grid grows before any cell is numbered.
+            self._cells(np.append(ends_x, pose.x), np.append(ends_y, pose.y))
+            solid = self._cells(ends_x[hit], ends_y[hit])
+            free = self._cells(np.append(xs, pose.x), np.append(ys, pose.y))
+            passed_by = np.zeros(self._hits.shape, dtype=np.bool_)
+            passed_by[free] = True
+            passed_by[solid] = False  # the cell that a ray ends in is not one that it passed
+            self._misses += passed_by
+            self._hits[solid] += 1
+
+    def area(self) -> float:
+        """Return how much floor has been seen [m^2]."""
+        with self._lock:
+            return float(self._free().sum()) * RESOLUTION * RESOLUTION
+
+    def occupancy(self) -> OccupancyMap:
+        """Return what is known as a map."""
+        with self._lock:
+            cells = np.full(self._hits.shape, UNKNOWN, dtype=np.int8)
+            cells[self._free()] = FREE
+            cells[self._solid()] = OCCUPIED
+            origin = Pose2D(self._x0 * RESOLUTION, self._y0 * RESOLUTION, 0.0)
+        return OccupancyMap(cells, RESOLUTION, origin)
+
+    def best_frontier(self, here: Pose2D) -> Frontier | None:
+        """Return the frontier that shows most for its way from `here`; None: none can be got to.
+
+        What was left is not offered again.
+        """
+        with self._lock:
+            border, lengths = self._border()
+            if not border.any():
+                return None
+            # Near the border, and not just on the other side of a wall.
+            near = ndimage.binary_dilation(
+                border > 0, structure=_EIGHT, iterations=_NEAR, mask=self._free()
+            )
+            places = self._room(self._radius + _SPARE) & near & ~self._refused
+            _, (rows, columns) = ndimage.distance_transform_edt(border == 0, return_indices=True)
+            labels = np.where(places, border[rows, columns], 0)
+            reached = self._reach(self._room(self._radius), labels, here)
+            if not reached:
+                return None
+            label = max(reached, key=lambda n: lengths[n] * RESOLUTION / (reached[n][0] + _DETOUR))
+            _, row, column = reached[label]
+            at = int(rows[row, column]), int(columns[row, column])
+            rows, columns = np.nonzero(border == label)
+            yaw = math.atan2(float(rows.mean()) - row, float(columns.mean()) - column)
+            pose = Pose2D(*self._centre(row, column), yaw)
+            return Frontier(pose, self._centre(*at), float(lengths[label]) * RESOLUTION)
+
+    def leave(self, frontier: Frontier, *, reached: bool) -> None:
+        """Do not offer this again: a border that was looked at, or a place out of reach."""
+        (x, y), reach = frontier.border, _LOOKED_AT
+        if not reached:
+            x, y, _ = frontier.pose
+            reach = math.ceil(2.0 * self._radius / RESOLUTION)
+        offsets = np.arange(-reach, reach + 1) * RESOLUTION
+        dx, dy = np.meshgrid(offsets, offsets)
+        disc = np.hypot(dx, dy) <= reach * RESOLUTION
+        with self._lock:
+            cells = self._cells(x + dx[disc], y + dy[disc])  # the grid may grow
+            (self._left if reached else self._refused)[cells] = True
+
+    # -- the grid: called with the lock --------------------------------------------------------
+
+    def _cells(
+        self, xs: NDArray[np.float64], ys: NDArray[np.float64]
+    ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Return the cells of points, each cell once; the grid grows to hold them."""
+        columns = np.floor(xs / RESOLUTION).astype(np.intp)
+        rows = np.floor(ys / RESOLUTION).astype(np.intp)
+        if not rows.size:
+            return rows, columns
+        self._grow(rows, columns)
+        width = self._hits.shape[1]
+        flat = np.unique((rows - self._y0) * width + columns - self._x0)
+        return flat // width, flat % width
+
+    def _grow(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> None:
+        height, width = self._hits.shape
+        if not height:
+            self._y0, self._x0 = int(rows.min()), int(columns.min())
+        below, left = self._y0 - int(rows.min()), self._x0 - int(columns.min())
+        above = int(rows.max()) - (self._y0 + height - 1)
+        right = int(columns.max()) - (self._x0 + width - 1)
+        below, above, left, right = (
+            n + _CHUNK if n > 0 else 0 for n in (below, above, left, right)
+        )
+        if below or above or left or right:
+            frame = ((below, above), (left, right))
+            self._hits, self._misses = np.pad(self._hits, frame), np.pad(self._misses, frame)
+            self._left, self._refused = np.pad(self._left, frame), np.pad(self._refused, frame)
+            self._y0, self._x0 = self._y0 - below, self._x0 - left
+
+    def _centre(self, row: int, column: int) -> tuple[float, float]:
+        return (self._x0 + column + 0.5) * RESOLUTION, (self._y0 + row + 0.5) * RESOLUTION
+
+    def _solid(self) -> Cells:
+        return (self._hits > 0) & (_HIT_WEIGHT * self._hits >= self._misses)
+
+    def _free(self) -> Cells:
+        return (self._misses > 0) & ~self._solid()
+
+    def _room(self, radius: float) -> Cells:
+        """Return the free cells with so much room [m] around them, as far as is known."""
+        free, solid = self._free(), self._solid()
+        if not solid.any():
+            return free
+        clear: Cells = ndimage.distance_transform_edt(~solid) * RESOLUTION > radius
+        return free & clear
+
+    def _border(self) -> tuple[NDArray[np.int32], NDArray[np.intp]]:
+        """Return the seen cells beside unseen ones, numbered by frontier, and their lengths."""
+        free = self._free()
+        unseen = ~free & ~self._solid()
+        beside = ndimage.binary_dilation(np.pad(unseen, 1, constant_values=True))[1:-1, 1:-1]
+        labels, _ = ndimage.label(free & beside & ~self._left, structure=_EIGHT)
+        lengths = np.bincount(labels.ravel())
+        labels[lengths[labels] * RESOLUTION < self._smallest] = 0
+        return labels.astype(np.int32), lengths
+
+    def _reach(
+        self, room: Cells, labels: NDArray[np.int32], here: Pose2D
+    ) -> dict[int, tuple[float, int, int]]:
+        """Return for each label the nearest cell through `room`: distance [m], row, column."""
+        column, row = math.floor(here.x / RESOLUTION), math.floor(here.y / RESOLUTION)
+        row, column = row - self._y0, column - self._x0
+        reach = math.ceil(2.0 * self._radius / RESOLUTION)  # it may stand where there is no room
+        around = np.s_[
+            max(0, row - reach) : row + reach + 1, max(0, column - reach) : column + reach + 1
+        ]
+        start = np.zeros(room.shape, dtype=np.bool_)
+        start[around] = room[around]
+        width = room.shape[1] + 2
+        free, wanted = np.pad(room, 1).ravel(), np.pad(labels, 1).ravel()  # no way over the edge
+        steps = np.array([dr * width + dc for dr in (-1, 0, 1) for dc in (-1, 0, 1)])
+        found: dict[int, tuple[float, int, int]] = {}
+        wave, distance = np.flatnonzero(np.pad(start, 1)), 0.0
+        while wave.size:
+            for label, first in zip(*np.unique(wanted[wave], return_index=True), strict=True):
+                if label and label not in found:
+                    cell = int(wave[first])
+                    found[int(label)] = distance, cell // width - 1, cell % width - 1
+            free[wave] = False
+            wave = (wave[:, None] + steps).ravel()
+            wave = np.unique(wave[free[wave]])
+            distance += RESOLUTION
+        return found

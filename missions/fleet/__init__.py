@@ -1,0 +1,1 @@
+"""A fleet: robots that deliver parcels, a coordinator, and docks that they share."""

@@ -1,0 +1,308 @@
+"""Fleet: robots that deliver parcels, a coordinator that hands the orders out, docks they share.
+
+    FLEET           a robot's line each, all at once
+      ROBOT_0
+        NEXT        waits for what it is to do
+        DELIVER     -> NEXT: its action robot_0/deliver
+        RECHARGE    -> NEXT: its action robot_0/recharge
+        PARK        -> NEXT: drives home when there is nothing to do
+      ROBOT_1 ...
+
+This is the coordinator. Each robot has a mission of its own, `missions.fleet.robot`; what happens
+to an order whose robot dies is in `missions.fleet.order_book`.
+
+Run it, with eight robots as processes: `smachpy run fleet -- --robots 8`
+"""
+
+from __future__ import annotations
+
+import random
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import smachpy
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
+from missions.fleet.dispatcher import Dispatcher, Robot
+from missions.fleet.order_book import Order, Stage
+from missions.fleet.processes import RobotProcesses
+from missions.fleet.site import load_site
+from missions.interfaces import DeliverAction, DeliverGoal, RechargeAction, RechargeGoal
+from smachpy import Concurrence, SimpleActionState, State, StateMachine, UserData
+from smachpy.sim.maps import OFFICE_FLEET
+from smachpy.states import MissionError, drive_to, goal_at, pose_of, serve_during
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from actionlib_core.interfaces.geometry_msgs.msg import Pose
+    from missions.fleet.site import Site
+    from missions.interfaces import DeliverResult, RechargeResult
+    from smachpy.states import Pose2D, Waypoint
+
+MOST = 100  # robots in one fleet
+ACTIONS = ("deliver", "recharge", "move_base")  # of each
+ORDER_LIMIT = 900.0  # [s] an order that takes longer is called off
+DOCK_LIMIT = 1800.0  # [s] likewise a charge
+WAY_LIMIT = 300.0  # [s] likewise a way home
+START_LIMIT = 60.0  # [s] a robot that does not take its goal within this is lost
+
+
+@smachpy.mission(
+    serves=[f"/robot_{n}/{action}" for n in range(MOST) for action in ACTIONS],
+    real_time="its robots are processes of their own",
+    robots="start",
+)
+def fleet(
+    robots: int = 8,
+    orders: int = 16,
+    *,
+    lose: int = 0,
+    seed: int = 1,
+    site: Path = OFFICE_FLEET,
+    together: bool = False,
+    start: bool = True,
+) -> Concurrence:
+    """Deliver parcels with several robots that share docks.
+
+    Args:
+        robots: How many, called robot_0, robot_1 and so on.
+        orders: How many parcels, between places that the seed picks.
+        lose: So many robots are killed while they have a parcel aboard.
+        seed: Picks the places.
+        site: The YAML file that lists docks, homes and places.
+        together: The bodies of all robots are on one floor, and see each other.
+        start: Start the robots, simulated, as processes; else they must run already.
+
+    Raises:
+        MissionError: the numbers do not fit the site.
+        InputFileError: the file is wrong; with the line and field of every problem.
+    """
+    place = load_site(Path(site))
+    check_numbers(robots, orders, lose, place)
+    if together and lose:
+        raise MissionError(
+            f"lose: got {lose} with together; expected 0: the body of a robot whose mission is "
+            "killed stays on their floor, where it drives on to its last goal."
+        )
+    if together and place.map is None:
+        raise MissionError(f"{site}: map: got none; expected one for the floor they share.")
+    team = [Robot(f"robot_{n}", place.homes[n].pose) for n in range(robots)]
+    processes = RobotProcesses(
+        team if start else [], place, Path(site), lose=lose, together=together
+    )
+    dispatcher = Dispatcher(
+        team,
+        make_orders(place.places, orders, seed),
+        place.docks,
+        low=place.low_battery,
+        on_permit=processes.on_permit,
+    )
+    sm = coordinator(dispatcher, place.charge_until)
+    serve_during(sm, dispatcher.serve, processes.start)
+    return sm
+
+
+def check_numbers(robots: int, orders: int, lose: int, site: Site) -> None:
+    """Refuse a fleet that does not fit its site.
+
+    Raises:
+        MissionError: with what was expected.
+    """
+    most = min(len(site.homes), MOST)
+    if not 1 <= robots <= most:
+        raise MissionError(f"robots: got {robots}; expected 1 to {most}: one for each home.")
+    if orders < 0:
+        raise MissionError(f"orders: got {orders}; expected 0 or more.")
+    if not 0 <= lose <= robots:
+        raise MissionError(f"lose: got {lose}; expected 0 to {robots}, of {robots} robots.")
+    if orders and len(site.places) < 2:  # noqa: PLR2004  from one place to another
+        raise MissionError(f"places: got {len(site.places)}; expected 2 or more for orders.")
+
+
+def make_orders(places: Sequence[Waypoint], count: int, seed: int) -> list[Order]:
+    """Return orders between places; the same seed gives the same ones."""
+    pick = random.Random(seed)  # noqa: S311  no secret
+    pairs = [pick.sample(list(places), 2) for _ in range(count)]
+    return [Order(f"order {n}", a, b) for n, (a, b) in enumerate(pairs, 1)]
+
+
+# -- the coordinator -------------------------------------------------------------------------------
+
+
+def coordinator(dispatcher: Dispatcher, charge_until: float) -> Concurrence:
+    """Let every robot work until no order is open.
+
+    Args:
+        dispatcher: Decides who does what.
+        charge_until: A robot leaves its dock at this charge, 0 to 1.
+    """
+    sm = Concurrence(
+        outcomes=["succeeded", "undelivered", "preempted"],
+        default_outcome="undelivered",
+        output_keys=["report"],
+        outcome_cb=partial(verdict, dispatcher),
+        name="FLEET",
+    )
+    sm.userdata.report = ""
+    sm.register_termination_cb(
+        lambda userdata, _final, _outcome: userdata.update({"report": dispatcher.finish()})
+    )
+    with sm:
+        for robot in dispatcher.robots:
+            sm.add(robot.name.upper(), line_of(robot, dispatcher, charge_until))
+    return sm
+
+
+def verdict(dispatcher: Dispatcher, outcomes: dict[str, str | None]) -> str:
+    """Return how the fleet's work ended."""
+    if "preempted" in outcomes.values():
+        return "preempted"
+    done = all(entry.stage is Stage.DELIVERED for entry in dispatcher.book.entries.values())
+    return "succeeded" if done else "undelivered"
+
+
+def line_of(robot: Robot, dispatcher: Dispatcher, charge_until: float) -> StateMachine:
+    """Let one robot do what the dispatcher says, until nothing is left for it."""
+    sm = StateMachine(outcomes=["done", "out", "lost", "preempted"])
+    with sm:
+        # Without a timeout: the last orders may come back from a robot that dies hours later.
+        tasks = {"deliver": "DELIVER", "recharge": "RECHARGE", "park": "PARK"}
+        sm.add("NEXT", Next(dispatcher, robot.name), tasks)
+        again = {"succeeded": "NEXT", "aborted": "NEXT"}
+        sm.add("DELIVER", delivering(robot.name, dispatcher), again)
+        sm.add("RECHARGE", recharging(robot, dispatcher, charge_until), again)
+        sm.add("PARK", parking(robot, dispatcher), {"succeeded": "NEXT", "aborted": "out"})
+    return sm
+
+
+class Next(State):
+    """Waits until the dispatcher has something for a robot."""
+
+    def __init__(self, dispatcher: Dispatcher, robot: str) -> None:
+        outcomes = ["deliver", "recharge", "park", "done", "out", "preempted"]
+        super().__init__(outcomes, output_keys=["task"])
+        self._dispatcher = dispatcher
+        self._robot = robot
+
+    def execute(self, userdata: UserData) -> str:
+        """Wait for it.
+
+        Blocks: until an order, a dock or the end has come.
+        """
+        forget = self.on_preempt(lambda: self._dispatcher.wake(self._robot))
+        try:
+            while not self.preempt_requested():
+                task = self._dispatcher.next_task(self._robot)
+                if task is not None:
+                    what, userdata.task = task
+                    return what
+                if (
+                    not self.preempt_requested()
+                ):  # a preempt before `next_task`: its wake is cleared
+                    self._dispatcher.wait(self._robot)
+        finally:
+            forget()
+        return "preempted"
+
+
+def delivering(robot: str, dispatcher: Dispatcher) -> SimpleActionState:
+    """Hand an order to a robot and wait for what becomes of it."""
+
+    def goal(userdata: UserData, _goal: DeliverGoal) -> DeliverGoal:
+        task = userdata.task
+        return DeliverGoal(
+            order=task.order,
+            attempt=task.attempt,
+            pickup=pose_message(task.pickup),
+            dropoff=pose_message(task.dropoff),
+        )
+
+    def note(userdata: UserData, status: int, result: DeliverResult) -> str | None:
+        if status == GoalStatus.LOST:
+            dispatcher.lost(robot, userdata.task)
+            return "lost"
+        dispatcher.charged(robot, result.charge)
+        if status == GoalStatus.SUCCEEDED:
+            dispatcher.delivered(robot, userdata.task)
+            return None
+        useful = dispatcher.failed(
+            robot, userdata.task, result.text or "no reason", aboard=result.aboard
+        )
+        return None if useful else "out"
+
+    return SimpleActionState(
+        f"/{robot}/deliver",
+        DeliverAction,
+        goal_cb=goal,
+        result_cb=note,
+        feedback_cb=partial(note_place, robot, dispatcher),
+        input_keys=["task"],
+        outcomes=["lost", "out"],
+        exec_timeout=ORDER_LIMIT,
+        server_wait_timeout=START_LIMIT,
+    )
+
+
+def recharging(robot: Robot, dispatcher: Dispatcher, charge_until: float) -> SimpleActionState:
+    """Send a robot to its dock, and home again."""
+
+    def goal(userdata: UserData, _goal: RechargeGoal) -> RechargeGoal:
+        return RechargeGoal(
+            dock=pose_message(userdata.task.pose),
+            outside=pose_message(robot.home),
+            until=charge_until,
+        )
+
+    def note(userdata: UserData, status: int, result: RechargeResult) -> str | None:
+        if status == GoalStatus.LOST:
+            dispatcher.lost_at(robot.name, userdata.task)
+            return "lost"
+        dispatcher.charged(robot.name, result.charge)
+        left = dispatcher.left_dock(robot.name, userdata.task, left=result.left)
+        if status != GoalStatus.SUCCEEDED:  # it cannot charge, so it can do nothing else
+            dispatcher.out_of_duty(robot.name)
+        return None if left and status == GoalStatus.SUCCEEDED else "out"
+
+    return SimpleActionState(
+        f"/{robot.name}/recharge",
+        RechargeAction,
+        goal_cb=goal,
+        result_cb=note,
+        feedback_cb=partial(note_place, robot.name, dispatcher),
+        input_keys=["task"],
+        outcomes=["lost", "out"],
+        exec_timeout=DOCK_LIMIT,
+        server_wait_timeout=START_LIMIT,
+    )
+
+
+def parking(robot: Robot, dispatcher: Dispatcher) -> SimpleActionState:
+    """Drive a robot home, so that it stands in nobody's way."""
+
+    def note(_userdata: UserData, status: int, _result: object) -> str | None:
+        if status == GoalStatus.SUCCEEDED:
+            dispatcher.parked(robot.name)
+            return None
+        dispatcher.out_of_duty(robot.name)
+        return "lost" if status == GoalStatus.LOST else None
+
+    return drive_to(
+        robot.home,
+        action=f"/{robot.name}/move_base",
+        result_cb=note,
+        outcomes=["lost"],
+        exec_timeout=WAY_LIMIT,
+        server_wait_timeout=START_LIMIT,
+    )
+
+
+def note_place(robot: str, dispatcher: Dispatcher, _userdata: UserData, feedback: Any) -> None:
+    """Tell the dispatcher where a robot is."""
+    dispatcher.seen(robot, pose_of(feedback.base_position.pose))
+
+
+def pose_message(pose: Pose2D) -> Pose:
+    """Return a pose as goals have it."""
+    message: Pose = goal_at(pose).target_pose.pose
+    return message

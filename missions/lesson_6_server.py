@@ -1,0 +1,69 @@
+"""Lesson 6, a machine as an action server: others send goals, the machine does them.
+
+    LOOK_AT_SERVER      runs for each goal of the action `look_at`
+      DRIVE             to the goal's pose; a cancel preempts it
+      TURN, TURN_BACK   all the way round, to see everything
+
+    LOOK_AT             the mission: brings the server along and sends it one goal
+      SEND
+
+Run it: `smachpy run look_at --start-robot`. The server alone: `smachpy run look_at.server`
+"""
+
+import smachpy
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseFeedback
+from smachpy import ActionServerWrapper, SimpleActionState, StateMachine, UserData
+from smachpy.states import Pose2D, drive_to, goal_at, serve_during, serving_machine, turn
+
+NAME = "look_at"
+ENDS = ["succeeded", "aborted", "preempted"]
+
+
+def tell_where(userdata: UserData, feedback: MoveBaseFeedback) -> None:
+    """Pass the robot's pose on to the client of `look_at`."""
+    userdata.feedback = feedback
+
+
+def go_and_look() -> StateMachine:
+    """Drive to the pose in the key `place`, and look all around."""
+    sm = StateMachine(ENDS, ["place", "feedback"], ["feedback"], name="LOOK_AT_SERVER")
+    drive = drive_to("place", feedback_cb=tell_where, output_keys=["feedback"])
+    with sm:
+        sm.add("DRIVE", drive, {"succeeded": "TURN"})
+        sm.add("TURN", turn(180.0), {"succeeded": "TURN_BACK"})
+        sm.add("TURN_BACK", turn(180.0))
+    return sm
+
+
+def offer() -> ActionServerWrapper:
+    """Put the action `look_at` on the network."""
+    server = ActionServerWrapper(
+        NAME,
+        MoveBaseAction,
+        go_and_look(),
+        succeeded_outcomes=["succeeded"],
+        goal_slots_map={"target_pose": "place"},  # field of the goal -> userdata key
+        feedback_key="feedback",
+    )
+    server.run_server()
+    return server
+
+
+@smachpy.mission(serves=[NAME])
+def look_at(x: float = 11.5, y: float = 8.0) -> StateMachine:
+    """Offer the action look_at, and look at a place by it.
+
+    Args:
+        x: Of the place [m], map frame.
+        y: Of the place [m], map frame.
+    """
+    send = SimpleActionState(NAME, MoveBaseAction, goal_at(Pose2D(x, y, 0.0)), exec_timeout=900.0)
+    sm = StateMachine(ENDS, name="LOOK_AT")
+    sm.add("SEND", send)
+    serve_during(sm, offer)  # from the start of each run to its end
+    return sm
+
+
+def server() -> StateMachine:
+    """Offer the action look_at until Ctrl-C."""
+    return serving_machine("LOOK_AT_SERVER", offer)

@@ -1,1 +1,0 @@
-"""Decisions of state machines without threads, time or input and output."""

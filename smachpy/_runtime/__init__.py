@@ -1,1 +1,0 @@
-"""What carries a running machine: frames, events, callbacks, preemption, child tasks."""

@@ -1,0 +1,337 @@
+"""`ActionServerWrapper`: a machine offered as an action."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.action.simple_server import SimpleActionServer
+from actionlib_core.wire.action_messages import ActionTypes
+from smachpy import log
+from smachpy.events import UserdataWritten
+from smachpy.exceptions import did_you_mean
+from smachpy.machines.problems import Problems
+from smachpy.run.grace import request_soon
+from smachpy.run.origin import asking
+from smachpy.userdata.user_data import Remapper, UserData
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+
+    from actionlib_core.action.server import OnClientLost
+    from actionlib_core.goal.single import Policy
+    from actionlib_core.node import Node
+    from smachpy.events import Event
+    from smachpy.machines.container import Container
+
+__all__ = ["ActionServerWrapper"]
+
+
+class ActionServerWrapper:
+    """Runs a container for each goal of an action; it is no state itself.
+
+    The goal is put into userdata before a run, the result is read from it afterwards. Feedback is
+    sent whenever the container's feedback key, or a key of `feedback_slots_map`, was written or has
+    changed at a transition. A cancel, or a newer goal, preempts the container.
+
+    Args:
+        server_name: Name of the action.
+        action_spec: Its class (XAction).
+        wrapped_container: What runs. It declares the keys below that it uses.
+        succeeded_outcomes: Its outcomes that mean SUCCEEDED.
+        aborted_outcomes: Those that mean ABORTED, as all do that are in no list; but 'preempted'
+            means PREEMPTED then, if the goal was to be preempted.
+        preempted_outcomes: Those that mean PREEMPTED.
+        goal_key: Gets the goal (XGoal).
+        feedback_key: Feedback (XFeedback); begins as an empty one with each goal.
+        result_key: Result (XResult); begins as an empty one with each goal.
+        goal_slots_map: Field of the goal -> key that gets it.
+        feedback_slots_map: Field of the feedback -> key that it is read from.
+        result_slots_map: Field of the result -> key that it is read from.
+        expand_goal_slots: Put every field of the goal into the key of its name.
+        pack_result_slots: Read every field of the result from the key of its name, if it is there.
+        node: Where the server is; the current node when None.
+        policy: What a new goal does while one runs; see `SimpleActionServer`.
+        on_client_lost: What happens to the goal of a client that died; likewise.
+
+    Attributes:
+        wrapped_container: See above.
+        userdata: What the container's input keys are copied from and its output keys to.
+
+    Raises:
+        ActionException: `action_spec` is no action class.
+        InvalidStateError: outcomes or fields do not exist or are listed twice, or an argument has
+            another type; all at once.
+
+    Threads: the container runs in the server's thread, one goal after the other.
+    """
+
+    def __init__(
+        self,
+        server_name: str,
+        action_spec: Any,
+        wrapped_container: Container,
+        succeeded_outcomes: Iterable[str] = (),
+        aborted_outcomes: Iterable[str] = (),
+        preempted_outcomes: Iterable[str] = (),
+        goal_key: str = "action_goal",
+        feedback_key: str = "action_feedback",
+        result_key: str = "action_result",
+        goal_slots_map: Mapping[str, str] | None = None,
+        feedback_slots_map: Mapping[str, str] | None = None,
+        result_slots_map: Mapping[str, str] | None = None,
+        expand_goal_slots: bool = False,
+        pack_result_slots: bool = False,
+        *,
+        node: Node | None = None,
+        policy: Policy = "preempt",
+        on_client_lost: OnClientLost = "continue",
+    ) -> None:
+        problems = Problems(f"ActionServerWrapper {server_name!r}")
+        problems.word("server_name", server_name)
+        self.wrapped_container = wrapped_container
+        self.userdata = UserData()
+        self._server_name = server_name
+        self._types = ActionTypes.of(action_spec)
+        self._outcomes = {
+            "succeeded_outcomes": problems.names("succeeded_outcomes", succeeded_outcomes),
+            "aborted_outcomes": problems.names("aborted_outcomes", aborted_outcomes),
+            "preempted_outcomes": problems.names("preempted_outcomes", preempted_outcomes),
+        }
+        self._goal_key = problems.word("goal_key", goal_key)
+        self._feedback_key = problems.word("feedback_key", feedback_key)
+        self._result_key = problems.word("result_key", result_key)
+        holds = "field -> userdata key"
+        self._goal_slots_map = problems.names_of("goal_slots_map", goal_slots_map, holds)
+        self._feedback_slots_map = problems.names_of(
+            "feedback_slots_map", feedback_slots_map, holds
+        )
+        self._result_slots_map = problems.names_of("result_slots_map", result_slots_map, holds)
+        self._expand_goal_slots = expand_goal_slots
+        self._pack_result_slots = pack_result_slots
+        if hasattr(wrapped_container, "register_transition_cb"):
+            problems.add(*self._outcome_problems())
+        else:
+            problems.add(f"wrapped_container: got {wrapped_container!r}; expected a container.")
+        problems.add(*self._slot_problems())
+        problems.raise_all()
+        self._lock = threading.Lock()
+        self._executing = False
+        self._feedback_sent = b""
+        self._unsubscribe: Callable[[], None] | None = None
+        self._action_server = SimpleActionServer(
+            server_name,
+            action_spec,
+            self.execute_cb,
+            False,  # noqa: FBT003  actionlib's flag
+            node=node,
+            policy=policy,
+            on_client_lost=on_client_lost,
+        )
+        wrapped_container.register_transition_cb(self.transition_cb)
+        wrapped_container.register_termination_cb(self.termination_cb)
+
+    def _outcome_problems(self) -> Iterator[str]:
+        known = self.wrapped_container.get_registered_outcomes()
+        listed: dict[str, str] = {}
+        for name, outcomes in self._outcomes.items():
+            for outcome in outcomes:
+                if outcome not in known:
+                    yield (
+                        f"{name}: got {outcome!r}; expected outcomes of the container: "
+                        f"{sorted(known)}.{did_you_mean(outcome, known)}"
+                    )
+                if outcome in listed:
+                    yield f"{name}: got {outcome!r}, which is in {listed[outcome]} too."
+                listed[outcome] = name
+
+    def _slot_problems(self) -> Iterator[str]:
+        for name, slots, message in (
+            ("goal_slots_map", self._goal_slots_map, self._types.goal),
+            ("feedback_slots_map", self._feedback_slots_map, self._types.feedback),
+            ("result_slots_map", self._result_slots_map, self._types.result),
+        ):
+            known = list(message.__slots__)
+            for slot in slots:
+                if isinstance(slot, str) and slot not in known:
+                    yield (
+                        f"{name}: got field {slot!r}; expected fields of {message._type}: {known}."
+                        f"{did_you_mean(slot, known)}"
+                    )
+
+    # -- life ----------------------------------------------------------------------------------
+
+    def run_server(self) -> None:
+        """Offer the action; returns at once.
+
+        Raises:
+            ServerConflictError: the name has a server already.
+        """
+        if self._unsubscribe is None:
+            self._unsubscribe = self.wrapped_container.subscribe(self._on_event)
+        self._action_server.register_preempt_callback(self.preempt_cb)
+        self._action_server.start()
+        log.loginfo(f"action server '{self._server_name}' offers a machine")
+
+    def stop(self) -> None:
+        """Preempt what runs and take the offer back; a second call does nothing.
+
+        Blocks: as `SimpleActionServer.stop`.
+        """
+        with self._lock:
+            executing = self._executing
+        if executing:
+            with asking("action", self._server_name, "the server stops"):
+                request_soon(self.wrapped_container)
+        self._action_server.stop()
+        if self._unsubscribe is not None:
+            self._unsubscribe()
+            self._unsubscribe = None
+
+    # -- goals ---------------------------------------------------------------------------------
+
+    def execute_cb(self, goal: Any) -> None:
+        """Run the container for `goal`; the action server calls it.
+
+        What the container raises goes through: the goal is ABORTED with its text.
+
+        Blocks: until the container has ended.
+        """
+        server = self._action_server
+        with self._lock:
+            if server.is_preempt_requested():
+                early = True
+            else:
+                early, self._executing = False, True
+        if early:
+            server.set_preempted(None, "preempted before it began")
+            return
+        try:
+            outcome = self._run(goal)
+        finally:
+            with self._lock:  # a preempt that comes too late does not stay for the next goal
+                self._executing = False
+                self.wrapped_container.recall_preempt()
+        result = self._make_result()
+        text = f"the machine ended with {outcome!r}"
+        if outcome in self._outcomes["succeeded_outcomes"]:
+            server.set_succeeded(result, text)
+        elif self._means_preempted(outcome):
+            server.set_preempted(result, text)
+        else:
+            server.set_aborted(result, text)
+
+    def _means_preempted(self, outcome: str) -> bool:
+        """Tell whether to answer PREEMPTED; unlisted, 'preempted' is, when asked for."""
+        if outcome in self._outcomes["preempted_outcomes"]:
+            return True
+        asked = outcome == "preempted" and self._action_server.is_preempt_requested()
+        return asked and outcome not in self._outcomes["aborted_outcomes"]
+
+    def _run(self, goal: Any) -> str:
+        container = self.wrapped_container
+        inputs = container.get_registered_input_keys()
+        outputs = container.get_registered_output_keys()
+        self._fill_userdata(goal)
+        for key in (self._feedback_key, self._result_key):
+            if key in outputs or _is_used(container, key):
+                container.userdata[key] = self.userdata[key]
+        self._feedback_sent = self.userdata[self._feedback_key].to_bytes()
+        return container.execute(Remapper(self.userdata, inputs, outputs))
+
+    def _fill_userdata(self, goal: Any) -> None:
+        userdata = self.userdata
+        if self._pack_result_slots:  # what an earlier goal left must not become a result
+            for slot in self._types.result.__slots__:
+                if slot in userdata:
+                    del userdata[slot]
+        if self._expand_goal_slots:
+            for slot in goal.__slots__:
+                userdata[slot] = getattr(goal, slot)
+        for slot, key in self._goal_slots_map.items():
+            userdata[key] = getattr(goal, slot)
+        userdata[self._goal_key] = goal
+        userdata[self._feedback_key] = self._types.feedback()
+        userdata[self._result_key] = self._types.result()
+
+    def _make_result(self) -> Any:
+        userdata = self.userdata
+        result = userdata[self._result_key]
+        if self._pack_result_slots:
+            for slot in result.__slots__:
+                if slot in userdata:
+                    setattr(result, slot, userdata[slot])
+        for slot, key in self._result_slots_map.items():
+            setattr(result, slot, userdata[key])
+        return result
+
+    def preempt_cb(self) -> None:
+        """Preempt the container; the action server calls it."""
+        with self._lock:  # so that it never hits the run of the next goal; nothing here waits
+            if self._executing and self._action_server.is_preempt_requested():
+                with asking("action", self._server_name, self._why()):
+                    request_soon(self.wrapped_container)
+
+    def _why(self) -> str:
+        """Say whether a cancel or a newer goal asks; goal ids begin with the client's name."""
+        newer, current = self._action_server.next_goal, self._action_server.current_goal
+        if newer is not None:
+            return f"newer goal {newer.get_goal_id().id}"
+        return "cancel" if current is None else f"cancel of goal {current.get_goal_id().id}"
+
+    # -- feedback ------------------------------------------------------------------------------
+
+    def transition_cb(self, userdata: UserData, active_states: Sequence[str]) -> None:
+        """Send feedback if it has changed; the container calls it."""
+        del active_states
+        self._publish_change(userdata)
+
+    def termination_cb(
+        self, userdata: UserData, terminal_states: Sequence[str], container_outcome: str
+    ) -> None:
+        """Send feedback if it has changed; the container calls it."""
+        del terminal_states, container_outcome
+        self._publish_change(userdata)
+
+    def publish_feedback(self, userdata: UserData) -> None:
+        """Send the feedback that is in `userdata`.
+
+        Raises:
+            ActionException: its value is no XFeedback.
+            FieldError: a field of it has a wrong type.
+        """
+        feedback = self._make_feedback(userdata)
+        self._action_server.publish_feedback(feedback)
+        self._feedback_sent = feedback.to_bytes()
+
+    def _make_feedback(self, userdata: UserData) -> Any:
+        feedback = (
+            userdata[self._feedback_key]
+            if self._feedback_key in userdata
+            else self._types.feedback()
+        )
+        for slot, key in self._feedback_slots_map.items():
+            if key in userdata:
+                setattr(feedback, slot, userdata[key])
+        return feedback
+
+    def _publish_change(self, userdata: UserData) -> None:
+        if self._executing and self._make_feedback(userdata).to_bytes() != self._feedback_sent:
+            self.publish_feedback(userdata)
+
+    def _on_event(self, event: Event) -> None:
+        """Send feedback that a state of the container itself has written, at once."""
+        if isinstance(event, UserdataWritten) and event.path.count("/") == 2:  # noqa: PLR2004
+            keys = {self._feedback_key, *self._feedback_slots_map.values()}
+            if event.key in keys and self._executing:
+                self.publish_feedback(self.wrapped_container.userdata)
+
+
+def _is_used(container: Container, key: str) -> bool:
+    """Tell whether a child of `container` reads or writes `key`."""
+    for label, child in container.get_children().items():
+        names = container._remappings.get(label, {})  # noqa: SLF001  there is no other way to ask
+        keys = {*child.get_registered_input_keys(), *child.get_registered_output_keys()}
+        if key in {names.get(own, own) for own in keys}:
+            return True
+    return False

@@ -1,0 +1,44 @@
+"""Callbacks that declare outcomes and keys, and the states that take them over."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, TypedDict
+
+from smachpy.util import has_smach_interface
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from smachpy.machines.state import Grace, RetrySpec, State
+
+
+class UntimedOptions(TypedDict, total=False):
+    """`smachpy.machines.state.StateOptions` for states that have a timeout of their own."""
+
+    preempt_timeout: Grace
+    retry: RetrySpec
+    on_exception: Mapping[type[BaseException], str] | None
+    on_enter: Callable[[Any], object] | None
+    on_exit: Callable[[Any, str], object] | None
+
+
+def adopt_interface(state: State, callback: object, *, outcomes: bool = True) -> None:
+    """Add the keys, and the outcomes too, that `callback` declared with `cb_interface`.
+
+    Args:
+        state: Gets them.
+        callback: May be None: nothing to do.
+        outcomes: Whether it chooses the state's outcome.
+    """
+    interface: Any = callback
+    if has_smach_interface(callback):
+        state.register_input_keys(interface.get_registered_input_keys())
+        state.register_output_keys(interface.get_registered_output_keys())
+        if outcomes:
+            state.register_outcomes(interface.get_registered_outcomes())
+
+
+def name_of(callback: object) -> str:
+    """Return what to call `callback` in texts."""
+    found = getattr(callback, "__qualname__", None) or getattr(callback, "__name__", None)
+    return str(found or type(callback).__name__)

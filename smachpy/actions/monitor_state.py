@@ -1,0 +1,150 @@
+"""`MonitorState`: check every message of a topic."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from actionlib_core.pubsub.topic import NotingSubscriber
+from smachpy import log
+from smachpy.actions.interface import adopt_interface, name_of
+from smachpy.actions.wakeup import Wakeup
+from smachpy.events import CallbackFailed
+from smachpy.machines.problems import Problems
+from smachpy.machines.state import State
+from smachpy.run.frame import current_scope
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+    from typing import Unpack
+
+    from actionlib_core.node import Node
+    from actionlib_core.time import Duration
+    from smachpy.actions.interface import UntimedOptions
+    from smachpy.introspection import Kind
+
+__all__ = ["MonitorState"]
+
+
+class MonitorState(State):
+    """Checks the messages of a topic. Outcomes: 'valid', 'invalid', 'preempted'.
+
+    The condition runs in the thread that runs the state, once per message, in order. It may take
+    its time: messages that come meanwhile wait.
+
+    Args:
+        topic: Name of the topic.
+        msg_type: Class of its messages.
+        cond_cb: Called as `cond_cb(userdata, message)`. The first false answer ends the state with
+            'invalid'; so does an exception, which is logged and reported as `CallbackFailed`. Its
+            `cb_interface` is added.
+        max_checks: 'valid' after so many true answers; -1: no limit.
+        input_keys: Userdata keys that it reads.
+        output_keys: Userdata keys that it writes.
+        timeout: `timeout_outcome` after so long [s]; None: no limit.
+        timeout_outcome: Outcome then; registered if there is a timeout.
+        latest: Of several messages that wait, check only the newest.
+        node: Where to listen; the current node when None.
+        **options: See `smachpy.machines.state.StateOptions`.
+
+    Raises:
+        InvalidStateError: an argument is wrong; all problems at once.
+    """
+
+    _smachpy_kind: ClassVar[Kind] = "monitor"
+
+    def __init__(
+        self,
+        topic: str,
+        msg_type: Any,
+        cond_cb: Callable[[Any, Any], object],
+        max_checks: int = -1,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        *,
+        timeout: float | Duration | None = None,
+        timeout_outcome: str = "aborted",
+        latest: bool = False,
+        node: Node | None = None,
+        **options: Unpack[UntimedOptions],
+    ) -> None:
+        problems = Problems(f"{type(self).__name__} {topic!r}")
+        with problems:
+            super().__init__(("valid", "invalid", "preempted"), input_keys, output_keys, **options)
+        self._topic = problems.word("topic", topic)
+        problems.kind_of("msg_type", msg_type, "_slot_types", "a class of messages")
+        self._msg_type = msg_type
+        call = "cond_cb(userdata, message)"
+        self._cond_cb = problems.function("cond_cb", cond_cb, call, 2, optional=False)
+        expected = "-1 (no limit) or a number of checks"
+        self._max_checks = problems.whole("max_checks", max_checks, -1, expected)
+        self._timeout_s = problems.seconds("timeout", timeout)
+        self._timeout_outcome = problems.word("timeout_outcome", timeout_outcome)
+        self._latest = latest
+        self._node = node
+        problems.raise_all()
+        if self._timeout_s is not None:
+            self.register_outcomes([timeout_outcome])
+        adopt_interface(self, cond_cb, outcomes=False)
+
+    def execute(self, ud: Any) -> str:
+        """Check messages until one is bad, enough are good, time is up, or a preempt.
+
+        Blocks: see above.
+        """
+        waiting: deque[Any] = deque(maxlen=1 if self._latest else None)
+
+        with Wakeup(self) as wake:
+
+            def note(message: Any) -> None:
+                waiting.append(message)
+                wake.set()
+
+            with NotingSubscriber(self._topic, self._msg_type, note, node=self._node):
+                return self._watch(ud, wake, waiting)
+
+    def _watch(self, ud: Any, wake: Wakeup, waiting: deque[Any]) -> str:
+        clock = wake.clock
+        until = None if self._timeout_s is None else clock.now() + self._timeout_s
+        good = 0
+        while True:
+            wake.clear()
+            if self.preempt_requested():
+                self.service_preempt()
+                return "preempted"
+            if until is not None and clock.now() >= until:
+                return self._timeout_outcome
+            if not waiting:
+                wake.wait_until(until)
+                continue
+            if not self._check(ud, waiting.popleft()):
+                return "invalid"
+            good += 1
+            if good == self._max_checks:
+                return "valid"
+
+    def _check(self, ud: Any, message: Any) -> bool:
+        try:
+            return bool(self._cond_cb(ud, message))
+        except Exception as error:  # noqa: BLE001  SMACH's rule: a broken check is not passed
+            text = f"{type(error).__name__}: {error}"
+            scope = current_scope()
+            where = f"MonitorState {self._topic!r}" if scope is None else scope.path
+            log.log_exception(f"{where}: condition {name_of(self._cond_cb)} raised {text}", error)
+            if scope is not None:
+                scope.emit(CallbackFailed, name_of(self._cond_cb), text)
+            return False
+
+    def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
+        """Add the topic, the condition and the limits."""
+        kind, details = super().describe_details()
+        own = [
+            ("topic", self._topic),
+            ("type", str(self._msg_type._type)),
+            ("condition", name_of(self._cond_cb)),
+        ]
+        if self._max_checks > 0:
+            own.append(("checks", str(self._max_checks)))
+        if self._timeout_s is not None:
+            own.append(("timeout", f"{self._timeout_s:g} s -> {self._timeout_outcome}"))
+        return kind, (*own, *details)

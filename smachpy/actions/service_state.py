@@ -1,0 +1,261 @@
+"""`ServiceState`: a state that calls a service."""
+
+from __future__ import annotations
+
+import copy
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from actionlib_core.exceptions import (
+    ServiceException,
+    ServiceTimeoutError,
+    ServiceUnavailableError,
+    WaitTimeoutError,
+)
+from actionlib_core.node import get_node
+from actionlib_core.pubsub.service_proxy import CALL_TIMEOUT_S, ServiceProxy
+from smachpy import log
+from smachpy.actions.messages import Incoming, Outgoing, UserCallback
+from smachpy.actions.wakeup import Wakeup
+from smachpy.machines.problems import Problems
+from smachpy.machines.state import State
+from smachpy.run.frame import current_scope
+from smachpy.util import is_shutdown
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+    from typing import Unpack
+
+    from actionlib_core.clock import Task
+    from actionlib_core.node import Node
+    from actionlib_core.time import Duration
+    from smachpy.actions.interface import UntimedOptions
+    from smachpy.introspection import Kind
+
+__all__ = ["ServiceState"]
+
+_TIMED_OUT = (ServiceTimeoutError, ServiceUnavailableError, WaitTimeoutError)
+
+
+class ServiceState(State):
+    """Calls a service once. Outcomes: 'succeeded', 'aborted', 'preempted'.
+
+    The request is made of `request` or `request_key`, then `request_slots`, then `request_cb`, anew
+    for each run. 'aborted' means: no server, a server that died, or a handler that raised; the
+    reason is logged.
+
+    Args:
+        service_name: Name of the service.
+        service_spec: Its class.
+        request: The request, or what the slots and the callback begin with.
+        request_cb: Called as `request_cb(userdata, request, *request_cb_args,
+            **request_cb_kwargs)`; changes the request or returns another. Its `cb_interface` is
+            added, as that of `response_cb`.
+        request_cb_args: Arguments for it.
+        request_cb_kwargs: Keyword arguments for it.
+        request_key: Userdata key that holds the request.
+        request_slots: Names of request fields that are set from userdata keys of the same name.
+        response_cb: Called as `response_cb(userdata, response, *response_cb_args,
+            **response_cb_kwargs)`; may return the outcome.
+        response_cb_args: Arguments for it.
+        response_cb_kwargs: Keyword arguments for it.
+        response_key: Userdata key that gets the response.
+        response_slots: Names of response fields that are written to keys of the same name.
+        input_keys: More keys to read, for the callbacks.
+        output_keys: More keys to write, for the callbacks.
+        outcomes: More outcomes, for `response_cb`.
+        timeout: `timeout_outcome` when there is no answer after so long [s], waiting for the server
+            included; None: no limit.
+        timeout_outcome: Outcome then.
+        node: Where the client is; the current node when None.
+        **options: See `smachpy.machines.state.StateOptions`.
+
+    Raises:
+        InvalidStateError: an argument does not fit the service; all problems at once.
+    """
+
+    _smachpy_kind: ClassVar[Kind] = "service"
+
+    def __init__(
+        self,
+        service_name: str,
+        service_spec: Any,
+        request: Any = None,
+        request_cb: Callable[..., Any] | None = None,
+        request_cb_args: Iterable[Any] = (),
+        request_cb_kwargs: Mapping[str, Any] | None = None,
+        request_key: str | None = None,
+        request_slots: Iterable[str] = (),
+        response_cb: Callable[..., str | None] | None = None,
+        response_cb_args: Iterable[Any] = (),
+        response_cb_kwargs: Mapping[str, Any] | None = None,
+        response_key: str | None = None,
+        response_slots: Iterable[str] = (),
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        outcomes: Iterable[str] = (),
+        *,
+        timeout: float | Duration | None = CALL_TIMEOUT_S,
+        timeout_outcome: str = "aborted",
+        node: Node | None = None,
+        **options: Unpack[UntimedOptions],
+    ) -> None:
+        problems = Problems(f"{type(self).__name__} {service_name!r}")
+        problems.kind_of("service_spec", service_spec, "_request_class", "a class of services")
+        problems.raise_all()
+        given = ("succeeded", "aborted", "preempted", *problems.names("outcomes", outcomes))
+        with problems:
+            super().__init__(given, input_keys, output_keys, **options)
+        self._service_name = problems.word("service_name", service_name)
+        self._service_spec = service_spec
+        self._request = Outgoing(
+            "request",
+            service_spec._request_class,
+            copy.deepcopy(request),
+            request_key,
+            problems.names("request_slots", request_slots),
+            UserCallback.of(
+                problems,
+                "request_cb",
+                ("userdata", "request"),
+                request_cb,
+                request_cb_args,
+                request_cb_kwargs,
+            ),
+        )
+        self._response = Incoming(
+            "response",
+            service_spec._response_class,
+            response_key,
+            problems.names("response_slots", response_slots),
+            UserCallback.of(
+                problems,
+                "response_cb",
+                ("userdata", "response"),
+                response_cb,
+                response_cb_args,
+                response_cb_kwargs,
+            ),
+        )
+        self._timeout_s = problems.seconds("timeout", timeout)
+        self._timeout_outcome = problems.word("timeout_outcome", timeout_outcome)
+        self._node = node
+        self._proxy: ServiceProxy | None = None
+        problems.add(*self._request.problems(), *self._response.problems())
+        problems.raise_all()
+        self.register_outcomes([timeout_outcome])
+        self._request.declare(self)
+        self._response.declare(self)
+
+    def execute(self, ud: Any) -> str:
+        """Call the service.
+
+        What a callback raises goes through.
+
+        Raises:
+            FieldError: a field of the request has a wrong type.
+            TypeMismatchError: the server is of another type.
+
+        Blocks: until the answer, `timeout` or a preempt; the server may go on with a call that was
+            left.
+        """
+        with Wakeup(self) as wake:
+            if self._is_preempted():
+                return "preempted"
+            request = self._request.build(ud)
+            if self._is_preempted():
+                return "preempted"
+            call = _Call(self._get_proxy(), request, self._timeout_s, wake)
+            try:
+                while not (call.over or self.preempt_requested()):
+                    wake.wait_until()
+                    wake.clear()
+            except BaseException:  # KeyboardInterrupt and the like: nobody waits for the answer
+                self._drop_proxy()
+                raise
+        if not call.over:
+            self._drop_proxy()
+            call.task.join()
+            if self._is_preempted():
+                return "preempted"
+        return self._finish(ud, call)
+
+    def _finish(self, ud: Any, call: _Call) -> str:
+        if call.error is not None and (self._is_preempted() or is_shutdown()):
+            return "preempted"
+        if isinstance(call.error, (ServiceException, WaitTimeoutError)):
+            scope = current_scope()
+            where = f"ServiceState {self._service_name!r}" if scope is None else scope.path
+            log.logwarn(f"{where}: service '{self._service_name}': {call.error}")
+            return self._timeout_outcome if isinstance(call.error, _TIMED_OUT) else "aborted"
+        if call.error is not None:
+            raise call.error
+        self._response.store(ud, call.response)
+        chosen = self._response.callback(ud, call.response)
+        return "succeeded" if chosen is None else chosen
+
+    def _is_preempted(self) -> bool:
+        if not self.preempt_requested():
+            return False
+        self.service_preempt()
+        return True
+
+    def _get_proxy(self) -> ServiceProxy:
+        """Return the proxy on the node in force, made when there is none yet."""
+        node = self._node if self._node is not None else get_node()
+        proxy = self._proxy
+        if proxy is None or proxy.node is not node or node.closed:
+            self._drop_proxy()
+            proxy = self._proxy = ServiceProxy(
+                self._service_name, self._service_spec, timeout=self._timeout_s, node=node
+            )
+        return proxy
+
+    def _drop_proxy(self) -> None:
+        """Leave the service; a call that is under way ends with an error at once."""
+        proxy, self._proxy = self._proxy, None
+        if proxy is not None:
+            proxy.close()
+
+    def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
+        """Add the service and the timeout."""
+        kind, details = super().describe_details()
+        own = [("service", self._service_name), ("type", str(self._service_spec._type))]
+        if self._timeout_s is not None:
+            own.append(("timeout", f"{self._timeout_s:g} s -> {self._timeout_outcome}"))
+        return kind, (*own, *details)
+
+
+class _Call:
+    """A call in a thread of its own, so that a preempt can end the state before the answer.
+
+    Attributes:
+        over: It has returned or raised.
+        response: What it returned.
+        error: What it raised.
+    """
+
+    def __init__(
+        self, proxy: ServiceProxy, request: Any, timeout_s: float | None, wake: Wakeup
+    ) -> None:
+        self.over = False
+        self.response: Any = None
+        self.error: BaseException | None = None
+        self._proxy = proxy
+        self._request = request
+        self._timeout_s = timeout_s
+        self._wake = wake
+        self.task: Task = wake.clock.spawn(self._run, name=f"call of {proxy.resolved_name}")
+
+    def _run(self) -> None:
+        proxy, clock = self._proxy, self._wake.clock
+        start = clock.now()
+        try:
+            proxy.wait_for_service(self._timeout_s)
+            if self._timeout_s is not None:
+                proxy.timeout = max(0.0, self._timeout_s - (clock.now() - start))
+            self.response = proxy.call(self._request)
+        except BaseException as error:  # noqa: BLE001  the thread's border: raised in the state's
+            self.error = error
+        finally:
+            self.over = True
+            self._wake.set()

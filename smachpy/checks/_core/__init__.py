@@ -1,1 +1,0 @@
-"""Deciding what is wrong with a machine: records and facts in, problems out."""

@@ -1,0 +1,346 @@
+"""All runs of a machine as one directed graph.
+
+A node is a moment: a state begins, or a state has ended with an outcome. The children of a
+concurrence run at once; the graph has them one after the other, once for each outcome of the
+concurrence with the child outcomes that lead to it, and once more each child alone, first.
+Edges that only a preempt takes are marked.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections import deque
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Iterator, Mapping
+
+    from smachpy.checks.model import Facts, Moments, Subject
+    from smachpy.introspection import StateRecord
+
+PREEMPTED = "preempted"
+MOST_COMBINATIONS = 5_000  # of child outcomes; a larger concurrence may end with any outcome
+MOST_NODES = 200_000
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A moment of a run.
+
+    Attributes:
+        number: Its number in the graph.
+        record: The state.
+        outcome: The outcome it has just ended with; None: it begins.
+    """
+
+    number: int
+    record: StateRecord
+    outcome: str | None
+
+
+@dataclass(slots=True)
+class _Part:
+    """A state inside the graph: where it begins, and where it ends by outcome."""
+
+    enter: Node
+    ends: dict[str, Node]
+
+
+@dataclass(slots=True)
+class Graph:
+    """Moments and what may follow them.
+
+    Attributes:
+        nodes: The moments.
+        edges: What may follow each.
+        only_preempt: Edges that only a preempt takes.
+        by_framework: Edges by which a container ends a run by itself after a preempt.
+        loose: Ends of children that were looked at alone; nothing follows in the graph.
+        start: The root begins.
+        ends: The root's outcomes.
+    """
+
+    nodes: list[Node] = field(default_factory=list)
+    edges: list[list[int]] = field(default_factory=list)
+    only_preempt: set[tuple[int, int]] = field(default_factory=set)
+    by_framework: set[tuple[int, int]] = field(default_factory=set)
+    loose: set[int] = field(default_factory=set)
+    start: int = 0
+    ends: dict[str, int] = field(default_factory=dict)
+
+    def begins(self, path: str) -> set[int]:
+        """Return the moments at which the state at `path` begins."""
+        return {n.number for n in self.nodes if n.outcome is None and n.record.path == path}
+
+    def after(self, number: int, *, preempt: bool = True, framework: bool = True) -> Iterator[int]:
+        """Yield what may follow a moment.
+
+        Args:
+            number: The moment.
+            preempt: Whether somebody may ask for a preempt.
+            framework: Whether a container may end because of it by itself.
+        """
+        for after in self.edges[number]:
+            pair = (number, after)
+            if (preempt or pair not in self.only_preempt) and (
+                framework or pair not in self.by_framework
+            ):
+                yield after
+
+    def reachable(self, start: Iterable[int], *, preempt: bool = True) -> set[int]:
+        """Return the moments that can follow one of `start`, and these."""
+        seen = set(start)
+        queue = list(seen)
+        while queue:
+            new = set(self.after(queue.pop(), preempt=preempt)) - seen
+            seen |= new
+            queue += new
+        return seen
+
+    def path(
+        self,
+        start: Iterable[int],
+        goals: Collection[int],
+        *,
+        avoid: Collection[int] = (),
+        preempt: bool = True,
+        framework: bool = True,
+    ) -> list[Node] | None:
+        """Return a shortest run from `start` to one of `goals` past none of `avoid`."""
+        came: dict[int, int | None] = {number: None for number in start if number not in avoid}
+        queue = deque(came)
+        while queue:
+            number = queue.popleft()
+            if number in goals:
+                steps = [number]
+                while (before := came[steps[-1]]) is not None:
+                    steps.append(before)
+                return [self.nodes[step] for step in reversed(steps)]
+            for after in self.after(number, preempt=preempt, framework=framework):
+                if after not in came and after not in avoid:
+                    came[after] = number
+                    queue.append(after)
+        return None
+
+    def closed_loops(self, among: Collection[int]) -> Iterator[set[int]]:
+        """Yield each set of moments that follow each other again and again, and nothing else.
+
+        Args:
+            among: Moments; what may follow them, unless a container ends because of a preempt, is
+                among them, too.
+        """
+        after = {number: [*self.after(number, framework=False)] for number in sorted(among)}
+        before: dict[int, list[int]] = {number: [] for number in after}
+        for number, followers in after.items():
+            for follower in followers:
+                before[follower].append(number)
+        # Kosaraju's algorithm on the reversed graph: a search backwards leaves a moment last if
+        # nothing that follows it was left out. From there forwards, loop after loop is found.
+        order: list[int] = []
+        seen: set[int] = set()
+        for start in after:
+            stack = [] if start in seen else [(start, iter(before[start]))]
+            seen.add(start)
+            while stack:
+                number, rest = stack[-1]
+                new = next((n for n in rest if n not in seen), None)
+                if new is None:
+                    order.append(number)
+                    stack.pop()
+                else:
+                    seen.add(new)
+                    stack.append((new, iter(before[new])))
+        taken: set[int] = set()
+        for start in reversed(order):
+            if start in taken:
+                continue
+            queue, loop, closed = [start], {start}, True
+            while queue:
+                found = set(after[queue.pop()])
+                closed = closed and not found & taken
+                found -= taken | loop
+                loop |= found
+                queue += found
+            taken |= loop
+            if closed and (len(loop) > 1 or start in after[start]):
+                yield loop
+
+
+def build(subject: Subject) -> Graph:
+    """Return the graph of a machine.
+
+    Raises:
+        RecursionError: the machine has more moments than can be looked through.
+    """
+    builder = _Builder(subject)
+    root = builder.state(subject.root)
+    graph = builder.graph
+    graph.start = root.enter.number
+    graph.ends = {outcome: node.number for outcome, node in root.ends.items()}
+    return graph
+
+
+def possible(record: StateRecord, facts: Facts) -> list[str]:
+    """Return the outcomes that a leaf can end with."""
+    if facts.returns is None:
+        return list(record.outcomes)
+    made = facts.returns | facts.made | {PREEMPTED}
+    return [outcome for outcome in record.outcomes if outcome in made]
+
+
+class _Builder:
+    """Adds the states of a machine to a graph."""
+
+    def __init__(self, subject: Subject) -> None:
+        self._subject = subject
+        self.graph = Graph()
+
+    def state(self, record: StateRecord) -> _Part:
+        if len(self.graph.nodes) > MOST_NODES:
+            raise RecursionError(
+                f"{record.path}: the machine has more than {MOST_NODES} moments; expected fewer. "
+                "Try checking its parts."
+            )
+        enter = self._node(record, None)
+        if not record.is_container:
+            outcomes = possible(record, self._subject.facts_of(record))
+            part = _Part(enter, {o: self._node(record, o) for o in outcomes})
+            for outcome, node in part.ends.items():
+                self._edge(enter, node, preempt=outcome == PREEMPTED)
+            return part
+        part = _Part(enter, {o: self._node(record, o) for o in record.outcomes})
+        for outcome in self._subject.facts_of(record).made & set(part.ends):
+            self._edge(enter, part.ends[outcome])
+        add = {"concurrence": self._concurrence, "iterator": self._iterator}
+        add.get(record.kind, self._machine)(record, part)
+        return part
+
+    def _machine(self, record: StateRecord, part: _Part) -> None:
+        children = {child.label: self.state(child) for child in record.children}
+        for label in record.initial:
+            self._edge(part.enter, children[label].enter)
+        for edge in record.transitions:
+            source = children[edge.source].ends.get(edge.outcome)
+            if source is None:
+                continue
+            if not edge.target_is_outcome and edge.target in children:
+                self._edge(source, children[edge.target].enter)
+            elif edge.target in part.ends:
+                self._edge(source, part.ends[edge.target])
+        for child in children.values():
+            self._preempted(part, child)
+
+    def _preempted(self, part: _Part, child: _Part) -> None:
+        """A preempt before or after a child ends the container, if it declares the outcome."""
+        if PREEMPTED in part.ends:
+            for node in (child.enter, *child.ends.values()):
+                self._edge(node, part.ends[PREEMPTED], preempt=True, framework=True)
+
+    def _iterator(self, record: StateRecord, part: _Part) -> None:
+        exhausted = [part.ends[r.outcome] for r in record.rules if r.outcome in part.ends]
+        facts = self._subject.facts_of(record)
+        for child_record in record.children:
+            child = self.state(child_record)
+            if not facts.empty:
+                self._edge(part.enter, child.enter)
+            for edge in record.transitions:
+                source = child.ends.get(edge.outcome)
+                if source is None:
+                    continue
+                targets = [part.ends[edge.target]] if edge.target in part.ends else []
+                if not edge.target_is_outcome:
+                    targets = [child.enter, *exhausted]
+                for target in targets:
+                    self._edge(source, target)
+            self._preempted(part, child)
+        if facts.empty or not record.children:
+            for node in exhausted:
+                self._edge(part.enter, node)
+
+    def _concurrence(self, record: StateRecord, part: _Part) -> None:
+        for child_record in record.children:  # alone, before the others did anything
+            alone = self.state(child_record)
+            self._edge(part.enter, alone.enter)
+            self.graph.loose |= {node.number for node in alone.ends.values()}
+        for outcome, allowed in outcomes_of(record, self._subject).items():
+            if outcome not in part.ends:
+                continue
+            at: list[Node] = [part.enter]
+            for child_record in record.children:
+                child = self.state(child_record)
+                for node in at:
+                    self._edge(node, child.enter)
+                at = [child.ends[o] for o in allowed[child_record.label] if o in child.ends]
+                if self._subject.facts_of(record).cuts and PREEMPTED in child.ends:
+                    self._edge(child.enter, child.ends[PREEMPTED])
+            for node in at:
+                self._edge(node, part.ends[outcome])
+        if PREEMPTED in part.ends:
+            self._edge(part.enter, part.ends[PREEMPTED], preempt=True, framework=True)
+
+    def _node(self, record: StateRecord, outcome: str | None) -> Node:
+        node = Node(len(self.graph.nodes), record, outcome)
+        self.graph.nodes.append(node)
+        self.graph.edges.append([])
+        return node
+
+    def _edge(
+        self, source: Node, target: Node, *, preempt: bool = False, framework: bool = False
+    ) -> None:
+        pair = (source.number, target.number)
+        graph = self.graph
+        new = target.number not in graph.edges[source.number]
+        if new:
+            graph.edges[source.number].append(target.number)
+        for marked, marks in ((preempt, graph.only_preempt), (framework, graph.by_framework)):
+            if marked and new:
+                marks.add(pair)
+            elif not marked:
+                marks.discard(pair)
+
+
+def combinations(record: StateRecord, subject: Subject) -> list[dict[str, str]] | None:
+    """Return every combination of outcomes of a concurrence's children; None when too many."""
+    choices = [
+        possible(child, subject.facts_of(child)) if not child.is_container else child.outcomes
+        for child in record.children
+    ]
+    count = 1
+    for choice in choices:
+        count *= max(1, len(choice))
+    if count > MOST_COMBINATIONS:
+        return None
+    labels = [child.label for child in record.children]
+    return [dict(zip(labels, chosen, strict=True)) for chosen in itertools.product(*choices)]
+
+
+def decide(facts: Facts, outcomes: Mapping[str, str]) -> str | None:
+    """Return the outcome that the rules give: the most demanding one that holds, the last."""
+    best, most = None, -1
+    for rule in facts.outcome_rules:
+        if rule.need >= most and rule.holds(outcomes):
+            best, most = rule.outcome, rule.need
+    return best
+
+
+def outcomes_of(record: StateRecord, subject: Subject) -> dict[str, dict[str, set[str]]]:
+    """Return each outcome of a concurrence with the child outcomes that can come with it."""
+    facts = subject.facts_of(record)
+    anything = {child.label: set(child.outcomes) for child in record.children}
+    combined = combinations(record, subject)
+    if facts.any_outcome or combined is None:
+        return {o: {k: set(v) for k, v in anything.items()} for o in record.outcomes}
+    found: dict[str, dict[str, set[str]]] = {}
+    for outcomes in combined:
+        outcome = decide(facts, outcomes) or record.default_outcome
+        if outcome is not None:
+            allowed = found.setdefault(outcome, {label: set() for label in anything})
+            for label, child_outcome in outcomes.items():
+                allowed[label].add(child_outcome)
+    return found
+
+
+def moments(steps: Iterable[Node]) -> Moments:
+    """Return a run as pairs (path, outcome), the outcome None where the state begins."""
+    return tuple((node.record.path, node.outcome) for node in steps)

@@ -1,0 +1,200 @@
+"""What the rules look at, what they are, and what they find."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from smachpy.introspection import StateRecord
+
+Severity: TypeAlias = Literal["error", "warning", "note"]
+Moments: TypeAlias = tuple[tuple[str, str | None], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One thing that is looked for.
+
+    Attributes:
+        name: Its id.
+        severity: Of what it finds, unless that is milder.
+        summary: What it finds.
+        is_on: Whether it is looked for when nobody asks for it.
+    """
+
+    name: str
+    severity: Severity
+    summary: str
+    is_on: bool = True
+
+
+RULES: dict[str, Rule] = {
+    rule.name: rule
+    for rule in (
+        Rule("inconsistent", "error", "the machine does not hold together and would not run"),
+        Rule("wrong-signature", "error", "`execute` cannot be called as the machine calls it"),
+        Rule("unreachable-state", "error", "no run can get to the state"),
+        Rule("unmapped-outcome", "error", "an outcome of a state leads nowhere"),
+        Rule("impossible-outcome", "warning", "a declared outcome that nothing can produce"),
+        Rule("undeclared-outcome", "error", "code returns an outcome that is not declared"),
+        Rule("unset-key", "error", "a userdata key is read on some path before anyone writes it"),
+        Rule("unread-key", "warning", "a userdata key is written and never read"),
+        Rule("endless-loop", "error", "a loop of states with no way out"),
+        Rule("no-timeout", "warning", "a wait without a timeout", is_on=False),
+        Rule("deaf-loop", "warning", "`execute` loops without looking at the preempt"),
+        Rule("stuck-concurrence", "error", "a concurrence that cannot finish"),
+        Rule("ambiguous-map", "warning", "two rules of an outcome map hold and ask equally"),
+        Rule("preempt-outcome", "warning", "a preempt leaves a container by the wrong outcome"),
+        Rule("property", "error", "a property that does not hold"),
+    )
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A line of the user's code."""
+
+    file: str
+    line: int
+
+
+class Reads(NamedTuple):
+    """The userdata keys that a function uses.
+
+    Attributes:
+        always: Read in every call.
+        sometimes: Read in some calls only: in a branch, or after one that may have returned.
+        writes: Written somewhere.
+    """
+
+    always: frozenset[str] = frozenset()
+    sometimes: frozenset[str] = frozenset()
+    writes: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class OutcomeRule:
+    """A concurrence's rule: `need` of the conditions (child label, its outcomes) must hold."""
+
+    outcome: str
+    need: int
+    conditions: tuple[tuple[str, tuple[str, ...]], ...]
+
+    def holds(self, outcomes: Mapping[str, str]) -> bool:
+        """Tell whether the children's outcomes fulfil it."""
+        met = sum(outcomes.get(label) in wanted for label, wanted in self.conditions)
+        return met >= self.need
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What is known of a state beyond its record; None or empty where nothing is known.
+
+    Attributes:
+        place: Where its code is.
+        returns: Outcomes that its code can end with.
+        made: Outcomes that the machine gives it: after a timeout, for an exception.
+        undeclared: Outcomes that its code names in a `return` and that are not declared.
+        reads: Keys that its code reads.
+        prepared: Its `on_enter` may write its output keys before it runs.
+        reaches: Its code may use the userdata of some machine past its own keys.
+        waits: Waits without a limit: what waits, and the line.
+        loops: Loops that wait and never look at the preempt: what, and the line.
+        is_function: Its code is a plain function, which has no `self`.
+        preset: Keys of the container's userdata that have a value before the run.
+        outcome_rules: A concurrence's rules.
+        any_outcome: The concurrence has an outcome callback.
+        cuts: The concurrence has a callback that may preempt its children.
+        watched: Callbacks, or code that is not seen, may change the container's userdata.
+        empty: Whether the iterator is known to have no items.
+        ignored: Rule id -> why the rule is switched off for this state.
+    """
+
+    place: Place | None = None
+    returns: frozenset[str] | None = None
+    made: frozenset[str] = frozenset()
+    undeclared: tuple[tuple[str, Place], ...] = ()
+    reads: Reads | None = None
+    prepared: bool = False
+    reaches: bool = False
+    waits: tuple[tuple[str, Place], ...] = ()
+    loops: tuple[tuple[str, Place], ...] = ()
+    is_function: bool = False
+    preset: frozenset[str] = frozenset()
+    outcome_rules: tuple[OutcomeRule, ...] = ()
+    any_outcome: bool = False
+    cuts: bool = False
+    watched: bool = False
+    empty: bool = False
+    ignored: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """Something wrong.
+
+    Attributes:
+        rule: Id of the rule.
+        severity: "error" and "warning" fail a check, "note" does not.
+        path: Path of the state.
+        message: What is wrong, in one sentence.
+        hint: What to do about it.
+        place: Line of the code, when known.
+        moments: A run that shows it: pairs (path, outcome), the outcome None where the state
+            begins.
+    """
+
+    rule: str
+    severity: Severity
+    path: str
+    message: str
+    hint: str = ""
+    place: Place | None = None
+    moments: Moments = ()
+
+    @property
+    def steps(self) -> tuple[str, ...]:
+        """The run in words: what ended, and how ("/PATROL/DRIVE -aborted->")."""
+        last = self.moments[-1:]
+        ended = [f"{path} -{outcome}->" for path, outcome in self.moments if outcome is not None]
+        return (*ended, *(path for path, outcome in last if outcome is None))
+
+
+NOTHING = Facts()
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """A machine under check, with what is known of its states by their paths."""
+
+    root: StateRecord
+    facts: Mapping[str, Facts]
+
+    def facts_of(self, record: StateRecord) -> Facts:
+        """Return what is known of a state."""
+        return self.facts.get(record.path, NOTHING)
+
+    def problem(
+        self,
+        rule: str,
+        record: StateRecord,
+        message: str,
+        hint: str,
+        *,
+        severity: Severity | None = None,
+        place: Place | None = None,
+        moments: Moments = (),
+    ) -> Problem:
+        """Return a problem of a state, at its code unless `place` says otherwise."""
+        return Problem(
+            rule,
+            severity or RULES[rule].severity,
+            record.path,
+            message,
+            hint,
+            place or self.facts_of(record).place,
+            moments,
+        )

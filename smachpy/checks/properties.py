@@ -1,0 +1,159 @@
+"""Properties of all runs of a machine, and the shortest run that breaks one."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+from smachpy.checks.graph import PREEMPTED, moments
+from smachpy.checks.model import Problem
+from smachpy.exceptions import SmachError, did_you_mean
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from smachpy.checks.graph import Graph, Node
+    from smachpy.checks.model import Subject
+
+    Broken: TypeAlias = tuple[str, list[Node]] | None  # in words, and a run
+
+
+class PropertyError(SmachError):
+    """A property names a state or an outcome that the machine does not have."""
+
+
+@dataclass(frozen=True, slots=True)
+class Property:
+    """Something that holds for every run.
+
+    Attributes:
+        kind: "never", "always_reaches", "before" or "after_preempt".
+        names: Paths or labels of states, or outcomes of the machine.
+    """
+
+    kind: str
+    names: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"{self.kind}({', '.join(self.names)})"
+
+
+def never(state: str) -> Property:
+    """No run gets to `state` (a path, or the end of one)."""
+    return Property("never", (state,))
+
+
+def always_reaches(*outcomes: str) -> Property:
+    """Every run without a preempt ends, with one of these outcomes of the machine.
+
+    A loop is left some time if there is a way out of it.
+    """
+    return Property("always_reaches", outcomes)
+
+
+def before(first: str, second: str) -> Property:
+    """No run gets to state `second` without state `first` having ended before."""
+    return Property("before", (first, second))
+
+
+def after_preempt(state: str) -> Property:
+    """A run in which a state answers a preempt passes through `state` before it ends."""
+    return Property("after_preempt", (state,))
+
+
+_KINDS = {"never": 1, "always_reaches": None, "before": 2, "after_preempt": 1}
+
+
+def parse(text: str) -> Property:
+    """Return the property that a text says, as in `before(/PATROL/UNDOCK, /PATROL/DRIVE)`.
+
+    Raises:
+        PropertyError: it says none.
+    """
+    match = re.fullmatch(r"\s*(\w+)\s*\((.*)\)\s*", text)
+    kind = match[1] if match else text.strip()
+    names = tuple(n.strip().strip("\"'") for n in match[2].split(",")) if match else ()
+    if kind not in _KINDS or not all(names) or not names or _KINDS[kind] not in {None, len(names)}:
+        raise PropertyError(
+            f"property: got {text!r}; expected never(STATE), always_reaches(OUTCOME, ...), "
+            f"before(STATE, STATE) or after_preempt(STATE).{did_you_mean(kind, _KINDS)}"
+        )
+    return Property(kind, names)
+
+
+def find(subject: Subject, graph: Graph, wanted: Property) -> Problem | None:
+    """Return the problem if a property does not hold.
+
+    Raises:
+        PropertyError: it names something that the machine does not have.
+    """
+    if wanted.kind == "always_reaches":
+        found = _always_reaches(subject, graph, wanted.names)
+    else:
+        paths = [_resolve(subject, name) for name in wanted.names]
+        search: dict[str, Callable[..., Broken]] = {
+            "never": _never,
+            "before": _before,
+            "after_preempt": _after_preempt,
+        }
+        found = search[wanted.kind](graph, *paths)
+    if found is None:
+        return None
+    text = f"{wanted} does not hold: {found[0]}."
+    return Problem("property", "error", subject.root.path, text, moments=moments(found[1]))
+
+
+def _resolve(subject: Subject, name: str) -> str:
+    """Return the path of the one state that `name` means."""
+    paths = [record.path for record in subject.root.walk()]
+    if name in paths:
+        return name
+    found = [path for path in paths if path.endswith("/" + name.strip("/"))]
+    if len(found) == 1:
+        return found[0]
+    what = f"{len(found)} states: {found}" if found else "no state"
+    near = did_you_mean(name, [*paths, *(p.rpartition("/")[2] for p in paths)])
+    raise PropertyError(f"property: state {name!r} means {what}; expected one of {paths}.{near}")
+
+
+def _never(graph: Graph, path: str) -> Broken:
+    steps = graph.path([graph.start], graph.begins(path))
+    return None if steps is None else (f"this run gets to {path}", steps)
+
+
+def _always_reaches(subject: Subject, graph: Graph, names: tuple[str, ...]) -> Broken:
+    unknown = [name for name in names if name not in subject.root.outcomes]
+    if unknown:
+        raise PropertyError(
+            f"property: outcomes {unknown} of {subject.root.path}: expected some of "
+            f"{list(subject.root.outcomes)}.{did_you_mean(unknown[0], subject.root.outcomes)}"
+        )
+    good = {number for outcome, number in graph.ends.items() if outcome in names}
+    steps = graph.path([graph.start], {*graph.ends.values()} - good, preempt=False)
+    if steps is not None:
+        return f"this run ends with {steps[-1].outcome!r}", steps
+    for number in sorted(graph.reachable([graph.start], preempt=False)):
+        if not (good | graph.loose) & graph.reachable([number], preempt=False):
+            return "this run never ends", graph.path([graph.start], {number}, preempt=False) or []
+    return None
+
+
+def _before(graph: Graph, first: str, second: str) -> Broken:
+    ended = {n.number for n in graph.nodes if n.record.path == first and n.outcome is not None}
+    steps = graph.path([graph.start], graph.begins(second), avoid=ended)
+    return None if steps is None else (f"this run gets to {second} without {first}", steps)
+
+
+def _after_preempt(graph: Graph, path: str) -> Broken:
+    for number in sorted(graph.reachable([graph.start])):
+        node = graph.nodes[number]
+        inside = f"{node.record.path}/".startswith(f"{path}/")
+        if node.outcome != PREEMPTED or node.record.is_container or inside:
+            continue
+        ends = set(graph.ends.values())
+        end = graph.path([number], ends, avoid=graph.begins(path), framework=False)
+        if end is not None:
+            run = (graph.path([graph.start], {number}) or []) + end[1:]
+            return f"{node.record.path} is preempted and the run ends without {path}", run
+    return None

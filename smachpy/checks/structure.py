@@ -1,0 +1,218 @@
+"""Rules about states, outcomes, loops and concurrences."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from smachpy.checks import graph as runs
+from smachpy.checks.graph import PREEMPTED
+from smachpy.checks.model import Problem
+from smachpy.outcome_classes import outcome_class
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from smachpy.checks.graph import Graph
+    from smachpy.checks.model import Subject
+    from smachpy.introspection import StateRecord
+
+
+def find(subject: Subject, graph: Graph) -> Iterator[Problem]:
+    """Yield what is wrong with the structure."""
+    reached = graph.reachable([graph.start])
+    made: dict[str, set[str | None]] = {}  # path of a reached state -> its outcomes there
+    for node in map(graph.nodes.__getitem__, reached):
+        made.setdefault(node.record.path, set()).add(node.outcome)
+    for record in subject.root.walk():
+        if record.path not in made:
+            continue
+        for child in record.children:
+            if child.path not in made:
+                text = f"no run gets to {child.path}."
+                hint = "Lead a transition to it, or remove it."
+                yield subject.problem("unreachable-state", child, text, hint)
+        yield from _outcomes(subject, record, made[record.path])
+        yield from _leaf(subject, record)
+        if record.kind == "concurrence":
+            yield from _concurrence(subject, record)
+        if record.is_container and record is not subject.root:  # whose parent may go on
+            yield from _preempts(subject, record)
+    yield from _loops(subject, graph, reached)
+    yield from _waits(subject, subject.root, limited=False)
+
+
+def _outcomes(subject: Subject, record: StateRecord, made: set[str | None]) -> Iterator[Problem]:
+    """Outcomes that nothing can produce."""
+    facts = subject.facts_of(record)
+    if not record.is_container and facts.returns is None:
+        return
+    who = "no child leads to it" if record.is_container else "its code never returns it"
+    for outcome in record.outcomes:
+        if outcome not in made | facts.made and outcome != PREEMPTED:
+            text = f"{record.path} declares outcome {outcome!r}, but {who}."
+            hint = "Remove the outcome, or produce it."
+            yield subject.problem("impossible-outcome", record, text, hint)
+
+
+def _leaf(subject: Subject, record: StateRecord) -> Iterator[Problem]:
+    facts = subject.facts_of(record)
+    for outcome, place in facts.undeclared:
+        text = f"{record.path} returns {outcome!r}; its outcomes are {list(record.outcomes)}."
+        hint = "Declare the outcome, or return another."
+        yield subject.problem("undeclared-outcome", record, text, hint, place=place)
+    state = "smachpy.current_state()" if facts.is_function else "self"
+    hint = f"Test {state}.preempt_requested() in the loop, or wait with {state}.sleep(...)."
+    for what, place in facts.loops:
+        text = f"{record.path}: {what} waits without looking at the preempt."
+        yield subject.problem("deaf-loop", record, text, hint, place=place)
+
+
+def _waits(subject: Subject, record: StateRecord, *, limited: bool) -> Iterator[Problem]:
+    """Waits without a timeout, unless a container around them has one."""
+    details = dict(record.details)
+    limited = limited or (record.is_container and "timeout" in details)
+    if not limited and "timeout" not in details:
+        for what, place in subject.facts_of(record).waits:
+            text = f"{record.path}: {what} has no timeout."
+            hint = "Give it a timeout, or give one to the state or a container around it."
+            yield subject.problem("no-timeout", record, text, hint, place=place)
+    for child in record.children:
+        yield from _waits(subject, child, limited=limited)
+
+
+def _loops(subject: Subject, graph: Graph, reached: set[int]) -> Iterator[Problem]:
+    """States that lead only to each other: nothing but a preempt from outside ends them."""
+    can_end = {*graph.ends.values(), *graph.loose}
+    before: dict[int, list[int]] = {}
+    for number in reached:
+        for after in graph.after(number, framework=False):
+            before.setdefault(after, []).append(number)
+    queue = list(can_end)
+    while queue:
+        new = {*before.get(queue.pop(), ())} - can_end
+        can_end |= new
+        queue += new
+    reported: set[tuple[str, ...]] = set()
+    for loop in graph.closed_loops(reached - can_end):
+        records = [graph.nodes[number].record for number in loop]
+        # The states of the loop itself; the others are somewhere in them.
+        outermost = min(record.path.count("/") for record in records)
+        paths = tuple(sorted({r.path for r in records if r.path.count("/") == outermost}))
+        parent = paths[0].rpartition("/")[0]
+        if paths not in reported and not _is_ended_from_outside(subject, parent):
+            reported.add(paths)
+            yield _endless(graph, parent, paths)
+
+
+def _is_ended_from_outside(subject: Subject, path: str) -> bool:
+    """Tell whether a timeout, or a callback of a concurrence, ends the container some time."""
+    around = [r for r in subject.root.walk() if f"{path}/".startswith(f"{r.path}/")]
+    return any("timeout" in dict(record.details) for record in around) or any(
+        subject.facts_of(record).cuts for record in around if record.path != path
+    )
+
+
+def _endless(graph: Graph, parent: str, paths: tuple[str, ...]) -> Problem:
+    """Return what is wrong with a loop; it is a note for a mission that is to run for ever."""
+    labels = ", ".join(path.rpartition("/")[2] for path in paths)
+    text = f"{parent}: {labels} lead only to {'each other' if len(paths) > 1 else 'itself'}"
+    begins = {number for path in paths for number in graph.begins(path)}
+    steps = runs.moments(graph.path([graph.start], begins) or [])
+    if _only_fails(graph):
+        text += "; the mission runs until it is preempted."
+        return Problem("endless-loop", "note", parent, text, moments=steps)
+    text += "; no outcome ends the loop."
+    return Problem(
+        "endless-loop", "error", parent, text, "Lead a transition out of it.", moments=steps
+    )
+
+
+def _only_fails(graph: Graph) -> bool:
+    """Tell whether no run without a preempt ends, unless it fails."""
+    reached = graph.reachable([graph.start], preempt=False)
+    ends = [outcome for outcome, number in graph.ends.items() if number in reached]
+    return all(outcome_class(outcome) in {"failure", "preempted"} for outcome in ends)
+
+
+def _concurrence(subject: Subject, record: StateRecord) -> Iterator[Problem]:
+    facts = subject.facts_of(record)
+    # A callback may decide before the rules are asked.
+    combined = [] if facts.any_outcome else runs.combinations(record, subject) or []
+    reported: set[frozenset[str]] = set()
+    for outcomes in combined:
+        holding = [rule for rule in facts.outcome_rules if rule.holds(outcomes)]
+        most = max((rule.need for rule in holding), default=0)
+        rivals = frozenset(rule.outcome for rule in holding if rule.need == most)
+        if len(rivals) > 1 and rivals not in reported:
+            reported.add(rivals)
+            ends = ", ".join(f"{label}:{outcome}" for label, outcome in outcomes.items())
+            text = f"{record.path}: with {ends} the rules for {sorted(rivals)} hold equally; the "
+            hint = "Make one of them ask for more."
+            yield subject.problem("ambiguous-map", record, text + "last one wins.", hint)
+    waiting = [child for child in record.children if _only_preempt_ends(subject, child)]
+    if (
+        facts.cuts
+        or len(waiting) == len(record.children)  # it watches as long as the mission runs
+        or _is_ended_from_outside(subject, record.path)
+    ):
+        return
+    for child in waiting:
+        text = f"{record.path} waits for {child.label}, which ends only when it is preempted, and "
+        hint = "Give the concurrence a child_termination_cb, or the child another way to end."
+        yield subject.problem("stuck-concurrence", record, text + "nobody preempts it.", hint)
+
+
+def _only_preempt_ends(subject: Subject, record: StateRecord) -> bool:
+    facts = subject.facts_of(record)
+    if record.is_container or facts.returns is None:
+        return False
+    return set(runs.possible(record, facts)) <= {PREEMPTED}
+
+
+def _preempts(subject: Subject, record: StateRecord) -> Iterator[Problem]:
+    """A preempt that the container passes on to the one around it as something else."""
+    for child, outcome in _preempt_ends(subject, record):
+        if outcome != PREEMPTED and _goes_on(subject, record, outcome):
+            text = (
+                f"{record.path}: a preempt of {child} leaves it by {outcome!r}, so what is around "
+            )
+            text += "it goes on as if there had been none."
+            hint = "Lead it to the outcome 'preempted'."
+            yield subject.problem("preempt-outcome", record, text, hint)
+
+
+def _goes_on(subject: Subject, record: StateRecord, outcome: str) -> bool:
+    """Tell whether an outcome of a container leads to a further state, here or further up."""
+    for parent in subject.root.walk():
+        for edge in parent.transitions if record in parent.children else ():
+            if (edge.source, edge.outcome) == (record.label, outcome):
+                ends = edge.target_is_outcome and edge.target != PREEMPTED
+                return _goes_on(subject, parent, edge.target) if ends else edge.target != PREEMPTED
+    return False
+
+
+def _preempt_ends(subject: Subject, record: StateRecord) -> Iterator[tuple[str, str]]:
+    """Yield (child, container outcome) for what children that were preempted lead to."""
+    if record.kind == "concurrence":
+        facts = subject.facts_of(record)
+        if not facts.any_outcome and all(PREEMPTED in c.outcomes for c in record.children):
+            ruled = runs.decide(facts, {child.label: PREEMPTED for child in record.children})
+            usual = PREEMPTED if PREEMPTED in record.outcomes else record.default_outcome
+            if ruled or usual:
+                yield "all its children", ruled or usual or ""
+        return
+    edges = {(e.source, e.outcome): e for e in record.transitions}
+    for child in record.children:
+        edge = edges.get((child.label, PREEMPTED))
+        queue = [edge] if edge is not None and PREEMPTED in child.outcomes else []
+        seen = {child.label}
+        ends: set[str] = set()
+        while queue:
+            at = queue.pop()
+            if at.target_is_outcome:
+                ends.add(at.target)
+            elif at.target not in seen and record.kind != "iterator":
+                seen.add(at.target)
+                queue += [e for e in record.transitions if e.source == at.target]
+        if ends and PREEMPTED not in ends:
+            yield child.label, min(ends)

@@ -1,0 +1,235 @@
+"""Rules about userdata keys: read before written, written and never read.
+
+A variable is a key of one container's userdata. A container copies its input keys in when it
+begins and its output keys out when it ends. A leaf is taken to write all its output keys.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING, TypeAlias
+
+from smachpy.checks.graph import moments
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from smachpy.checks.graph import Graph, Node
+    from smachpy.checks.model import Problem, Subject
+    from smachpy.introspection import StateRecord
+
+Variable: TypeAlias = tuple[str, str]  # path of the container, key
+MOST_STEPS = 50_000  # moments looked at for a run that shows a problem
+
+
+def find(subject: Subject, graph: Graph) -> Iterator[Problem]:
+    """Yield what is wrong with the keys."""
+    flow = _Flow(subject, graph)
+    yield from flow.unset()
+    yield from flow.unread()
+
+
+class _Flow:
+    """What is certainly written at each moment."""
+
+    def __init__(self, subject: Subject, graph: Graph) -> None:
+        self._subject = subject
+        self._graph = graph
+        self._parents = {c.path: r for r in subject.root.walk() for c in r.children}
+        self._preset = frozenset(
+            (record.path, key)
+            for record in subject.root.walk()
+            for key in subject.facts_of(record).preset
+        )
+        self._watched = {
+            record.path for record in subject.root.walk() if subject.facts_of(record).watched
+        }
+        self._written = self._solve()
+
+    # -- one moment ----------------------------------------------------------------------------
+
+    def _outer(self, record: StateRecord, key: str) -> Variable | None:
+        """Return the variable of the container around `record` that its `key` stands for."""
+        parent = self._parents.get(record.path)
+        return None if parent is None else (parent.path, dict(record.remapping).get(key, key))
+
+    def _pass(self, node: Node, written: frozenset[Variable]) -> frozenset[Variable]:
+        """Return what is written after a moment."""
+        record = node.record
+        new: set[Variable] = set()
+        if node.outcome is None and self._subject.facts_of(record).prepared:
+            outers = (self._outer(record, key) for key in record.output_keys)
+            new.update(outer for outer in outers if outer is not None)
+        if node.outcome is None and record.is_container:
+            for key in record.input_keys:
+                outer = self._outer(record, key)
+                if outer is None or outer in written | new or outer[0] in self._watched:
+                    new.add((record.path, key))
+            item_key = dict(record.details).get("item key")
+            if record.kind == "iterator" and item_key is not None:
+                new.add((record.path, item_key))
+        elif node.outcome is not None:
+            for key in record.output_keys:
+                outer = self._outer(record, key)
+                inner = record.path in self._watched or (record.path, key) in written
+                if outer is not None and (inner or not record.is_container):
+                    new.add(outer)
+        return written | new if new else written
+
+    def _solve(self) -> dict[int, frozenset[Variable]]:
+        """Return what is certainly written before each moment, whatever the run."""
+        graph = self._graph
+        written = {graph.start: self._preset}
+        queue = deque([graph.start])
+        while queue:
+            number = queue.popleft()
+            after_it = self._pass(graph.nodes[number], written[number])
+            for after in graph.after(number):
+                old = written.get(after)
+                new = after_it if old is None else old & after_it
+                if new != old:
+                    written[after] = new
+                    queue.append(after)
+        return written
+
+    def _may_be_written(self, variable: Variable, reader: StateRecord, key: str) -> bool:
+        """Tell whether `variable` is written at some moment of some run.
+
+        Args:
+            variable: The variable.
+            reader: A leaf that reads it.
+            key: Its name there.
+        """
+        known = self._subject.facts_of(reader).reads
+        others = {
+            number
+            for number in self._written
+            if self._graph.nodes[number].record.path != reader.path
+            or (known is not None and key in known.writes)
+        }
+        ever: frozenset[Variable] = self._preset
+        before: frozenset[Variable] | None = None
+        while ever != before:
+            before = ever
+            for number in others:
+                ever = self._pass(self._graph.nodes[number], ever)
+        return variable in ever
+
+    # -- rules ---------------------------------------------------------------------------------
+
+    def unset(self) -> Iterator[Problem]:
+        reported: set[tuple[str, str]] = set()
+        for number, written in sorted(self._written.items()):
+            node = self._graph.nodes[number]
+            reads = self._subject.facts_of(node.record).reads
+            if node.outcome is not None or node.record.is_container or reads is None:
+                continue
+            for key in node.record.input_keys:
+                variable = self._outer(node.record, key)
+                if (
+                    variable is None
+                    or (node.record.path, key) in reported
+                    or variable in self._pass(node, written)
+                    or variable[0] in self._watched  # a callback may have written it
+                ):
+                    continue
+                sure = key in reads.always
+                # What is read in some branch only may go with what was written in some runs only.
+                if sure or (
+                    key in reads.sometimes and not self._may_be_written(variable, node.record, key)
+                ):
+                    reported.add((node.record.path, key))
+                    yield self._unset(node, key, variable, sure=sure)
+
+    def _unset(self, node: Node, key: str, variable: Variable, *, sure: bool) -> Problem:
+        path = node.record.path
+        alias = "" if variable[1] == key else f" ({key!r} there)"
+        beside = self._beside(node.record, variable)
+        later = f"; {beside} writes it, and may do so later" if beside else ""
+        return self._subject.problem(
+            "unset-key",
+            node.record,
+            f"{path} {'reads' if sure else 'may read'} userdata key {variable[1]!r}{alias} of "
+            f"{variable[0]}, which nobody has written on this run{later}.",
+            "Write it before, set it in the machine's userdata, or declare it as an input key "
+            "of the machine.",
+            severity="error" if sure and not beside else "warning",
+            moments=moments(self._witness(node, variable)),
+        )
+
+    def _beside(self, record: StateRecord, variable: Variable) -> str:
+        """Return the path of a state beside `record` that writes `variable`; "" if none does."""
+        path = record.path
+        while (parent := self._parents.get(path)) is not None:
+            if parent.kind == "concurrence":
+                for child in parent.children:
+                    if child.path != path and variable in self._writes(child):
+                        return child.path
+            path = parent.path
+        return ""
+
+    def _writes(self, record: StateRecord) -> Iterator[Variable]:
+        """Yield the variables that a state or a state below it may write."""
+        for state in record.walk():
+            for key in state.output_keys:
+                outer = self._outer(state, key)
+                if outer is not None:
+                    yield outer
+
+    def _witness(self, goal: Node, variable: Variable) -> list[Node]:
+        """Return a shortest run that gets to `goal` with `variable` unwritten."""
+        graph = self._graph
+        first = (graph.start, self._preset)
+        came: dict[tuple[int, frozenset[Variable]], tuple[int, frozenset[Variable]] | None]
+        came = {first: None}
+        queue = deque([first])
+        while queue and len(came) < MOST_STEPS:
+            at = queue.popleft()
+            if graph.nodes[at[0]].record.path == goal.record.path and variable not in at[1]:
+                steps = [at]
+                while (before := came[steps[-1]]) is not None:
+                    steps.append(before)
+                return [graph.nodes[number] for number, _ in reversed(steps)]
+            written = self._pass(graph.nodes[at[0]], at[1])
+            for after in graph.after(at[0]):
+                if (after, written) not in came:
+                    came[after, written] = at
+                    queue.append((after, written))
+        return graph.path([graph.start], {goal.number}) or []
+
+    def unread(self) -> Iterator[Problem]:
+        reached = {self._graph.nodes[number].record.path for number in self._written}
+        seen = self._read()
+        for record in self._subject.root.walk():
+            for key in record.output_keys:
+                variable = self._outer(record, key)
+                if record.is_container or record.path not in reached or variable is None:
+                    continue
+                if variable in seen:
+                    continue
+                seen.add(variable)
+                yield self._subject.problem(
+                    "unread-key",
+                    record,
+                    f"{record.path} writes userdata key {variable[1]!r} of {variable[0]}, which no "
+                    "state reads.",
+                    "Remove it, read it, or declare it as an output key of the machine.",
+                    # After the run the caller can look at the root's own userdata.
+                    severity="note" if variable[0] == self._subject.root.path else None,
+                )
+
+    def _read(self) -> set[Variable]:
+        """Return the variables that somebody reads."""
+        read: set[Variable] = set()
+        for record in self._subject.root.walk():
+            facts = self._subject.facts_of(record)
+            parent = self._parents.get(record.path)
+            if parent is not None:
+                names = dict(record.remapping)
+                read |= {(parent.path, names.get(key, key)) for key in record.input_keys}
+            read |= {(record.path, key) for key in record.output_keys if record.is_container}
+            if facts.watched:
+                keys = [k for c in record.children for k in c.output_keys]
+                names = {k: n for c in record.children for k, n in c.remapping}
+                read |= {(record.path, names.get(key, key)) for key in keys}
+        return read

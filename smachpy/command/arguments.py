@@ -1,0 +1,442 @@
+"""A mission's arguments: the parameters of its function, filled from a command line.
+
+    def gotopose(robot: str, x: float, y: float, theta: float = 0.0) -> StateMachine: ...
+
+    smachpy run rp_action.gotopose -- robot_0 10 2 0
+    smachpy run rp_action.gotopose -- robot_0 10 2 --theta=1.57
+    smachpy run rp_action.gotopose --input robot=robot_0 --input x=10 --input y=2
+
+The annotations say what fits; the first line and the `Args:` of the docstring are the help.
+"""
+
+from __future__ import annotations
+
+import difflib
+import enum
+import inspect
+import math
+import re
+import types
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    Final,
+    Literal,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
+
+from actionlib_core.yaml_text import YamlTextError, load_yaml
+from smachpy.machines.container import Container
+from smachpy.sim.exceptions import MissionError
+
+if TYPE_CHECKING:
+    from smachpy.command.targets import Target
+
+NO_DEFAULT: Final = inspect.Parameter.empty
+_OPTION = re.compile(r"--?[A-Za-z]")
+_DOC = re.compile(r"(?P<name>\w+): (?P<text>.*)")
+_HELP = frozenset({"-h", "--help"})
+_LISTS = (list, tuple, Sequence)
+_WORDS: Final[dict[object, str]] = {
+    bool: "true or false",
+    int: "a whole number",
+    float: "a number",
+    str: "text",
+    Path: "a path",
+    type(None): "null",
+    Any: "a value in YAML",
+}
+
+
+class Text(str):
+    """A value as it was typed; what it means depends on the parameter that it is for."""
+
+    __slots__ = ()
+
+
+class MisfitError(ValueError):
+    """A value does not fit; the text says what was expected."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One parameter of a mission's function.
+
+    Attributes:
+        name: As in Python.
+        hint: Its type; `Any` when there is no annotation.
+        default: `NO_DEFAULT` when it has to be given.
+        text: From the docstring.
+        rest: It takes all the words that are left: a list, and the last in its place.
+        named: It is given by name only.
+    """
+
+    name: str
+    hint: Any
+    default: object = NO_DEFAULT
+    text: str = ""
+    rest: bool = False
+    named: bool = False
+
+    @property
+    def required(self) -> bool:
+        """Whether it has to be given."""
+        return self.default is NO_DEFAULT
+
+    def shown(self) -> str:
+        """Return it as it stands in a usage line."""
+        if self.named:
+            name = self.name.replace("_", "-")
+            flags = {False: f"--{name}", True: f"--no-{name}"}  # what there is to say
+            known = isinstance(self.default, bool)
+            word = flags[bool(self.default)] if known else f"--{name} VALUE"
+        else:
+            word = self.name.upper()
+        word += "..." if self.rest else ""
+        return word if self.required else f"[{word}]"
+
+
+# -- what fits -------------------------------------------------------------------------------------
+
+
+def fit(value: object, hint: Any) -> Any:
+    """Return `value` as a parameter of type `hint` takes it.
+
+    Args:
+        value: A Python value, or a `Text`.
+        hint: A type, a union, `Literal`, an enumeration, a list of any of them, or `Any`.
+
+    Raises:
+        MisfitError: it cannot be taken.
+    """
+    kinds = _alternatives(hint)
+    if isinstance(value, Text):
+        return _read(value, kinds)
+    for kind in kinds:
+        if _is_a(value, kind):
+            return value
+    for kind in kinds:
+        converted = _convert(value, kind)
+        if converted is not None:
+            return converted
+    raise MisfitError(expectation(hint))
+
+
+def expectation(hint: Any) -> str:
+    """Return what is expected of a parameter, in words."""
+    kinds = _alternatives(hint)
+    return " or ".join(_kind_in_words(k) for k in kinds if not (k is int and float in kinds))
+
+
+def _kind_in_words(kind: Any) -> str:
+    choices = _choices(kind)
+    if choices:
+        return f"one of {list(choices)}"
+    if _is_list(kind):
+        (item, *_) = get_args(kind) or (Any,)
+        return "a list" if item is Any else f"a list, each {expectation(item)}"
+    return _WORDS.get(kind) or str(getattr(kind, "__name__", kind))
+
+
+def _alternatives(hint: Any) -> tuple[Any, ...]:
+    if get_origin(hint) in {Union, types.UnionType}:
+        return tuple(kind for part in get_args(hint) for kind in _alternatives(part))
+    if hint is NO_DEFAULT or hint is object or isinstance(hint, TypeVar):
+        return (Any,)
+    return (hint,)
+
+
+def _choices(kind: Any) -> dict[str, Any]:
+    """Return what may be typed for a `Literal` or an enumeration, and what it stands for."""
+    if get_origin(kind) is Literal:
+        return {str(choice): choice for choice in get_args(kind)}
+    if isinstance(kind, type) and issubclass(kind, enum.Enum):
+        return {member.name: member for member in kind}
+    return {}
+
+
+def _is_list(kind: Any) -> bool:
+    return (get_origin(kind) or kind) in _LISTS
+
+
+def _read(text: Text, kinds: tuple[Any, ...]) -> Any:
+    """Return what was typed, as one of `kinds`."""
+    for kind in kinds:
+        choices = _choices(kind)
+        if text in choices:
+            return choices[text]
+    value = _yaml(text)
+    for kind in kinds:
+        if kind not in {str, Path} and (_is_a(value, kind) or kind is Any):
+            return value
+    for kind in kinds:
+        if kind in {str, Path}:
+            return kind(text)
+        converted = _convert(value, kind, text)
+        if converted is not None:
+            return converted
+    raise MisfitError(expectation(Union[kinds]))  # noqa: UP007  made of a tuple
+
+
+def _yaml(text: Text) -> object:
+    try:
+        return load_yaml(str(text))
+    except YamlTextError:  # `2026-13-01` looks like a date and is none
+        return str(text)
+
+
+def _is_a(value: object, kind: Any) -> bool:
+    """Tell whether a value needs no conversion."""
+    if kind is Any:
+        return True
+    if kind is float:
+        return isinstance(value, float) and math.isfinite(value)
+    if kind is int:
+        return isinstance(value, int) and not isinstance(value, bool)
+    if get_origin(kind) is not None or _is_list(kind):
+        origin = get_origin(kind)
+        return origin in {dict, Mapping} and isinstance(value, Mapping)
+    return isinstance(kind, type) and isinstance(value, kind)
+
+
+def _convert(value: object, kind: Any, text: Text | None = None) -> Any:
+    """Return a value as a `kind`, None when it cannot be one."""
+    choices = _choices(kind)
+    if choices:
+        return choices.get(str(value), value if value in choices.values() else None)
+    if kind is float and isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    if kind is str and isinstance(value, int | float | PurePath):
+        return str(value)
+    if kind is Path and isinstance(value, str | PurePath):
+        return Path(value)
+    if _is_list(kind) and not isinstance(value, Mapping):
+        return _convert_list(value, kind, text)
+    return None
+
+
+def _convert_list(value: object, kind: Any, text: Text | None) -> Any:
+    (item, *_) = get_args(kind) or (Any,)
+    if not isinstance(value, list | tuple):
+        value = [value if text is None else text]
+    made = [fit(one, item) for one in value]
+    return tuple(made) if (get_origin(kind) or kind) is tuple else made
+
+
+# -- a function's parameters -----------------------------------------------------------------------
+
+
+def parameters_of(thing: object) -> dict[str, Parameter]:
+    """Return the parameters of a mission's function, by name; a finished machine has none."""
+    if isinstance(thing, Container) or not callable(thing):
+        return {}
+    found = [
+        parameter
+        for parameter in inspect.signature(thing).parameters.values()
+        if parameter.kind in {parameter.POSITIONAL_OR_KEYWORD, parameter.KEYWORD_ONLY}
+    ]
+    places = [p.name for p in found if p.kind is p.POSITIONAL_OR_KEYWORD]
+    texts = _texts(thing)
+    made = {}
+    for parameter in found:
+        hint = _hint(thing, parameter)
+        made[parameter.name] = Parameter(
+            name=parameter.name,
+            hint=hint,
+            default=parameter.default,
+            text=texts.get(parameter.name, ""),
+            rest=places[-1:] == [parameter.name] and any(map(_is_list, _alternatives(hint))),
+            named=parameter.kind is parameter.KEYWORD_ONLY,
+        )
+    return made
+
+
+def _hint(thing: Callable[..., object], parameter: inspect.Parameter) -> Any:
+    """Return a parameter's type: its annotation, else that of its default."""
+    annotation = parameter.annotation
+    if annotation is NO_DEFAULT:
+        default = parameter.default
+        if isinstance(default, int | float) and not isinstance(default, bool):
+            return int | float
+        return type(default) if isinstance(default, bool | str) else Any
+    holder = types.SimpleNamespace(__annotations__={"it": annotation})
+    names = getattr(inspect.unwrap(thing), "__globals__", {})
+    try:
+        return get_type_hints(holder, globalns=names)["it"]
+    except (NameError, TypeError, SyntaxError):  # a name that only type checkers import
+        return Any
+
+
+def _texts(thing: object) -> dict[str, str]:
+    """Return what a docstring's `Args:` say, by name."""
+    _, _, section = (inspect.getdoc(thing) or "").partition("\nArgs:\n")
+    texts: dict[str, str] = {}
+    name = ""
+    for line in section.splitlines():
+        if not line.startswith("    "):
+            break
+        start = _DOC.fullmatch(line.removeprefix("    "))
+        if start is not None:
+            name = start["name"]
+            texts[name] = start["text"]
+        elif name:
+            texts[name] += f" {line.strip()}"
+    return texts
+
+
+# -- the words after `--` --------------------------------------------------------------------------
+
+
+def wants_help(words: Sequence[str]) -> bool:
+    """Tell whether the words after `--` ask what may stand there."""
+    return not _HELP.isdisjoint(words)
+
+
+def usage(target: Target) -> str:
+    """Return what a mission is and what it takes, several lines."""
+    parameters = list(parameters_of(target.thing).values())
+    lines = [usage_line(target, parameters), ""]
+    if target.summary:
+        lines += [target.summary, ""]
+    width = max((len(parameter.shown()) for parameter in parameters), default=0)
+    for parameter in parameters:
+        words = expectation(parameter.hint)
+        if not parameter.required:
+            words += f", {parameter.default} when not given"
+        text = f"{parameter.text.rstrip('.')} ({words})" if parameter.text else words
+        lines.append(f"  {parameter.shown():{width}}  {text}")
+    if parameters:
+        lines += ["", "Each may be given by name too: --NAME VALUE, or --input NAME=VALUE."]
+    else:
+        lines.append("It takes no arguments.")
+    return "\n".join(lines)
+
+
+def usage_line(target: Target, parameters: Sequence[Parameter]) -> str:
+    """Return the line that shows how to call it."""
+    words = " ".join(parameter.shown() for parameter in parameters)
+    return f"usage: smachpy run {target.name} [OPTIONS]{' -- ' if words else ''}{words}"
+
+
+def read_words(
+    target: Target, words: Sequence[str], given: Mapping[str, object]
+) -> dict[str, object]:
+    """Return the arguments of a mission's function.
+
+    Args:
+        target: The mission.
+        words: What stands after `--`: values in the order of the parameters, `--name VALUE`,
+            `--name=VALUE`; `--flag` and `--no-flag` for a truth value.
+        given: What was given by name already (`--input`).
+
+    Raises:
+        MissionError: a word is too many, unknown, missing or does not fit; names all of them.
+    """
+    parameters = parameters_of(target.thing)
+    reader = _Reader(parameters, given)
+    reader.read(list(words))
+    if reader.problems:
+        line = usage_line(target, list(parameters.values()))
+        problems = "\n".join(reader.problems)
+        raise MissionError(f"mission {target.name!r}: {problems}\n{line}")
+    return reader.values
+
+
+class _Reader:
+    """Fills parameters from words."""
+
+    def __init__(self, parameters: Mapping[str, Parameter], given: Mapping[str, object]) -> None:
+        self.values: dict[str, object] = {}
+        self.problems: list[str] = []
+        self._parameters = parameters
+        self._given = {name: value for name, value in given.items() if name in parameters}
+
+    def read(self, words: list[str]) -> None:
+        places: list[str] = []
+        while words:
+            word = words.pop(0)
+            if word == "--":
+                places += words
+                break
+            if _OPTION.match(word):
+                self._take_option(word, words)
+            else:
+                places.append(word)
+        for name, value in self._given.items():
+            self._take(self._parameters[name], value, f"--input {name}")
+        self._take_places(places)
+        missing = [
+            p.name for p in self._parameters.values() if p.required and p.name not in self.values
+        ]
+        if missing and not self.problems:
+            self.problems.append(f"missing: {', '.join(missing)}; expected a value for each.")
+
+    def _take_option(self, word: str, words: list[str]) -> None:
+        name, equals, value = word.lstrip("-").partition("=")
+        name = name.replace("-", "_")
+        parameter = self._parameters.get(name)
+        if parameter is None and name.startswith("no_") and not equals:
+            parameter = self._flag(name.removeprefix("no_"))
+            if parameter is not None:
+                self._take(parameter, False, word)  # noqa: FBT003  the value itself
+                return
+        if parameter is None:
+            self.problems.append(f"{word}: no such argument; {self._known(name)}")
+        elif equals:
+            self._take(parameter, Text(value), f"--{name}")
+        elif self._flag(name) is not None:
+            self._take(parameter, True, word)  # noqa: FBT003  the value itself
+        elif words and words[0] != "--" and not _OPTION.match(words[0]):
+            self._take(parameter, Text(words.pop(0)), word)
+        else:
+            self.problems.append(f"{word}: no value follows; expected {_wish(parameter)}.")
+            self.values.setdefault(name, None)
+
+    def _flag(self, name: str) -> Parameter | None:
+        parameter = self._parameters.get(name)
+        return parameter if parameter and bool in _alternatives(parameter.hint) else None
+
+    def _known(self, name: str) -> str:
+        near = difflib.get_close_matches(name, self._parameters, n=1, cutoff=0.5)
+        names = sorted(self._parameters)
+        hint = f" Did you mean '--{near[0]}'?" if near else ""
+        return f"expected {f'one of {names}' if names else 'none'}.{hint}"
+
+    def _take_places(self, places: list[str]) -> None:
+        named = [p.name for p in self._parameters.values() if p.name in self.values and not p.named]
+        free = [p for p in self._parameters.values() if p.name not in self.values and not p.named]
+        for parameter in free:
+            if not places:
+                return
+            if parameter.rest and (len(places) > 1 or not places[0].startswith("[")):
+                self._take(parameter, [Text(word) for word in places], parameter.name)
+                return
+            self._take(parameter, Text(places.pop(0)), parameter.name)
+        if places:
+            why = f", as {', '.join(named)} came by name" if named else ""
+            self.problems.append(
+                f"got {len(places)} more than it takes: {' '.join(places)!r}; expected "
+                f"{len(free)}{why}. A text with spaces needs quotes."
+            )
+
+    def _take(self, parameter: Parameter, value: object, where: str) -> None:
+        if parameter.name in self.values:
+            self.problems.append(f"{where}: given twice; expected once.")
+            return
+        try:
+            self.values[parameter.name] = fit(value, parameter.hint)
+        except MisfitError as error:
+            shown = str(value) if isinstance(value, Text) else value
+            self.problems.append(f"{where}: got {shown!r}; expected {error}.")
+            self.values[parameter.name] = None
+
+
+def _wish(parameter: Parameter) -> str:
+    return expectation(parameter.hint)

@@ -1,0 +1,89 @@
+"""A run's events as lines of JSON on a stream, standard output for example."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from typing import TYPE_CHECKING, Self
+
+from actionlib_core.clock import RealClock, SerialExecutor
+from smachpy.events import to_record
+from smachpy.events.recording import event_line, header_line
+
+if TYPE_CHECKING:
+    from typing import TextIO
+
+    from smachpy import events as ev
+    from smachpy.introspection import StateRecord
+
+CLOSE_S = 10.0
+"""Longest wait at the end for a reader that is behind [s]."""
+
+
+class EventStream:
+    """Writes every event as it happens, in the form of a recorded run; a context manager.
+
+    The mission never waits for the reader.
+
+    Args:
+        out: Where to write.
+        record: The machine's structure.
+        stamp_ns: When the run began [ns since the epoch].
+
+    Threads: `on_event` may be called from any thread.
+    """
+
+    def __init__(self, out: TextIO, record: StateRecord, stamp_ns: int) -> None:
+        self._header = header_line(record, stamp_ns)
+        self._out = out
+        self._executor = SerialExecutor(RealClock(), "events")  # a reader is slow in real time
+        self._lock = threading.Lock()
+        self._waiting: deque[str] = deque()
+        self._scheduled = False
+        self._number = 0
+        self._gone = False
+
+    def __enter__(self) -> Self:
+        self._put(self._header)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Write what waits; a second call does nothing.
+
+        Blocks: `CLOSE_S` at most.
+        """
+        self._executor.join(CLOSE_S)
+
+    def on_event(self, event: ev.Event) -> None:
+        """Take one event in; for `machine.subscribe`."""
+        record = to_record(event)
+        with self._lock:
+            self._number += 1
+            line = event_line({**record, "seq": self._number})
+        self._put(line)
+
+    def print_summary(self, outcome: str | None) -> None:
+        """Nothing: the last event says how it ended."""
+
+    def _put(self, line: str) -> None:
+        with self._lock:
+            if self._gone:
+                return
+            self._waiting.append(line)
+            scheduled, self._scheduled = self._scheduled, True
+        if not scheduled:
+            self._executor.submit(self._write)
+
+    def _write(self) -> None:
+        with self._lock:
+            lines = list(self._waiting)
+            self._waiting.clear()
+            self._scheduled = False
+        try:
+            self._out.write("".join(lines))
+            self._out.flush()
+        except (OSError, ValueError):  # nobody reads any more: the mission goes on unseen
+            self._gone = True

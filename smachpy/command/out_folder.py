@@ -1,0 +1,136 @@
+"""What `smachpy run --out DIR` leaves: events, pictures and a summary."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import json
+from typing import TYPE_CHECKING, Any
+
+from smachpy.command.extras import advice, load_view
+from smachpy.command.track_recorder import TrackRecorder
+from smachpy.events.recording import Recorder, RecordingError
+from smachpy.log import logwarn
+from smachpy.sim.exceptions import MissionError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from smachpy.command.surroundings import RobotOptions
+    from smachpy.machines.container import Container
+
+
+class OutFolder:
+    """The files of one run, which replace those of the mission's last run.
+
+    Args:
+        folder: Where to write; made when it is not there.
+        name: The mission's, in front of the files' names.
+        machine: The mission.
+        robot: Its map and dock are in the picture of the track.
+
+    Raises:
+        MissionError: a file cannot be written.
+        SmachError: the machine cannot be drawn.
+    """
+
+    def __init__(self, folder: Path, name: str, machine: Container, robot: RobotOptions) -> None:
+        self._folder = folder
+        self._name = name
+        self._machine = machine
+        self._robot = robot
+        self._track = TrackRecorder()
+        self._history: Any = load_view("history")()
+        self._draw: Callable[..., Path] = load_view("run")
+        self._events = self._path(".jsonl")
+        with self._writing():
+            folder.mkdir(parents=True, exist_ok=True)
+            # What cannot be drawn or written is known before anything moves.
+            self._draw(machine, self._path(".svg"))
+            for old in (self._events, self._path("_summary.json"), self._path("_track.png")):
+                old.unlink(missing_ok=True)
+        self._no_track = _why_no_track()
+
+    @contextlib.contextmanager
+    def collecting(self) -> Iterator[None]:
+        """Collect events inside the `with` block.
+
+        Raises:
+            MissionError: the file cannot be written.
+        """
+        try:
+            recorder = Recorder(self._events, self._machine)
+        except RecordingError as error:
+            raise MissionError(f"--out {self._folder}: {error}") from error
+        with recorder, contextlib.ExitStack() as stack:
+            for listener in (self._track, self._history):
+                stack.callback(self._machine.subscribe(listener.on_event))
+            yield
+
+    def write(self, facts: dict[str, Any]) -> list[Path]:
+        """Write the pictures and the summary.
+
+        Args:
+            facts: How the run was started and ended: first in the summary.
+
+        Returns:
+            All files, the events too.
+
+        Raises:
+            MissionError: a file cannot be written.
+        """
+        with self._writing():
+            files = [self._draw(self._machine, self._path(".svg"), run=self._history)]
+            if self._track.has_goals and self._no_track is not None:
+                logwarn(f"{self._path('_track.png')}: not drawn: {self._no_track}")
+            elif self._track.has_goals:
+                files.append(self._draw_track(f"{self._name}: {facts['outcome']}"))
+            path = self._path("_summary.json")
+            path.write_text(json.dumps({**facts, **self._summary()}, indent=2) + "\n", "utf-8")
+        return [*files, self._events, path]
+
+    def _summary(self) -> dict[str, Any]:
+        """Return what the run did, as plain data."""
+        return {
+            "seconds": self._history.seconds,
+            "states": {
+                path: {
+                    "visits": visits.count,
+                    "seconds": round(visits.seconds, 6),
+                    "outcomes": visits.outcomes,
+                }
+                for path, visits in self._history.visits().items()
+            },
+        }
+
+    def _draw_track(self, title: str) -> Path:
+        path = self._path("_track.png")
+        grid, dock = self._robot.floor()
+        self._track.draw(path, grid, dock=dock, title=title)
+        return path
+
+    def _path(self, ending: str) -> Path:
+        return self._folder / f"{self._name}{ending}"
+
+    @contextlib.contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise MissionError(
+                f"--out {self._folder}: got {error.strerror or str(error)!r}; expected a folder to "
+                "write to."
+            ) from error
+
+
+def _why_no_track() -> str | None:
+    """Import what draws tracks, which takes a moment; return what is missing for it."""
+    try:
+        importlib.import_module("smachpy.sim.track")
+    except ModuleNotFoundError as error:
+        text = advice(error)
+        if text is None:
+            raise
+        return text
+    return None

@@ -1,0 +1,202 @@
+"""`smachpy robot`: the simulated robot as a program of its own."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core import shutdown
+from actionlib_core.clock import current_clock
+from smachpy.sim.config import SimConfig, load_config
+from smachpy.sim.exceptions import NavigationError
+from smachpy.sim.geometry import Pose2D, finite, wrap_angle
+from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
+from smachpy.sim.robot_process import end_with_stdin
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from actionlib_core.node import Node
+    from smachpy.sim.server import RobotServer
+    from smachpy.sim.simulation import Simulation
+    from smachpy.sim.world import Robot
+    from smachpy.sim.world_file import WorldSpec
+
+_MOST_ROBOTS = 1000
+
+
+def register(subparsers: Any) -> None:
+    """Add `smachpy robot`."""
+    parser = subparsers.add_parser(
+        "robot",
+        help="start the simulated robot",
+        description="A simulated robot with the actions move_base and charge and the topics odom, "
+        "battery, scan and cmd_vel; or a world of several.",
+        epilog="Names are changed by a:=b, __ns:=robot_1 or --ros-args.",
+    )
+    add_robot_options(parser)
+    parser.add_argument(
+        "--namespace", help="in front of its names, robot_1 say (default: the configuration's)"
+    )
+    several = parser.add_mutually_exclusive_group()
+    several.add_argument(
+        "--world", type=Path, help="a world file, YAML: robots, doors, docks, moving obstacles"
+    )
+    several.add_argument(
+        "--robots", type=_count, metavar="N", help="N robots in namespaces robot_0, robot_1, ..."
+    )
+    parser.add_argument("--parameters", action="store_true", help="list all parameters and end")
+    parser.add_argument("--child", action="store_true", help=argparse.SUPPRESS)
+    parser.set_defaults(run=_run, words=())
+
+
+def add_robot_options(group: Any) -> None:
+    """Add what says which robot is simulated, and where."""
+    group.add_argument(
+        "--map",
+        type=Path,
+        default=OFFICE_MAP,
+        metavar="FILE",
+        help="its map, a map_server YAML file (default: the office)",
+    )
+    group.add_argument(
+        "--config", type=Path, default=OFFICE_ROBOT, metavar="FILE", help="its parameters, YAML"
+    )
+    group.add_argument(
+        "--pose",
+        type=finite,
+        nargs=3,
+        metavar=("X", "Y", "YAW"),
+        help="where it starts [m, m, rad]",
+    )
+
+
+def _run(args: argparse.Namespace) -> int:
+    if args.parameters:
+        print(parameters())
+        return 0
+    return serve(args)
+
+
+def serve(args: argparse.Namespace) -> int:
+    """Put the robots on the floor and serve them until SIGINT or SIGTERM; returns the exit code.
+
+    A single robot has the namespace of the configuration, unless `args` say otherwise; in a
+    world the robots have names of their own.
+
+    Raises:
+        InputFileError: the map, the config or the world file is wrong.
+        NavigationError: a robot cannot stand where it should start.
+        ServerConflictError: there is a robot of that name already.
+    """
+    from actionlib_core.config import load_config as load_network
+    from actionlib_core.node import Node
+    from smachpy.sim.server import RobotServer
+    from smachpy.sim.simulation import Simulation
+
+    with shutdown.handle_signals() as ending:
+        if args.child:
+            current_clock().spawn(lambda: end_with_stdin(ending), name="lifeline")
+        alone = args.world is None and not args.robots
+        served = make_robot(args.map, args.config, args.pose or ()) if alone else None
+        spec = _world(args) if served is None else None
+        config = load_network()
+        name, space = ("move_base", config.namespace) if served else ("simulation", "")
+        if args.namespace is not None:
+            space = args.namespace
+        with Node(name, namespace=space, config=config, arguments=args.names) as node:
+            server: RobotServer | Simulation
+            if served is not None:
+                server = RobotServer(served, node=node)
+            else:
+                assert spec is not None
+                server = Simulation(spec.build(current_clock().now()), node=node)
+            try:
+                server.start()
+                print(_ready(server, node, args), flush=True)
+                forget = ending.on_shutdown(server.close)
+                server.wait()
+                forget()
+            finally:
+                server.close()
+    return 0
+
+
+def make_robot(floor: Path, config: Path, pose: Sequence[float]) -> Robot:
+    """Put one robot on a floor of its own.
+
+    Args:
+        floor: The map.
+        config: The robot's parameters.
+        pose: Where it begins (x, y, yaw) [m, m, rad]; empty: where its parameters say.
+
+    Raises:
+        InputFileError: a file is wrong.
+        NavigationError: it cannot stand there.
+    """
+    from smachpy.sim.occupancy import load_map
+    from smachpy.sim.world import Robot, World
+
+    parameters, grid = load_config(config), load_map(floor)
+    start = Pose2D(pose[0], pose[1], wrap_angle(pose[2])) if pose else parameters.start
+    try:
+        return Robot(World(grid), parameters, start, current_clock().now())
+    except NavigationError as error:
+        where = "--pose" if pose else config
+        raise NavigationError(f"{where}: {error}. Try --pose X Y YAW.") from error
+
+
+def _world(args: argparse.Namespace) -> WorldSpec:
+    from smachpy.sim.occupancy import load_map
+    from smachpy.sim.world_file import WorldSpec, load_world, place_robots
+
+    if args.world is not None:
+        return load_world(args.world)
+    config, grid = load_config(args.config), load_map(args.map)
+    if args.pose:
+        config = dataclasses.replace(config, start=Pose2D(*args.pose))
+    return WorldSpec(args.map.name, grid, place_robots(grid, config, args.robots))
+
+
+def _ready(server: RobotServer | Simulation, node: Node, args: argparse.Namespace) -> str:
+    """Return the line that says what is served."""
+    from smachpy.sim.server import RobotServer
+
+    if isinstance(server, RobotServer):
+        x, y, _ = server.robot.body.pose
+        where = f"{args.map.name} at ({x:.2f}, {y:.2f})"
+        return f"{node.resolve('move_base')}: ready on {where}; Ctrl-C ends it"
+    floor = args.world.name if args.world else args.map.name
+    names = list(server.robots)
+    robots = f"{names[0]} to {names[-1]}" if len(names) > 1 else names[0]
+    doors = f", doors {', '.join(server.world.doors)}" if server.world.doors else ""
+    return f"{node.resolve('simulation')}: ready on {floor}: {robots}{doors}; Ctrl-C ends it"
+
+
+def parameters() -> str:
+    """Return all parameters as the YAML text of their defaults, with unit and limits."""
+    lines = []
+    for part in dataclasses.fields(SimConfig):
+        default = part.default
+        if not dataclasses.is_dataclass(default):
+            continue
+        lines.append(f"{part.name}:")
+        for item in dataclasses.fields(default):
+            text = f"  {item.name}: {str(getattr(default, item.name)).lower()}"
+            if item.metadata:
+                unit, limits = item.metadata["unit"], item.metadata["limits"].text()
+                notes = "; ".join(note for note in (f"[{unit}]" if unit else "", limits) if note)
+                text = f"{text:<32}# {item.metadata['doc']} {notes}"
+            lines.append(text)
+    lines += ["start: {x: 0, y: 0, yaw: 0}     # Where it begins. [m, m, rad]"]
+    lines += ["dock: {x: 0, y: 0, yaw: 0}      # Where it charges; left out: it has no dock."]
+    return "\n".join(lines)
+
+
+def _count(text: str) -> int:
+    """Read how many robots."""
+    if not (text.isdecimal() and 1 <= int(text) <= _MOST_ROBOTS):
+        raise argparse.ArgumentTypeError(f"got {text!r}; expected 1 to {_MOST_ROBOTS}")
+    return int(text)

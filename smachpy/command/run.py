@@ -1,0 +1,286 @@
+"""`smachpy list` and `smachpy run`."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from actionlib_core.names import check_name
+from actionlib_core.output import printable
+from smachpy.command.arguments import Text, parameters_of, read_words, usage, wants_help
+from smachpy.command.robot import add_robot_options
+from smachpy.mission_info import mission_info
+from smachpy.sim.exceptions import MissionError
+from smachpy.sim.geometry import finite
+from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import TextIO
+
+    from smachpy.command.surroundings import Pace, RobotOptions
+    from smachpy.command.targets import Target
+
+
+def register_list(subparsers: Any) -> None:
+    """Add `smachpy list`."""
+    parser = subparsers.add_parser(
+        "list", help="name the missions", description="Name the missions that are installed."
+    )
+    parser.set_defaults(run=_list)
+
+
+def register(subparsers: Any) -> None:
+    """Add `smachpy run`."""
+    parser = subparsers.add_parser(
+        "run",
+        add_help=False,
+        help="run a mission",
+        usage="smachpy run MISSION [OPTIONS] [-- ARGUMENTS]",
+        description="Run a mission to its end and show it in the terminal. Exit codes: 0 it "
+        "succeeded, 1 it ended otherwise, 2 bad input; the mission was preempted: 130 by Ctrl-C, "
+        "143 by SIGTERM.",
+        epilog="What stands after -- are the arguments of the mission's function: smachpy run "
+        "there_and_back -- 4.6 10.6. 'smachpy run MISSION --help' shows them. Names are "
+        "changed by a:=b, __ns:=robot_1 or --ros-args.",
+    )
+    parser.add_argument(
+        "-h", "--help", action=_Help, nargs=0, help="show this, and the mission's arguments"
+    )
+    parser.add_argument(
+        "target", metavar="MISSION", help="a name of `smachpy list`, module:factory, or a .py file"
+    )
+    parser.add_argument(
+        "--input",
+        "-i",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        type=_input,
+        help="an argument of the mission's function by name, or a userdata key",
+    )
+    parser.add_argument(
+        "--time",
+        type=_pace,
+        default="real",
+        metavar="PACE",
+        help="real; virtual: in this process alone, as fast as it can; 10x: so, at that rate",
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="write events, pictures and a summary there"
+    )
+    shown = parser.add_mutually_exclusive_group()
+    shown.add_argument("--plain", action="store_true", help="lines only, for logs")
+    shown.add_argument("--json", action="store_true", help="one event a line, as JSON")
+    parser.add_argument(
+        "--success",
+        action="append",
+        default=[],
+        metavar="OUTCOME",
+        help="an outcome that counts as success (default: succeeded)",
+    )
+    parser.add_argument(
+        "--server-timeout",
+        type=_seconds,
+        default=10.0,
+        metavar="S",
+        help="how long to wait for the mission's action servers [s] (default: %(default)g)",
+    )
+    _add_watching(parser)
+    robot = parser.add_argument_group("the simulated robot")
+    robot.add_argument(
+        "--start-robot",
+        action=argparse.BooleanOptionalAction,
+        default=False,
+        help="start it for this run (default: use one that runs)",
+    )
+    robot.add_argument(
+        "--robot",
+        default="",
+        metavar="NAME",
+        help="the robot to use: its name is in front of the mission's names",
+    )
+    add_robot_options(robot)
+    robot.add_argument(
+        "--world",
+        type=Path,
+        metavar="FILE",
+        help="a world file in place of map, parameters and pose (default: what the mission needs)",
+    )
+    robot.add_argument(
+        "--share",
+        action="store_true",
+        help="with robots of its own: be on the network that others are on (default: one of its "
+        "own, unless SMACHPY_DOMAIN or SMACHPY_CONFIG names one)",
+    )
+    parser.set_defaults(run=_run, words=())
+
+
+def _add_watching(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("watching")
+    group.add_argument("--view", action="store_true", help="show it in a browser while it runs")
+    group.add_argument(
+        "--port", type=int, default=8080, help="of that page; 0 takes any (default: %(default)s)"
+    )
+    group.add_argument(
+        "--control", action="store_true", help="let viewers pause, step, jump and preempt"
+    )
+    group.add_argument("--record", type=Path, metavar="FILE", help="write the run to a file")
+
+
+def _list(_args: argparse.Namespace) -> int:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text as Cell
+
+    from smachpy.command.targets import list_missions
+
+    table = Table(box=None, pad_edge=False, show_header=False)
+    table.add_column(style="bold")
+    table.add_column()
+    for name, summary in list_missions().items():
+        table.add_row(Cell(printable(name)), Cell(printable(summary)))
+    Console(highlight=False).print(table)
+    return 0
+
+
+def _run(args: argparse.Namespace) -> int:
+    events = sys.stdout if args.json else None
+    with contextlib.ExitStack() as stack:
+        if args.json:  # whatever a mission prints: events are alone
+            stack.enter_context(contextlib.redirect_stdout(sys.stderr))
+        if args.start_robot:  # its module, once imported, may join a network
+            _use_own_network(args, stack)
+        return _run_mission(args, events, stack)
+
+
+def _use_own_network(args: argparse.Namespace, stack: contextlib.ExitStack) -> None:
+    """Give a run that brings its robots a domain of its own, unless it is said which to use."""
+    from actionlib_core.node import has_node
+    from actionlib_core.private_network import network_is_chosen, private_network
+
+    if not (args.share or args.time.virtual or network_is_chosen() or has_node()):
+        domain = stack.enter_context(private_network())
+        print(f"network of this run: SMACHPY_DOMAIN={domain}", file=sys.stderr)
+
+
+def _brings_robots(target: Target, words: Sequence[str], inputs: Mapping[str, Text]) -> bool:
+    """Tell whether a mission starts its robots itself, when called with these arguments."""
+    robots = mission_info(target.thing).robots
+    if not isinstance(robots, str):
+        return robots
+    parameter = parameters_of(target.thing).get(robots)
+    if parameter is None:
+        raise MissionError(
+            f"mission {target.name!r}: robots: got {robots!r}; expected a parameter of it."
+        )
+    return bool(read_words(target, words, inputs).get(robots, parameter.default))
+
+
+def _run_mission(
+    args: argparse.Namespace, events: TextIO | None, stack: contextlib.ExitStack
+) -> int:
+    from smachpy.command.runner import RunOptions, run_mission
+    from smachpy.command.targets import load_target
+    from smachpy.command.watching import Watching
+
+    target = load_target(args.target)
+    if wants_help(args.words):
+        print(usage(target))
+        return 0
+    inputs = _inputs(args.input)
+    if _brings_robots(target, args.words, inputs):
+        _use_own_network(args, stack)
+    options = RunOptions(
+        inputs=inputs,
+        words=args.words,
+        pace=args.time,
+        robot=_robot(args, mission_info(target.thing).world),
+        names=args.names,
+        namespace=check_name(args.robot, "robot name") if args.robot else "",
+        out=args.out,
+        plain=args.plain,
+        events=events,
+        success=tuple(args.success),
+        server_timeout=args.server_timeout,
+        debug=args.debug,
+        watching=Watching(
+            record=args.record,
+            view=args.view,
+            port=args.port,
+            control=args.control,
+            alone=args.time.virtual,
+        ),
+    )
+    return run_mission(target, options)
+
+
+def _robot(args: argparse.Namespace, world: Path | None) -> RobotOptions:
+    """Return what to simulate; `world` is where the mission plays unless something else is said."""
+    from smachpy.command.surroundings import RobotOptions
+
+    said = args.pose or args.map != OFFICE_MAP or args.config != OFFICE_ROBOT
+    if args.world is not None and said:
+        raise MissionError(
+            "--world: got it beside --map, --config or --pose; expected it alone: the file says "
+            "all of that."
+        )
+    pose = tuple(args.pose or ())
+    world = args.world or (None if said else world)
+    return RobotOptions(args.start_robot, args.map, args.config, pose, world)
+
+
+class _Help(argparse.Action):
+    """Shows the options, and the arguments of the mission that was named before."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: object,
+        option_string: str | None = None,
+    ) -> NoReturn:
+        """Print and exit."""
+        del values, option_string
+        parser.print_help()
+        name = getattr(namespace, "target", None)
+        if name is not None:
+            from smachpy.command.targets import load_target
+
+            print(f"\n{usage(load_target(name))}")
+        parser.exit()
+
+
+def _seconds(text: str) -> float:
+    seconds = finite(text)
+    if seconds <= 0:
+        raise argparse.ArgumentTypeError(f"got {text!r}; expected seconds above 0")
+    return seconds
+
+
+def _pace(text: str) -> Pace:
+    from smachpy.command.surroundings import Pace
+
+    try:
+        return Pace.read(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def _inputs(pairs: Sequence[tuple[str, Text]]) -> dict[str, Text]:
+    inputs = dict(pairs)
+    if len(inputs) < len(pairs):
+        twice = next(key for key, _ in pairs if sum(key == other for other, _ in pairs) > 1)
+        raise MissionError(f"--input {twice}: given twice; expected once.")
+    return inputs
+
+
+def _input(text: str) -> tuple[str, Text]:
+    """Read KEY=VALUE."""
+    key, equals, value = text.partition("=")
+    if not (key and equals):
+        raise argparse.ArgumentTypeError(f"got {text!r}; expected KEY=VALUE")
+    return key, Text(value)

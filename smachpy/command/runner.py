@@ -1,0 +1,269 @@
+"""Run one mission for a person: robot, terminal view, signals, pictures, exit code."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import sys
+import traceback
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+
+from actionlib_core import shutdown
+from actionlib_core.clock import RealClock, current_clock
+from actionlib_core.names import NameArguments
+from actionlib_core.output import printable, tell
+from smachpy import InvalidUserCodeError, describe
+from smachpy.command.arguments import MisfitError, fit, parameters_of, read_words
+from smachpy.command.extras import load_view
+from smachpy.command.out_folder import OutFolder
+from smachpy.command.surroundings import REAL_TIME, Pace, RobotOptions, open_surroundings
+from smachpy.command.watching import Watching, watched
+from smachpy.mission_info import mission_info
+from smachpy.outcome_classes import is_good
+from smachpy.sim.exceptions import MissionError
+from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+    from typing import TextIO
+
+    from smachpy.command.targets import Target
+    from smachpy.introspection import StateRecord
+    from smachpy.machines.container import Container
+
+EXIT_SUCCESS: Final = 0
+EXIT_OTHER_OUTCOME: Final = 1
+OFFICE: Final = RobotOptions(start=False, map=OFFICE_MAP, config=OFFICE_ROBOT)
+NO_NAMES: Final = NameArguments()
+_SIGNAL_EXIT: Final = 128  # plus the signal's number, as shells have it
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """How to run a mission.
+
+    Attributes:
+        inputs: Arguments of the mission's function, or values of its userdata keys.
+        words: Arguments of its function, in order.
+        pace: How time passes.
+        robot: The simulated robot that the run brings along.
+        names: Renaming from the command line.
+        namespace: What the mission's relative names live under; "" leaves it to the configuration.
+        out: Folder for events, pictures and summary; None writes none.
+        plain: Only lines, no panel.
+        events: Where events go as lines of JSON, instead of what a person would see.
+        success: Outcomes that count as success; empty takes 'succeeded', or all that do not sound
+            like a failure.
+        server_timeout: How long to wait for the action servers that the mission needs [s].
+        debug: Show the traceback of a mission that raises.
+        watching: Who else may see it, and the file that it is written to.
+    """
+
+    inputs: Mapping[str, object] = field(default_factory=dict)
+    words: tuple[str, ...] = ()
+    pace: Pace = REAL_TIME
+    robot: RobotOptions = OFFICE
+    names: NameArguments = NO_NAMES
+    namespace: str = ""
+    out: Path | None = None
+    plain: bool = False
+    events: TextIO | None = None
+    success: tuple[str, ...] = ()
+    server_timeout: float = 10.0
+    debug: bool = False
+    watching: Watching = field(default_factory=Watching)
+
+
+def run_mission(target: Target, options: RunOptions) -> int:
+    """Run it to its end and return the exit code.
+
+    Ctrl-C and SIGTERM request the shutdown, which preempts the mission; a second Ctrl-C ends the
+    process.
+
+    Raises:
+        SmachError: the inputs do not fit, a server is missing, or the robot cannot start.
+
+    Blocks: until the mission has ended.
+    """
+    needs = mission_info(target.thing)
+    if options.pace.virtual and needs.real_time:
+        raise MissionError(
+            f"--time {options.pace}: mission {target.name!r} needs real time: {needs.real_time}. "
+            "Try --time real."
+        )
+    if options.pace.virtual and options.watching.view:
+        raise MissionError(
+            f"--view: got it beside --time {options.pace}, where nobody else can look in; expected "
+            "real time. Try --record FILE, and 'smachpy view FILE' afterwards."
+        )
+    with contextlib.ExitStack() as stack:
+        ending = stack.enter_context(shutdown.handle_signals())
+        surroundings = stack.enter_context(
+            open_surroundings(options.pace, options.robot, options.names, options.namespace)
+        )
+        machine = build(target, options.inputs, options.words)
+        record = describe(machine)
+        _check_success(target, record, options)
+        out = None
+        if options.out is not None:
+            out = OutFolder(options.out, target.name, machine, options.robot)
+        surroundings.start(machine, needed_servers(record) - set(needs.serves))
+        if not surroundings.wait(options.server_timeout):
+            return _signal_exit(ending)
+        if out is not None:
+            stack.enter_context(out.collecting())
+        stack.enter_context(watched(target.name, machine, record.path, options.watching))
+        show = _show(record, options)
+        stack.enter_context(show)
+        stack.callback(machine.subscribe(show.on_event))
+        outcome = _execute(machine, show, options)
+        surroundings.over()
+        good = outcome in good_outcomes(record, options)
+        code = EXIT_SUCCESS if good else EXIT_OTHER_OUTCOME
+        if ending.requested():
+            code = _signal_exit(ending)
+        if out is not None:
+            facts = {
+                "mission": target.name,
+                "outcome": outcome,
+                "exit_code": code,
+                "time": str(options.pace),
+            }
+            print(f"\nWritten: {', '.join(map(str, out.write(facts)))}")
+    return code
+
+
+def _show(record: StateRecord, options: RunOptions) -> Any:
+    """Return what shows the run: a terminal view, or an event stream."""
+    clock = current_clock()
+    if options.events is not None:
+        from smachpy.command.event_stream import EventStream
+
+        return EventStream(options.events, record, clock.time_ns())
+    # Where time jumps there is nothing to see between two lines.
+    jumps = options.pace.virtual and options.pace.rate is None
+    return load_view("terminal")(
+        record,
+        plain=options.plain or jumps,
+        clock=clock,
+        drawing=None if options.pace.rate is None else RealClock(),
+    )
+
+
+def build(target: Target, inputs: Mapping[str, object], words: Sequence[str] = ()) -> Container:
+    """Make the machine.
+
+    Args:
+        target: The mission.
+        inputs: Arguments of its function, or values of its userdata keys, by name.
+        words: Arguments of its function as they stand after `--`.
+
+    Raises:
+        MissionError: one of them does not fit, is missing, or is not known.
+    """
+    machine = target.build(**read_words(target, words, inputs))
+    parameters = parameters_of(target.thing)
+    keys = machine.get_registered_input_keys()
+    known = {*parameters, *keys, *machine.userdata.keys()}
+    for key, value in inputs.items():
+        if key not in known:
+            raise MissionError(
+                f"--input {key}: mission {target.name!r} has no such input; expected one of "
+                f"{sorted(known)}."
+            )
+        if key not in parameters:
+            machine.userdata[key] = _fit_userdata(machine, key, value)
+    missing = sorted(key for key in keys if key not in machine.userdata)
+    if missing:
+        raise MissionError(
+            f"mission {target.name!r}: input keys {missing} have no value; expected one for each. "
+            f"Try --input {missing[0]}=VALUE."
+        )
+    return machine
+
+
+def _fit_userdata(machine: Container, key: str, value: object) -> object:
+    """Return an input as the machine's own value of that key has it, if there is one."""
+    own = machine.userdata[key] if key in machine.userdata else None  # noqa: SIM401  no dict
+    hint: Any = Any
+    if isinstance(own, bool | str):
+        hint = type(own)
+    elif isinstance(own, int | float):
+        hint = int | float
+    elif isinstance(own, list | dict):
+        hint = type(own)
+    try:
+        return fit(value, hint)
+    except MisfitError as error:
+        raise MissionError(
+            f"--input {key}: got {value!s:.60}; expected {error}, as the mission's own {own!r}."
+        ) from error
+
+
+def needed_servers(record: StateRecord) -> set[str]:
+    """Return the names of the actions that a machine's states call."""
+    return {
+        value
+        for state in record.walk()
+        if state.kind == "action"
+        for name, value in state.details
+        if name == "action"
+    }
+
+
+def good_outcomes(record: StateRecord, options: RunOptions) -> set[str]:
+    """Return the outcomes that count as success."""
+    if options.success:
+        return set(options.success)
+    if "succeeded" in record.outcomes:
+        return {"succeeded"}
+    return {outcome for outcome in record.outcomes if is_good(outcome)}
+
+
+def _check_success(target: Target, record: StateRecord, options: RunOptions) -> None:
+    unknown = sorted(set(options.success) - set(record.outcomes))
+    if unknown:
+        raise MissionError(
+            f"--success {unknown[0]}: mission {target.name!r} has no such outcome; expected one of "
+            f"{sorted(record.outcomes)}."
+        )
+
+
+def _execute(machine: Container, show: Any, options: RunOptions) -> str | None:
+    """Run it; None when its own code raised, which is said here.
+
+    Raises:
+        MissionError: in virtual time, nothing can happen any more.
+    """
+    outcome: str | None = None
+    try:
+        outcome = machine.execute()
+    except Exception as error:
+        show.close()
+        stuck = _stuck(error) if options.pace.virtual else None
+        if stuck is not None:
+            raise MissionError(f"--time {options.pace}: {stuck}\nTry --time real.") from error
+        if not isinstance(error, InvalidUserCodeError):
+            raise
+        if options.debug:
+            sys.stderr.write(printable("".join(traceback.format_exception(error))))
+        else:
+            tell("smachpy", str(error))
+    show.print_summary(outcome)
+    return outcome
+
+
+def _stuck(error: BaseException | None) -> str | None:
+    """Return what everybody waits for when that is why a mission in virtual time raised."""
+    from actionlib_core.clock import Deadlock
+
+    while error is not None and not isinstance(error, Deadlock):
+        error = error.__cause__
+    return None if error is None else str(error)
+
+
+def _signal_exit(ending: shutdown.Shutdown) -> int:
+    members = signal.Signals.__members__
+    return _SIGNAL_EXIT + members.get(ending.reason or "", signal.SIGINT)

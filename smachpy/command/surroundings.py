@@ -1,0 +1,484 @@
+"""Where a mission runs: on the network in real time, or alone in this process in virtual time."""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, Protocol
+
+from actionlib_core import shutdown
+from actionlib_core.clock import current_clock, use_clock
+from actionlib_core.exceptions import NodeError
+from actionlib_core.node import Node, get_node, init, use_node
+from actionlib_core.wire.presence import Kind, list_endpoints, parse_token, token_pattern
+from smachpy.sim.exceptions import MissionError
+from smachpy.sim.robot_process import RobotProcess
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterator, Mapping
+    from pathlib import Path
+
+    from actionlib_core.names import NameArguments
+    from actionlib_core.transport import Closable, Presence, Transport
+    from smachpy.machines.container import Container
+    from smachpy.sim.geometry import Pose2D
+    from smachpy.sim.occupancy import OccupancyMap
+
+ROBOT_ACTIONS: Final = frozenset({"move_base", "charge"})
+"""What the simulated robot does; the last word of an action's name."""
+
+MOST_NAMED: Final = 3
+"""Names of servers that may be meant, in an error."""
+
+_TIMES = re.compile(r"(?P<number>\d+(\.\d+)?)x")
+_FASTEST: Final = 1000.0
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How time passes.
+
+    Attributes:
+        virtual: In this process alone, on a clock of its own.
+        rate: Seconds per real second; None: as fast as the computer allows.
+    """
+
+    virtual: bool = False
+    rate: float | None = None
+
+    @classmethod
+    def read(cls, text: str) -> Pace:
+        """Read `real`, `virtual` or `10x`.
+
+        Raises:
+            ValueError: it is none of them.
+        """
+        if text in {"real", "virtual"}:
+            return cls(virtual=text == "virtual")
+        match = _TIMES.fullmatch(text)
+        if match is None or not 0 < float(match["number"]) <= _FASTEST:
+            raise ValueError(
+                f"got {text!r}; expected real, virtual, or a rate of at most {_FASTEST:g}x such "
+                "as 10x"
+            )
+        return cls(virtual=True, rate=float(match["number"]))
+
+    def __str__(self) -> str:
+        if not self.virtual:
+            return "real"
+        return "virtual" if self.rate is None else f"{self.rate:g}x"
+
+
+REAL_TIME: Final = Pace()
+
+
+@dataclass(frozen=True, slots=True)
+class RobotOptions:
+    """The simulated robot that a run brings along.
+
+    Attributes:
+        start: Start it for this run.
+        map: Its floor.
+        config: Its parameters.
+        pose: Where it starts [m, m, rad]; empty: where its parameters say.
+        world: A world file in place of all that: robots, doors, what moves.
+    """
+
+    start: bool
+    map: Path
+    config: Path
+    pose: tuple[float, ...] = ()
+    world: Path | None = None
+
+    def arguments(self) -> tuple[str, ...]:
+        """Return them as the robot's program takes them."""
+        if self.world is not None:
+            return ("--world", str(self.world))
+        pose = ("--pose", *map(str, self.pose)) if self.pose else ()
+        return ("--map", str(self.map), "--config", str(self.config), *pose)
+
+    def floor(self) -> tuple[OccupancyMap, Pose2D | None]:
+        """Return the map, and where the robot charges.
+
+        Raises:
+            InputFileError: a file is wrong.
+        """
+        from smachpy.sim.config import load_config
+        from smachpy.sim.occupancy import load_map
+
+        if self.world is None:
+            return load_map(self.map), load_config(self.config).dock
+        from smachpy.sim.world_file import load_world
+
+        spec = load_world(self.world)
+        return spec.grid, spec.robots[0].config.dock if spec.robots else None
+
+    def choose_robot(self, name: str) -> str:
+        """Return the name of the robot to use in the world: `name`, or its first one.
+
+        Raises:
+            InputFileError: the world file is wrong.
+            MissionError: there is no such robot.
+        """
+        if self.world is None:
+            return name
+        from smachpy.sim.world_file import load_world
+
+        names = [robot.name for robot in load_world(self.world).robots]
+        if names and not name:
+            return names[0]
+        if name not in names:
+            raise MissionError(f"--robot: got {name!r}; expected one of {names}, of {self.world}.")
+        return name
+
+
+class Surroundings(Protocol):
+    """Brings up what a mission needs around it."""
+
+    def start(self, machine: Container, needed: set[str]) -> None:
+        """Begin to bring it up.
+
+        Args:
+            machine: The mission, which is preempted when its robot refuses.
+            needed: Names of the actions that others have to serve.
+
+        Raises:
+            MissionError: it cannot be had here.
+        """
+
+    def wait(self, timeout: float) -> bool:
+        """Wait until all is there; False when the program is to end.
+
+        Raises:
+            MissionError: something is missing after `timeout` [s], or the robot could not start.
+
+        Blocks: `timeout` at most.
+        """
+
+    def over(self) -> None:
+        """Take notice that the mission has ended.
+
+        Raises:
+            MissionError: its goals may have gone to a wrong robot.
+        """
+
+    def close(self) -> None:
+        """Take everything down.
+
+        Blocks: 3.5 s at most.
+        """
+
+
+@contextlib.contextmanager
+def open_surroundings(
+    pace: Pace, robot: RobotOptions, names: NameArguments, namespace: str
+) -> Iterator[Surroundings]:
+    """Make clock and node for a mission; both are in force inside the `with` block.
+
+    Args:
+        pace: How time passes.
+        robot: The simulated robot.
+        names: Renaming from the command line.
+        namespace: What relative names live under; "" leaves it to the configuration.
+
+    Raises:
+        NameSetupError: a name is not allowed.
+        TransportError: the network cannot be joined.
+        MissionError: names are to be changed, but the mission's module has made its node; or the
+            world is wrong, or has no such robot.
+    """
+    if pace.virtual or robot.start:
+        namespace = robot.choose_robot(namespace)
+    if pace.virtual:
+        with _open_virtual(pace, robot, names, namespace) as surroundings:
+            yield surroundings
+        return
+    if names.rules or namespace:
+        _name_node(names, namespace)
+    real = _Network(robot)
+    try:
+        yield real
+    finally:
+        real.close()
+
+
+def _name_node(names: NameArguments, namespace: str) -> None:
+    words: list[str] = []
+    for rule in names.rules:
+        text = f"{rule.old}:={rule.new}"
+        words += ["--ros-args", "-r", f"{rule.node}:{text}", "--"] if rule.node else [text]
+    try:
+        init(argv=words, namespace=namespace or None)
+    except NodeError as error:
+        raise MissionError(
+            f"names cannot be changed: the mission made its node already ({error}). Try making "
+            "clients and servers in the mission's function or its states, not when its module is "
+            "imported."
+        ) from error
+
+
+# -- real time -------------------------------------------------------------------------------------
+
+
+class _Network:
+    """The network as configured; the robot is a process of its own."""
+
+    def __init__(self, robot: RobotOptions) -> None:
+        self._options = robot
+        self._robot: RobotProcess | None = None
+        self._wait: ServerWait | None = None
+        self._forget: Callable[[], None] = lambda: None
+
+    def start(self, machine: Container, needed: set[str]) -> None:
+        self._wait = ServerWait(needed)
+        self._forget = shutdown.on_shutdown(self._wait.wake)
+        if not self._options.start:
+            return
+        arguments = self._options.arguments()
+        if self._options.world is None:
+            prefix = _prefix_of(needed)
+            space = get_node().namespace
+            name = "/".join(word for word in (space, prefix) if word)
+            arguments += ("--namespace", name or "/")
+        self._robot = RobotProcess(arguments, on_change=self._wait.wake)
+        self._robot.on_refusal(machine.request_preempt)
+        self._robot.__enter__()
+
+    def wait(self, timeout: float) -> bool:
+        assert self._wait is not None
+        missing = self._wait.wait(timeout, self._robot)
+        if missing:
+            there = list_endpoints(get_node().transport, kind=Kind.ACTION_SERVER)
+            raise MissionError(missing_text(missing, {end.name for end in there}, timeout))
+        return not shutdown.requested()
+
+    def over(self) -> None:
+        if self._robot is not None:
+            if (
+                self._robot.refused()
+            ):  # an older robot of its name turned up late, and got the goals
+                self._robot.check()
+            self._robot.let_go()
+
+    def close(self) -> None:
+        self._forget()
+        if self._wait is not None:
+            self._wait.close()
+        if self._robot is not None:
+            self._robot.stop()
+
+
+def _prefix_of(needed: set[str]) -> str:
+    """Return the name of the robot whose actions a mission calls; "" for its own.
+
+    Raises:
+        MissionError: they are several.
+    """
+    prefixes = {
+        name.strip("/").rpartition("/")[0]
+        for name in needed
+        if name.rpartition("/")[2] in ROBOT_ACTIONS
+    }
+    if len(prefixes) > 1:
+        raise MissionError(
+            f"--start-robot: the mission calls several robots: {sorted(prefixes)}; expected one. "
+            "Try starting each: smachpy robot --namespace NAME"
+        )
+    return prefixes.pop() if prefixes else ""
+
+
+class ServerWait:
+    """Waits until every needed action has a server, or something makes waiting pointless.
+
+    Args:
+        names: The actions, as the mission names them.
+    """
+
+    def __init__(self, names: set[str]) -> None:
+        self._clock = current_clock()
+        self._wake = self._clock.event("the servers of the mission's actions")
+        self._missing: dict[str, str] = {}
+        self._watches: list[Closable] = []
+        if names:
+            self._watch(get_node(), names)
+
+    def _watch(self, node: Node, names: set[str]) -> None:
+        self._missing = {node.resolve(name, "action name"): name for name in names}
+        for full in list(self._missing):
+            pattern = token_pattern(Kind.ACTION_SERVER, full)
+            self._watches.append(node.transport.watch_alive(pattern, self._on_presence))
+
+    def wake(self) -> None:
+        """Look again whether to go on waiting; from any thread."""
+        self._wake.set()
+
+    def close(self) -> None:
+        """Stop watching."""
+        for watch in self._watches:
+            watch.close()
+
+    def wait(self, timeout: float, robot: RobotProcess | None) -> dict[str, str]:
+        """Wait for the servers, and for `robot` to be ready.
+
+        Returns:
+            What is missing after `timeout` [s], full name -> name in the mission; nothing when all
+            is there or the program is to end.
+
+        Raises:
+            MissionError: the robot could not start.
+
+        Blocks: `timeout` at most.
+        """
+        deadline = self._clock.now() + timeout
+        while not shutdown.requested():
+            if robot is not None:
+                robot.check()
+            if not self._missing and (robot is None or robot.ready()):
+                return {}
+            left = deadline - self._clock.now()
+            if left <= 0:
+                return dict(self._missing) or {get_node().resolve("move_base"): "move_base"}
+            self._wake.wait(left)
+            self._wake.clear()
+        return {}
+
+    def _on_presence(self, presence: Presence) -> None:
+        endpoint = parse_token(presence.key)
+        if endpoint is not None and presence.alive:
+            self._missing.pop(endpoint.name, None)
+            self._wake.set()
+
+
+def missing_text(missing: Mapping[str, str], there: Collection[str], timeout: float) -> str:
+    """Return what to say about actions without a server.
+
+    Args:
+        missing: Full name -> name in the mission.
+        there: Full names of the actions that have one.
+        timeout: How long they were waited for [s].
+    """
+    what, be = ("action", "has") if len(missing) == 1 else ("actions", "have")
+    listed = ", ".join(f"'/{full}'" for full in sorted(missing))
+    text = f"{what} {listed}: {be} no server after {timeout:g} s; expected one."
+    if any(name.strip("/") != full for full, name in missing.items()):
+        called = ", ".join(repr(name) for _, name in sorted(missing.items()))
+        text += f" The mission calls {'it' if len(missing) == 1 else 'them'} {called}."
+    near = {close for full in missing for close in _close_names(full, there)}
+    if near:
+        text += f" Did you mean {' or '.join(repr(f'/{name}') for name in sorted(near))}?"
+    full = min(missing)
+    if all(name.rpartition("/")[2] in ROBOT_ACTIONS for name in missing.values()):
+        prefix = full.rpartition("/")[0]
+        program = "smachpy robot" + (f" --namespace {prefix}" if prefix else "")
+        text += "" if not near else " Try --robot NAME if another robot is meant."
+        return f"{text} Try --start-robot, or in another terminal: {program}"
+    return f"{text} Try starting it; `actionlib list` shows those that run."
+
+
+def _close_names(name: str, there: Collection[str]) -> list[str]:
+    """Return the names that somebody who said `name` may have meant: another robot's, or alike."""
+    word = name.rpartition("/")[2]
+    same = sorted(other for other in there if other.rpartition("/")[2] == word)
+    return same[:MOST_NAMED] or difflib.get_close_matches(name, there, n=1)
+
+
+# -- virtual time ----------------------------------------------------------------------------------
+
+
+@contextlib.contextmanager
+def _open_virtual(
+    pace: Pace, robot: RobotOptions, names: NameArguments, namespace: str
+) -> Iterator[_VirtualNetwork]:
+    from actionlib_core.clock import VirtualClock
+    from actionlib_core.transport.memory import MemoryNetwork
+
+    with VirtualClock(rate=pace.rate) as clock, use_clock(clock):
+        network = MemoryNetwork(clock)
+        node = Node(
+            "mission",
+            transport=network.session(),
+            clock=clock,
+            namespace=namespace,
+            arguments=names,
+        )
+        with node, use_node(node):
+            surroundings = _VirtualNetwork(pace, robot, network.session)
+            try:
+                yield surroundings
+            finally:
+                surroundings.close()
+
+
+class _VirtualNetwork:
+    """A network in memory, with the robot in this process; nobody else is there."""
+
+    def __init__(self, pace: Pace, robot: RobotOptions, session: Callable[[], Transport]) -> None:
+        self._pace = pace
+        self._options = robot
+        self._session = session
+        self._needed: set[str] = set()
+        self._down = contextlib.ExitStack()
+
+    def start(self, machine: Container, needed: set[str]) -> None:
+        del machine
+        others = {name for name in needed if name.rpartition("/")[2] not in ROBOT_ACTIONS}
+        if others:
+            raise MissionError(
+                f"--time {self._pace}: the mission calls {sorted(others)}, which nobody in this "
+                "process serves; expected a mission that needs the simulated robot only. Try "
+                "--time real."
+            )
+        self._needed = needed
+        if self._options.world is not None:
+            self._put_world(self._options.world)
+        elif needed or self._options.start:
+            self._put_robot(_prefix_of(needed))
+
+    def _put_world(self, world: Path) -> None:
+        from smachpy.sim.simulation import simulation
+
+        node = Node("simulation", transport=self._session(), clock=get_node().clock)
+        self._down.enter_context(node)
+        self._down.enter_context(simulation(world, node=node))
+
+    def _put_robot(self, prefix: str) -> None:
+        from smachpy.command.robot import make_robot
+        from smachpy.sim.server import RobotServer
+
+        options, mine = self._options, get_node()
+        space = "/".join(word for word in (mine.namespace, prefix) if word)
+        node = Node(
+            "move_base",
+            transport=self._session(),
+            clock=mine.clock,
+            namespace=space,
+        )
+        self._down.enter_context(node)
+        robot = make_robot(options.map, options.config, options.pose)
+        server = RobotServer(robot, node=node)
+        self._down.callback(server.close)
+        server.start()
+
+    def wait(self, timeout: float) -> bool:
+        wait = ServerWait(self._needed)
+        forget = shutdown.on_shutdown(wait.wake)
+        try:
+            missing = wait.wait(timeout, None)
+        finally:
+            forget()
+            wait.close()
+        if missing:
+            raise MissionError(
+                f"--time {self._pace}: the mission calls {sorted(missing.values())}, which the "
+                "simulated robot does not serve under that name; expected its own. Try other "
+                "--robot or renaming."
+            )
+        return not shutdown.requested()
+
+    def over(self) -> None:
+        """Nothing is left to say."""
+
+    def close(self) -> None:
+        self._down.close()

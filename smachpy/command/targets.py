@@ -1,0 +1,244 @@
+"""Find the machine that a user names on a command line: a mission, a module or a file."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import inspect
+import sys
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.suggest import did_you_mean
+from smachpy.command.extras import advice, clash, hidden_by
+from smachpy.exceptions import SmachError
+from smachpy.machines.container import Container
+from smachpy.mission_info import mission
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+GROUP = "smachpy.missions"
+DEFAULT_NAMES = ("mission", "machine", "sm")
+
+
+class TargetError(SmachError):
+    """The named mission, module or file cannot be loaded.
+
+    Attributes:
+        target: What the user wrote.
+        problem: Why, and what to try.
+    """
+
+    def __init__(self, target: str, problem: str) -> None:
+        self.target = target
+        self.problem = problem
+        super().__init__(f"target {target!r}: {problem}")
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A machine, or the function that makes it.
+
+    Attributes:
+        name: What to call it in messages and file names.
+        source: Where it was found, `module:attribute`.
+        summary: First line of its docstring.
+    """
+
+    name: str
+    source: str
+    summary: str
+    thing: Any
+
+    def build(self, **arguments: object) -> Container:
+        """Return the machine; a factory is called with `arguments`.
+
+        Raises:
+            TargetError: it takes no such argument, or gives something that is no container.
+        """
+        if isinstance(self.thing, Container):
+            if arguments:
+                raise TargetError(
+                    self.name,
+                    f"got arguments {sorted(arguments)}; expected none, {self.source} is a "
+                    "finished machine. Try a function that returns one.",
+                )
+            return self.thing
+        self._check_arguments(arguments)
+        machine = self.thing(**arguments)
+        if not isinstance(machine, Container):
+            raise TargetError(
+                self.name, f"{self.source} returned {machine!r}; expected a state machine."
+            )
+        return machine
+
+    def _check_arguments(self, arguments: dict[str, object]) -> None:
+        signature = inspect.signature(self.thing)
+        missing = [
+            name
+            for name, parameter in signature.parameters.items()
+            if parameter.default is parameter.empty
+            and parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
+        ]
+        if missing and not arguments:
+            raise TargetError(
+                self.name,
+                f"{self.source} needs {', '.join(missing)}; expected what needs no arguments. "
+                "Try a function of your own that calls it with some.",
+            )
+        try:
+            signature.bind(**arguments)
+        except TypeError as error:
+            raise TargetError(
+                self.name,
+                f"{self.source}{signature} cannot be called with {sorted(arguments)}: {error}.",
+            ) from error
+
+
+def list_missions() -> dict[str, str]:
+    """Return the missions that installed packages offer, name -> what it does, in one line.
+
+    They are the entry points `smachpy.missions`. The line of one that cannot be loaded says why.
+    """
+    lines = {}
+    for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
+        hidden = hidden_by(point.module)
+        try:
+            lines[point.name] = (
+                f"not available: hidden by {str(hidden)!r}"
+                if hidden is not None
+                else _load_mission(point.name).summary
+            )
+        except TargetError as error:
+            lines[point.name] = f"not available: {error.problem}"
+    return lines
+
+
+def load_target(text: str) -> Target:
+    """Load what a user named.
+
+    Args:
+        text: A mission's name (`patrol`), `module:factory`, or `path.py[:factory]`. Without
+            `:factory` a file's `mission`, `machine` or `sm` is taken, else its only machine.
+
+    Raises:
+        TargetError: there is no such thing; names the nearest ones.
+    """
+    place, _, attribute = text.partition(":")
+    if place.endswith(".py") or "/" in place:
+        return _from_module(text, _import_file(text, Path(place)), attribute, Path(place).stem)
+    if attribute:
+        return _from_module(text, _import_module(text, place), attribute, attribute)
+    if place in _mission_names():
+        return _load_mission(place)
+    raise TargetError(text, f"no such mission; {_suggest(place, _mission_names())}")
+
+
+def _mission_names() -> list[str]:
+    return sorted(point.name for point in entry_points(group=GROUP))
+
+
+def _load_mission(name: str) -> Target:
+    (point,) = (point for point in entry_points(group=GROUP) if point.name == name)
+    try:
+        thing = point.load()
+    except ImportError as error:
+        text = advice(error) or f"importing {point.value!r} raised {_text_of(error)}"
+        raise TargetError(name, text) from error
+    return _target(name, point.value, thing)
+
+
+def _import_file(text: str, path: Path) -> ModuleType:
+    if not path.is_file():
+        near = sorted(str(p) for p in path.parent.glob("*.py")) if path.parent.is_dir() else []
+        raise TargetError(text, f"no file {str(path)!r}; {_suggest(str(path), near)}")
+    name = _free_name(path.stem)
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise TargetError(
+            text, f"{str(path)!r} is not a Python file; expected a name ending in .py"
+        )
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses and pickles look their module up
+    sys.path.insert(0, str(path.parent.resolve()))  # as `python path.py` would
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        sys.modules.pop(name, None)  # half of it is there
+        why = clash(error, [path.parent]) if isinstance(error, ImportError) else None
+        raise TargetError(text, why or f"running the file raised {_text_of(error)}") from error
+    finally:
+        sys.path.remove(str(path.parent.resolve()))
+    return module
+
+
+def _free_name(stem: str) -> str:
+    """Return `stem`, with a number after it if a module, another file's maybe, has that name."""
+    name, number = stem, 1
+    while name in sys.modules:
+        number += 1
+        name = f"{stem}_{number}"
+    return name
+
+
+def _import_module(text: str, name: str) -> ModuleType:
+    here = str(Path.cwd())
+    sys.path.insert(0, here)
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        why = clash(error, [Path(here)])
+        raise TargetError(
+            text,
+            why or f"no module {error.name!r}; expected one on the Python path or in {here!r}.",
+        ) from error
+    except Exception as error:
+        raise TargetError(text, f"importing {name!r} raised {_text_of(error)}") from error
+    finally:
+        sys.path.remove(here)
+
+
+def _from_module(text: str, module: ModuleType, attribute: str, name: str) -> Target:
+    # The decorator `mission`, imported by that name, is not the file's mission.
+    found = [n for n in DEFAULT_NAMES if getattr(module, n, mission) is not mission]
+    names = [attribute] if attribute else found
+    if not names:
+        machines = [n for n, thing in vars(module).items() if isinstance(thing, Container)]
+        if len(machines) != 1:
+            raise TargetError(
+                text,
+                f"which machine is meant? got {machines}; expected one of "
+                f"{list(DEFAULT_NAMES)} or a single machine. Try {text}:NAME.",
+            )
+        names = machines
+    thing: Any = module
+    for word in names[0].split("."):
+        if not hasattr(thing, word):
+            public = [n for n, value in vars(module).items() if _usable(n, value)]
+            raise TargetError(text, f"nothing is called {names[0]!r}; {_suggest(word, public)}")
+        thing = getattr(thing, word)
+    if not (isinstance(thing, Container) or callable(thing)):
+        raise TargetError(
+            text, f"{names[0]} is {thing!r}; expected a machine or a function that returns one."
+        )
+    return _target(name, f"{module.__name__}:{names[0]}", thing)
+
+
+def _usable(name: str, value: object) -> bool:
+    return not name.startswith("_") and (isinstance(value, Container) or inspect.isfunction(value))
+
+
+def _target(name: str, source: str, thing: Any) -> Target:
+    doc = "" if isinstance(thing, Container) else (inspect.getdoc(thing) or "").strip()
+    return Target(name, source, doc.splitlines()[0] if doc else "", thing)
+
+
+def _suggest(word: str, names: list[str]) -> str:
+    return f"expected one of {sorted(names)}.{did_you_mean(word, names)}"
+
+
+def _text_of(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"

@@ -1,0 +1,139 @@
+"""Collects, from a mission's events, where the robot drove and what for."""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+from smachpy import events as ev
+from smachpy.sim.geometry import Pose2D, yaw_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from smachpy.sim.occupancy import OccupancyMap
+    from smachpy.sim.track import GoalMark
+
+_SAME_STATE = 3  # goals of one state that have its name
+_SAME_PLACE = 0.05  # [m] a goal this near to a named waypoint has its name
+
+
+class TrackRecorder:
+    """Listens to a mission and can draw its track; for `machine.subscribe(recorder.on_event)`.
+
+    The track is made of the poses that `move_base` reports as feedback, and other actions whose
+    feedback has a field `base_position`. A goal is named after the waypoint that a state wrote to
+    userdata, that is anything with a `name` and a `pose`, else after the state that sent it.
+
+    Threads: `on_event` may be called from any thread.
+
+    Attributes:
+        tracks: The places, (x, y) [m] in the map frame, by robot: what is in front of the names of
+            its actions, "" for a robot without a name.
+    """
+
+    def __init__(self) -> None:
+        self.tracks: dict[str, list[tuple[float, float]]] = {}
+        self._lost: set[str] = set()
+        self._docks: dict[tuple[float, float], Pose2D] = {}
+        self._lock = threading.Lock()
+        self._names: list[tuple[Pose2D, str]] = []
+        self._goals: dict[str, tuple[Pose2D, str, bool]] = {}
+
+    @property
+    def track(self) -> list[tuple[float, float]]:
+        """The track of the only robot, or of the first one."""
+        return next(iter(self.tracks.values()), [])
+
+    @property
+    def has_goals(self) -> bool:
+        """Whether any goal was a place to drive to, or several robots drove."""
+        return bool(self._goals) or len(self.tracks) > 1
+
+    def on_event(self, event: ev.Event) -> None:
+        """Take one event in."""
+        with self._lock:
+            if isinstance(event, ev.GoalFeedback):
+                self._on_feedback(_robot(event.action), event.feedback)
+            elif isinstance(event, ev.GoalSent):
+                self._on_goal(event)
+            elif isinstance(event, ev.GoalDone):
+                self._on_done(event)
+            elif isinstance(event, ev.UserdataWritten):
+                pose = getattr(event.value, "pose", None)
+                name = getattr(event.value, "name", None)
+                if isinstance(pose, Pose2D) and isinstance(name, str):
+                    self._names.append((pose, name))
+
+    def draw(self, path: Path, grid: OccupancyMap, *, dock: Pose2D | None, title: str) -> None:
+        """Write the picture of the drive.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        from smachpy.sim.track import draw_track, draw_tracks
+
+        with self._lock:
+            tracks, goals = {name: list(way) for name, way in self.tracks.items()}, self._marks()
+            lost, docks = set(self._lost), [*self._docks.values()]
+        if len(tracks) > 1:
+            tracks = dict(sorted(tracks.items(), key=lambda item: (len(item[0]), item[0])))
+            draw_tracks(path, grid, tracks, lost=lost, docks=docks, title=title)
+        else:
+            draw_track(path, grid, next(iter(tracks.values()), []), goals, dock=dock, title=title)
+
+    def _marks(self) -> list[GoalMark]:
+        from smachpy.sim.track import GoalMark
+
+        # A state that drives to many places is no name for any of them.
+        times = Counter(label for _, label, _ in self._goals.values())
+        return [
+            GoalMark(
+                pose,
+                self._name(pose) or (label if times[label] <= _SAME_STATE else ""),
+                reached=reached,
+            )
+            for pose, label, reached in self._goals.values()
+        ]
+
+    def _on_goal(self, event: ev.GoalSent) -> None:
+        dock = getattr(event.goal, "dock", None)
+        if dock is not None:
+            self._docks[dock.position.x, dock.position.y] = _pose(dock)
+        target = getattr(event.goal, "target_pose", None)
+        if target is not None and target.header.frame_id.removeprefix("/") == "map":
+            label = event.path.rpartition("/")[2].replace("_", " ").lower()
+            self._goals[event.goal_id] = _pose(target.pose), label, False
+
+    def _on_done(self, event: ev.GoalDone) -> None:
+        if event.goal_id in self._goals:
+            pose, label, _ = self._goals[event.goal_id]
+            self._goals[event.goal_id] = pose, label, event.status == "SUCCEEDED"
+        if event.status == "LOST":
+            self._lost.add(_robot(event.action))
+
+    def _on_feedback(self, robot: str, feedback: Any) -> None:
+        base = getattr(feedback, "base_position", None)
+        if base is not None:
+            track = self.tracks.setdefault(robot, [])
+            place = (base.pose.position.x, base.pose.position.y)
+            if not track or track[-1] != place:
+                track.append(place)
+
+    def _name(self, pose: Pose2D) -> str:
+        for place, name in reversed(self._names):
+            if place.distance(pose) < _SAME_PLACE:
+                return name
+        return ""
+
+
+def _robot(action: str) -> str:
+    """Return what stands in front of an action's name: the robot's."""
+    return action.lstrip("/").rpartition("/")[0]
+
+
+def _pose(message: Any) -> Pose2D:
+    turn = message.orientation
+    yaw = yaw_of(turn.x, turn.y, turn.z, turn.w)
+    return Pose2D(message.position.x, message.position.y, yaw)

@@ -1,0 +1,409 @@
+"""What a running machine reports: one closed union of small immutable records.
+
+Every event begins with the same three fields: `path` of the state it is about
+("/PATROL/DRIVE"), `t`, the clock's monotonic time [s], and `stamp_ns`, nanoseconds since the
+Unix epoch. Events are tuples, because a transition costs less than a microsecond and making a
+dataclass costs more than that.
+
+The events of one run, in order, rebuild it: `Started` and `Finished` enclose it; `Entered` and
+`Left` enclose every state below the root, containers included. A state that raised has `Failed`
+in place of `Left`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any, NamedTuple, TypeAlias
+
+from smachpy.userdata.shown import (
+    DEEPEST,
+    LONGEST_LIST,
+    LONGEST_TEXT,
+    MOST_TEXT,
+    WIDEST_INT,
+    Room,
+    text_of,
+)
+
+
+class Started(NamedTuple):
+    """A root container began to run."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    initial: tuple[str, ...] = ()
+
+
+class Finished(NamedTuple):
+    """A root container's run ended; `outcome` is None when it raised."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    outcome: str | None
+
+
+class Entered(NamedTuple):
+    """A state became active."""
+
+    path: str
+    t: float
+    stamp_ns: int
+
+
+class Left(NamedTuple):
+    """A state ended with `outcome`."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    outcome: str
+
+
+class Failed(NamedTuple):
+    """A state raised; `error` is "Type: message"."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    error: str
+
+
+class PreemptRequested(NamedTuple):
+    """Somebody asked the state to stop.
+
+    Below a container that was asked, every active state has such an event of its own, with the
+    same `source`, `by` and `why`: they tell where the wish came from first.
+
+    Attributes:
+        source: Kind of its origin: one of `SOURCES`.
+        by: Who: the signal's name, the operator's or client's name, the path of the state (of a
+            concurrence's child that ended, of the state whose timeout passed, of the state that
+            asked), the action's name, the thread's name; "" when there is no more to say.
+        why: What happened, in words ("ended with 'low'", "cancel of goal desk-1-3.5"), or "".
+        grace: Time that the state has to stop [s] before it is abandoned; None for a container and
+            for a state without a limit.
+    """
+
+    path: str
+    t: float
+    stamp_ns: int
+    source: str = "program"
+    by: str = ""
+    why: str = ""
+    grace: float | None = None
+
+    @property
+    def asker(self) -> str:
+        """Who asked and why, in one phrase for people."""
+        return asker_text(self.source, self.by, self.why)
+
+
+class PreemptServiced(NamedTuple):
+    """The state acknowledged its preempt: `service_preempt()`, or it ended with 'preempted'.
+
+    A state that was asked and has no such event still runs (and delays the preempt), has finished
+    its work, or was abandoned. The event comes before the state's `Left`; in between the state
+    cleans up.
+    """
+
+    path: str
+    t: float
+    stamp_ns: int
+
+
+class Preempted(NamedTuple):
+    """A container ended because of a preempt; `label`: the child not started or not followed."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    label: str
+
+
+class Abandoned(NamedTuple):
+    """A state ignored its preempt for `grace` [s]; `stack` shows where it was."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    grace: float
+    stack: str
+
+
+class TimedOut(NamedTuple):
+    """A state ran into its `timeout` [s] and was preempted."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    timeout: float
+
+
+class Retried(NamedTuple):
+    """A state runs again after attempt number `attempt` ended with `reason`."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    attempt: int
+    reason: str
+
+
+class Iterated(NamedTuple):
+    """An iterator took item `number` (from 0)."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    number: int
+
+
+class CallbackFailed(NamedTuple):
+    """A callback, hook or listener raised; the machine goes on."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    callback: str
+    error: str
+
+
+class UserdataWritten(NamedTuple):
+    """The state at `path` wrote `value` to `key` (the container's name of the key)."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    key: str
+    value: Any
+
+
+class Paused(NamedTuple):
+    """The machine stands still before `path`; `reason`: "pause", "step" or "breakpoint"."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    reason: str
+
+
+class Resumed(NamedTuple):
+    """The machine goes on with the state at `path`, or without it if it was called off."""
+
+    path: str
+    t: float
+    stamp_ns: int
+
+
+class Jumped(NamedTuple):
+    """An operator sent the container at `path` to its child `label`."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    label: str
+
+
+class OutcomeForced(NamedTuple):
+    """An operator ended the state at `path` with `outcome`."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    outcome: str
+
+
+class GoalSent(NamedTuple):
+    """An action state sent a goal."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    action: str
+    goal_id: str
+    goal: Any
+
+
+class GoalFeedback(NamedTuple):
+    """An action server reported progress."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    action: str
+    goal_id: str
+    feedback: Any
+
+
+class GoalDone(NamedTuple):
+    """A goal ended; `status` is the name of its goal status ("SUCCEEDED")."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    action: str
+    goal_id: str
+    status: str
+    text: str
+    result: Any = None
+
+
+Event: TypeAlias = (
+    Started
+    | Finished
+    | Entered
+    | Left
+    | Failed
+    | PreemptRequested
+    | PreemptServiced
+    | Preempted
+    | Abandoned
+    | TimedOut
+    | Retried
+    | Iterated
+    | CallbackFailed
+    | UserdataWritten
+    | Paused
+    | Resumed
+    | Jumped
+    | OutcomeForced
+    | GoalSent
+    | GoalFeedback
+    | GoalDone
+)
+
+EVENT_TYPES: tuple[type[Event], ...] = Event.__args__
+
+SOURCES: dict[str, str] = {
+    "signal": "signal",
+    "shutdown": "the program's end",
+    "operator": "operator",
+    "timeout": "timeout of",
+    "concurrence": "concurrence, after",
+    "action": "action",
+    "state": "state",
+    "test": "test",
+    "program": "program",
+}
+"""Kinds of origins of a preempt (`PreemptRequested.source`) -> what to call them.
+
+signal: a signal, Ctrl-C too. shutdown: `actionlib_core.shutdown` or the shutdown check. operator:
+`machine.control`, here or over the network. timeout: the state's, or that of a state around it.
+concurrence: the end of a child. action: a client's cancel, a newer goal or the server's stop, by
+`ActionServerWrapper`. state: code that a state or callback ran. test: the test kit. program: all
+else; `by` is the thread, or what `request_preempt(by=...)` said.
+"""
+
+NUMBERS = frozenset({"seq", "dropped"})
+"""What a tape adds to a record: the event's number, and the number of events missing before it."""
+
+_BY_NAME = {kind.__name__: kind for kind in EVENT_TYPES}
+
+
+def asker_text(source: str, by: str, why: str) -> str:
+    """Return who asked for a preempt, in one phrase for people ("timeout of /P/DRIVE: 5 s")."""
+    who = f"{SOURCES.get(source, source)} {by}".strip()
+    return f"{who}: {why}" if why else who
+
+
+def to_record(event: Event) -> dict[str, Any]:
+    """Return `event` as a dict of its fields and its `kind`, for JSON.
+
+    Messages become `{"$msg": type, "fields": {...}}`; other values that JSON does not know are
+    replaced by their `repr`, and those that are too long to look at are cut or named by their size.
+    """
+    record: dict[str, Any] = {"kind": type(event).__name__}
+    room = Room()
+    for key, value in event._asdict().items():
+        record[key] = _plain(value, room)
+    return record
+
+
+def record_text(record: dict[str, Any]) -> str:
+    """Return a record as JSON; what JSON does not take is replaced, the record is never lost."""
+    try:
+        return json.dumps(record)
+    except (TypeError, ValueError, RecursionError):
+        return json.dumps({key: _plain(value, Room()) for key, value in record.items()})
+
+
+def was_cut(text: str, size: int) -> bool:
+    """Return whether a text in a record may be the beginning of a longer one.
+
+    Args:
+        text: As it is in the record.
+        size: Characters that the whole record has as JSON; texts of a long one are cut shorter.
+    """
+    return text.endswith("\u2026") and (len(text) > LONGEST_TEXT or size >= MOST_TEXT)
+
+
+def from_record(record: dict[str, Any]) -> Event:
+    """Rebuild the event of a `to_record` dict; the numbers of a tape in it are passed over.
+
+    Raises:
+        ValueError: `kind` names no event, or a field is missing or unknown.
+    """
+    fields = {key: v for key, v in record.items() if key not in NUMBERS}
+    name = fields.pop("kind", None)
+    kind = _BY_NAME.get(name) if isinstance(name, str) else None
+    if kind is None:
+        raise ValueError(f"event record: kind: got {name!r}; expected one of {sorted(_BY_NAME)}.")
+    fields = {key: tuple(v) if isinstance(v, list) else v for key, v in fields.items()}
+    try:
+        return kind(**fields)
+    except TypeError as error:
+        raise ValueError(
+            f"event record: {name}: got fields {sorted(fields)}; expected {list(kind._fields)}."
+        ) from error
+
+
+def _plain(value: Any, room: Room, depth: int = 0) -> Any:
+    if value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, int):
+        bits = value.bit_length()
+        return value if bits <= WIDEST_INT else f"<int of {bits} bits>"
+    if isinstance(value, float) and math.isfinite(value):
+        return value
+    if isinstance(value, str):
+        return _cut(value, room)
+    try:
+        shown = _container(value, room, depth) if depth < DEEPEST else None
+    except Exception as error:  # noqa: BLE001  foreign code: its failure is what there is to show
+        return f"<{type(value).__name__}: looking at it raised {type(error).__name__}>"
+    return _cut(text_of(value, room), room) if shown is None else shown
+
+
+def _cut(text: str, room: Room) -> str:
+    most = min(LONGEST_TEXT, max(room.text, 0))
+    room.text -= min(len(text), most)
+    return text if len(text) <= most else text[:most] + "\u2026"
+
+
+def _container(value: Any, room: Room, depth: int) -> Any:
+    """What is inside, None when it is no container or too long."""
+    if isinstance(value, (list, tuple, dict)):
+        if len(value) > min(LONGEST_LIST, room.items):
+            return None
+        room.items -= len(value)
+        if not isinstance(value, dict):
+            return [_plain(item, room, depth + 1) for item in value]
+        pairs = list(value.items())
+        if all(isinstance(key, str) for key, _ in pairs):
+            room.text -= sum(len(key) for key, _ in pairs)
+            return {key[:LONGEST_TEXT]: _plain(item, room, depth + 1) for key, item in pairs}
+        return None
+    return _fields_of(value, room, depth)
+
+
+def _fields_of(value: Any, room: Room, depth: int) -> Any:
+    """A message, or a ROS time or duration, by its fields; None when it is none."""
+    if hasattr(value, "_md5sum") and hasattr(value, "__slots__"):
+        fields = {name: getattr(value, name, None) for name in value.__slots__}
+        return {"$msg": value._type, "fields": _plain(fields, room, depth + 1)}
+    if hasattr(value, "to_nsec") and hasattr(value, "nsecs"):
+        return {"secs": value.secs, "nsecs": value.nsecs}
+    return None

@@ -1,0 +1,344 @@
+"""An operator's hand on a running machine: pause, step, breakpoint, jump, force, preempt.
+
+    machine.control.pause()
+    machine.control.step()
+    machine.control.force_outcome("/PATROL/DRIVE", "succeeded")
+    machine.control.resume()
+
+A pause holds the machine before the next state; what runs goes on, goals included (`keep`), or is
+preempted and runs again after the resume (`cancel`). Costs nothing while it is not used.
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+from smachpy import log
+from smachpy.events import Paused, Resumed
+from smachpy.exceptions import SmachError, did_you_mean
+from smachpy.run.child import ContainerData, on_preempt
+from smachpy.run.frame import SUBSCRIPTIONS
+from smachpy.run.grace import ask_child, request_soon
+from smachpy.run.origin import asking
+from smachpy.run.visit import Override
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from actionlib_core.clock import Event
+    from smachpy.machines.container import Container
+    from smachpy.run.child import Child
+    from smachpy.run.frame import Frame, Run
+    from smachpy.run.step import Step
+
+__all__ = ["Control", "ControlError"]
+
+Running: TypeAlias = Literal["keep", "cancel"]
+
+
+class ControlError(SmachError):
+    """A command names a state that does not run, or that does not exist.
+
+    Attributes:
+        path: The path of the command.
+        active: Paths of the states that run.
+    """
+
+    def __init__(self, path: str, problem: str, active: tuple[str, ...]) -> None:
+        self.path = path
+        self.active = active
+        super().__init__(
+            f"{path}: {problem}; running: {sorted(active)}.{did_you_mean(path, active)}"
+        )
+
+
+class Control:
+    """Commands for one machine; made by `Container.control` of the root.
+
+    Threads: every command may come from any thread and does not wait for the machine.
+    """
+
+    def __init__(self, machine: Container) -> None:
+        self._machine = machine
+        self._lock = threading.RLock()
+        self._paused = False
+        self._steps = 0
+        self._breakpoints: set[tuple[str, str | None]] = set()
+        self._waiting: dict[str, Event] = {}
+        self._run: Run | None = None
+        self._listeners: tuple[Callable[[], object], ...] = ()
+
+    def on_change(self, listener: Callable[[], object]) -> Callable[[], None]:
+        """Call `listener` after every change of `is_paused()` or `breakpoints()`.
+
+        Returns:
+            A function that ends it.
+
+        Threads: called in the thread of the change, the machine's own at a breakpoint, which it
+            holds up: let it wake a thread that works. What it raises is logged.
+        """
+        with self._lock:
+            self._listeners = (*self._listeners, listener)
+
+        def forget() -> None:
+            with self._lock:
+                self._listeners = tuple(item for item in self._listeners if item is not listener)
+
+        return forget
+
+    # -- commands ------------------------------------------------------------------------------
+
+    def pause(self, *, running: Running = "keep") -> None:
+        """Hold the machine before the next state.
+
+        Args:
+            running: What happens to the states that run, and to their goals: "keep" lets them
+                end; "cancel" preempts them, and they run again from their start after `resume`.
+        """
+        self._watch()
+        self._pause()
+        if running == "cancel":
+            with asking("operator", "", "pause"):
+                for frame, step in self._active():
+                    if not step.state._smachpy_is_container:
+                        ask_child(frame, step, Override(label=step.label))
+
+    def resume(self) -> None:
+        """Let the machine go on."""
+        with self._lock:
+            changed, self._paused = self._paused, False
+            self._steps = 0
+            waiting = list(self._waiting.values())
+        for event in waiting:
+            event.set()
+        if changed:
+            self._tell()
+
+    def step(self) -> None:
+        """Let one state run, then pause again."""
+        self._watch()
+        with self._lock:
+            changed, self._paused = not self._paused, True
+            self._steps += 1
+            waiting = list(self._waiting.values())[:1]
+        for event in waiting:
+            event.set()
+        if changed:
+            self._tell()
+
+    def is_paused(self) -> bool:
+        """Tell whether the machine is held, or will be before its next state."""
+        return self._paused
+
+    def waiting(self) -> tuple[str, ...]:
+        """Return the paths of the states that a pause holds back."""
+        with self._lock:
+            return tuple(self._waiting)
+
+    def add_breakpoint(self, path: str, outcome: str | None = None) -> None:
+        """Pause before the state at `path`, or, with `outcome`, after it has ended with that."""
+        self._watch()
+        with self._lock:
+            self._breakpoints.add((path, outcome))
+        self._tell()
+
+    def remove_breakpoint(self, path: str, outcome: str | None = None) -> None:
+        """Forget a breakpoint."""
+        with self._lock:
+            self._breakpoints.discard((path, outcome))
+        self._tell()
+
+    def breakpoints(self) -> tuple[tuple[str, str | None], ...]:
+        """Return the breakpoints as pairs (path, outcome)."""
+        with self._lock:
+            return tuple(sorted(self._breakpoints, key=str))
+
+    def jump(self, path: str) -> None:
+        """Preempt what runs beside the state at `path`, and go on there.
+
+        Raises:
+            ControlError: its container does not run, is no state machine, or has no such child.
+        """
+        above, _, label = path.rpartition("/")
+        frame = self._frame_at(above, path)
+        if label not in frame.container.get_children() or not hasattr(
+            frame.container, "_transitions"
+        ):
+            known = sorted(frame.container.get_children())
+            raise ControlError(path, f"no jump there; children: {known}", self.active())
+        with asking("operator", "", f"jump to {path}"):
+            self._stop_at(frame, frame.step, path, Override(label=label))
+
+    def force_outcome(self, path: str, outcome: str) -> None:
+        """Preempt the active state at `path`; whatever it returns, it ends with `outcome`.
+
+        Raises:
+            ControlError: it does not run, or has no such outcome.
+        """
+        frame, step = self._step_at(path)
+        outcomes = step.state._smachpy.outcomes
+        if outcome not in outcomes:
+            raise ControlError(
+                path,
+                f"no such outcome: got {outcome!r}; expected one of {sorted(outcomes)}",
+                self.active(),
+            )
+        with asking("operator", "", f"force {outcome!r} of {path}"):
+            self._stop_at(frame, step, path, Override(outcome=outcome))
+
+    def preempt(self, path: str) -> None:
+        """Preempt the state or sub-machine at `path`; its container follows its outcome.
+
+        Raises:
+            ControlError: it does not run.
+        """
+        with asking("operator", "", f"preempt of {path}"):
+            if path == self._path():
+                request_soon(self._machine)
+                return
+            frame, step = self._step_at(path)
+            self._stop_at(frame, step, path, None)
+
+    def active(self) -> tuple[str, ...]:
+        """Return the paths of all states that run, containers first."""
+        return tuple(f"{frame.path}/{step.label}" for frame, step in self._active())
+
+    # -- for the machinery ---------------------------------------------------------------------
+
+    def attach(self, run: Run) -> None:
+        """Control a new run."""
+        run.control = self
+        self._run = run
+        if self._paused or self._breakpoints:
+            run.watched = run.careful = True
+
+    def pass_gate(self, frame: Frame, step: Step) -> None:
+        """Hold the machine before `step` while it is paused.
+
+        Blocks: until a command lets it go on, or a preempt comes.
+        """
+        path = f"{frame.path}/{step.label}"
+        if (path, None) in self._breakpoints:
+            self._pause()
+            reason = "breakpoint"
+        else:
+            reason = "step" if self._steps else "pause"
+        if not self._paused or self._take_step():
+            return
+        self._hold(frame, path, reason)
+
+    def release(self, path: str) -> None:
+        """Let the state at `path` look again whether it is called off, if a pause holds it back."""
+        event = self._waiting.get(path)
+        if event is not None:
+            event.set()
+
+    def note_outcome(self, frame: Frame, step: Step, outcome: object) -> None:
+        """Pause after `step` if there is a breakpoint on this outcome of it."""
+        if (f"{frame.path}/{step.label}", outcome) in self._breakpoints:
+            self._pause()
+
+    def _pause(self) -> None:
+        with self._lock:
+            changed, self._paused = not self._paused, True
+        if changed:
+            self._tell()
+
+    def _tell(self) -> None:
+        for listener in self._listeners:
+            try:
+                listener()
+            except Exception as error:  # noqa: BLE001  a border: reported, the machine goes on
+                log.log_exception(f"{self._path()}: on_change raised {error!r}", error)
+
+    def _take_step(self) -> bool:
+        with self._lock:
+            if self._steps == 0:
+                return False
+            self._steps -= 1
+            return True
+
+    def _hold(self, frame: Frame, path: str, reason: str) -> None:
+        event = frame.run.clock.event(f"control of {path}")
+        with self._lock:
+            self._waiting[path] = event
+        container = frame.container
+        forget = on_preempt(container, event.set)
+        frame.emit(Paused, reason)
+        try:
+            while self._paused and not self._take_step():
+                visit = frame.visit
+                if container._preempt_requested or (visit is not None and visit.is_asked()):
+                    return
+                event.wait()
+                event.clear()
+        finally:
+            forget()
+            with self._lock:
+                self._waiting.pop(path, None)
+            frame.emit(Resumed)
+
+    def _watch(self) -> None:
+        run = self._run
+        frame = self._machine._smachpy.frame
+        if frame is not None and self._machine._smachpy.root is None:
+            raise ControlError(frame.path, "it is not the root; expected the root's control", ())
+        if frame is not None:
+            run = self._run = frame.run
+            run.control = self
+        if run is not None:
+            run.watched = run.careful = True
+            SUBSCRIPTIONS.version = object()
+
+    # -- finding -------------------------------------------------------------------------------
+
+    def _path(self) -> str:
+        return f"/{self._machine.name or 'SM_ROOT'}"
+
+    def _active(self) -> list[tuple[Frame, Step]]:
+        frame = self._machine._smachpy.frame
+        return [] if frame is None else list(_walk(frame))
+
+    def _frame_at(self, path: str, wanted: str) -> Frame:
+        root = self._machine._smachpy.frame
+        if root is not None and root.path == path:
+            return root
+        for frame, step in self._active():
+            inner = _frame_of(step.state)
+            if inner is not None and f"{frame.path}/{step.label}" == path:
+                return inner
+        raise ControlError(wanted, f"its container {path!r} does not run", self.active())
+
+    def _step_at(self, path: str) -> tuple[Frame, Step]:
+        for frame, step in self._active():
+            if f"{frame.path}/{step.label}" == path:
+                return frame, step
+        raise ControlError(path, "no state runs there", self.active())
+
+    def _stop_at(self, frame: Frame, step: Step, path: str, override: Override | None) -> None:
+        self._watch()
+        if not ask_child(frame, step, override):
+            raise ControlError(path, "it has just ended", self.active())
+        with self._lock:
+            waiting = list(self._waiting.values())
+        for event in waiting:
+            event.set()
+
+
+def _frame_of(state: Child) -> Frame | None:
+    """Return the frame of a container that runs; None for other states."""
+    data = state._smachpy
+    return data.frame if isinstance(data, ContainerData) else None
+
+
+def _walk(frame: Frame) -> Iterator[tuple[Frame, Step]]:
+    """Yield (frame, step) for all that runs below `frame`."""
+    for branch in frame.running():
+        step = branch.step
+        if step is None:
+            continue
+        yield branch, step
+        inner = _frame_of(step.state)
+        if inner is not None:
+            yield from _walk(inner)

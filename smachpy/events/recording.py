@@ -1,0 +1,330 @@
+"""One run, one file: JSON lines, appended as it happens, so that a crash leaves a readable file.
+
+The first line is the header: `format` "smachpy-run", `version`, `machine` (a
+`smachpy.introspection.StateRecord`), `stamp_ns` and `base`, the `RunState` before
+the first event, or null. Every further line is an event (`smachpy.events.to_record`) with a number
+`seq`. Where events are missing it jumps, and the next event has their number, `dropped`; what goes
+on in the end is told all the same (`events.tape`). A last line that was cut off by a crash is left
+out when reading.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.clock import SerialExecutor, current_clock
+from smachpy import log
+from smachpy.events import record_text
+from smachpy.exceptions import SmachError
+from smachpy.introspection import StateRecord, describe
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+    from typing import Self, TextIO
+
+    from smachpy.machines.container import Container
+
+FORMAT = "smachpy-run"
+VERSION = 1
+WAITING_EVENTS = 100_000
+"""So many entries of a tape wait to be written: when the disk hangs, or the machine is faster than
+its events become text. Further ones are thinned out and counted."""
+
+CLOSE_S = 2.0
+
+_FIELDS = {"kind": str, "path": str, "stamp_ns": int}
+_TEXTS = frozenset(
+    {"action", "by", "container", "error", "goal_id", "key", "label", "outcome", "source"}
+    | {"status", "text", "why", "writer"}
+)
+"""Fields of events that are texts, or null."""
+_STAMPS = 2**63  # [ns] from 1970 on
+_MALFORMED = (
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    ArithmeticError,
+    RecursionError,
+)
+"""What JSON of another shape raises where it is read."""
+
+
+class RecordingError(SmachError):
+    """A recording cannot be written or read.
+
+    Attributes:
+        path: The file.
+    """
+
+    def __init__(self, path: str | Path, problem: str) -> None:
+        self.path = str(path)
+        super().__init__(f"recording {str(path)!r}: {problem}")
+
+
+@dataclass(slots=True)
+class Recording:
+    """A run that was read from a file.
+
+    Attributes:
+        path: The file.
+        record: The machine.
+        stamp_ns: When the recording began.
+        base: What happened before, None when it began with the run.
+        events: The records.
+        cut: Whether the file ends in the middle of a line.
+    """
+
+    path: Path
+    record: StateRecord
+    stamp_ns: int
+    base: dict[str, Any] | None
+    events: list[dict[str, Any]] = field(default_factory=list)
+    cut: bool = False
+
+    @property
+    def dropped(self) -> int:
+        """So many events are missing between those that are there."""
+        return sum(event.get("dropped", 0) for event in self.events)
+
+    def history(self) -> dict[str, Any]:
+        """Return it in the shape in which servers tell their history (`smachpy.network.feed`)."""
+        return {
+            "epoch": f"file {self.path.name} {self.stamp_ns}",
+            "description": asdict(self.record),
+            "base": self.base,
+            "events": self.events,
+            "problems": [],
+            "control": None,
+        }
+
+
+class Recorder:
+    """Writes the events of a machine to a file; a context manager.
+
+    Args:
+        path: The file; it must not exist yet.
+        machine: The machine.
+
+    Raises:
+        RecordingError: the file exists or cannot be made.
+
+    Threads: the machine never waits for the disk; another thread writes.
+    """
+
+    def __init__(self, path: str | Path, machine: Container) -> None:
+        self._path = Path(path)
+        clock = current_clock()
+        self._executor = SerialExecutor(clock, f"recording {self._path.name}")
+        self._failed = False
+        self._unwritten = 0
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            self._file: TextIO = self._path.open("x", encoding="utf-8")
+            self._file.write(header_line(describe(machine), clock.time_ns()))
+            self._file.flush()
+        except FileExistsError as error:
+            raise RecordingError(
+                path, "the file exists; expected a new name, runs are never overwritten."
+            ) from error
+        except OSError as error:
+            raise RecordingError(path, f"cannot write: {error.strerror or error}.") from error
+        self._tape = machine.tape(self._on_news, limit=WAITING_EVENTS)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Write what waits and close the file; a second call does nothing.
+
+        Blocks: 2 s at most.
+        """
+        self._tape.close()
+        self._on_news()
+        in_time = self._executor.join(CLOSE_S)
+        if in_time and self._file.closed:
+            return
+        if not in_time:
+            log.logwarn(
+                f"recording {str(self._path)!r}: still being written after {CLOSE_S:g} s; the end "
+                "of the run is lost if the program ends now."
+            )
+        else:
+            try:
+                self._file.close()
+            except OSError as error:
+                self._fail(error)
+        if self._tape.dropped:
+            log.logwarn(
+                f"recording {str(self._path)!r}: {self._tape.dropped} events are missing; more "
+                "came than could be written. Every state's last visit is there."
+            )
+        if self._unwritten:
+            log.logwarn(f"recording {str(self._path)!r}: {self._unwritten} events are not in it.")
+
+    @property
+    def dropped(self) -> int:
+        """So many events were not written: there were too many at once, or the disk failed."""
+        return self._tape.dropped + self._unwritten
+
+    def _on_news(self) -> None:
+        self._executor.submit(self._write)
+
+    def _write(self) -> None:
+        """Write what was taken down, until there is no more."""
+        while records := self._tape.read():
+            if self._failed:
+                self._unwritten += len(records)
+                continue
+            try:
+                self._file.write("".join(map(event_line, records)))
+                self._file.flush()
+            except OSError as error:
+                self._unwritten += len(records)
+                self._fail(error)
+
+    def _fail(self, error: OSError) -> None:
+        if not self._failed:
+            self._failed = True
+            log.logerr(f"recording {str(self._path)!r}: ends here: {error.strerror or error}.")
+
+
+def header_line(record: StateRecord, stamp_ns: int, base: dict[str, Any] | None = None) -> str:
+    """Return the first line of a file."""
+    header = {
+        "format": FORMAT,
+        "version": VERSION,
+        "stamp_ns": stamp_ns,
+        "machine": asdict(record),
+        "base": base,
+    }
+    return json.dumps(header) + "\n"
+
+
+def event_line(record: dict[str, Any]) -> str:
+    """Return the line of an event."""
+    return record_text(record) + "\n"
+
+
+def recording_lines(
+    record: StateRecord, events: list[dict[str, Any]], base: dict[str, Any] | None
+) -> Iterator[str]:
+    """Yield the lines of a file that holds these events."""
+    stamp_ns = events[0]["stamp_ns"] if events else 0
+    yield header_line(record, stamp_ns, base)
+    yield from map(event_line, _numbered(events))
+
+
+def _numbered(events: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """The events with numbers from 1, which count those that are missing too."""
+    seq = 0
+    for event in events:
+        seq += 1 + event.get("dropped", 0)
+        yield {**event, "seq": seq}
+
+
+def read_recording(path: str | Path) -> Recording:
+    """Read a file.
+
+    Raises:
+        RecordingError: it cannot be read, or a line before the last is no event; names the line.
+    """
+    path = Path(path)
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
+    except OSError as error:
+        raise RecordingError(path, f"cannot read: {error.strerror or error}.") from error
+    recording = _read_header(path, lines[0])
+    whole = lines[1:-1]  # what follows the last line's end was cut off, or is empty
+    recording.cut = bool(lines[-1]) and len(lines) > 1
+    events = [_read_event(path, number, line) for number, line in enumerate(whole, 2)]
+    recording.events = list(_numbered(events))
+    return recording
+
+
+def _read_header(path: Path, line: str) -> Recording:
+    try:
+        header = json.loads(line)
+        if header["format"] != FORMAT or header["version"] != VERSION:
+            raise ValueError(f"format {header['format']!r} version {header['version']!r}")
+        record = StateRecord.from_json(json.dumps(header["machine"]))
+        base = header.get("base")
+        if base is not None:
+            for name in ("states", "goals", "userdata"):
+                for facts in base[name].values():
+                    dict(facts)
+        return Recording(path, record, _check_stamp(int(header["stamp_ns"])), base)
+    except _MALFORMED as error:
+        raise RecordingError(
+            path, f"line 1: got no header ({error}); expected a file of `smachpy run --record`."
+        ) from error
+
+
+def _check_stamp(stamp_ns: int) -> int:
+    if abs(stamp_ns) >= _STAMPS:
+        raise ValueError(f"stamp_ns: {stamp_ns!r:.60}")
+    return stamp_ns
+
+
+def _read_event(path: Path, number: int, line: str) -> dict[str, Any]:
+    try:
+        event: dict[str, Any] = json.loads(line)
+        for name, kind in _FIELDS.items():
+            if type(event[name]) is not kind:
+                raise ValueError(f"{name}: {event[name]!r}")
+        _check_stamp(event["stamp_ns"])
+        for name in _TEXTS & event.keys():
+            if not isinstance(event[name], str | None):
+                raise TypeError(f"{name}: {event[name]!r}")
+        dropped = event.get("dropped", 0)
+        if type(dropped) is not int or dropped < 0:
+            raise ValueError(f"dropped: {dropped!r}")
+    except _MALFORMED as error:
+        raise RecordingError(
+            path, f"line {number}: got {line[:60]!r} ({error}); expected an event."
+        ) from error
+    return event
+
+
+def find_recordings(places: Iterable[str | Path]) -> list[Path]:
+    """Return the files that are named, and those in the folders that are named, sorted.
+
+    Raises:
+        RecordingError: there is no such file or folder.
+    """
+    found: list[Path] = []
+    for place in map(Path, places):
+        if place.is_dir():
+            found += sorted(place.glob("*.jsonl"))
+        elif place.is_file():
+            found.append(place)
+        else:
+            raise RecordingError(place, "no such file or folder; expected recorded runs.")
+    return found
+
+
+def each_recording(places: Iterable[str | Path]) -> Iterator[Recording]:
+    """Yield the files that are named, and those in the folders that are named, sorted.
+
+    Each is read when it is asked for. What is in a folder and is no recording is named in the log
+    and left out.
+
+    Raises:
+        RecordingError: there is no such file or folder, or a file that is named cannot be read.
+    """
+    for place in places:
+        for path in find_recordings([place]):
+            try:
+                recording = read_recording(path)
+            except RecordingError as error:
+                if not Path(place).is_dir():
+                    raise
+                log.logwarn(f"{error} It is left out.")
+                continue
+            yield recording

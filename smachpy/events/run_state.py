@@ -1,0 +1,205 @@
+"""The current state of a run, computed from the records of its events.
+
+A `RunState` is plain JSON data, so that it can be sent to a viewer that joins in the middle of a
+run, or serve as a keyframe of a recording. It keeps counts and the newest facts, not the events.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+RAISED = "exception"
+"""Stands for the outcome of a state that raised."""
+
+_NOT_ASKED = {"preempt": None, "asked": None, "serviced": None, "abandoned": None}
+
+CUT_SHORT = "a new run began before it ended"
+"""Text of a LOST goal whose run was cut short."""
+
+ENDED_GOALS = 20
+"""Number of ended goals that are kept."""
+
+
+class RunState:
+    """Folds records (`smachpy.events.to_record`) into one state.
+
+    Attributes:
+        data: The facts. Times are nanoseconds since the Unix epoch.
+            run: number of runs begun; started, ended, outcome: of the newest run;
+            states: by path: visits, since (None while it does not run), left (when it last ended),
+            outcome, outcomes (times each), seconds (in finished visits), error, preempt (when it
+            was asked to stop), asked (by whom: `source`, `by`, `why` and `grace` of the
+            PreemptRequested), serviced (when it serviced the preempt), abandoned (when its grace
+            was over); these four are None while it is not asked; attempt, item (of an iterator),
+            waits (why it is held back);
+            goals: by goal id: path, action, since, goal, feedback, first_feedback, status, text,
+            result, ended; userdata: by "container key": key, value, writer, at, container;
+            dropped: number of events that are missing, by which counts are too low; absent when 0.
+
+    Threads: one at a time.
+    """
+
+    def __init__(self, data: dict[str, Any] | None = None) -> None:
+        self.data: dict[str, Any] = data or {
+            "run": 0,
+            "started": None,
+            "ended": None,
+            "outcome": None,
+            "states": {},
+            "goals": {},
+            "userdata": {},
+        }
+        self._fold: dict[str, Callable[[dict[str, Any]], None]] = {
+            "Started": self._on_started,
+            "Finished": self._on_finished,
+            "Entered": self._on_entered,
+            "Left": lambda record: self._leave(record, record["outcome"]),
+            "Failed": self._on_failed,
+            "PreemptRequested": self._on_preempt,
+            "PreemptServiced": lambda r: self._on_answer(r, "serviced"),
+            "Abandoned": lambda r: self._on_answer(r, "abandoned"),
+            "Retried": lambda r: self._set(r, attempt=r["attempt"] + 1),
+            "Iterated": lambda r: self._set(r, item=r["number"]),
+            "Paused": lambda r: self._set(r, waits=r["reason"]),
+            "Resumed": lambda r: self._set(r, waits=None),
+            "UserdataWritten": self._on_userdata,
+            "GoalSent": self._on_goal_sent,
+            "GoalFeedback": self._on_feedback,
+            "GoalDone": self._on_goal_done,
+        }
+
+    def fold(self, record: dict[str, Any]) -> None:
+        """Fold one record; kinds that change nothing are ignored."""
+        if "dropped" in record:
+            self.data["dropped"] = self.data.get("dropped", 0) + record["dropped"]
+        fold = self._fold.get(record["kind"])
+        if fold is not None:
+            fold(record)
+
+    def active(self) -> list[str]:
+        """Return the paths of what runs."""
+        states = self.data["states"]
+        return [path for path, state in states.items() if state["since"] is not None]
+
+    def _state(self, path: str) -> dict[str, Any]:
+        states: dict[str, dict[str, Any]] = self.data["states"]
+        if path not in states:
+            states[path] = {
+                "visits": 0,
+                "since": None,
+                "outcome": None,
+                "outcomes": {},
+                "seconds": 0.0,
+            }
+        return states[path]
+
+    def _set(self, record: dict[str, Any], **facts: Any) -> None:
+        self._state(record["path"]).update(facts)
+
+    def _on_started(self, record: dict[str, Any]) -> None:
+        self.data["run"] += 1
+        self.data.update(started=record["stamp_ns"], ended=None, outcome=None)
+        # What an earlier run of this root left open was cut short: nothing will say that it ended.
+        root, below = record["path"], f"{record['path']}/"
+        for path, state in self.data["states"].items():
+            if path == root or path.startswith(below):
+                state.update(since=None, waits=None, **_NOT_ASKED)
+        for goal in self.data["goals"].values():
+            if goal["ended"] is None and goal["path"].startswith(below):  # GoalDone may come late
+                goal.update(status="LOST", text=CUT_SHORT, ended=record["stamp_ns"])
+        self._on_entered(record)
+
+    def _on_finished(self, record: dict[str, Any]) -> None:
+        outcome = record["outcome"] or RAISED
+        self._leave(record, outcome)
+        self.data.update(ended=record["stamp_ns"], outcome=outcome)
+
+    def _on_entered(self, record: dict[str, Any]) -> None:
+        state = self._state(record["path"])
+        state["visits"] += 1
+        state.update(since=record["stamp_ns"], waits=None, error=None, attempt=1, **_NOT_ASKED)
+
+    def _on_failed(self, record: dict[str, Any]) -> None:
+        self._leave(record, RAISED)
+        self._set(record, error=record["error"])
+
+    def _leave(self, record: dict[str, Any], outcome: str) -> None:
+        state = self._state(record["path"])
+        if state["since"] is not None:
+            state["seconds"] += (record["stamp_ns"] - state["since"]) / 1e9
+        state.update(since=None, left=record["stamp_ns"], outcome=outcome, waits=None, **_NOT_ASKED)
+        state["outcomes"][outcome] = state["outcomes"].get(outcome, 0) + 1
+
+    def _on_preempt(self, record: dict[str, Any]) -> None:
+        state = self._state(record["path"])
+        if state["since"] is not None and not state.get("preempt"):
+            asked = {name: record.get(name) for name in ("source", "by", "why", "grace")}
+            state.update(preempt=record["stamp_ns"], asked=asked)
+
+    def _on_answer(self, record: dict[str, Any], fact: str) -> None:
+        state = self._state(record["path"])
+        if state.get("preempt"):
+            state[fact] = record["stamp_ns"]
+
+    def holding_up(self) -> list[str]:
+        """Return the paths of the leaves that were asked to stop and still run."""
+        asked = [
+            path
+            for path, state in self.data["states"].items()
+            if state["since"] is not None and state.get("preempt")
+        ]
+        return [path for path in asked if not any(one.startswith(f"{path}/") for one in asked)]
+
+    def _on_userdata(self, record: dict[str, Any]) -> None:
+        container = record["path"].rpartition("/")[0] or record["path"]
+        userdata, name = self.data["userdata"], f"{container} {record['key']}"
+        userdata.pop(name, None)  # what was written last stands last
+        userdata[name] = {
+            "key": record["key"],
+            "value": record["value"],
+            "writer": record["path"],
+            "at": record["stamp_ns"],
+            "container": container,
+        }
+
+    def _on_goal_sent(self, record: dict[str, Any]) -> None:
+        goals = self.data["goals"]
+        goals[record["goal_id"]] = {
+            "path": record["path"],
+            "action": record["action"],
+            "since": record["stamp_ns"],
+            "goal": record["goal"],
+            "feedback": None,
+            "first_feedback": None,
+            "status": "ACTIVE",
+            "text": "",
+            "result": None,
+            "ended": None,
+            "attempt": self._state(record["path"]).get("attempt", 1),
+        }
+        ended = [goal_id for goal_id, goal in goals.items() if goal["ended"] is not None]
+        ended.sort(key=lambda goal_id: (goals[goal_id]["since"], goal_id))
+        for goal_id in ended[:-ENDED_GOALS]:
+            del goals[goal_id]
+
+    def _on_feedback(self, record: dict[str, Any]) -> None:
+        goal = self.data["goals"].get(record["goal_id"])
+        if goal is not None:
+            goal["feedback"] = record["feedback"]
+            if "progress" in record:  # a viewer's reading of it
+                goal["progress"] = record["progress"]
+            if goal["first_feedback"] is None:
+                goal["first_feedback"] = record["feedback"]
+
+    def _on_goal_done(self, record: dict[str, Any]) -> None:
+        goal = self.data["goals"].get(record["goal_id"])
+        if goal is not None:
+            goal.update(
+                status=record["status"],
+                text=record["text"],
+                result=record["result"],
+                ended=record["stamp_ns"],
+            )

@@ -1,0 +1,1 @@
+"""What users build machines from: states, containers, and their checks."""

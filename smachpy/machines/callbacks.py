@@ -1,0 +1,152 @@
+"""Who hears of a run: SMACH's callbacks and the listeners of events."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from smachpy import log
+from smachpy.events.tape import LONGEST, Tape
+from smachpy.machines.problems import Problems
+from smachpy.run.frame import SUBSCRIPTIONS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from smachpy.events import Event
+    from smachpy.userdata.user_data import UserData
+
+Callback = tuple["Callable[..., object]", "tuple[Any, ...]"]
+
+
+class Callbacks:
+    """The part of a container that calls back."""
+
+    userdata: UserData
+    _smachpy: Any
+
+    def __init__(self) -> None:
+        self._start_cbs: list[Callback] = []
+        self._transition_cbs: list[Callback] = []
+        self._termination_cbs: list[Callback] = []
+
+    def get_initial_states(self) -> list[str]:
+        """Return the labels of the children that run first."""
+        raise NotImplementedError
+
+    def get_active_states(self) -> list[str]:
+        """Return the labels of the children that run now."""
+        raise NotImplementedError
+
+    def register_start_cb(
+        self, start_cb: Callable[..., object], cb_args: Iterable[Any] = ()
+    ) -> None:
+        """Call `start_cb(userdata, initial_states, *cb_args)` at the start of each run."""
+        call = "start_cb(userdata, initial_states, *cb_args)"
+        self._start_cbs.append(_checked("start_cb", start_cb, call, 2, cb_args))
+
+    def register_transition_cb(
+        self, transition_cb: Callable[..., object], cb_args: Iterable[Any] = ()
+    ) -> None:
+        """Call `transition_cb(userdata, active_states, *cb_args)` after each transition."""
+        call = "transition_cb(userdata, active_states, *cb_args)"
+        self._transition_cbs.append(_checked("transition_cb", transition_cb, call, 2, cb_args))
+        SUBSCRIPTIONS.version = object()
+
+    def register_termination_cb(
+        self, termination_cb: Callable[..., object], cb_args: Iterable[Any] = ()
+    ) -> None:
+        """Call `termination_cb(userdata, terminal_states, outcome, *cb_args)` at the end."""
+        call = "termination_cb(userdata, terminal_states, outcome, *cb_args)"
+        self._termination_cbs.append(_checked("termination_cb", termination_cb, call, 3, cb_args))
+
+    def call_start_cbs(self) -> None:
+        """Call the start callbacks; one that raises is reported, the others still run."""
+        self._call(self._start_cbs, self.get_initial_states())
+
+    def call_transition_cbs(self) -> None:
+        """Call the transition callbacks; one that raises is reported, the others still run."""
+        self._call(self._transition_cbs, self.get_active_states())
+
+    def call_termination_cbs(self, terminal_states: Sequence[str], outcome: str) -> None:
+        """Call the termination callbacks; one that raises is reported, the others still run."""
+        self._call(self._termination_cbs, terminal_states, outcome)
+
+    def _call(self, callbacks: list[Callback], *arguments: object) -> None:
+        for callback, extra in tuple(callbacks):
+            try:
+                callback(self.userdata, *arguments, *extra)
+            except Exception as error:  # noqa: BLE001  a border: reported, the machine goes on
+                frame = self._smachpy.frame
+                if frame is not None:
+                    frame.callback_failed(callback, error)
+                else:
+                    log.log_exception(f"callback {callback!r} raised {error!r}", error)
+
+    def subscribe(self, listener: Callable[[Event], object]) -> Callable[[], None]:
+        """Give every event of this container and of all below it to `listener`.
+
+        Returns:
+            A function that ends it.
+
+        Threads: `listener` is called in the thread where the event happens and holds the machine
+            up while it runs. What it raises is logged and otherwise without effect.
+        """
+        problems = Problems("subscribe")
+        problems.function("listener", listener, "listener(event)", 1, optional=False)
+        problems.raise_all()
+        data = self._smachpy
+        data.listeners = (*data.listeners, listener)
+        self._subscriptions_changed()
+
+        def unsubscribe() -> None:
+            data.listeners = tuple(item for item in data.listeners if item is not listener)
+            self._subscriptions_changed()
+
+        return unsubscribe
+
+    def tape(
+        self, on_news: Callable[[], object] | None = None, *, limit: int = LONGEST, name: str = ""
+    ) -> Tape:
+        """Take every event of this container and of all below it down, to be read later.
+
+        It costs the machine a fraction of what a listener does. Arguments as for
+        `smachpy.events.tape.Tape`, whose `read` gives the records and whose `close` ends it.
+
+        Threads: any.
+        """
+        problems = Problems("tape")
+        problems.function("on_news", on_news, "on_news()", 0)
+        problems.whole("limit", limit, 0, "a whole number >= 0")
+        problems.raise_all()
+        made = Tape(self, on_news, limit=limit, name=name)
+        self._smachpy_add_tape(made)
+        return made
+
+    def _smachpy_add_tape(self, tape: Tape) -> None:
+        data = self._smachpy
+        data.tapes = (*data.tapes, tape)
+        self._subscriptions_changed()
+
+    def _smachpy_remove_tape(self, tape: Tape) -> None:
+        data = self._smachpy
+        data.tapes = tuple(item for item in data.tapes if item is not tape)
+        self._subscriptions_changed()
+
+    def _subscriptions_changed(self) -> None:
+        SUBSCRIPTIONS.version = object()
+        frame = self._smachpy.frame or self._smachpy.root
+        if frame is not None:
+            frame.run.watched = True
+
+
+def _checked(name: str, function: Any, call: str, ours: int, args: Iterable[Any]) -> Callback:
+    """Return a callback and its arguments, which `register_...` was given.
+
+    Raises:
+        InvalidStateError: the callback cannot be called so.
+    """
+    problems = Problems(f"register_{name}")
+    more = problems.values("cb_args", args)
+    problems.function(name, function, call, ours + len(more), optional=False)
+    problems.raise_all()
+    return function, more

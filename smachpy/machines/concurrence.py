@@ -1,0 +1,391 @@
+"""The concurrence: all children at once, their outcomes make its own."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from smachpy import log
+from smachpy.events import Preempted
+from smachpy.exceptions import (
+    InconsistentMachineError,
+    InvalidConstructionError,
+    InvalidStateError,
+    InvalidTransitionError,
+    InvalidUserCodeError,
+    did_you_mean,
+)
+from smachpy.introspection import RuleRecord, Structure
+from smachpy.machines.construction import construction_method
+from smachpy.machines.container import Container, below
+from smachpy.machines.problems import Problems
+from smachpy.machines.rules import Rule, all_of, any_of, as_rules, decide, n_of
+from smachpy.machines.spec import ChildSpec, ConcurrenceSpec
+from smachpy.machines.validate import concurrence_problems
+from smachpy.run.branches import Group
+from smachpy.run.origin import asking
+from smachpy.run.visit import End
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Sequence as SequenceOf
+    from typing import Unpack
+
+    from smachpy.introspection import Kind
+    from smachpy.machines.state import State, StateOptions
+    from smachpy.run.branches import ChildBranch
+    from smachpy.run.frame import Frame
+    from smachpy.run.step import Step
+    from smachpy.userdata.user_data import UserData
+
+__all__ = ["Concurrence", "Rule", "all_of", "any_of", "n_of"]
+
+
+class _Plan:
+    """A concurrence, compiled."""
+
+    __slots__ = ("epoch", "steps", "userdata")
+
+    def __init__(self, concurrence: Concurrence, steps: list[Step]) -> None:
+        self.epoch = 0
+        self.userdata = concurrence.userdata
+        self.steps = steps
+        for step in self.steps:
+            step.next = {outcome: End(outcome) for outcome in step.state._smachpy.outcomes}
+
+    def is_stale(self) -> bool:
+        return any(step.is_stale() for step in self.steps)
+
+
+class Concurrence(Container):
+    """A container that runs all its children at once and ends when all have ended.
+
+    Args:
+        outcomes: Outcomes.
+        default_outcome: Outcome when no rule of `outcome_map` holds.
+        input_keys: Keys copied from the parent's userdata when it starts.
+        output_keys: Keys copied to the parent's userdata when it ends.
+        outcome_map: Outcome -> rule: `{label: outcome}` (all must hold; an outcome may be a
+            list of outcomes), or `all_of`, `any_of`, `n_of`. The rule that asks for most wins.
+        outcome_cb: Called with label -> outcome when all have ended; returns the outcome, or
+            None to leave it to the rules.
+        child_termination_cb: Called with label -> outcome (None: still runs) each time a child
+            has ended; returns True to preempt all others, a list of labels to preempt those,
+            False to let them run. Called in the container's thread, never two at once, and not
+            after a child or it itself has raised.
+        name: Name of the machine when it is the root.
+        userdata_type: A dataclass or TypedDict: the userdata has its fields, and their defaults.
+        **options: See `StateOptions`.
+
+    Raises:
+        InvalidStateError: there is no way to an outcome, or a callback cannot be called.
+
+    Threads: each child runs in a thread named after its path; all have ended when `execute`
+        returns, except those left behind after a preempt they ignored (docs/preemption.md).
+    """
+
+    _smachpy_kind: ClassVar[Kind] = "concurrence"
+
+    def __init__(
+        self,
+        outcomes: Iterable[str],
+        default_outcome: str,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        outcome_map: Mapping[str, Any] | None = None,
+        outcome_cb: Callable[[dict[str, str | None]], str | None] | None = None,
+        child_termination_cb: Callable[[dict[str, str | None]], Any] | None = None,
+        *,
+        name: str | None = None,
+        userdata_type: type | None = None,
+        **options: Unpack[StateOptions],
+    ) -> None:
+        problems = Problems(type(self).__name__)
+        with problems:
+            super().__init__(
+                outcomes, input_keys, output_keys, name=name, userdata_type=userdata_type, **options
+            )
+        known = self._smachpy.outcomes
+        outcome_map = problems.mapping("outcome_map", outcome_map, "outcome -> rule")
+        if not (default_outcome or outcome_map or outcome_cb):
+            problems.add("outcome policy: got none; expected default_outcome at least")
+        for what, named in (("default outcome", [default_outcome]), ("outcome map", outcome_map)):
+            problems.add(
+                *(
+                    f"{what}: got {outcome!r}; expected one of {sorted(known)}."
+                    f"{did_you_mean(outcome, known)}"
+                    for outcome in named
+                    if outcome not in known and (outcome or outcome_map is named)
+                )
+            )
+        self._rules: tuple[tuple[str, Rule], ...] = ()
+        with problems:
+            self._rules = as_rules(outcome_map)
+        ended = "({label: outcome})"
+        problems.function("outcome_cb", outcome_cb, f"outcome_cb{ended}", 1)
+        problems.function(
+            "child_termination_cb", child_termination_cb, f"child_termination_cb{ended}", 1
+        )
+        problems.raise_all()
+        self._default_outcome = default_outcome
+        self._outcome_map = outcome_map
+        self._outcome_cb = outcome_cb
+        self._child_termination_cb = child_termination_cb
+
+    @construction_method
+    def add(
+        self: Concurrence,
+        label: str,
+        state: State,
+        remapping: Mapping[str, str] | None = None,
+    ) -> State:
+        """Add a state.
+
+        Args:
+            label: Its name here; unique.
+            state: The state.
+            remapping: Key of the state -> key of this container's userdata.
+
+        Returns:
+            The state.
+
+        Raises:
+            InvalidStateError: the label is taken, or `state` is no state.
+            InvalidConstructionError: called on the class while no concurrence is open.
+        """
+        if self._smachpy.frame is not None:
+            raise InvalidConstructionError(f"{label}: add: got a new state while it runs.")
+        for other, child in self._states.items():
+            if child is state:
+                raise InvalidStateError(
+                    f"{label}: state: got the instance that runs as {other!r} at the same time; "
+                    "expected one of its own."
+                )
+        self._store_child(label, state, remapping)
+        return state
+
+    # -- structure -----------------------------------------------------------------------------
+
+    def get_initial_states(self) -> list[str]:
+        """Return all labels."""
+        return list(self._states)
+
+    def set_initial_state(
+        self, initial_states: SequenceOf[str], userdata: UserData | None = None
+    ) -> None:
+        """Add to the userdata; the children always start all together.
+
+        Raises:
+            InvalidStateError: a label that is not there.
+        """
+        unknown = sorted(set(initial_states) - set(self._states))
+        if unknown:
+            raise InvalidStateError(
+                f"initial states: got {unknown}; expected labels of {sorted(self._states)}."
+                f"{did_you_mean(unknown[0], self._states)}"
+            )
+        if initial_states and set(initial_states) != set(self._states):
+            log.logwarn("Concurrence.set_initial_state: all children start together; ignored.")
+        if userdata is not None:
+            self.userdata.update(userdata)
+
+    def get_active_states(self) -> list[str]:
+        """Return the labels of the children that run now."""
+        frame = self._smachpy.frame
+        group = None if frame is None else frame.group
+        return [] if group is None else [branch.step.label for branch in group.running()]
+
+    def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
+        """Return what the outcome map names as (child outcome, child label, outcome)."""
+        return [
+            (child_outcome, label, outcome)
+            for outcome, rule in self._rules
+            for label, wanted in rule.conditions
+            for child_outcome in wanted
+        ]
+
+    def find_problems(self, where: str) -> tuple[str, ...]:
+        """Return what is wrong with this concurrence itself."""
+        children = tuple(
+            ChildSpec(label, tuple(state.get_registered_outcomes()))
+            for label, state in self._states.items()
+        )
+        spec = ConcurrenceSpec(
+            where, self._smachpy.outcomes, children, self._default_outcome, self._rules
+        )
+        return (*concurrence_problems(spec), *self._shared_states(where))
+
+    def _shared_states(self, where: str) -> Iterator[str]:
+        """Yield the states that two branches would run at the same time."""
+        branch_of: dict[int, str] = {}
+        for label, child in self._states.items():
+            for state in {id(state): state for state in below(child)}.values():
+                other = branch_of.setdefault(id(state), label)
+                if other != label:
+                    yield (
+                        f"{where}: one state in two branches: got one {type(state).__name__} "
+                        f"below both {other!r} and {label!r}; expected an instance for each."
+                    )
+
+    def describe_structure(self) -> Structure:
+        """Return the children and the rules."""
+        children = tuple(
+            (label, state, tuple(self._remappings[label].items()))
+            for label, state in self._states.items()
+        )
+        rules = [
+            RuleRecord(
+                outcome,
+                tuple((label, one) for label, wanted in rule.conditions for one in wanted),
+                str(rule),
+            )
+            for outcome, rule in self._rules
+        ]
+        return Structure(
+            children,
+            tuple(self._states),
+            (),
+            tuple(rules),
+            self._default_outcome or None,
+            (("outcome callback", _name_of(self._outcome_cb)),) if self._outcome_cb else (),
+        )
+
+    # -- running -------------------------------------------------------------------------------
+
+    def _compile(self, frame: Frame) -> _Plan:
+        problems = self.find_problems(frame.path)
+        if problems:
+            raise InconsistentMachineError(f"{type(self).__name__} {frame.path!r}", problems)
+        return _Plan(self, [self._make_step(label) for label in self._states])
+
+    def _run_children(self, frame: Frame, plan: _Plan) -> str:
+        each = bool(self._child_termination_cb or self._transition_cbs)
+        group = frame.group = Group(frame, plan.steps, each=each)
+        if self._start_cbs:
+            self.call_start_cbs()
+        if self._preempt_requested:
+            frame.answered = True
+            frame.emit_own(Preempted, "")
+            frame.group = None
+            outcome = "preempted"
+        else:
+            self._run_group(group)
+            outcome = self._outcome(frame, group)
+        if self._termination_cbs:
+            self.call_termination_cbs(list(self._states), outcome)
+        return outcome
+
+    def _run_group(self, group: Group) -> None:
+        """Start the branches and see them end."""
+        try:
+            group.start()
+            if self._transition_cbs:
+                for _ in group.branches:
+                    self.call_transition_cbs()
+            self._see_them_end(group)
+        except BaseException as error:
+            with asking("concurrence", group.frame.path, f"raised {type(error).__name__}"):
+                group.ask(group.running())
+            raise
+
+    def _see_them_end(self, group: Group) -> None:
+        failure: InvalidUserCodeError | None = None
+        running = True
+        while running or group.reports:
+            running = group.wait() if running else False
+            while group.reports:
+                branch = group.reports.popleft()
+                try:
+                    self._branch_ended(group, branch)
+                except InvalidUserCodeError as error:
+                    failure = error
+                    group.failed = True
+                    with asking("concurrence", group.frame.path, "child_termination_cb raised"):
+                        group.ask(group.running())
+        group.raise_errors(failure)
+
+    def _branch_ended(self, group: Group, branch: ChildBranch) -> None:
+        if branch.error is not None:
+            with asking("concurrence", branch.here(), f"raised {type(branch.error).__name__}"):
+                group.ask(group.running())
+            return
+        if self._transition_cbs:
+            self.call_transition_cbs()
+        if self._child_termination_cb is None or group.failed:
+            return  # an outcome that a child did not live to give would pass for one that runs
+        try:
+            answer = self._child_termination_cb(group.outcomes())
+        except Exception as error:
+            raise InvalidUserCodeError(
+                f"{group.frame.path}: child_termination_cb raised {type(error).__name__}: {error}",
+                path=group.frame.path,
+            ) from error
+        with asking("concurrence", branch.here(), f"ended with {branch.outcome!r}"):
+            group.ask(self._chosen(group, answer))
+
+    def _chosen(self, group: Group, answer: Any) -> list[ChildBranch]:
+        """Return the branches that the answer of child_termination_cb names."""
+        if answer is True or answer is False or answer is None:
+            return group.running() if answer else []
+        labels = [answer] if isinstance(answer, str) else answer
+        if not isinstance(labels, (list, tuple, set, frozenset)):
+            return group.running() if answer else []
+        unknown = sorted(set(labels) - set(self._states))
+        if unknown:
+            raise InvalidUserCodeError(
+                f"{group.frame.path}: child_termination_cb: got labels {unknown}; expected labels "
+                f"of {sorted(self._states)}.{did_you_mean(unknown[0], self._states)}",
+                path=group.frame.path,
+            )
+        return [branch for branch in group.running() if branch.step.label in labels]
+
+    def _outcome(self, frame: Frame, group: Group) -> str:
+        """Return the outcome that the callback, the rules or the default give.
+
+        It answers a preempt only if every child behind it answered: when one just finished its
+        work, the machine above must not take the outcome for the end of the preempt.
+        """
+        outcomes = group.outcomes()
+        answered = [b.step.label for b in group.branches if b.answered]
+        asked = self._preempt_requested
+        if self._outcome_cb is not None:
+            answer = self._ask_callback(frame, outcomes)
+            if answer is not None:
+                frame.answered = asked and len(answered) == len(outcomes)
+                return answer
+        ruled = decide(self._rules, outcomes)
+        if ruled is not None:
+            outcome, rule = ruled
+            frame.answered = asked and set(rule.met_by(outcomes)) <= set(answered)
+            return outcome
+        frame.answered = asked and bool(answered)
+        if frame.answered and self._may_end_preempted():
+            frame.emit_own(Preempted, "")
+            return "preempted"
+        return self._default_outcome
+
+    def _ask_callback(self, frame: Frame, outcomes: dict[str, str | None]) -> str | None:
+        assert self._outcome_cb is not None
+        try:
+            answer = self._outcome_cb(dict(outcomes))
+        except Exception as error:
+            raise InvalidUserCodeError(
+                f"{frame.path}: outcome_cb raised {type(error).__name__}: {error}",
+                path=frame.path,
+            ) from error
+        return self._registered(frame, answer) if answer else None
+
+    def _may_end_preempted(self) -> bool:
+        return "preempted" in self._smachpy.outcomes or not self._default_outcome
+
+    def _registered(self, frame: Frame, answer: object) -> str:
+        known = self._smachpy.outcomes
+        if answer in known:
+            return str(answer)
+        raise InvalidTransitionError(
+            f"{frame.path}: outcome_cb: got {answer!r}; expected one of {sorted(known)}."
+            f"{did_you_mean(answer, known)}"
+        )
+
+
+def _name_of(function: object) -> str:
+    return getattr(function, "__qualname__", None) or repr(function)

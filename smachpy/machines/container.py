@@ -1,0 +1,458 @@
+"""What all containers share: children, userdata, callbacks, construction, the frame of a run."""
+
+from __future__ import annotations
+
+import contextlib
+import inspect
+import threading
+from functools import partial
+from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
+
+from actionlib_core.clock import RealClock
+from smachpy import log
+from smachpy.context import THREAD
+from smachpy.exceptions import (
+    InconsistentMachineError,
+    InvalidStateError,
+    did_you_mean,
+)
+from smachpy.machines.callbacks import Callbacks
+from smachpy.machines.construction import Openable
+from smachpy.machines.problems import Problems, takes
+from smachpy.machines.state import DataOf, State, get_options, make_step
+from smachpy.run.child import EPOCH, ContainerData, on_preempt
+from smachpy.run.frame import Frame, clock_of_run
+from smachpy.run.grace import request, request_soon
+from smachpy.run.options import retry_problems
+from smachpy.run.origin import REQUESTING, asking, signal_being_handled
+from smachpy.run.root import execute_root
+from smachpy.run.runner import forget_visit
+from smachpy.run.visit import Origin
+from smachpy.userdata.typed import CheckedDict
+from smachpy.userdata.user_data import Remapper, UserData, reset, typed_userdata
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from typing import Unpack
+
+    from smachpy.events.control import Control
+    from smachpy.machines.state import StateOptions
+    from smachpy.run.step import Step
+
+__all__ = ["Container"]
+
+
+class Container(Openable, Callbacks, State):
+    """A state made of states.
+
+    Args:
+        outcomes: Outcomes.
+        input_keys: Keys copied from the parent's userdata when it starts.
+        output_keys: Keys copied to the parent's userdata when it ends.
+        name: Name of the machine when it is the root, first part of every path below it.
+        userdata_type: A dataclass or TypedDict: the userdata has its fields, and their defaults.
+        **options: See `StateOptions`.
+
+    Attributes:
+        userdata: The container's own userdata, kept between runs (see `reset_userdata`).
+        name: See above.
+    """
+
+    _smachpy_is_container: ClassVar[bool] = True
+    _smachpy: DataOf[ContainerData] = DataOf(ContainerData)
+    name: str | None = None
+
+    def __init__(
+        self,
+        outcomes: Iterable[str] = (),
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        *,
+        name: str | None = None,
+        userdata_type: type | None = None,
+        **options: Unpack[StateOptions],
+    ) -> None:
+        problems = Problems(type(self).__name__)
+        with problems:
+            State.__init__(self, outcomes, input_keys, output_keys, **options)
+        Openable.__init__(self)
+        Callbacks.__init__(self)
+        with problems:
+            self.userdata = UserData() if userdata_type is None else typed_userdata(userdata_type)
+        if name is not None:
+            self.name = problems.word("name", name)
+        problems.raise_all()
+        self._states: dict[str, State] = {}
+        self._remappings: dict[str, dict[str, str]] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy of the container needs: the structure and the userdata, no run."""
+        return {**super().__getstate__(), "_open_tokens": []}
+
+    # -- structure -----------------------------------------------------------------------------
+
+    def _repr_svg_(self) -> str | None:
+        """Return the picture that a notebook shows."""
+        from smachpy.pictures import draw_svg
+
+        return draw_svg(self)
+
+    def __getitem__(self, key: str) -> State:
+        """Return the child with this label."""
+        try:
+            return self._states[key]
+        except KeyError:
+            self._no_child(key)
+
+    def get_children(self) -> dict[str, State]:
+        """Return label -> child, in the order in which they were added."""
+        return self._states
+
+    def set_initial_state(
+        self, initial_states: Sequence[str], userdata: UserData | None = None
+    ) -> None:
+        """Choose where the next run begins, and add to the userdata."""
+        raise NotImplementedError
+
+    def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
+        """Return the edges inside as (outcome, from label, to label or container outcome)."""
+        raise NotImplementedError
+
+    def find_problems(self, where: str) -> tuple[str, ...]:
+        """Return what is wrong with this container itself, its children left out."""
+        raise NotImplementedError
+
+    def check_consistency(self) -> None:
+        """Check this container and all below it.
+
+        Raises:
+            InconsistentMachineError: with all problems found.
+        """
+        where = f"/{self.name or 'SM_ROOT'}"
+        problems = [*self._own_problems(where), *_all_problems(self, where)]
+        if problems:
+            raise InconsistentMachineError(f"{type(self).__name__} {where!r}", problems)
+
+    def _own_problems(self, where: str) -> Iterator[str]:
+        """Yield what is wrong with its options, which `add` checks if it is no root."""
+        for problem in retry_problems(self._smachpy.options, self._smachpy.outcomes):
+            yield f"{where}: {problem}"
+
+    def is_running(self) -> bool:
+        """Tell whether it runs."""
+        return self._smachpy.frame is not None
+
+    def wait_ended(self, timeout: float | None = None) -> bool:
+        """Wait until it does not run.
+
+        Returns:
+            Whether that came within `timeout` [s].
+
+        Raises:
+            InvalidStateError: `timeout` is no duration.
+
+        Blocks: until then; None waits for ever.
+        """
+        problems = Problems(type(self).__name__)
+        timeout = problems.seconds("wait_ended: timeout", timeout)
+        problems.raise_all()
+        data, ended = self._smachpy, clock_of_run().event()
+        data.end_waiters.append(ended)
+        try:
+            # First the mark, then the look: see the end of `_run`.
+            return data.frame is None or ended.wait(timeout)
+        finally:
+            data.end_waiters.remove(ended)
+
+    def reset_userdata(self) -> None:
+        """Bring the userdata, also of all containers below, back to its defaults, or to none."""
+        reset(self.userdata)
+        for child in self.get_children().values():
+            if isinstance(child, Container):
+                child.reset_userdata()
+
+    def _store_child(
+        self,
+        label: object,
+        state: object,
+        remapping: Mapping[str, str] | None,
+        problems: Problems | None = None,
+    ) -> None:
+        """Add a child, unless something is wrong: with its arguments, or already in `problems`."""
+        if not isinstance(label, str) or not label:
+            raise InvalidStateError(f"label: got {label!r}; expected a string, not empty.")
+        problems = problems or Problems(label)
+        if label in self._states:
+            problems.add(
+                "label is taken: got a second state with it; expected a label not in "
+                f"{sorted(self._states)}."
+            )
+        if isinstance(state, State):
+            with problems:
+                problems.add(*state_problems(state))
+        else:
+            hint = f" Try {state.__name__}()." if isinstance(state, type) else ""
+            problems.add(f"state: got {state!r}; expected an instance of State.{hint}")
+        if isinstance(state, State) and any(each is self for each in below(state)):
+            problems.add(f"state: got {state!r}, which contains this container.")
+        names = problems.names_of("remapping", remapping, "key of the state -> key here")
+        problems.raise_all()
+        assert isinstance(state, State)
+        self._states[label] = state
+        self._remappings[label] = names
+        self._smachpy.plan = None
+
+    def _smachpy_exchange(self, label: str, state: State) -> None:
+        """Put another state in the place of a child; for doubles, between two runs."""
+        self._states[label] = state
+        self._smachpy.plan = None
+
+    def _no_child(self, key: str) -> NoReturn:
+        labels = sorted(self.get_children())
+        raise KeyError(
+            f"{type(self).__name__}: no such state: got {key!r}; expected one of {labels}."
+            f"{did_you_mean(key, labels)}"
+        ) from None
+
+    # -- running -------------------------------------------------------------------------------
+
+    def execute(self, parent_ud: UserData | Remapper | None = None) -> str:
+        """Run to the end and return the outcome.
+
+        Args:
+            parent_ud: Where input keys are copied from and output keys to.
+
+        Raises:
+            InconsistentMachineError: the machine does not hold together.
+            InvalidUserCodeError: a state or callback raised; the cause is chained.
+            InvalidTransitionError: a state returned something that is none of its outcomes.
+
+        Blocks: until the machine has ended; after a preempt, see docs/preemption.md.
+        Threads: one run at a time; from several threads one after another.
+        """
+        first: Frame | None = THREAD.get()
+        parent = None if first is None else first.innermost
+        if first is None or parent is None:
+            run = partial(Container.execute, self)
+            return execute_root(self, run, get_options(self), parent_ud)
+        frame = Frame(self, parent)
+        step = parent.step
+        if step is None or step.state is self:
+            return self._run(frame, parent_ud)
+        if self._smachpy.frame is not None:
+            raise self._already_runs(frame)
+        # A state runs this container by hand, maybe in a thread that it has started: a preempt of
+        # the state is one of the container.
+        token = None
+        if first.thread != threading.get_ident():
+            frame.begin_thread()
+            token = THREAD.set(frame)
+        forget = on_preempt(step.state, self.request_preempt)
+        try:
+            return self._run(frame, parent_ud)
+        finally:
+            forget()
+            if token is not None:
+                THREAD.reset(token)
+                frame.end_thread()
+
+    def _run(self, frame: Frame, parent_ud: UserData | Remapper | None) -> str:
+        """Run in `frame`: copy the keys, call the callbacks, run the children."""
+        data = self._smachpy
+        plan = data.plan
+        if plan is None or plan.userdata is not self.userdata or plan.epoch != EPOCH.value:
+            plan = data.plan = self._current_plan(frame, plan)
+        if data.frame is not None:
+            raise self._already_runs(frame)
+        raised = True
+        try:
+            data.frame = frame.first.innermost = frame
+            if data.listeners or data.tapes:
+                frame.run.watched = True
+            if data.input_keys and parent_ud is not None:
+                self._copy_input_keys(parent_ud, self.userdata)
+            outcome = self._run_children(frame, plan)
+            if data.output_keys and parent_ud is not None:
+                self._copy_output_keys(self.userdata, parent_ud)
+            raised = False
+            return outcome
+        finally:
+            frame.first.innermost = frame.parent or frame
+            # Whoever passes a preempt on sets its mark first and looks at the frame then; here
+            # it is the other way round, so one of the two always sees the other.
+            if data.frame is frame:
+                data.frame = None
+                data.answered = frame.answered
+            if raised or self._preempt_requested or frame.visit is not None or data.end_waiters:
+                self._leave(frame)
+
+    def _already_runs(self, frame: Frame) -> InvalidStateError:
+        return InvalidStateError(
+            f"{frame.path}: execute: got a second call while it runs; expected one run at a time."
+        )
+
+    def _current_plan(self, frame: Frame, plan: Any) -> Any:
+        """Return a plan for the states as they are now."""
+        epoch = EPOCH.value
+        if plan is None or plan.userdata is not self.userdata or plan.is_stale():
+            is_root = self._smachpy.root is not None
+            problems = [*self._own_problems(frame.path)] if is_root else []
+            if problems:
+                raise InconsistentMachineError(f"{type(self).__name__} {frame.path!r}", problems)
+            plan = self._compile(frame)
+        plan.epoch = epoch
+        return plan
+
+    def _compile(self, frame: Frame) -> Any:
+        """Return this container's plan.
+
+        Raises:
+            InconsistentMachineError: it does not hold together.
+        """
+        raise NotImplementedError
+
+    def _run_children(self, frame: Frame, plan: Any) -> str:
+        """Run the children and return the outcome."""
+        raise NotImplementedError
+
+    def _make_step(self, label: str) -> Step:
+        state, names = self._states[label], self._remappings[label]
+        data = state._smachpy
+        window = Remapper(self.userdata, data.input_keys, data.output_keys, names)
+        return make_step(label, state, window)
+
+    def _leave(self, frame: Frame) -> None:
+        """Forget the run; with it ends the preempt that belonged to it."""
+        data = self._smachpy
+        with frame.run.lock:
+            if frame.dead:
+                return
+            if data.frame is None:
+                self._preempt_requested = False
+            if frame.step is not None:  # what a child that raised asked itself
+                frame.step.state._preempt_requested = False
+        forget_visit(frame)
+        for ended in tuple(data.end_waiters):
+            ended.set()
+
+    def request_preempt(self, *, by: str = "") -> None:
+        """Ask the container and all active states below it to stop.
+
+        Before a run it ends the next one at once. When it returns, every active descendant has
+        been told; a signal handler's request is only noted, and a thread tells them at once.
+
+        Args:
+            by: Who asks, for those who watch; "" finds out what it can (see
+                `smachpy.events.PreemptRequested`).
+
+        Threads: any thread, callback or signal handler; never waits for a state.
+        """
+        if REQUESTING.get() is self:
+            return
+        name = signal_being_handled()
+        if name:
+            self._note_request(Origin("program", by) if by else Origin("signal", name))
+            return
+        token = REQUESTING.set(self)
+        try:
+            with asking("program", by) if by else contextlib.nullcontext():
+                run = request(self)
+        finally:
+            REQUESTING.reset(token)
+        if run is not None:
+            run.flush()
+
+    _smachpy_request_preempt: ClassVar[object] = request_preempt
+
+    def _note_request(self, origin: Origin) -> None:
+        """Note a signal handler's request: the code that it interrupted may hold any lock."""
+        data = self._smachpy
+        frame = data.root or data.frame
+        if frame is None:
+            data.origin = origin
+            self._preempt_requested = True
+            return
+
+        def ask() -> None:
+            with asking(*origin):
+                request_soon(self, frame)
+
+        # A clock of its own, whose locks nobody holds.
+        RealClock().spawn(ask, name=f"preempt of {frame.here()}")
+
+    def _copy_input_keys(self, parent_ud: UserData | Remapper, ud: UserData) -> None:
+        for key in self._smachpy.input_keys:
+            if key in parent_ud:
+                ud[key] = parent_ud[key]
+            else:
+                log.logwarn(f"{type(self).__name__}: input key {key!r} has no value to copy.")
+
+    def _copy_output_keys(self, ud: UserData, parent_ud: UserData | Remapper) -> None:
+        for key in self._smachpy.output_keys:
+            if key in ud:
+                parent_ud[key] = ud[key]
+            else:
+                log.logwarn(f"{type(self).__name__}: output key {key!r} has no value to copy.")
+
+    @property
+    def control(self) -> Control:
+        """The operator's control of this machine: pause, step, jump and so on; see `Control`."""
+        from smachpy.events.control import Control
+
+        data = self._smachpy
+        if data.control is None:
+            data.control = Control(self)
+        assert isinstance(data.control, Control)
+        return data.control
+
+
+def state_problems(state: State) -> Iterator[str]:
+    """Yield what makes it impossible to run `state`, or an option of it useless.
+
+    Raises:
+        InvalidStateError: it was not initialised.
+    """
+    yield from retry_problems(state._smachpy.options, state.get_registered_outcomes())
+    execute: Any = state.execute
+    if not callable(execute):
+        yield f"execute: got {execute!r}; expected a method execute(self, userdata)."
+    elif not takes(execute, 1):
+        name = type(state).__name__
+        yield (
+            f"execute: got {name}.execute{inspect.signature(execute, follow_wrapped=False)}, which "
+            "cannot be called with the userdata; expected `def execute(self, userdata):`."
+        )
+
+
+def below(state: State) -> Iterator[State]:
+    """Yield `state` and all that it is made of."""
+    yield state
+    if isinstance(state, Container):
+        for child in state.get_children().values():
+            yield from below(child)
+
+
+def _all_problems(container: Container, where: str) -> Iterator[str]:
+    yield from container.find_problems(where)
+    yield from _key_problems(container, where)
+    for label, child in container.get_children().items():
+        if isinstance(child, Container):
+            yield from _all_problems(child, f"{where}/{label}")
+
+
+def _key_problems(container: Container, where: str) -> Iterator[str]:
+    """Yield the keys of children that typed userdata has no field for."""
+    data = container.userdata._data  # noqa: SLF001  one machinery
+    if not isinstance(data, CheckedDict):
+        return
+    fields = data.fields
+    for label, state in container.get_children().items():
+        names = container._remappings[label]  # noqa: SLF001  its own module
+        keys = (*state.get_registered_input_keys(), *state.get_registered_output_keys())
+        for key in dict.fromkeys(names.get(key, key) for key in keys):
+            if "." not in key and key not in fields.types:
+                yield (
+                    f"{where}/{label}: userdata key is no field of {fields.kind.__name__}: got "
+                    f"{key!r}; expected one of {sorted(fields.types)}."
+                    f"{did_you_mean(key, fields.types)}"
+                )

@@ -1,0 +1,71 @@
+"""`@smachpy.state(...)`: a plain function as a state."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from smachpy.machines.state import CBState, Retry, State
+from smachpy.machines.state import StateOptions as _StateOptions
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+    from typing import Unpack
+
+
+class FunctionState(CBState):
+    """A state made from a function `f(userdata) -> outcome`; calling it calls the function."""
+
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        outcomes: Iterable[str] = (),
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        io_keys: Iterable[str] = (),
+        **options: Unpack[_StateOptions],
+    ) -> None:
+        super().__init__(function, (), None, outcomes, input_keys, output_keys, io_keys, **options)
+        self.__doc__ = function.__doc__
+        self.__name__ = getattr(function, "__name__", "state")
+        self.__wrapped__ = function
+
+    def __call__(self, userdata: Any) -> Any:
+        """Call the function, for tests of it."""
+        return self._cb(userdata)
+
+
+class _StateDecorator:
+    """The decorator; it also carries the classes of the module `smachpy.state`."""
+
+    State: ClassVar[type[State]] = State
+    CBState: ClassVar[type[CBState]] = CBState
+    Retry: ClassVar[type[Retry]] = Retry
+    StateOptions: ClassVar[Any] = _StateOptions
+
+    def __call__(
+        self,
+        outcomes: Iterable[str],
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        io_keys: Iterable[str] = (),
+        **options: Unpack[_StateOptions],
+    ) -> Callable[[Callable[..., Any]], FunctionState]:
+        """Make a state of a function `f(userdata) -> outcome`, plain or `async`.
+
+            @smachpy.state(outcomes=["charged", "failed"], output_keys=["level"])
+            def charge(userdata):
+                userdata.level = 1.0
+                return "charged"
+
+            StateMachine.add("CHARGE", charge, {"charged": "DRIVE"})
+
+        Inside it, `smachpy.current_state()` is the state, for `sleep` and `preempt_requested`.
+        """
+
+        def make(function: Callable[..., Any]) -> FunctionState:
+            return FunctionState(function, outcomes, input_keys, output_keys, io_keys, **options)
+
+        return make
+
+
+state = _StateDecorator()

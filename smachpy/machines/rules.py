@@ -1,0 +1,99 @@
+"""How the outcomes of parallel children make the outcome of their concurrence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from smachpy.exceptions import InvalidStateError
+from smachpy.machines.names import unique_names
+from smachpy.machines.problems import as_number
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """So many of these conditions must hold.
+
+    Attributes:
+        need: Number of conditions that must hold.
+        conditions: Pairs (child label, outcomes of which the child must have one).
+    """
+
+    need: int
+    conditions: tuple[tuple[str, tuple[str, ...]], ...]
+
+    def holds(self, outcomes: Mapping[str, str | None]) -> bool:
+        """Tell whether the children's outcomes fulfil the rule."""
+        return len(self.met_by(outcomes)) >= self.need
+
+    def met_by(self, outcomes: Mapping[str, str | None]) -> tuple[str, ...]:
+        """Return the labels of the children that meet their condition."""
+        return tuple(label for label, wanted in self.conditions if outcomes.get(label) in wanted)
+
+    def __str__(self) -> str:
+        parts = ", ".join(f"{label}:{'|'.join(wanted)}" for label, wanted in self.conditions)
+        if len(self.conditions) == 1:
+            return parts
+        if self.need == len(self.conditions):
+            return f"all of {parts}"
+        return f"any of {parts}" if self.need == 1 else f"{self.need} of {parts}"
+
+
+def all_of(conditions: Mapping[str, str | Iterable[str]]) -> Rule:
+    """Every child named here must have (one of) its outcome(s)."""
+    made = _conditions(conditions)
+    return Rule(len(made), made)
+
+
+def any_of(conditions: Mapping[str, str | Iterable[str]]) -> Rule:
+    """At least one child named here must have (one of) its outcome(s)."""
+    return Rule(1, _conditions(conditions))
+
+
+def n_of(n: int, conditions: Mapping[str, str | Iterable[str]]) -> Rule:
+    """At least `n` of the children named here must have (one of) their outcome(s)."""
+    made = _conditions(conditions)
+    if as_number(n) is None or not 1 <= n <= len(made) or int(n) != n:
+        raise InvalidStateError(
+            f"n_of: got n={n!r} with {len(made)} conditions; expected 1 <= n <= {len(made)}."
+        )
+    return Rule(int(n), made)
+
+
+def as_rules(outcome_map: Mapping[str, Any]) -> tuple[tuple[str, Rule], ...]:
+    """Return an `outcome_map` as pairs (container outcome, rule)."""
+    return tuple(
+        (outcome, rule if isinstance(rule, Rule) else all_of(rule))
+        for outcome, rule in outcome_map.items()
+    )
+
+
+def decide(
+    rules: Iterable[tuple[str, Rule]], outcomes: Mapping[str, str | None]
+) -> tuple[str, Rule] | None:
+    """Return the rule that holds and asks for most, with its outcome; None when none holds.
+
+    Among rules that ask for equally much the last one wins, as in SMACH.
+    """
+    best: tuple[str, Rule] | None = None
+    for outcome, rule in rules:
+        if (best is None or rule.need >= best[1].need) and rule.holds(outcomes):
+            best = outcome, rule
+    return best
+
+
+def _conditions(
+    conditions: Mapping[str, str | Iterable[str]],
+) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    if not isinstance(conditions, Mapping):
+        raise InvalidStateError(
+            f"rule: got {conditions!r}; expected a dict: child label -> outcome, or outcomes."
+        )
+    return tuple(
+        (label, (wanted,) if isinstance(wanted, str) else unique_names(wanted, f"rule {label!r}"))
+        for label, wanted in conditions.items()
+    )

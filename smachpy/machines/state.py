@@ -1,0 +1,463 @@
+"""States: what a machine is made of."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import math
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    ClassVar,
+    Generic,
+    Literal,
+    TypeAlias,
+    TypedDict,
+    TypeVar,
+    overload,
+)
+
+from smachpy.context import current_path
+from smachpy.exceptions import InvalidStateError
+from smachpy.introspection import Structure
+from smachpy.machines.names import unique_names
+from smachpy.machines.problems import Problems, as_number, unknown_arguments
+from smachpy.run.child import StateData, mark_preempt, on_preempt
+from smachpy.run.frame import clock_of_run, current_scope
+from smachpy.run.grace import note_serviced
+from smachpy.run.options import NAMES, NO_OPTIONS, Options, Retry, changed
+from smachpy.run.origin import REQUESTING
+from smachpy.run.runner import runner_of
+from smachpy.run.step import Step
+from smachpy.util import has_smach_interface
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Coroutine, Iterable, Mapping
+    from typing import Self, Unpack
+
+    from actionlib_core.clock import Clock
+    from smachpy.introspection import Kind
+    from smachpy.run.frame import Scope
+    from smachpy.run.options import Result
+    from smachpy.userdata.user_data import Remapper, UserData
+
+__all__ = ["CBState", "Options", "Retry", "State", "StateOptions", "get_options", "set_options"]
+
+Data_co = TypeVar("Data_co", bound=StateData, covariant=True)
+Grace: TypeAlias = float | Literal["inherit"] | None
+# With None in it: within another union mypy takes the items of `["aborted", OSError]` for objects.
+RetrySpec: TypeAlias = (
+    "Retry | tuple[int, float, Result | Iterable[Result]] | tuple[int, float] | int | None"
+)
+
+
+class StateOptions(TypedDict, total=False):
+    """What any state can be told beyond SMACH; all are off by default.
+
+    Keys:
+        timeout: Longest run [s]; then the state is preempted and ends with `timeout_outcome`,
+            unless it finished after all.
+        timeout_outcome: Outcome after a timeout; default "aborted". It is registered by itself.
+        preempt_timeout: Grace after a preempt [s] before the state is abandoned; None waits for
+            ever; "inherit", the default, takes the container's, in the end 10 s.
+        retry: `Retry(attempts, backoff, on)`, or that as a tuple, or the number of attempts.
+        on_exception: Exception type -> outcome; the outcomes are registered by themselves.
+        on_enter: Called with the userdata before the state runs.
+        on_exit: Called with the userdata and the outcome after it ran.
+    """
+
+    timeout: float | None
+    timeout_outcome: str
+    preempt_timeout: Grace
+    retry: RetrySpec
+    on_exception: Mapping[type[BaseException], str] | None
+    on_enter: Callable[[Any], object] | None
+    on_exit: Callable[[Any, str], object] | None
+
+
+class DataOf(Generic[Data_co]):
+    """Stands where a state's data is missing: says that `State.__init__` was not called."""
+
+    def __init__(self, kind: type[Data_co]) -> None:
+        self.kind = kind
+
+    @overload
+    def __get__(self, state: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, state: State, owner: type) -> Data_co: ...
+    def __get__(self, state: State | None, owner: type) -> Self | Data_co:
+        if state is None:
+            return self
+        name = owner.__name__
+        problem = (
+            f"state: got a {name} that is not initialised: its __init__ did not call "
+            f"State.__init__. Try `super().__init__(outcomes=[...])` as the first line of "
+            f"{name}.__init__ (in __post_init__ for a dataclass)."
+        )
+        raise InvalidStateError(f"{name}: {problem}", [problem])
+
+
+class State:
+    """One thing a robot does: reads userdata, does it, and ends with one of its outcomes.
+
+    Subclass it and define `execute(self, userdata)`, plain or `async`; the rest is optional. The
+    options (see `StateOptions`) work for every state, containers too, when a container runs it.
+    The attributes of a state are yours, whatever their names; `get_options` and `set_options` read
+    and change the options.
+
+    Args:
+        outcomes: Names of the ways it can end.
+        input_keys: Userdata keys that it reads.
+        output_keys: Userdata keys that it writes.
+        io_keys: Keys that it reads and writes.
+        **options: See `StateOptions`.
+
+    Raises:
+        InvalidStateError: a list is a plain string or holds something that is no string, or an
+            option has no meaning; all problems at once.
+        TypeError: there is no such option.
+
+    Threads: `request_preempt` may be called from any thread, callback or signal handler; all
+        else belongs to the thread that runs the state.
+    """
+
+    # The instance's own data is in its __dict__, which comes before this.
+    _smachpy: DataOf[StateData] = DataOf(StateData)
+    _smachpy_kind: ClassVar[Kind] = "state"
+    _smachpy_is_container: ClassVar[bool] = False
+    _preempt_requested: bool = False  # SMACH's name for it, which programs use
+
+    def __init__(
+        self,
+        outcomes: Iterable[str] = (),
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        io_keys: Iterable[str] = (),
+        **options: Unpack[StateOptions],
+    ) -> None:
+        problems = Problems(type(self).__name__)
+        both = problems.names("io_keys", io_keys)
+        # A second call begins anew with the same data: machines and waiting threads know it.
+        data = vars(self).setdefault("_smachpy", type(self)._smachpy.kind())
+        data.outcomes = problems.names("outcomes", outcomes)
+        data.input_keys = tuple(dict.fromkeys((*problems.names("input_keys", input_keys), *both)))
+        data.output_keys = tuple(
+            dict.fromkeys((*problems.names("output_keys", output_keys), *both))
+        )
+        data.options = NO_OPTIONS
+        if options:
+            self._smachpy_set_options(options, problems)
+        problems.raise_all()
+        data.changed()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy of the state needs."""
+        return {**vars(self), "_smachpy": self._smachpy.copy()}
+
+    # The argument has SMACH's name at run time; for type checkers a subclass may call it anything.
+    if TYPE_CHECKING:
+
+        def execute(self, ud: Any, /) -> str | Coroutine[Any, Any, str]:
+            """Do it and return the outcome; see below."""
+
+    else:
+
+        def execute(self, ud: Any) -> str:
+            """Do it and return the outcome; `async def` in a subclass is cancelled on a preempt.
+
+            Args:
+                ud: The declared userdata keys, as attributes or items.
+            """
+            raise NotImplementedError(f"{type(self).__name__}.execute")
+
+    # -- interface -----------------------------------------------------------------------------
+
+    def register_outcomes(self, new_outcomes: Iterable[str]) -> None:
+        """Add outcomes."""
+        self._smachpy.add("outcomes", new_outcomes)
+
+    def get_registered_outcomes(self) -> tuple[str, ...]:
+        """Return the outcomes, in the order of their declaration."""
+        return self._smachpy.outcomes
+
+    def register_io_keys(self, keys: Iterable[str]) -> None:
+        """Add keys that are read and written."""
+        names = unique_names(keys, "io_keys")
+        self.register_input_keys(names)
+        self.register_output_keys(names)
+
+    def register_input_keys(self, keys: Iterable[str]) -> None:
+        """Add keys that are read."""
+        self._smachpy.add("input_keys", keys)
+
+    def get_registered_input_keys(self) -> tuple[str, ...]:
+        """Return the keys that are read."""
+        return self._smachpy.input_keys
+
+    def register_output_keys(self, keys: Iterable[str]) -> None:
+        """Add keys that are written."""
+        self._smachpy.add("output_keys", keys)
+
+    def get_registered_output_keys(self) -> tuple[str, ...]:
+        """Return the keys that are written."""
+        return self._smachpy.output_keys
+
+    # -- preemption ----------------------------------------------------------------------------
+
+    def request_preempt(self) -> None:
+        """Ask the state to stop; a request belongs to the run that is on, or else to the next.
+
+        A container tells its children without it, and then calls an override, once in a visit, in
+        a thread of its own: whatever that does, it holds up nobody.
+
+        Threads: any thread, callback or signal handler; never waits for the state.
+        """
+        if REQUESTING.get() is not self:
+            mark_preempt(self)
+
+    _smachpy_request_preempt: ClassVar[object] = request_preempt
+
+    def _smachpy_has_own_request(self) -> bool:
+        """Tell whether `request_preempt` is the user's."""
+        kind = type(self)
+        own = kind.request_preempt is not kind._smachpy_request_preempt
+        return own or "request_preempt" in vars(self)
+
+    def service_preempt(self) -> None:
+        """Say that the request was answered; the machine follows the outcome then."""
+        if self._preempt_requested:
+            self._preempt_requested = False
+            note_serviced(self)
+
+    def recall_preempt(self) -> None:
+        """Take a request back."""
+        self._preempt_requested = False
+
+    def preempt_requested(self) -> bool:
+        """Tell whether the state was asked to stop."""
+        return self._preempt_requested
+
+    def wait_preempt(self, timeout: float | None = None) -> bool:
+        """Wait until the state is asked to stop.
+
+        Returns:
+            Whether it was, within `timeout` [s].
+
+        Raises:
+            InvalidStateError: `timeout` is no duration.
+
+        Blocks: until the request or the timeout; None waits for ever.
+        """
+        return _wait_preempt(self, "wait_preempt: timeout", timeout)
+
+    def sleep(self, seconds: float) -> bool:
+        """Let time pass, less of it when the state is asked to stop.
+
+        Returns:
+            Whether the sleep ended early because of a preempt.
+
+        Raises:
+            InvalidStateError: `seconds` is no duration.
+
+        Blocks: for `seconds`, or until the preempt.
+        """
+        return _wait_preempt(self, "sleep: seconds", seconds)
+
+    def on_preempt(self, callback: Callable[[], object]) -> Callable[[], None]:
+        """Call `callback` on each request to stop, at once if there is one already.
+
+        Returns:
+            A function that removes the callback.
+
+        Threads: the callback runs in the requester's thread, possibly in a signal handler: it must
+            not wait.
+        """
+        return on_preempt(self, callback)
+
+    def _smachpy_grace(self, inherited: Grace) -> Grace:
+        """Return how long the state has after a preempt [s], given what its containers say."""
+        own: Grace = self._smachpy.options.preempt_timeout
+        return inherited if own == "inherit" else own
+
+    # -- for those who write states ------------------------------------------------------------
+
+    # The library itself calls the functions behind these three: a user's state may use the names.
+
+    def clock(self) -> Clock:
+        """Return the clock of this run; outside of a run, that of the context.
+
+        Its `now()` [s], `event()` and `spawn()` follow virtual time in tests.
+        """
+        return clock_of_run()
+
+    def scope(self) -> Scope | None:
+        """Return the scope of this run, which publishes events; call it in `execute`.
+
+        None when the state is executed by hand, outside any machine.
+        """
+        return current_scope()
+
+    def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
+        """Return the kind of the state and pairs (name, text) about it, for pictures.
+
+        Override it to add to the pairs: `kind, details = super().describe_details()`.
+        """
+        options = self._smachpy.options
+        details: list[tuple[str, str]] = []
+        if options.timeout is not None:
+            details.append(("timeout", f"{options.timeout:g} s -> {options.timeout_outcome}"))
+        if options.retry is not None:
+            details.append(("retry", str(options.retry)))
+        return self._smachpy_kind, tuple(details)
+
+    def describe_structure(self) -> Structure:
+        """Return what is inside; leaves have nothing."""
+        return Structure()
+
+    def _smachpy_set_options(self, options: Mapping[str, Any], problems: Problems) -> None:
+        """Take options over; what is wrong with them goes to `problems`.
+
+        Raises:
+            TypeError: there is no such option.
+        """
+        unknown = unknown_arguments(options, NAMES)
+        if unknown:
+            raise TypeError(f"{type(self).__name__}: {unknown}")
+        data = self._smachpy
+        data.options = changed(data.options, options, problems)
+        data.outcomes = tuple(dict.fromkeys((*data.outcomes, *data.options.made_outcomes())))
+
+
+def make_step(label: str, state: State, window: Any) -> Step:
+    """Return a child ready to run: its `execute`, with its options around it."""
+    execute: Callable[[Any], Any] = state.execute
+    callback = state._cb if isinstance(state, CBState) else None  # noqa: SLF001  its own module
+    is_async = inspect.iscoroutinefunction(execute) or inspect.iscoroutinefunction(callback)
+    run = runner_of(state, get_options(state), execute, is_async=is_async)
+    return Step(label, state, window, run)
+
+
+def get_options(state: State) -> Options:
+    """Return the options of `state`, hooks that are methods of its class included.
+
+    A method `on_enter(self, userdata)` or `on_exit(self, userdata, outcome)` is a hook; a method of
+    one of these names with other arguments is the state's own.
+    """
+    data = state._smachpy
+    known, options = data.with_hooks, data.options
+    if known is not None and known[0] is options:
+        return known[1]  # looking for methods takes longer than running a small machine
+    hooks = {
+        name: getattr(state, name)
+        for name, count in (("on_enter", 2), ("on_exit", 3))
+        if getattr(options, name) is None and _is_hook(type(state), name, count)
+    }
+    found = dataclasses.replace(options, **hooks) if hooks else options
+    data.with_hooks = options, found
+    return found
+
+
+def set_options(state: State, **options: Unpack[StateOptions]) -> None:
+    """Change options of `state`; they hold from its next run on.
+
+    Raises:
+        InvalidStateError: a value is wrong; all problems at once.
+        TypeError: there is no such option.
+    """
+    problems = Problems(type(state).__name__)
+    data = state._smachpy
+    before = data.options, data.outcomes
+    state._smachpy_set_options(options, problems)
+    try:
+        problems.raise_all()
+    except InvalidStateError:
+        data.options, data.outcomes = before
+        raise
+    data.changed()
+
+
+def _is_hook(kind: type, name: str, count: int) -> bool:
+    """Tell whether the method `name` of a class takes `count` arguments, no fewer and no more."""
+    method = inspect.getattr_static(kind, name, None)
+    if not inspect.isfunction(method) or inspect.iscoroutinefunction(method):
+        return False
+    code = method.__code__
+    return (
+        code.co_argcount == count
+        and not method.__defaults__
+        and not code.co_kwonlyargcount
+        and not code.co_flags & (inspect.CO_VARARGS | inspect.CO_VARKEYWORDS)
+    )
+
+
+def _wait_preempt(state: State, argument: str, seconds: float | None) -> bool:
+    """Wait for a preempt of `state`, at most `seconds`; tell whether there is one."""
+    if seconds is not None and not (type(seconds) is float and 0.0 <= seconds < math.inf):
+        problems = Problems(current_path() or type(state).__name__)
+        number = as_number(seconds)
+        past = number is not None and number < 0  # a deadline that is over
+        seconds = 0.0 if past else problems.seconds(argument, seconds)
+        problems.raise_all()
+    if state._preempt_requested:
+        return True
+    wake = clock_of_run().event()
+    forget = on_preempt(state, wake.set)
+    try:
+        wake.wait(seconds)
+    finally:
+        forget()
+    return state._preempt_requested
+
+
+class CBState(State):
+    """A state that calls a function.
+
+    Args:
+        cb: Called as `cb(userdata, *cb_args, **cb_kwargs)`; returns the outcome. May be `async`.
+        cb_args: Positional arguments.
+        cb_kwargs: Keyword arguments.
+        outcomes: Outcomes; those of a `cb_interface` are added.
+        input_keys: Keys read; likewise.
+        output_keys: Keys written; likewise.
+        io_keys: Keys read and written.
+        **options: See `StateOptions`.
+    """
+
+    _smachpy_kind: ClassVar[Kind] = "callback"
+
+    def __init__(
+        self,
+        cb: Callable[..., Any],
+        cb_args: Iterable[Any] = (),
+        cb_kwargs: Mapping[str, Any] | None = None,
+        outcomes: Iterable[str] = (),
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        io_keys: Iterable[str] = (),
+        **options: Unpack[StateOptions],
+    ) -> None:
+        problems = Problems(type(self).__name__)
+        with problems:
+            super().__init__(outcomes, input_keys, output_keys, io_keys, **options)
+        self._args = problems.values("cb_args", cb_args)
+        self._kwargs = problems.mapping("cb_kwargs", cb_kwargs, "name -> value")
+        self._cb = cb
+        call = "cb(userdata, *cb_args, **cb_kwargs)"
+        count = 1 + len(self._args)
+        problems.function("cb", cb, call, count, self._kwargs, optional=False, plain=False)
+        problems.raise_all()
+        interface: Any = cb
+        if has_smach_interface(cb):
+            self.register_input_keys(interface.get_registered_input_keys())
+            self.register_output_keys(interface.get_registered_output_keys())
+            self.register_outcomes(interface.get_registered_outcomes())
+
+    def execute(self, ud: Remapper | UserData) -> Any:
+        """Call the function."""
+        return self._cb(ud, *self._args, **self._kwargs)
+
+    def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
+        """Add the function's name."""
+        kind, details = super().describe_details()
+        name = getattr(self._cb, "__qualname__", None) or getattr(self._cb, "__name__", "")
+        return kind, (*details, ("callback", name)) if name else details

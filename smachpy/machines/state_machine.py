@@ -1,0 +1,491 @@
+"""The state machine: one child at a time, outcomes lead from one to the next."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
+
+from smachpy import log
+from smachpy.events import Jumped, Preempted
+from smachpy.exceptions import (
+    InconsistentMachineError,
+    InvalidConstructionError,
+    InvalidStateError,
+    InvalidTransitionError,
+    SmachError,
+    did_you_mean,
+)
+from smachpy.introspection import Structure, TransitionRecord
+from smachpy.machines.construction import construction_method
+from smachpy.machines.container import Container
+from smachpy.machines.names import unique_names
+from smachpy.machines.problems import Problems
+from smachpy.machines.spec import ChildSpec, MachineSpec
+from smachpy.machines.validate import machine_problems
+from smachpy.run.frame import SUBSCRIPTIONS
+from smachpy.run.grace import request_soon
+from smachpy.run.interrupt import Interruption
+from smachpy.run.origin import asking
+from smachpy.run.runner import (
+    end_visit,
+    forget_visit,
+    only_tape,
+    publish_left,
+    publish_raised,
+    run_watched,
+    unknown_outcome,
+    user_error,
+)
+from smachpy.run.visit import PREEMPTED, End, Why
+from smachpy.util import is_shutdown
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+    from typing import Unpack
+
+    from smachpy.events.tape import Tape
+    from smachpy.introspection import Kind
+    from smachpy.machines.state import State, StateOptions
+    from smachpy.run.frame import Frame
+    from smachpy.run.step import Following, Step
+    from smachpy.userdata.user_data import UserData
+
+__all__ = ["StateMachine"]
+
+
+class _Plan:
+    """A state machine, compiled: each step knows what comes after each of its outcomes."""
+
+    __slots__ = ("epoch", "steps", "userdata")
+
+    def __init__(
+        self,
+        userdata: UserData,
+        steps: dict[str, Step],
+        outcomes: Iterable[str],
+        children: Iterable[ChildSpec],
+    ) -> None:
+        self.epoch = 0
+        self.userdata = userdata
+        self.steps = steps
+        ends = {outcome: End(outcome) for outcome in outcomes}
+        for child in children:
+            following: dict[str, Following] = {}
+            for outcome, target in child.targets().items():
+                where = target or outcome
+                if where in steps and target:
+                    following[outcome] = steps[where]
+                elif where in ends:
+                    following[outcome] = ends[where]
+            steps[child.label].next = following
+
+    def is_stale(self) -> bool:
+        return any(step.is_stale() for step in self.steps.values())
+
+
+class StateMachine(Container):
+    """A container that runs one child after the other, as their outcomes say.
+
+    The first state added is the initial one. An outcome without a transition ends the machine
+    with the outcome of the same name.
+
+    Args:
+        outcomes: Outcomes.
+        input_keys: Keys copied from the parent's userdata when it starts.
+        output_keys: Keys copied to the parent's userdata when it ends.
+        name: Name of the machine when it is the root.
+        userdata_type: A dataclass or TypedDict: the userdata has its fields, and their defaults.
+        **options: See `StateOptions`.
+    """
+
+    _smachpy_kind: ClassVar[Kind] = "machine"
+
+    def __init__(
+        self,
+        outcomes: Iterable[str],
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        *,
+        name: str | None = None,
+        userdata_type: type | None = None,
+        **options: Unpack[StateOptions],
+    ) -> None:
+        super().__init__(
+            outcomes, input_keys, output_keys, name=name, userdata_type=userdata_type, **options
+        )
+        self._transitions: dict[str, dict[str, str | None]] = {}
+        self._initial_state_label: str | None = None
+        self._next_initial: str | None = None
+        self._follow_connectors: tuple[str, tuple[str, ...]] | None = None
+
+    # -- construction --------------------------------------------------------------------------
+
+    @construction_method
+    def add(
+        self: StateMachine,
+        label: str,
+        state: State,
+        transitions: Mapping[str, str | None] | None = None,
+        remapping: Mapping[str, str] | None = None,
+        constants: Mapping[str, Any] | None = None,
+    ) -> State:
+        """Add a state.
+
+        Args:
+            label: Its name here; unique.
+            state: The state.
+            transitions: Outcome of the state -> label of the next state, or outcome of this
+                machine. Outcomes left out, or mapped to None, end the machine with the outcome of
+                the same name.
+            remapping: Key of the state -> key of this machine's userdata.
+            constants: Key of the state -> fixed value; the key is made its own in the userdata.
+
+        Returns:
+            The state.
+
+        Raises:
+            InvalidStateError: the label is taken, or `state` is no state.
+            InvalidConstructionError: called on the class while no machine is open.
+        """
+        return self._add(label, state, transitions, remapping, constants)
+
+    @construction_method
+    def add_auto(
+        self: StateMachine,
+        label: str,
+        state: State,
+        connector_outcomes: Iterable[str],
+        transitions: Mapping[str, str | None] | None = None,
+        remapping: Mapping[str, str] | None = None,
+        constants: Mapping[str, Any] | None = None,
+    ) -> State:
+        """Add a state whose `connector_outcomes` lead to the state that is added next.
+
+        Transitions given explicitly take precedence. Other arguments as in `add`.
+        """
+        connectors = unique_names(connector_outcomes, "connector_outcomes")
+        self._add(label, state, transitions, remapping, constants)
+        open_ends = tuple(o for o in connectors if self._transitions[label].get(o) is None)
+        self._follow_connectors = (label, open_ends)
+        return state
+
+    def _add(
+        self,
+        label: str,
+        state: State,
+        transitions: Mapping[str, str | None] | None,
+        remapping: Mapping[str, str] | None,
+        constants: Mapping[str, Any] | None,
+    ) -> State:
+        if self._smachpy.frame is not None:
+            raise InvalidConstructionError(
+                f"{label}: add: got a new state while the machine runs; expected it before or "
+                "after."
+            )
+        problems = Problems(str(label))
+        holds = "outcome -> label of the next state, outcome of this machine, or None"
+        given = problems.names_of("transitions", transitions, holds, optional=True)
+        fixed = problems.mapping("constants", constants, "key of the state -> value")
+        self._store_child(label, state, remapping, problems)
+        self._transitions[label] = given
+        for key, value in fixed.items():
+            name = f"{label}.{key}"
+            self.userdata[name] = value
+            self._remappings[label][key] = name
+            state.register_input_keys([key])
+        if self._follow_connectors is not None:
+            before, outcomes = self._follow_connectors
+            self._transitions[before].update(dict.fromkeys(outcomes, label))
+            self._follow_connectors = None
+        if self._initial_state_label is None:
+            self._initial_state_label = label
+        return state
+
+    # -- structure -----------------------------------------------------------------------------
+
+    def set_initial_state(
+        self, initial_states: Sequence[str], userdata: UserData | None = None
+    ) -> None:
+        """Choose where the next run begins, that one only, and add to the userdata.
+
+        Raises:
+            InvalidStateError: more than one state, or one that is not there.
+        """
+        if isinstance(initial_states, str):
+            initial_states = [initial_states]
+        labels = list(initial_states)
+        unknown = [label for label in labels if label not in self._states]
+        if len(labels) > 1 or unknown:
+            raise InvalidStateError(
+                f"initial state: got {labels!r}; expected one of {sorted(self._states)}."
+                f"{did_you_mean(unknown[0], self._states) if unknown else ''}"
+            )
+        if labels:
+            if not self.is_opened() and self._initial_state_label is not None:
+                self._next_initial = labels[0]
+            else:
+                self._initial_state_label = labels[0]
+        if userdata is not None:
+            self.userdata.update(userdata)
+
+    def get_initial_states(self) -> list[str]:
+        """Return the label of the state that the next run begins with."""
+        label = self._next_initial or self._initial_state_label
+        return [] if label is None else [label]
+
+    def get_active_states(self) -> list[str]:
+        """Return the label of the active state; ['None'] when idle."""
+        return [str(self._current_label)]
+
+    @property
+    def _current_label(self) -> str | None:
+        frame = self._smachpy.frame
+        step = None if frame is None else frame.step
+        return None if step is None else step.label
+
+    @property
+    def _current_state(self) -> State | None:
+        frame = self._smachpy.frame
+        step = None if frame is None else frame.step
+        return None if step is None else step.state
+
+    @property
+    def _is_running(self) -> bool:
+        return self._smachpy.frame is not None
+
+    def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
+        """Return the edges as (outcome, from label, to label or container outcome)."""
+        return [
+            (outcome, child.label, target or outcome)
+            for child in self._child_specs()
+            for outcome, target in child.targets().items()
+        ]
+
+    def check_state_spec(
+        self, label: str, state: State, transitions: Mapping[str, str | None]
+    ) -> None:
+        """Check that `transitions` leave from outcomes of `state`.
+
+        Raises:
+            InvalidTransitionError: one does not.
+        """
+        outcomes = state.get_registered_outcomes()
+        for outcome in transitions:
+            if outcome not in outcomes:
+                raise InvalidTransitionError(
+                    f"{label}: transition from an unknown outcome: got {outcome!r}; expected one "
+                    f"of {sorted(outcomes)}.{did_you_mean(outcome, outcomes)}"
+                )
+
+    def find_problems(self, where: str) -> tuple[str, ...]:
+        """Return what is wrong with this machine itself."""
+        initial = self._next_initial or self._initial_state_label
+        outcomes = self.get_registered_outcomes()
+        spec = MachineSpec(where, outcomes, tuple(self._child_specs()), initial)
+        return machine_problems(spec)
+
+    def _child_specs(self) -> Iterable[ChildSpec]:
+        for label, state in self._states.items():
+            outcomes = tuple(state.get_registered_outcomes())
+            yield ChildSpec(label, outcomes, tuple(self._transitions[label].items()))
+
+    def describe_structure(self) -> Structure:
+        """Return the children and the edges between them."""
+        edges = []
+        for child in self._child_specs():
+            for outcome, target in child.targets().items():
+                ends = not target or target not in self._states
+                edges.append(
+                    TransitionRecord(child.label, outcome, target or outcome, ends, not target)
+                )
+        children = tuple(
+            (label, state, tuple(self._remappings[label].items()))
+            for label, state in self._states.items()
+        )
+        return Structure(children, tuple(self.get_initial_states()), tuple(edges))
+
+    # -- running -------------------------------------------------------------------------------
+
+    def _compile(self, frame: Frame) -> _Plan:
+        problems = self.find_problems(frame.path)
+        if problems:
+            raise InconsistentMachineError(f"{type(self).__name__} {frame.path!r}", problems)
+        steps = {label: self._make_step(label) for label in self._states}
+        return _Plan(self.userdata, steps, self._smachpy.outcomes, self._child_specs())
+
+    def _run_children(self, frame: Frame, plan: _Plan) -> str:
+        if self._start_cbs:
+            self.call_start_cbs()
+        label, self._next_initial = self._next_initial or self._initial_state_label, None
+        assert label is not None
+        logged = frame.run.logged
+        if logged:
+            log.loginfo(f"{frame.path}: starting in {label!r}, keys {self.userdata.keys()}")
+        following: Following = plan.steps[label]
+        while not following.final:
+            try:
+                following = self._loop(frame, following)
+            except Interruption:
+                if frame.dead:
+                    raise
+                following = self._follow_asked(frame, frame.step, "preempted")
+            except SmachError:
+                raise
+            except Exception as error:
+                step = frame.step
+                raise user_error(step.path_in(frame), step.state, error) from error
+        last, outcome = frame.step.label, following.outcome
+        if logged:
+            log.loginfo(f"{frame.path}: {last!r} ended it with {outcome!r}")
+        if self._termination_cbs:
+            frame.step = None
+            self.call_termination_cbs([last], outcome)
+        return outcome
+
+    def _loop(self, frame: Frame, step: Step) -> End:
+        """Run step after step; return how the machine ends, with the last step in the frame.
+
+        This is the hot path. While nobody watches, waits or asks for a preempt, a transition is
+        one call, one look-up and a few flags.
+        """
+        run = frame.run
+        while True:
+            frame.step = step  # first the mark, then the look: see `smachpy.run.grace.ask`
+            if (
+                self._preempt_requested
+                or frame.visit is not None
+                or self._transition_cbs
+                or run.careful
+            ):
+                following = self._careful(frame, step)
+            elif run.watched:
+                tape = only_tape(frame)
+                if tape is not None:
+                    following = self._taped(frame, step, tape)
+                else:
+                    following = self._follow(frame, step, run_watched(frame, step))
+            else:
+                outcome = step.execute(step.userdata)
+                if (
+                    self._preempt_requested
+                    or frame.visit is not None
+                    or step.state._preempt_requested
+                ):
+                    following = self._follow_asked(frame, step, outcome)
+                else:
+                    try:
+                        following = step.next[outcome]
+                    except (KeyError, TypeError):
+                        self._raise_bad_outcome(frame, step, outcome)
+            if following.final:
+                return following
+            step = following
+
+    def _taped(self, frame: Frame, step: Step, tape: Tape) -> Following:
+        """Run step after step as `_loop` does while one tape is all that wants to know.
+
+        Returns how the machine goes on when something else comes up. A loop of its own, because
+        one entry says that a step ended and that the next began, with one look at the clock: there
+        is nothing in between, and a recorded transition costs little more than a plain one.
+        """
+        run, subscriptions = frame.run, SUBSCRIPTIONS
+        version = subscriptions.version
+        if self._transition_cbs or run.careful:
+            return step
+        base, now = frame.path, run.clock.now
+        run.flush()
+        tape.put((now(), base, None, None, step))
+        while True:
+            rounds, note = tape.room()
+            for _ in rounds:
+                try:
+                    window = step.watched_userdata(frame) if step.writes else step.userdata
+                    outcome = step.execute(window)
+                except BaseException as error:
+                    publish_raised(frame, error)
+                    raise
+                if (
+                    self._preempt_requested
+                    or frame.visit is not None
+                    or step.state._preempt_requested
+                ):
+                    publish_left(frame, step, outcome)
+                    return self._follow_asked(frame, step, outcome)
+                try:
+                    following: Following = step.next[outcome]
+                except (KeyError, TypeError):
+                    publish_left(frame, step, outcome)
+                    self._raise_bad_outcome(frame, step, outcome)
+                if following.final:
+                    tape.put((now(), base, step, outcome, None))
+                    return following
+                frame.step = following  # first the mark, then the look
+                if (
+                    self._preempt_requested
+                    or frame.visit is not None
+                    or subscriptions.version is not version
+                ):
+                    frame.step = step
+                    publish_left(frame, step, outcome)
+                    frame.step = following
+                    return following
+                note((now(), base, step, outcome, following))
+                if tape.quiet:
+                    tape.ring()
+                step = following
+
+    def _careful(self, frame: Frame, step: Step) -> Following:
+        """Run one step with everything that may want to know of it."""
+        run = frame.run
+        visit = frame.visit
+        if visit is not None and visit.step is not step:  # it had ended when it was asked
+            forget_visit(frame)
+        if run.control is not None:
+            run.control.pass_gate(frame, step)
+            if frame.visit is not None and not self._preempt_requested:  # called off meanwhile
+                return self._follow_asked(frame, step, "preempted")
+        if run.has_shutdown_check and is_shutdown():
+            with asking("shutdown", "", "the shutdown check says so"):
+                request_soon(self)
+        if self._preempt_requested:
+            return self._preempted(frame, step)
+        outcome = run_watched(frame, step) if run.watched else step.execute(step.userdata)
+        following = self._follow(frame, step, outcome)
+        if not following.final and (self._transition_cbs or run.logged):
+            frame.step = following
+            if run.logged:
+                log.loginfo(f"{frame.path}: {step.label!r} -{outcome}-> {following.label!r}")
+            if self._transition_cbs:
+                self.call_transition_cbs()
+        return following
+
+    def _follow(self, frame: Frame, step: Step, outcome: Any) -> Following:
+        """Return what comes after `step`, whether somebody asked or not."""
+        if self._preempt_requested or frame.visit is not None or step.state._preempt_requested:
+            return self._follow_asked(frame, step, outcome)
+        try:
+            following: Following = step.next[outcome]
+        except (KeyError, TypeError):
+            self._raise_bad_outcome(frame, step, outcome)
+        return following
+
+    def _follow_asked(self, frame: Frame, step: Step, outcome: Any) -> Following:
+        """Return what comes after `step` when somebody may have asked it to stop meanwhile."""
+        decision = end_visit(frame, outcome)
+        if decision.why is Why.STOPPED:
+            return self._preempted(frame, step)
+        if decision.why is Why.JUMPED:
+            frame.emit_own(Jumped, decision.target)
+            steps: dict[str, Following] = self._smachpy.plan.steps
+            return step if decision.target == step.label else steps[decision.target]
+        following: Following = decision.target
+        return following
+
+    def _preempted(self, frame: Frame, step: Step) -> End:
+        """End because of a preempt; `step` was not started, or finished in vain."""
+        frame.answered = True
+        frame.emit_own(Preempted, step.label)
+        return PREEMPTED
+
+    def _raise_bad_outcome(self, frame: Frame, step: Step, outcome: object) -> NoReturn:
+        outcomes = step.state._smachpy.outcomes
+        raise unknown_outcome(step.path_in(frame), outcomes, outcome) from None

@@ -1,0 +1,1 @@
+"""A running machine on the network: its structure, events, values and commands."""

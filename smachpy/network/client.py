@@ -1,0 +1,181 @@
+"""`IntrospectionClient`: find machines on the network, watch them, choose where they begin."""
+
+from __future__ import annotations
+
+import json
+import uuid
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.exceptions import WaitTimeoutError
+from actionlib_core.interfaces.smach_msgs.msg import (
+    SmachContainerInitialStatusCmd,
+    SmachContainerStatus,
+)
+from actionlib_core.interfaces.std_msgs.msg import String
+from actionlib_core.node import get_node
+from actionlib_core.pubsub.topic import Publisher, Subscriber, wait_for_message
+from actionlib_core.time import to_seconds
+from actionlib_core.wire.presence import Kind, list_endpoints
+from smachpy import log
+from smachpy.events import from_record
+from smachpy.exceptions import SmachError
+from smachpy.introspection import StateRecord
+from smachpy.machines.problems import Problems
+from smachpy.network.server import (
+    DESCRIPTION_TOPIC,
+    EVENTS_TOPIC,
+    INIT_TOPIC,
+    REMOTE_INIT,
+    REQUEST_ID,
+    STATUS_TOPIC,
+)
+from smachpy.userdata.json_text import dumps, find_lost
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from actionlib_core.node import Node
+    from actionlib_core.time import Duration
+    from smachpy.events import Event
+    from smachpy.userdata.user_data import UserData
+
+__all__ = ["IntrospectionClient"]
+
+ANSWER_S = 5.0
+"""How long a server has to answer when the caller does not say."""
+
+
+class IntrospectionClient:
+    """Talks to introspection servers.
+
+    Args:
+        node: Where; the current node when None.
+    """
+
+    def __init__(self, *, node: Node | None = None) -> None:
+        self._node = node
+
+    def get_servers(self, *, timeout: float = 1.0) -> list[str]:
+        """Return the names of the introspection servers that are there, sorted.
+
+        Blocks: until the network has answered, `timeout` [s] at most.
+        """
+        transport = self._get_node().transport
+        names = {
+            end.name for end in list_endpoints(transport, kind=Kind.PUBLISHER, timeout=timeout)
+        }
+        end = STATUS_TOPIC
+        return sorted(f"/{name.removesuffix(end)}" for name in names if name.endswith(end))
+
+    def set_initial_state(
+        self,
+        server: str,
+        path: str,
+        initial_states: Sequence[str],
+        initial_userdata: UserData | None = None,
+        timeout: float | Duration | None = None,
+    ) -> bool | None:
+        """Choose where the next run of a container begins, and set userdata of it.
+
+        Args:
+            server: Name of the introspection server.
+            path: Path of the container.
+            initial_states: Labels.
+            initial_userdata: Values to set.
+            timeout: Longest wait for the server's answer [s]; None: 5 s.
+
+        Returns:
+            Whether the server has done it; why it has not is logged.
+
+        Raises:
+            InvalidStateError: an argument has another type, or there is userdata that JSON cannot
+                carry over; all is named.
+
+        Blocks: until the answer, `timeout` at most.
+        """
+        problems = Problems(f"{server}: {path}")
+        problems.word("server", server)
+        problems.word("path", path)
+        labels = problems.names("initial_states", initial_states)
+        seconds = ANSWER_S if timeout is None else problems.seconds("timeout", timeout)
+        values = {} if initial_userdata is None else dict(initial_userdata._data)  # noqa: SLF001
+        lost = find_lost(values)
+        if lost:
+            problems.add(
+                f"initial_userdata: got {lost}, which JSON cannot carry over; expected numbers, "
+                "texts, containers, times and messages."
+            )
+        problems.raise_all()
+        request = uuid.uuid4().hex
+        data = dumps({**values, REQUEST_ID: request})
+        command = SmachContainerInitialStatusCmd(path, list(labels), data)
+        node = self._get_node()
+        answered = node.clock.event(f"the answer of {server}")
+        answers: list[str] = []
+
+        def take(status: Any) -> None:
+            if status.info.startswith(request):  # else news, or an answer to somebody else
+                answers.append(status.info.removeprefix(request))
+                answered.set()
+
+        with (
+            Subscriber(server + STATUS_TOPIC, SmachContainerStatus, take, node=node),
+            Publisher(  # latched: the server gets it when the network has connected the two
+                server + INIT_TOPIC, SmachContainerInitialStatusCmd, latch=True, node=node
+            ) as commands,
+        ):
+            commands.publish(command)
+            answered.wait(seconds)
+        if answers[:1] != [REMOTE_INIT]:
+            problem = answers[0] if answers else f"no answer in {seconds} s. Try get_servers()."
+            log.logwarn(f"{server}: {path}: initial state not set: {problem}")
+        return answers[:1] == [REMOTE_INIT]
+
+    def get_description(self, server: str, *, timeout: float | Duration = ANSWER_S) -> StateRecord:
+        """Return the structure of a server's machine.
+
+        Raises:
+            SmachError: there is no such server, or it does not answer.
+
+        Blocks: until the answer, `timeout` [s] at most.
+        """
+        topic = server + DESCRIPTION_TOPIC
+        try:
+            message = wait_for_message(topic, String, timeout, node=self._get_node())
+        except WaitTimeoutError as error:
+            known = self.get_servers()
+            raise SmachError(
+                f"introspection server {server!r}: got no answer in {to_seconds(timeout):g} s; "
+                f"servers that are there: {known}."
+            ) from error
+        return StateRecord.from_json(message.data)
+
+    def subscribe(
+        self, server: str, listener: Callable[[Event, int], object]
+    ) -> Callable[[], None]:
+        """Call `listener(event, seq)` with every event of a server's machine from now on.
+
+        Goals and userdata arrive as plain values or as their `repr`. A gap in `seq` is the number
+        of events that the server could not send in time.
+
+        Returns:
+            A function that ends it.
+
+        Raises:
+            InvalidStateError: `listener` cannot be called so.
+
+        Threads: the listener runs in a thread of the node's clock.
+        """
+        problems = Problems(f"events of {server}")
+        problems.function("listener", listener, "listener(event, seq)", 2, optional=False)
+        problems.raise_all()
+
+        def take(message: Any) -> None:
+            record = json.loads(message.data)
+            number = record.pop("seq")
+            listener(from_record(record), number)
+
+        return Subscriber(server + EVENTS_TOPIC, String, take, node=self._get_node()).unregister
+
+    def _get_node(self) -> Node:
+        return get_node() if self._node is None else self._node

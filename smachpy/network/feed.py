@@ -1,0 +1,219 @@
+"""The machine as a whole on the network: its structure, its events and their history.
+
+    <server>/smach/description   `smachpy.introspection.StateRecord`, latched      std_msgs/String
+    <server>/smach/events        `smachpy.events` with sequence numbers `seq`      std_msgs/String
+    <server>/smach/history       the run so far, for viewers that join late     std_srvs/Trigger
+    <server>/smach/value         a userdata value in full (`smachpy.network.values`)
+
+The history is a JSON object: `epoch` (an id that changes when the machine's server restarts),
+`session` (id of the network session, which tells two servers of one name apart), `description`,
+`problems` (found by `smachpy.checks`), `base` (a `RunState` of the events that are no longer kept),
+`events` (the newest, as they were sent), `control` (paused and breakpoints; null if the server
+takes no commands), `now` (the server's time, nanoseconds since the Unix epoch).
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+import uuid
+from collections import deque
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.clock import SerialExecutor
+from actionlib_core.interfaces.std_msgs.msg import String
+from actionlib_core.interfaces.std_srvs.srv import Trigger
+from actionlib_core.pubsub.service import Service
+from actionlib_core.pubsub.topic import Publisher
+from smachpy.events import Started, record_text
+from smachpy.events.run_state import RunState
+from smachpy.introspection import describe
+from smachpy.network.values import serve_values
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.node import Node
+    from smachpy.machines.container import Container
+    from smachpy.network.remote_control import ControlServer
+
+EVENTS_TOPIC = "/smach/events"
+DESCRIPTION_TOPIC = "/smach/description"
+HISTORY_SERVICE = "/smach/history"
+
+QUEUED_EVENTS = 20_000
+"""Limit of the tape: beyond it events are thinned out, which shows as gaps in `seq`."""
+
+KEPT_EVENTS = 5_000
+"""Events kept for viewers that join late, and events that may wait to be sent."""
+
+KEPT_BYTES = 8_000_000
+"""Limit of both in bytes of text."""
+
+STOP_S = 1.0
+
+
+class Feed:
+    """Sends the description and the events of a machine, and keeps the newest events.
+
+    The machine only appends its events to a tape; another thread encodes and sends them, so that
+    the machine never waits for the network.
+
+    Args:
+        server_name: First part of the topics' names.
+        machine: What is shown.
+        path: What to call it.
+        node: Where to send.
+        control: The server of commands; None if the machine takes none.
+        on_paths: Called with path -> kind of its newest event, for the events that were just sent.
+    """
+
+    def __init__(
+        self,
+        server_name: str,
+        machine: Container,
+        path: str,
+        node: Node,
+        *,
+        control: ControlServer | None = None,
+        on_paths: Callable[[dict[str, str]], object] = lambda _kinds: None,
+    ) -> None:
+        self._machine = machine
+        self._path = path
+        self._control = control
+        self._on_paths = on_paths
+        self._epoch = uuid.uuid4().hex
+        self._lock = threading.Lock()
+        self._kept: deque[tuple[dict[str, Any], str]] = deque()
+        self._kept_bytes = 0
+        self._base = RunState()
+        self._queue: deque[str] = deque()
+        self._queued_bytes = 0
+        self._executor = SerialExecutor(node.clock, f"events of {server_name}")
+        self._description = ""
+        self._problems: list[dict[str, str]] = []
+        self._descriptions = Publisher(
+            server_name + DESCRIPTION_TOPIC, String, latch=True, node=node
+        )
+        self._describe()
+        self._session = node.transport.session_id
+        self._node = node
+        self._values = serve_values(server_name, machine, path, node)
+        self._history = Service(
+            server_name + HISTORY_SERVICE, Trigger, self._answer, node=node, alone=False
+        )
+        self._events = Publisher(
+            server_name + EVENTS_TOPIC, String, node=node
+        )  # viewers find machines by it
+        self._tape = machine.tape(self._on_news, limit=QUEUED_EVENTS, name=path)
+
+    def close(self) -> None:
+        """Send the events that still wait, then leave the topics.
+
+        Blocks: 2 s at most.
+        """
+        self._tape.close()
+        self._on_news()
+        if not self._executor.join(STOP_S):
+            with self._lock:
+                self._queue.clear()  # the network is stuck: give up
+            self._executor.join(STOP_S)
+        self._descriptions.unregister()
+        self._history.close()
+        self._values.close()
+        self._events.unregister()
+
+    def _on_news(self) -> None:
+        self._executor.submit(self._work)
+
+    def _work(self) -> None:
+        """Send new events; run again until there are none."""
+        kinds = self._collect()
+        self._on_paths(kinds)
+        self._send()
+        if kinds:
+            self._on_news()
+
+    def _collect(self) -> dict[str, str]:
+        """Encode new events; return path -> kind of its newest event."""
+        kinds: dict[str, str] = {}
+        with self._lock:
+            wanted = self._events.get_num_connections() > 0
+            for record in self._tape.read():
+                kinds[record["path"]] = record["kind"]
+                if record["kind"] == Started.__name__:
+                    self._executor.submit(self._describe)
+                text = record_text(record)
+                self._keep(record, text)
+                if wanted:
+                    self._enqueue(text)
+        return kinds
+
+    def _keep(self, record: dict[str, Any], text: str) -> None:
+        self._kept.append((record, text))
+        self._kept_bytes += len(text)
+        while len(self._kept) > KEPT_EVENTS or self._kept_bytes > KEPT_BYTES:
+            old, text = self._kept.popleft()
+            self._kept_bytes -= len(text)
+            self._base.fold(old)
+
+    def _enqueue(self, text: str) -> None:
+        """Queue an event for sending; a viewer that misses dropped ones asks for the history."""
+        self._queue.append(text)
+        self._queued_bytes += len(text)
+        while len(self._queue) > KEPT_EVENTS or self._queued_bytes > KEPT_BYTES:
+            self._queued_bytes -= len(self._queue.popleft())
+
+    def _answer(self, _request: object) -> tuple[bool, str]:
+        """Answer with the history."""
+        kinds = self._collect()
+        if kinds:
+            self._executor.submit(lambda: self._on_paths(kinds))
+            self._on_news()
+        head = {
+            "epoch": self._epoch,
+            "session": self._session,
+            "description": json.loads(self._description),
+            "problems": self._problems,
+            "control": None if self._control is None else self._control.state(),
+            "now": self._node.clock.time_ns(),
+        }
+        with self._lock:
+            base = json.dumps(self._base.data)
+            kept = [text for _, text in self._kept]
+        text = json.dumps(head)[:-1]
+        return True, f'{text}, "base": {base}, "events": [{", ".join(kept)}]}}'
+
+    def _send(self) -> None:
+        while True:
+            with self._lock:
+                if not self._queue:
+                    return
+                text = self._queue.popleft()
+                self._queued_bytes -= len(text)
+            self._events.publish(text)
+
+    def _describe(self) -> None:
+        text = describe(self._machine, name=self._path.strip("/")).to_json()
+        if text != self._description:
+            self._description = text
+            self._descriptions.publish(text)
+            self._executor.submit(self._look_for_problems)
+
+    def _look_for_problems(self) -> None:
+        self._problems = _problems(self._machine, self._path)
+
+
+def _problems(machine: Container, path: str) -> list[dict[str, str]]:
+    from smachpy.checks import check
+
+    found = check(machine, name=path.strip("/")).problems
+    return [
+        {
+            "rule": one.rule,
+            "severity": one.severity,
+            "path": one.path,
+            "text": f"{one.message} {one.hint}".strip(),
+        }
+        for one in found
+    ]

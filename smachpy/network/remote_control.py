@@ -1,0 +1,259 @@
+"""`machine.control` over the network, for servers made with `control=True`.
+
+    <server>/smach/control          service smachpy_msgs/Command: a command and its answer, in JSON
+    <server>/smach/control_state    `paused` and `breakpoints`, sent on every change, latched;
+                                    JSON in std_msgs/String
+
+A command is a JSON object: `command`, its arguments, and optionally `by` (who sent it, shown by
+viewers):
+
+    pause [running]  resume  step
+    preempt path          jump path          force path outcome
+    break path [outcome]  unbreak path [outcome]
+    initial path states
+
+A path is absolute and begins with the machine's name as viewers show it ("/JOB/A"). `running` is
+"keep" or "cancel", as for `Control.pause`. An answer has `ok`, `text` (the reason of a refusal),
+`paused` and `breakpoints` (pairs path, outcome) right after the command; the current values are
+those of the newest `control_state`.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.clock import SerialExecutor
+from actionlib_core.exceptions import ActionlibError, ServiceUnavailableError
+from actionlib_core.interfaces import define_service
+from actionlib_core.interfaces.std_msgs.msg import String
+from actionlib_core.pubsub.service import Service
+from actionlib_core.pubsub.service_proxy import ServiceProxy
+from actionlib_core.pubsub.topic import Publisher
+from smachpy import log
+from smachpy.exceptions import SmachError
+from smachpy.network.values import find_state
+from smachpy.run.origin import asking
+from smachpy.userdata.user_data import UserData
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.node import Node
+    from smachpy.machines.container import Container
+
+CONTROL_SERVICE = "/smach/control"
+STATE_TOPIC = "/smach/control_state"
+
+Command = define_service("smachpy_msgs/Command", "string command\n---\nstring answer")
+
+COMMANDS: dict[str, tuple[str, ...]] = {
+    "pause": (),
+    "resume": (),
+    "step": (),
+    "preempt": ("path",),
+    "jump": ("path",),
+    "force": ("path", "outcome"),
+    "break": ("path",),
+    "unbreak": ("path",),
+    "initial": ("path", "states"),
+}
+"""Command -> its required arguments."""
+
+RUNNING = (None, "keep", "cancel")
+
+ANSWER_S = 3.0
+
+
+class CommandError(SmachError):
+    """A command is unknown or incomplete, names no existing state, or got no answer."""
+
+
+class ControlServer:
+    """Carries out commands from the network.
+
+    Args:
+        server_name: First part of the names.
+        machine: What to control.
+        path: What the machine is called in commands.
+        node: Where it listens.
+
+    Threads: commands are carried out one after another, in threads of the node's clock.
+    """
+
+    def __init__(self, server_name: str, machine: Container, path: str, node: Node) -> None:
+        self._machine = machine
+        self._path = path
+        self._lock = threading.Lock()
+        self._executor = SerialExecutor(node.clock, f"control of {server_name}")
+        self._states = Publisher(server_name + STATE_TOPIC, String, latch=True, node=node)
+        self._service = Service(
+            server_name + CONTROL_SERVICE, Command, self._answer, node=node, alone=False
+        )
+        self._forget = machine.control.on_change(lambda: self._executor.submit(self._publish_state))
+        self._executor.submit(self._publish_state)
+
+    def close(self) -> None:
+        """Take no more commands; a second call does nothing."""
+        self._forget()
+        self._service.close()
+        self._executor.join(ANSWER_S)
+        self._states.unregister()
+
+    def _publish_state(self) -> None:
+        """Publish after every change, even to the same values: an answer may have shown others."""
+        self._states.publish(json.dumps(self.state()))
+
+    def state(self) -> dict[str, Any]:
+        """Return whether the machine is paused, and its breakpoints."""
+        control = self._machine.control
+        return {
+            "paused": control.is_paused(),
+            "breakpoints": [[self._shown(path), out] for path, out in control.breakpoints()],
+        }
+
+    def _answer(self, request: Any) -> str:
+        problem = ""
+        try:
+            command = parse_command(request.command)
+            words = [command["command"], *(str(command[f]) for f in COMMANDS[command["command"]])]
+            with self._lock, asking("operator", command.get("by") or "", " ".join(words)):
+                self._carry_out(command)
+            log.loginfo(f"{self._path}: command from remote: {command}")
+        except SmachError as error:
+            problem = str(error)
+            log.logwarn(f"{self._path}: command from remote refused: {problem}")
+        return json.dumps({"ok": not problem, "text": problem, **self.state()})
+
+    def _carry_out(self, command: dict[str, Any]) -> None:
+        control = self._machine.control
+        path = self._own(str(command.get("path", "")))
+        outcome = command.get("outcome")
+        actions: dict[str, Callable[[], object]] = {
+            "pause": lambda: control.pause(running=command.get("running") or "keep"),
+            "resume": control.resume,
+            "step": control.step,
+            "preempt": lambda: control.preempt(path),
+            "jump": lambda: control.jump(path),
+            "force": lambda: control.force_outcome(path, str(outcome)),
+            "break": lambda: self._break(path, outcome),
+            "unbreak": lambda: control.remove_breakpoint(path, outcome),
+            "initial": lambda: self._begin_at(path, command["states"]),
+        }
+        actions[command["command"]]()
+
+    def _break(self, path: str, outcome: str | None) -> None:
+        state = self._find(path)
+        if state is None or state is self._machine:
+            raise CommandError(
+                f"command 'break': path: got {self._shown(path)!r}; expected that of a state below "
+                f"{self._path!r}."
+            )
+        outcomes = state.get_registered_outcomes()
+        if outcome is not None and outcome not in outcomes:
+            raise CommandError(
+                f"command 'break': outcome: got {outcome!r}; expected one of {sorted(outcomes)}."
+            )
+        self._machine.control.add_breakpoint(path, outcome)
+
+    def _begin_at(self, path: str, states: list[str]) -> None:
+        container = self._find(path)
+        if not hasattr(container, "set_initial_state"):
+            raise CommandError(
+                f"command 'initial': path: got {self._shown(path)!r}; expected a container's, such "
+                f"as {self._path!r}."
+            )
+        container.set_initial_state([str(state) for state in states], UserData())
+
+    def _find(self, path: str) -> Any:
+        """Return the state at an absolute path, None when there is none."""
+        root = self._root()
+        return find_state(self._machine, path.removeprefix(root)) if _is_in(root, path) else None
+
+    def _root(self) -> str:
+        return f"/{self._machine.name or 'SM_ROOT'}"
+
+    def _own(self, path: str) -> str:
+        """Return a command's path as the machine calls it."""
+        return _moved(path, self._path, self._root())
+
+    def _shown(self, path: str) -> str:
+        return _moved(path, self._root(), self._path)
+
+
+def _is_in(root: str, path: str) -> bool:
+    return path == root or path.startswith(root + "/")
+
+
+def _moved(path: str, old: str, new: str) -> str:
+    """Return `path` with the root `old` replaced by `new`; unchanged if its root is another."""
+    return new + path.removeprefix(old) if _is_in(old, path) else path
+
+
+class ControlClient:
+    """Sends commands to one server.
+
+    Args:
+        server_name: The server.
+        node: Where.
+    """
+
+    def __init__(self, server_name: str, node: Node) -> None:
+        self._name = server_name
+        self._by = node.full_name
+        self._service = ServiceProxy(
+            server_name + CONTROL_SERVICE, Command, timeout=ANSWER_S, node=node
+        )
+
+    def close(self) -> None:
+        """End calls that wait; a second call does nothing."""
+        self._service.close()
+
+    def send(self, command: dict[str, Any]) -> dict[str, Any]:
+        """Send a command and return the answer; `by` is the node's name if it is left out.
+
+        Raises:
+            CommandError: the command is wrong, or nobody answers.
+
+        Blocks: until the answer, `ANSWER_S` at most.
+        """
+        text = json.dumps({"by": self._by, **command})
+        parse_command(text)
+        try:
+            answer: dict[str, Any] = json.loads(self._service(text).answer)
+        except ActionlibError as error:
+            absent = isinstance(error, ServiceUnavailableError)
+            hint = " Was the mission started with --control?" if absent else ""
+            raise CommandError(f"{self._name}: got no answer: {error}{hint}") from error
+        return answer
+
+
+def parse_command(text: str) -> dict[str, Any]:
+    """Return the command that `text` is.
+
+    Raises:
+        CommandError: it is none; names what is missing.
+    """
+    try:
+        command = json.loads(text)
+    except ValueError as error:
+        raise CommandError(f"command: got no JSON: {error}; expected an object.") from error
+    if not isinstance(command, dict):
+        raise CommandError(f"command: got {command!r}; expected an object.")
+    name = command.get("command")
+    if not isinstance(name, str) or name not in COMMANDS:
+        raise CommandError(f"command: got {name!r}; expected one of {sorted(COMMANDS)}.")
+    for field in COMMANDS[name]:
+        kind = list if field == "states" else str
+        if not isinstance(command.get(field), kind):
+            got = command.get(field)
+            raise CommandError(f"command {name!r}: {field}: got {got!r}; expected {kind.__name__}.")
+    if command.get("running") not in RUNNING:
+        got = command["running"]
+        raise CommandError(f"command {name!r}: running: got {got!r}; expected 'keep' or 'cancel'.")
+    for field in ("outcome", "by"):
+        value = command.get(field)
+        if value is not None and not isinstance(value, str):
+            raise CommandError(f"command {name!r}: {field}: got {value!r}; expected str.")
+    return command

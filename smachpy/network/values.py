@@ -1,0 +1,94 @@
+"""Current userdata values in full, on request: in events long values are shortened.
+
+<server>/smach/value     container and key -> text     smachpy_msgs/ReadValue
+"""
+
+from __future__ import annotations
+
+import pprint
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.interfaces import Message, define_service
+from actionlib_core.pubsub.service import Service
+
+if TYPE_CHECKING:
+    from actionlib_core.node import Node
+    from smachpy.machines.container import Container
+
+VALUE_SERVICE = "/smach/value"
+LONGEST_VALUE = 2_000_000
+"""Longest text of a value; the number of characters cut off is appended."""
+
+WIDTH = 100
+
+ReadValue = define_service(
+    "smachpy_msgs/ReadValue",
+    """
+string container  # path of the container whose userdata it is
+string key
+---
+bool success
+string text       # the value; without success, why there is none
+""",
+)
+
+
+def serve_values(server_name: str, machine: Container, path: str, node: Node) -> Service:
+    """Offer the service that returns the current value of a key of a container's userdata.
+
+    Args:
+        server_name: First part of the service's name.
+        machine: Whose userdata.
+        path: What the machine is called in the paths of requests.
+        node: Where to offer it.
+
+    Threads: values are formatted while the machine runs. A value that changes at that moment may
+        show a mix of old and new parts, or the error that this caused.
+    """
+
+    def answer(request: Any) -> tuple[bool, str]:
+        container = find_state(machine, request.container.removeprefix(path))
+        userdata = getattr(container, "userdata", None)
+        if userdata is None:
+            return False, f"{request.container}: no such container; expected one of {path}."
+        try:
+            value = userdata[request.key]
+        except KeyError:
+            return False, f"{request.container}: {request.key!r} is not there any more."
+        try:
+            return True, value_text(value)
+        except Exception as error:  # noqa: BLE001  a repr may raise anything
+            return False, f"{type(value).__name__}: its repr raised {type(error).__name__}: {error}"
+
+    return Service(server_name + VALUE_SERVICE, ReadValue, answer, node=node, alone=False)
+
+
+def value_text(value: Any) -> str:
+    """Return a value for people: text as it is, messages as YAML, all else as Python.
+
+    Raises:
+        Exception: whatever the value's `repr` does.
+    """
+    if isinstance(value, (str, Message)):
+        text = str(value)
+    else:
+        text = pprint.pformat(value, width=WIDTH, compact=True)
+    if len(text) <= LONGEST_VALUE:
+        return text
+    return f"{text[:LONGEST_VALUE]}\n... {len(text) - LONGEST_VALUE} characters more"
+
+
+def find_state(state: Any, path: str) -> Any:
+    """Return the state at `path` below `state` ("/A/B"; "" is `state` itself), None for none.
+
+    Labels may have slashes in them.
+    """
+    if not path:
+        return state
+    children = state.get_children() if hasattr(state, "get_children") else {}
+    for label, child in children.items():
+        if path == f"/{label}" or path.startswith(f"/{label}/"):
+            found = find_state(child, path.removeprefix(f"/{label}"))
+            if found is not None:
+                return found
+    return None

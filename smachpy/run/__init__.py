@@ -1,0 +1,1 @@
+"""How a machine runs: visits of states, threads, preemption, retries."""

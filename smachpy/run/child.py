@@ -1,0 +1,204 @@
+"""What the library knows of one state or container, in one place: all else in it is the user's.
+
+`smachpy.run` runs what is described here and imports no states; `smachpy.machines` builds them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol
+
+from smachpy.machines.names import unique_names
+from smachpy.run.options import NO_OPTIONS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+    from typing import Self
+
+    from actionlib_core.clock import Event as ClockEvent
+    from smachpy.events import Event
+    from smachpy.events.tape import Tape
+    from smachpy.run.frame import Frame, Gate
+    from smachpy.run.options import Options
+    from smachpy.run.visit import Origin
+
+
+class _Epoch:
+    """Counts changes of states' interfaces, so that nobody has to look at every state."""
+
+    value = 0
+
+
+EPOCH = _Epoch()
+
+
+class StateData:
+    """What the library knows of one state.
+
+    Attributes:
+        outcomes: Its outcomes.
+        input_keys: Keys that it reads.
+        output_keys: Keys that it writes.
+        options: Its options.
+        version: Changes with each of these.
+        with_hooks: Its options and what they are with the hooks of its class; None when not known.
+        preempt_callbacks: Called on each request to stop.
+    """
+
+    __slots__ = (
+        "input_keys",
+        "options",
+        "outcomes",
+        "output_keys",
+        "preempt_callbacks",
+        "version",
+        "with_hooks",
+    )
+
+    def __init__(self) -> None:
+        self.outcomes: tuple[str, ...] = ()
+        self.input_keys: tuple[str, ...] = ()
+        self.output_keys: tuple[str, ...] = ()
+        self.options = NO_OPTIONS
+        self.version = 0
+        self.with_hooks: tuple[Options, Options] | None = None
+        self.preempt_callbacks: list[Callable[[], object]] = []
+
+    def add(self, name: str, names: Iterable[str]) -> None:
+        """Add outcomes or keys to the attribute `name`."""
+        argument = name.replace("_", " ")
+        more = unique_names(names, argument)
+        setattr(self, name, unique_names((*getattr(self, name), *more), argument))
+        self.changed()
+
+    def changed(self) -> None:
+        """Say that machines with this state are to be compiled again."""
+        self.version += 1
+        EPOCH.value += 1
+
+    def copy(self) -> Self:
+        """Return the data for a copy of the state, which does not run and nobody waits for."""
+        made = type(self)()
+        for name in ("outcomes", "input_keys", "output_keys", "options", "version"):
+            setattr(made, name, getattr(self, name))
+        return made
+
+
+class ContainerData(StateData):
+    """What the library knows of one container.
+
+    Attributes:
+        frame: Where it runs; None between runs, and between two attempts of one run.
+        root: The root's frame while it runs as the root of a machine.
+        plan: Its children, compiled; None when they have changed.
+        listeners: Called at each event of it and of all below it.
+        tapes: Take these events down.
+        control: The operator's control, once somebody asked for it.
+        answered: Its last run ended because a request to stop was taken up.
+        origin: Who asked it to stop before it ran.
+        is_passing_on: A request to stop is being passed on to what runs in it.
+        end_waiters: Set when it does not run any more.
+    """
+
+    __slots__ = (
+        "answered",
+        "control",
+        "end_waiters",
+        "frame",
+        "is_passing_on",
+        "listeners",
+        "origin",
+        "plan",
+        "root",
+        "tapes",
+    )
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.frame: Frame | None = None
+        self.root: Frame | None = None
+        self.plan: Any = None
+        self.listeners: tuple[Callable[[Event], object], ...] = ()
+        self.tapes: tuple[Tape, ...] = ()
+        self.control: Gate | None = None
+        self.answered = False
+        self.origin: Origin | None = None
+        self.is_passing_on = False
+        self.end_waiters: list[ClockEvent] = []
+
+
+class Child(Protocol):
+    """What running a state needs of it."""
+
+    _preempt_requested: bool
+
+    @property
+    def _smachpy(self) -> StateData: ...
+    @property
+    def _smachpy_is_container(self) -> bool: ...
+    @property
+    def execute(self) -> Callable[[Any], Any]:
+        """Does it and returns the outcome; may be a coroutine function."""
+        ...
+
+    def request_preempt(self) -> None:
+        """Ask it to stop; may be the user's."""
+
+    def _smachpy_grace(self, inherited: Any) -> Any: ...
+    def _smachpy_has_own_request(self) -> bool: ...
+
+
+class Parent(Child, Protocol):
+    """What running a container needs of it."""
+
+    @property
+    def _smachpy(self) -> ContainerData: ...
+    @property
+    def name(self) -> str | None:
+        """Name of the machine when it is the root."""
+        ...
+
+    def get_initial_states(self) -> list[str]:
+        """Return the labels of the children that run first."""
+        ...
+
+    def get_children(self) -> Mapping[str, Any]:
+        """Return label -> child."""
+        ...
+
+
+def mark_preempt(state: Child) -> None:
+    """Set the flag of `state` and call what waits for it.
+
+    Raises:
+        Exception: the first one that a callback raised, after all were called.
+    """
+    state._preempt_requested = True
+    failure: Exception | None = None
+    for callback in tuple(state._smachpy.preempt_callbacks):
+        try:
+            callback()
+        except Exception as error:  # noqa: BLE001  raised below: the others are called too
+            failure = failure or error
+    if failure is not None:
+        raise failure
+
+
+def on_preempt(state: Child, callback: Callable[[], object]) -> Callable[[], None]:
+    """Call `callback` on each request to `state`, at once if there is one.
+
+    Returns:
+        Forgets the callback.
+
+    Threads: the callback runs in the requester's thread, maybe in a signal handler: it must not
+        wait.
+    """
+    callbacks = state._smachpy.preempt_callbacks
+    callbacks.append(callback)
+    if state._preempt_requested:
+        callback()
+
+    def forget() -> None:
+        if callback in callbacks:
+            callbacks.remove(callback)
+
+    return forget

@@ -1,0 +1,373 @@
+"""Where we are: the chain of running containers, in a context variable.
+
+A `Run` belongs to one execution of a root; every container below it has a `Frame`. The frames
+know the path and the listeners, so that states need to know neither.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from functools import partial
+from typing import TYPE_CHECKING, Any, Protocol
+
+from actionlib_core.clock import current_clock
+from actionlib_core.clock._serial import report_thread_exception
+from smachpy import log
+from smachpy.context import current_frame
+from smachpy.events import CallbackFailed
+from smachpy.util import has_shutdown_check
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from actionlib_core.clock import Clock
+    from smachpy.events import Event
+    from smachpy.events.tape import Tape
+    from smachpy.run.child import Child, Parent
+    from smachpy.run.grace import Visit
+
+
+class Gate(Protocol):
+    """What a run needs of an operator's control."""
+
+    def attach(self, run: Run) -> None:
+        """Control a new run."""
+
+    def pass_gate(self, frame: Frame, step: Any) -> None:
+        """Hold the machine before `step` while it is paused."""
+
+    def release(self, path: str) -> None:
+        """Let the state at `path` look again whether it is called off."""
+
+    def note_outcome(self, frame: Frame, step: Any, outcome: object) -> None:
+        """Pause after `step` if there is a breakpoint on this outcome of it."""
+
+
+class Group(Protocol):
+    """The children of a concurrence while they run."""
+
+    def running(self) -> Sequence[Frame]:
+        """Return the branches that have not ended."""
+        ...
+
+
+class Run:
+    """One execution of a root container, shared by all frames below it.
+
+    Attributes:
+        clock: The clock of the run.
+        watched: Somebody wants to see each transition.
+        careful: Somebody wants more than to see them: a log, an operator, a shutdown check.
+        logged: Transitions go to the log.
+        has_shutdown_check: `set_shutdown_check` was called.
+        control: The operator's control, once somebody asked for it.
+        lock: Held while a request to stop is passed on, and by whoever ends a child; one for all
+            frames, so that requests that begin at different containers cannot wait for each other.
+            Re-entrant, because a signal handler may come in between.
+        pending: What is to be told once no lock is held, in order: events to listeners, texts to
+            the log.
+    """
+
+    __slots__ = (
+        "careful",
+        "clock",
+        "control",
+        "has_shutdown_check",
+        "lock",
+        "logged",
+        "pending",
+        "watched",
+    )
+
+    def __init__(self, clock: Clock) -> None:
+        self.clock = clock
+        self.logged = log.is_info_wanted()
+        self.has_shutdown_check = has_shutdown_check()
+        self.watched = self.careful = self.logged or self.has_shutdown_check
+        self.control: Gate | None = None
+        self.lock = threading.RLock()
+        self.pending: deque[Callable[[], object]] = deque()
+
+    def flush(self) -> None:
+        """Tell what was noted; never with a lock held.
+
+        Blocks: as long as the listeners do.
+        """
+        while self.pending:
+            try:
+                tell = self.pending.popleft()
+            except IndexError:  # another thread took the last one
+                return
+            tell()
+
+    def flush_soon(self) -> None:
+        """Tell what was noted in a thread of its own: no timer waits for a listener or a log."""
+        if not self.pending:
+            return
+        try:
+            self.clock.spawn(self.flush, name="events")
+        except RuntimeError:  # the system gives no thread: whoever publishes next tells it
+            return
+
+    def note_log(self, text: str) -> None:
+        """Note an error for the log."""
+        self.pending.append(partial(_log_error, text))
+
+
+def _log_error(text: str) -> None:
+    try:
+        log.logerr(text)
+    except Exception:  # noqa: BLE001  a border: the program's own logger
+        report_thread_exception()
+
+
+class _Subscriptions:
+    """Changes when somebody wants to hear, see or steer more or less than before."""
+
+    version = object()
+
+
+SUBSCRIPTIONS = _Subscriptions()
+
+
+class Subscribers:
+    """Who hears the events of a frame, as long as nobody comes or goes.
+
+    Attributes:
+        version: `SUBSCRIPTIONS.version` then.
+        listeners: Those of the container, then those of the containers above.
+        tapes: Likewise.
+        tape: The only one that hears anything, if it is a tape.
+    """
+
+    __slots__ = ("listeners", "tape", "tapes", "version")
+
+    def __init__(
+        self,
+        version: object,
+        listeners: tuple[Callable[[Event], object], ...],
+        tapes: tuple[Tape, ...],
+    ) -> None:
+        self.version = version
+        self.listeners = listeners
+        self.tapes = tapes
+        self.tape = tapes[0] if len(tapes) == 1 and not listeners else None
+
+
+class Frame:
+    """One running container, or a thread in which one child runs (`smachpy.run.branches.Branch`).
+
+    Attributes:
+        container: The container.
+        parent: The frame around it; None for the top, in which the root runs.
+        run: What all frames of this execution share.
+        step: What runs now: anything with `label` and `state`; None between runs.
+        visit: The visit of what runs; None while it just runs and nobody asks or watches.
+        group: The children of a concurrence, while they run.
+        answered: The container ends because a request to stop was taken up.
+        dead: The thread was left behind.
+        first: The frame with which its thread begins.
+        innermost: Of the first frame of a thread: the innermost one that runs there.
+        thread: Of the first frame of a thread: the thread's identifier.
+        can_be_left: That thread is ours to leave behind.
+        ended: The child of a `Branch` has ended, and was reported.
+    """
+
+    # Entering a container is a hot path: what is rarely set stands here, not in __init__.
+    run: Run
+    step: Any
+    first: Frame
+    innermost: Frame | None
+    visit: Visit | None = None
+    group: Group | None = None
+    answered = False
+    dead = False
+    ended = False
+    thread = 0
+    can_be_left = False
+    subscribers: Subscribers | None = None
+    _path: str | None = None
+
+    def __init__(self, container: Parent, parent: Frame) -> None:
+        self.container = container
+        self.parent: Frame | None = parent
+        self.run = parent.run
+        self.first = parent.first
+        self.step = None
+        self._above = parent.step  # what the parent runs while this frame lives: this container
+
+    @property
+    def path(self) -> str:
+        """Path of the container."""
+        path = self._path
+        if path is None:
+            parent = self.parent
+            assert parent is not None
+            above = self._above
+            path = self._path = parent.path if above is None else f"{parent.path}/{above.label}"
+        return path
+
+    def here(self) -> str:
+        """Return the path of the state that runs now."""
+        step = self.step
+        return self.path if step is None else f"{self.path}/{step.label}"
+
+    def is_asked(self) -> bool:
+        """Tell whether the container itself was asked to stop, not only what runs in it."""
+        return self.container._preempt_requested
+
+    def running(self) -> Sequence[Frame]:
+        """Return the frames that run a child each: this one, or those of a concurrence."""
+        return [self] if self.group is None else self.group.running()
+
+    def begin_thread(self) -> None:
+        """Let the thread that runs here begin with this frame."""
+        self.first = self.innermost = self
+        self.thread = threading.get_ident()
+
+    def end_thread(self) -> None:
+        """Refer to itself no more, so that no run waits for the garbage collector."""
+        self.innermost = None
+        del self.first
+
+    # -- events --------------------------------------------------------------------------------
+
+    def publish(self, event: Event) -> None:
+        """Give `event` to the listeners of this container and of all above it.
+
+        A listener that raises is reported to the others and to the log; it hurts nobody.
+        """
+        subscribers = self.subscribers
+        if subscribers is None or subscribers.version is not SUBSCRIPTIONS.version:
+            subscribers = self.find_subscribers()
+        self.give(subscribers, event)
+
+    def give(self, subscribers: Subscribers, event: Event) -> None:
+        """Give `event` to `subscribers`."""
+        if subscribers.tapes:
+            for tape in subscribers.tapes:
+                tape.take(event)
+        for listener in subscribers.listeners:
+            try:
+                listener(event)
+            except Exception as error:  # noqa: BLE001  a border: reported below
+                self._listener_failed(listener, error, event)
+
+    def find_subscribers(self) -> Subscribers:
+        """Return who hears the events of this frame now."""
+        version = SUBSCRIPTIONS.version
+        if self.dead:
+            self.subscribers = Subscribers(version, (), ())
+            return self.subscribers
+        container, parent = self.container, self.parent
+        above = None
+        if parent is not None:
+            above = parent.subscribers
+            if above is None or above.version is not version:
+                above = parent.find_subscribers()
+        data = container._smachpy
+        if above is None or parent is None or parent.container is not container:
+            for tape in data.tapes:
+                tape.begin(self.here() if parent is None else self.path, self.run.clock)
+            if above is None:
+                above = Subscribers(version, data.listeners, data.tapes)
+            elif data.listeners or data.tapes:
+                listeners = data.listeners + above.listeners
+                above = Subscribers(version, listeners, data.tapes + above.tapes)
+        self.subscribers = above
+        return above
+
+    def emit(self, kind: Callable[..., Event], *fields: Any) -> None:
+        """Publish an event about the state that runs now."""
+        self._emit(self.here, kind, fields)
+
+    def emit_own(self, kind: Callable[..., Event], *fields: Any) -> None:
+        """Publish an event about the container itself."""
+        self._emit(lambda: self.path, kind, fields)
+
+    def _emit(self, path: Callable[[], str], kind: Callable[..., Event], fields: Any) -> None:
+        run = self.run
+        if run.watched:
+            if run.pending:
+                run.flush()
+            clock = run.clock
+            self.publish(kind(path(), clock.now(), clock.time_ns(), *fields))
+
+    def note(self, path: str, kind: Callable[..., Event], *fields: Any) -> None:
+        """Note an event while a lock is held; the next `Run.flush` or event publishes it."""
+        run = self.run
+        if run.watched:
+            clock = run.clock
+            event = kind(path, clock.now(), clock.time_ns(), *fields)
+            run.pending.append(partial(self.publish, event))
+
+    def note_failure(self, path: str, callback: object, error: BaseException) -> None:
+        """Note that a callback of the state at `path` raised."""
+        name = getattr(callback, "__qualname__", None) or repr(callback)
+        text = f"{type(error).__name__}: {error}"
+        self.note(path, CallbackFailed, name, text)
+        self.run.note_log(f"{path}: {name} raised {text}")
+
+    def callback_failed(self, callback: object, error: BaseException) -> None:
+        """Report a raising callback: to the log and to the listeners."""
+        name = getattr(callback, "__qualname__", None) or repr(callback)
+        text = f"{type(error).__name__}: {error}"
+        log.log_exception(f"{self.path}: callback {name} raised {text}", error)
+        self.emit_own(CallbackFailed, name, text)
+
+    def _listener_failed(self, listener: object, error: BaseException, event: Event) -> None:
+        name = getattr(listener, "__qualname__", None) or repr(listener)
+        path = self.path or self.here()
+        log.log_exception(f"{path}: listener {name} raised {error!r} on {event!r}", error)
+
+
+class Scope:
+    """A running state's handle on its run: to publish from any thread, also after callbacks.
+
+    Attributes:
+        path: Path of the state.
+        clock: Clock of the run.
+    """
+
+    __slots__ = ("_frame", "clock", "path")
+
+    def __init__(self, frame: Frame) -> None:
+        self._frame = frame
+        self.path = frame.here()
+        self.clock = frame.run.clock
+
+    @property
+    def is_watched(self) -> bool:
+        """Somebody wants to hear of each transition."""
+        return self._frame.run.watched
+
+    def emit(self, kind: Callable[..., Event], *fields: Any) -> None:
+        """Publish the event `kind(path, t, stamp_ns, *fields)`, if anybody listens.
+
+        Threads: any.
+        """
+        frame = self._frame
+        if frame.run.watched:
+            if frame.run.pending:
+                frame.run.flush()
+            clock = self.clock
+            frame.publish(kind(self.path, clock.now(), clock.time_ns(), *fields))
+
+
+def current_scope() -> Scope | None:
+    """Return the scope of the state that runs in this context; None outside any machine."""
+    frame = current_frame()
+    return None if frame is None else Scope(frame)
+
+
+def clock_of_run() -> Clock:
+    """Return the clock of the run in this context, or outside of one that of the context."""
+    frame = current_frame()
+    return current_clock() if frame is None else frame.run.clock
+
+
+def current_state() -> Child | None:
+    """Return the state that runs in this context."""
+    frame = current_frame()
+    return None if frame is None or frame.step is None else frame.step.state

@@ -1,0 +1,485 @@
+"""The visit of a child: asked to stop, given its grace, interrupted, left behind.
+
+What happens to a visit is the table of `smachpy.run.visit`; here each effect of it is performed.
+All of it happens with the run's lock held, and no code of the user runs there but what waits for a
+request: events and logs are noted and told afterwards, and a child's own `request_preempt` has a
+thread of its own. Graces end on the clock's thread, which waits for no listener and no log.
+"""
+
+from __future__ import annotations
+
+import sys
+from functools import partial
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from smachpy.context import current_frame
+from smachpy.events import Abandoned, Finished, Left, PreemptRequested, PreemptServiced, TimedOut
+from smachpy.run.child import mark_preempt
+from smachpy.run.frame import clock_of_run
+from smachpy.run.interrupt import Interruption, interrupt, take_back
+from smachpy.run.origin import REQUESTING, asking, current_origin
+from smachpy.run.visit import IS_ASKED, STEPS, Effect, Event, Phase
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.clock import Task, Timer
+    from smachpy.run.child import Child, Parent
+    from smachpy.run.frame import Frame, Run
+    from smachpy.run.step import Step
+    from smachpy.run.visit import Override
+
+DEFAULT_GRACE_S = 10.0
+PATIENCE_S = 0.1  # how long an interrupted state has to unwind before it is left behind
+LONGEST_PATIENCE_S = 1.0
+
+
+class Visit:
+    """One visit of the child that `frame` runs, and where it is.
+
+    Attributes:
+        phase: Where it is.
+        step: The child.
+        by_timeout: Nobody but its own timeout has asked.
+        serviced: It has said that it takes the request up.
+        timeout: Its own timeout [s], when that has passed.
+        override: What an operator wants instead of its outcome.
+    """
+
+    __slots__ = (
+        "_frame",
+        "_injected",
+        "_override_call",
+        "_patience",
+        "_timer",
+        "_timer_number",
+        "by_timeout",
+        "override",
+        "phase",
+        "serviced",
+        "step",
+        "timeout",
+    )
+
+    def __init__(self, frame: Frame, step: Step, phase: Phase = Phase.RUNNING) -> None:
+        self.phase = phase
+        self.step = step
+        self.by_timeout = False
+        self.serviced = False
+        self.timeout: float | None = None
+        self.override: Override | None = None
+        self._frame = frame
+        self._injected = 0  # thread to which an interruption is on its way
+        self._override_call: Task | None = None
+        self._patience = PATIENCE_S
+        self._timer: Timer | None = None
+        self._timer_number = 0
+
+    def happen(self, event: Event) -> None:
+        """Let `event` happen; with the run's lock held."""
+        self.phase, effects = STEPS[self.phase, event]
+        for effect in effects:
+            self._PERFORM[effect](self)
+
+    def is_asked(self) -> bool:
+        """Tell whether somebody wants the child to stop."""
+        return self.phase in IS_ASKED
+
+    def has_answered(self, outcome: object) -> bool:
+        """Tell whether the child, which ended with `outcome`, took its request up.
+
+        It did if it says 'preempted' or has serviced the request; work that just finished did not.
+        """
+        if outcome == "preempted":
+            return self.is_asked() or self.phase is Phase.LEFT_BEHIND
+        if not self.is_asked():
+            return False
+        state: Any = self.step.state
+        return bool(
+            state._smachpy.answered if state._smachpy_is_container else not state._preempt_requested
+        )
+
+    def service(self) -> None:
+        """Publish, once, that the child takes its request up."""
+        frame = self._frame
+        with frame.run.lock:
+            if not self.serviced and self.is_asked():
+                self.serviced = True
+                self.happen(Event.SERVICE)
+        frame.run.flush()
+
+    def settle(self) -> None:
+        """Wait until the own `request_preempt` of the child that has ended has returned too.
+
+        Else it might meet the child's next visit. One that blocks is left behind.
+        """
+        frame, task = self._frame, self._override_call
+        self._override_call = None
+        if task is None or frame.dead:
+            return
+        try:
+            ended = task.join(LONGEST_PATIENCE_S)
+        except Interruption:  # it was for the child, which has ended
+            if frame.dead:
+                raise
+            return
+        if not ended:
+            frame.run.note_log(f"{task.name} still runs; its thread is left behind.")
+            frame.run.flush_soon()
+
+    # -- the effects of the table --------------------------------------------------------------
+
+    def _path(self) -> str:
+        return f"{self._frame.path}/{self.step.label}"
+
+    def _publish_timed_out(self) -> None:
+        self._frame.note(self._path(), TimedOut, self.timeout)
+
+    def _publish_request(self) -> None:
+        frame = self._frame
+        if frame.run.watched:
+            is_container = self.step.state._smachpy_is_container
+            grace = None if is_container else grace_of(frame, self.step.state)
+            frame.note(self._path(), PreemptRequested, *current_origin(), grace)
+
+    def _tell(self) -> None:
+        state: Any = self.step.state
+        try:
+            if state._smachpy_is_container:
+                pass_on(state)
+            else:
+                mark_preempt(state)
+        except Exception as error:  # noqa: BLE001  its siblings are told all the same
+            self._frame.note_failure(self._path(), state.request_preempt, error)
+
+    def _call_override(self) -> None:
+        state, frame, path = self.step.state, self._frame, self._path()
+        if REQUESTING.get() is state or not state._smachpy_has_own_request():
+            return
+        call = partial(call_override, state, frame, path)
+        try:
+            self._override_call = frame.run.clock.spawn(call, name=f"request_preempt of {path}")
+        except Exception as error:  # noqa: BLE001  no thread, for one: told, as what it raises is
+            frame.note_failure(path, state.request_preempt, error)
+
+    def _arm_grace(self) -> None:
+        state = self.step.state
+        grace = None if state._smachpy_is_container else grace_of(self._frame, state)
+        if grace is not None:  # a container's children have their own
+            self._start_timer(grace, Event.GRACE_OVER)
+
+    def _publish_serviced(self) -> None:
+        self._frame.note(self._path(), PreemptServiced)
+
+    def _publish_abandoned(self) -> None:
+        frame, clock = self._frame, self._frame.run.clock
+        grace = grace_of(frame, self.step.state)
+        path, now = self._path(), (clock.now(), clock.time_ns())
+        lines = lines_of(frame.first.thread)
+        subscribers = frame.find_subscribers() if frame.run.watched else None  # before it is dead
+
+        def tell() -> None:
+            stack = text_of(lines)
+            if subscribers is not None:
+                frame.give(subscribers, Abandoned(path, *now, grace or 0.0, stack))
+            frame.run.note_log(
+                f"{path}: still runs {grace or 0.0:g} s after its preempt; interrupted. It was "
+                f"at:\n{stack}"
+            )
+
+        frame.run.pending.append(tell)
+
+    def _arm_patience(self) -> None:
+        patience, self._patience = self._patience, min(2 * self._patience, LONGEST_PATIENCE_S)
+        can_be_left = self._frame.first.can_be_left
+        self._start_timer(patience, Event.LEAVE if can_be_left else Event.INTERRUPT_AGAIN)
+
+    def _interrupt(self) -> None:
+        ident = self._frame.first.thread
+        if interrupt(self._frame.run.clock, ident, self._is_on):
+            self._injected = ident
+
+    def _publish_left(self) -> None:
+        """Note the ends of all that is left behind with the child.
+
+        Those who listen are looked up now: a dead frame has none.
+        """
+        frame, run = self._frame, self._frame.run
+        first = frame.first
+        last = outcome_left(first)
+        now = run.clock.now(), run.clock.time_ns()
+        for each in _up_to(frame, first):
+            if run.watched and each.step is not None:
+                kind = Finished if each.parent is None else Left
+                event = kind(each.here(), *now, last if each is first else "preempted")
+                run.pending.append(partial(each.give, each.find_subscribers(), event))
+        run.note_log(f"{self._path()}: did not react; its thread is left behind.")
+
+    def _cut_off(self) -> None:
+        """Cut off what is left behind from userdata, events and later runs; then go on without.
+
+        The thread that is left behind keeps dead frames: it can neither go on to another state,
+        nor write userdata, nor end a later run, nor publish events.
+        """
+        frame = self._frame
+        first: Any = frame.first
+        chain = _up_to(frame, first)
+        try:
+            for each in chain:
+                each.dead = True
+                each.subscribers = None
+            for each in chain:
+                if each.step is not None:
+                    each.step.cut_off()
+                    each.step.state._preempt_requested = False
+                data = each.container._smachpy
+                data.plan = None
+                if data.frame is each:
+                    data.frame = None
+                    each.container._preempt_requested = False
+                    for ended in tuple(data.end_waiters):
+                        ended.set()
+        finally:
+            frame.dead = True
+            first.abandon()
+
+    def _clear(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+            self._timer_number += 1
+        if self._injected:
+            take_back(self._injected)
+            self._injected = 0
+        self._patience = PATIENCE_S
+        self.by_timeout = self.serviced = False
+        self.step.state._preempt_requested = False
+
+    def _is_on(self) -> bool:
+        frame = self._frame
+        return self.is_asked() and frame.visit is self and frame.step is self.step
+
+    def _start_timer(self, seconds: float, event: Event) -> None:
+        self._timer_number += 1
+        over = partial(self._overdue, event, self._timer_number)
+        self._timer = self._frame.run.clock.call_later(seconds, over)
+
+    def _overdue(self, event: Event, number: int) -> None:
+        with self._frame.run.lock:
+            if self._is_on() and number == self._timer_number:  # not one that was cancelled late
+                self.happen(event)
+        self._frame.run.flush_soon()
+
+    _PERFORM: ClassVar[dict[Effect, Callable[[Visit], None]]] = {
+        Effect.PUBLISH_TIMED_OUT: _publish_timed_out,
+        Effect.PUBLISH_REQUEST: _publish_request,
+        Effect.TELL: _tell,
+        Effect.CALL_OVERRIDE: _call_override,
+        Effect.ARM_GRACE: _arm_grace,
+        Effect.PUBLISH_SERVICED: _publish_serviced,
+        Effect.PUBLISH_ABANDONED: _publish_abandoned,
+        Effect.ARM_PATIENCE: _arm_patience,
+        Effect.INTERRUPT: _interrupt,
+        Effect.PUBLISH_LEFT: _publish_left,
+        Effect.CUT_OFF: _cut_off,
+        Effect.CLEAR: _clear,
+    }
+
+
+# -- asking --------------------------------------------------------------------------------------
+
+
+def ask(frame: Frame, step: Any = None, *, timeout: float | None = None) -> bool:
+    """Ask what runs in `frame` to stop; with the run's lock held.
+
+    Args:
+        frame: Where the child runs.
+        step: The child that is meant; None: whatever runs.
+        timeout: The child's own timeout [s], if that is what asks.
+
+    Returns:
+        Whether it runs, or will.
+    """
+    before, meant = frame.visit, step or frame.step
+    if meant is None:
+        return False
+    visit = before
+    if visit is None or visit.step is not meant:
+        visit = Visit(frame, meant)
+    # First the mark, then the look; the frame's thread sets its step first and looks at the mark
+    # then, so one of the two always sees the other.
+    frame.visit = visit
+    if frame.step is not meant or frame.dead or frame.ended:
+        frame.visit = before
+        return False
+    if timeout is None:
+        visit.by_timeout = False
+    elif not visit.is_asked():
+        visit.by_timeout = True
+    visit.timeout = timeout
+    if frame.run.control is not None:
+        frame.run.control.release(f"{frame.path}/{meant.label}")
+    visit.happen(Event.ASK if timeout is None else Event.TIME_OVER)
+    return True
+
+
+def ask_child(frame: Frame, step: Step, override: Override | None = None) -> bool:
+    """Ask the child of `step` to stop, but not its container; tell whether it ran."""
+    with frame.run.lock:
+        asked = ask(frame, step)
+        if asked and frame.visit is not None:
+            frame.visit.override = override
+    frame.run.flush_soon()
+    return asked
+
+
+def pass_on(container: Parent) -> None:
+    """Ask a container, then what runs in it; with the run's lock held.
+
+    Raises:
+        Exception: what waits for a request to the container raised; all that runs was asked.
+    """
+    data = container._smachpy
+    if data.is_passing_on:
+        return  # a child that is told runs this container, or asks it: it is asked
+    data.is_passing_on = True
+    try:
+        try:
+            mark_preempt(container)  # first the mark, then the look: see `Container._run`
+        finally:
+            if data.frame is not None:
+                for each in data.frame.running():
+                    ask(each)
+    finally:
+        data.is_passing_on = False
+
+
+def request(container: Parent, only: Frame | None = None) -> Run | None:
+    """Ask a container and all that runs in it to stop; publish nothing yet.
+
+    Args:
+        container: The container; before a run it is marked, and the next run ends at once.
+        only: Ask only if this frame's run is still on.
+
+    Returns:
+        The run that was asked, or None.
+    """
+    data = container._smachpy
+    origin = current_origin()
+    with asking(*origin):
+        frame = data.root or data.frame
+        if frame is None and only is None:
+            data.origin = origin
+            pass_on(container)
+            frame = data.root or data.frame  # it may have begun meanwhile
+            return None if frame is None else frame.run
+        if frame is None:
+            return None
+        with frame.run.lock:
+            if data.is_passing_on or (only is not None and only is not frame):
+                return None
+            if frame is data.root:
+                ask(frame)
+            elif frame is data.frame:
+                _pass_on_reported(container, frame)
+            else:  # it has just ended
+                container._preempt_requested = True
+        return frame.run
+
+
+def _pass_on_reported(container: Parent, frame: Frame) -> None:
+    try:
+        pass_on(container)
+    except Exception as error:  # noqa: BLE001  reported: all that runs was asked
+        frame.note_failure(frame.path, container.request_preempt, error)
+
+
+def request_soon(container: Parent, only: Frame | None = None) -> None:
+    """Ask as `request` does, but wait for no code of the user, listeners neither.
+
+    A `request_preempt` of the container's own is called in a thread of its own.
+    """
+    run = request(container, only)
+    data = container._smachpy
+    if data.root is None and container._smachpy_has_own_request():
+        clock = clock_of_run() if run is None else run.clock
+        name = f"request_preempt of /{container.name or 'SM_ROOT'}"
+        clock.spawn(partial(call_override, container, data.frame, ""), name=name)
+    if run is not None:
+        run.flush_soon()
+
+
+def call_override(state: Child, frame: Frame | None, path: str) -> None:
+    """Call the own `request_preempt` of a state that has been asked; its thread's whole work."""
+    REQUESTING.set(state)
+    try:
+        state.request_preempt()
+    except BaseException as error:  # a border: reported, and without effect on others
+        if frame is None:
+            raise
+        frame.note_failure(path or frame.path, state.request_preempt, error)
+        frame.run.flush()
+
+
+def note_serviced(state: Child) -> None:
+    """Publish that `state`, which runs in this context, takes its request up."""
+    frame: Frame | None = current_frame()
+    if frame is None or not frame.run.watched:
+        return
+    visit = frame.visit
+    if visit is not None and visit.step is frame.step and visit.step.state is state:
+        visit.service()
+
+
+# -- graces --------------------------------------------------------------------------------------
+
+
+def grace_of(frame: Frame, state: Child) -> float | None:
+    """Return the seconds that a child has after a request; None for as long as it likes."""
+    grace: Any = state._smachpy_grace(inherited_grace(frame))
+    if grace == "inherit":
+        return DEFAULT_GRACE_S
+    return None if grace is None else float(grace)
+
+
+def inherited_grace(frame: Frame | None) -> Any:
+    """Return the `preempt_timeout` of the nearest container that has one, else "inherit"."""
+    while frame is not None:
+        grace = frame.container._smachpy.options.preempt_timeout
+        if grace != "inherit":
+            return grace
+        frame = frame.parent
+    return "inherit"
+
+
+def outcome_left(frame: Frame) -> str:
+    """Return the outcome of the child that `frame` runs if it is left behind now."""
+    visit = frame.visit
+    late = visit is not None and visit.by_timeout
+    outcome: str = frame.step.state._smachpy.options.timeout_outcome if late else "preempted"
+    return outcome
+
+
+def _up_to(frame: Frame, first: Frame) -> list[Frame]:
+    """Return the frames that are left behind with `frame`: itself and those up to `first`."""
+    chain = [frame]
+    while chain[-1] is not first and chain[-1].parent is not None:
+        chain.append(chain[-1].parent)
+    return chain
+
+
+def lines_of(ident: int) -> list[tuple[str, int, str]]:
+    """Return where the thread `ident` is: file, line and function, the innermost last."""
+    top = sys._current_frames().get(ident)  # noqa: SLF001  the documented way
+    lines = []
+    while top is not None:
+        lines.append((top.f_code.co_filename, top.f_lineno or 0, top.f_code.co_name))
+        top = top.f_back
+    return lines[::-1]
+
+
+def text_of(lines: list[tuple[str, int, str]]) -> str:
+    """Return these lines as a traceback prints them."""
+    import traceback
+
+    return "".join(traceback.format_list([traceback.FrameSummary(*line) for line in lines]))

@@ -1,0 +1,187 @@
+"""The options of a state: what they are, and what is wrong with those that were given."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from smachpy.exceptions import InvalidStateError
+from smachpy.machines.problems import Problems, as_number
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import TypeAlias
+
+    Result: TypeAlias = str | type[BaseException]
+
+
+@dataclasses.dataclass(frozen=True, slots=True, init=False)
+class Retry:
+    """Run a state again when it ends badly.
+
+    Attributes:
+        attempts: How often it runs at most, the first time included; >= 1.
+        backoff: Wait before the second attempt [s]; it doubles each time.
+        on: Outcomes and exception types that ask for another attempt.
+
+    Raises:
+        InvalidStateError: a value is wrong; all problems at once.
+    """
+
+    attempts: int
+    backoff: float
+    on: tuple[Result, ...]
+
+    def __init__(
+        self,
+        attempts: int = 2,
+        backoff: float = 0.0,
+        on: Result | Iterable[Result] = ("aborted",),
+    ) -> None:
+        problems = Problems("")
+        expected = "a whole number of attempts >= 1"
+        checked = {
+            "attempts": problems.whole("retry: attempts", attempts, 1, expected),
+            "backoff": problems.seconds("retry: backoff", backoff, optional=False),
+            "on": _results(problems, on),
+        }
+        problems.raise_all()
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+
+    def wants(self, attempt: int, result: str | BaseException) -> bool:
+        """Tell whether to run again after attempt number `attempt` (from 1) gave `result`."""
+        if attempt >= self.attempts:
+            return False
+        if isinstance(result, BaseException):
+            kinds = tuple(kind for kind in self.on if isinstance(kind, type))
+            return isinstance(result, kinds)
+        return result in self.on
+
+    def wait_s(self, attempt: int) -> float:
+        """Return the pause after attempt number `attempt` (from 1) [s]."""
+        return float(self.backoff * 2.0 ** (attempt - 1))
+
+    def __str__(self) -> str:
+        on = ", ".join(item if isinstance(item, str) else item.__name__ for item in self.on)
+        return f"{self.attempts} attempts, {self.backoff:g} s apart, on {on}"
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Options:
+    """The options of one state; see `smachpy.machines.state.StateOptions` for what they do.
+
+    Attributes:
+        timeout: [s], or None.
+        timeout_outcome: Outcome after a timeout.
+        preempt_timeout: [s]; None waits for ever, "inherit" takes the container's.
+        retry: When to run again, or None.
+        on_exception: Exception type -> outcome.
+        on_enter: Called before the state runs, or None.
+        on_exit: Called after it ran, or None.
+    """
+
+    timeout: float | None = None
+    timeout_outcome: str = "aborted"
+    preempt_timeout: Any = "inherit"
+    retry: Retry | None = None
+    on_exception: Mapping[type[BaseException], str] = dataclasses.field(default_factory=dict)
+    on_enter: Callable[[Any], object] | None = None
+    on_exit: Callable[[Any, str], object] | None = None
+
+    def made_outcomes(self) -> tuple[str, ...]:
+        """Return the outcomes that these options give a state."""
+        own = () if self.timeout is None else (self.timeout_outcome,)
+        return (*own, *self.on_exception.values())
+
+
+NO_OPTIONS = Options()
+NAMES = tuple(field.name for field in dataclasses.fields(Options))
+
+
+def as_retry(value: Any) -> Retry | None:
+    """Return `value` as a `Retry`: one already, (attempts, backoff, on), a number, or None.
+
+    Raises:
+        InvalidStateError: it is none of these, or a part of it is wrong.
+    """
+    if value is None or isinstance(value, Retry):
+        return value
+    if isinstance(value, tuple) and 1 <= len(value) <= 3:  # noqa: PLR2004  the three fields
+        return Retry(*value)
+    if as_number(value) is not None:
+        return Retry(value)
+    raise InvalidStateError(
+        f"retry: got {value!r}; expected Retry(attempts, backoff, on), that as a tuple, or a "
+        "number of attempts."
+    )
+
+
+def _results(problems: Problems, on: Any) -> tuple[Any, ...]:
+    found = (on,) if isinstance(on, (str, type)) or not isinstance(on, Iterable) else tuple(on)
+    wrong = [
+        item
+        for item in found
+        if not (
+            (isinstance(item, str) and item)
+            or (isinstance(item, type) and issubclass(item, BaseException))
+        )
+    ]
+    if wrong or not found:
+        problems.add(f"retry: on: got {wrong or on!r}; expected outcomes or exception types.")
+    return found
+
+
+def changed(options: Options, given: Mapping[str, Any], problems: Problems) -> Options:
+    """Return `options` with those in `given`, whose names are known, in their place."""
+    checked = {name: _CHECKS[name](problems, name, value) for name, value in given.items()}
+    return dataclasses.replace(options, **checked)
+
+
+def retry_problems(options: Options, outcomes: Iterable[str]) -> list[str]:
+    """Return what is wrong with `retry` for a state with these outcomes."""
+    retry = options.retry
+    known = {*outcomes, *options.made_outcomes(), "preempted"}
+    if retry is None or any(isinstance(one, type) or one in known for one in retry.on):
+        return []
+    text = (
+        f"retry: got {retry!r}; expected outcomes of the state that ask for another attempt, of "
+        f"{sorted(known)}, or exception types. Try retry=({retry.attempts}, {retry.backoff:g}, "
+        "[...])."
+    )
+    return [text]
+
+
+def _preempt_timeout(problems: Problems, name: str, given: Any) -> Any:
+    return given if isinstance(given, str) and given == "inherit" else problems.seconds(name, given)
+
+
+def _retry(problems: Problems, _name: str, given: Any) -> Retry | None:
+    with problems:
+        return as_retry(given)
+    return None
+
+
+def _on_exception(problems: Problems, name: str, given: Any) -> dict[type[BaseException], str]:
+    holds = "exception type -> outcome"
+    if given is not None and not isinstance(given, Mapping):
+        problems.add(f"{name}: got {given!r}; expected a dict: {holds}.")
+        return {}
+    for kind, outcome in (given or {}).items():
+        if not (isinstance(kind, type) and issubclass(kind, BaseException)):
+            problems.add(f"{name}: got {kind!r} in it; expected {holds}.")
+        if not isinstance(outcome, str) or not outcome:
+            problems.add(f"{name}: got outcome {outcome!r} in it; expected {holds}.")
+    return dict(given or {})
+
+
+_CHECKS: dict[str, Callable[[Problems, str, Any], Any]] = {
+    "timeout": Problems.seconds,
+    "timeout_outcome": Problems.word,
+    "preempt_timeout": _preempt_timeout,
+    "retry": _retry,
+    "on_exception": _on_exception,
+    "on_enter": lambda p, name, f: p.function(name, f, "on_enter(userdata)", 1),
+    "on_exit": lambda p, name, f: p.function(name, f, "on_exit(userdata, outcome)", 2),
+}

@@ -1,0 +1,72 @@
+"""`set_preempt_handler`: a machine ends before its program does."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from smachpy import log
+from smachpy.machines.problems import Problems
+from smachpy.run.origin import shutdown_asking
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from smachpy.machines.state import State
+
+
+def set_preempt_handler(sc: State, *, timeout: float | None = 60.0) -> None:
+    """Preempt `sc` when the program is to end, and let it finish before the network is left.
+
+    A machine that runs is preempted by Ctrl-C and by the program's shutdown anyway. This makes the
+    program wait for one that runs in another thread, so that its goals are cancelled and not left
+    running; and, when called in the main thread, it makes SIGTERM a request to end as Ctrl-C is,
+    unless the program handles that itself.
+
+    Args:
+        sc: A container, or a state.
+        timeout: Longest wait for its end [s]; None waits for ever.
+
+    Raises:
+        InvalidStateError: `sc` is no state, or `timeout` no duration.
+    """
+    from actionlib_core import shutdown
+
+    problems = Problems("set_preempt_handler")
+    timeout = problems.seconds("timeout", timeout)
+    if not callable(getattr(sc, "request_preempt", None)):
+        problems.add(f"sc: got {sc!r}; expected a container or state.")
+    problems.raise_all()
+    running: Callable[[], bool] = getattr(sc, "is_running", lambda: True)
+    wait: Callable[[float | None], object] = getattr(sc, "wait_ended", lambda _timeout: True)
+
+    def stop() -> None:
+        if running():
+            with shutdown_asking(current):
+                sc.request_preempt()
+            if not wait(timeout):
+                log.logerr(f"{sc!r} still runs {timeout} s after its preempt; it is left behind.")
+
+    current = shutdown.current_shutdown()
+    forget = _handle_sigterm()
+    if forget is not None:
+        current.at_exit(forget)
+    current.on_shutdown(stop)
+    current.at_exit(stop)
+
+
+def _handle_sigterm() -> Callable[[], object] | None:
+    """Let SIGTERM request the program's end; returns how to undo that, None if it was not done."""
+    import contextlib
+    import signal
+    import threading
+
+    from actionlib_core.clock import RealClock, current_clock
+    from actionlib_core.shutdown import handle_signals
+
+    real = isinstance(current_clock(), RealClock)
+    main = threading.current_thread() is threading.main_thread()
+    if not (real and main and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL):
+        return None
+    handling = contextlib.ExitStack()
+    handling.enter_context(handle_signals((signal.SIGTERM,)))
+    return handling.close

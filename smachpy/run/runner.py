@@ -1,0 +1,371 @@
+"""Run one child: its options around it, its events, its end, and where the container goes then."""
+
+from __future__ import annotations
+
+import inspect
+from typing import TYPE_CHECKING, Any
+
+from smachpy.context import current_frame
+from smachpy.events import Entered, Failed, Left, OutcomeForced, Retried
+from smachpy.exceptions import (
+    InvalidTransitionError,
+    InvalidUserCodeError,
+    did_you_mean,
+)
+from smachpy.run.child import on_preempt
+from smachpy.run.frame import SUBSCRIPTIONS, clock_of_run
+from smachpy.run.grace import ask
+from smachpy.run.interrupt import Interruption
+from smachpy.run.origin import asking
+from smachpy.run.visit import Again, Decision, Event, Why, after, after_attempt
+
+if TYPE_CHECKING:
+    import asyncio
+    from collections.abc import Callable, Coroutine, Iterable
+
+    from smachpy.events.tape import Tape
+    from smachpy.run.child import Child
+    from smachpy.run.frame import Frame
+    from smachpy.run.options import Options
+    from smachpy.run.step import Step
+
+_new = tuple.__new__  # half the time of a NamedTuple's own
+
+
+# -- with its options around it ----------------------------------------------------------------
+
+
+def runner_of(
+    state: Child, options: Options, execute: Callable[[Any], Any], *, is_async: bool = False
+) -> Callable[[Any], Any]:
+    """Return `execute` with `options` around it: itself when it asks for nothing more."""
+    if is_async:
+        execute = _Async(state, execute)
+    plain = (
+        options.timeout is None
+        and options.retry is None
+        and options.on_enter is None
+        and options.on_exit is None
+        and not options.on_exception
+    )
+    return execute if plain else _WithOptions(state, options, execute)
+
+
+class _Async:
+    """Runs a state's coroutine; a preempt cancels it."""
+
+    def __init__(self, state: Child, execute: Callable[[Any], Coroutine[Any, Any, Any]]) -> None:
+        self._state: Any = state
+        self._execute = execute
+
+    def __call__(self, userdata: Any) -> Any:
+        return clock_of_run().run_async(self._main(userdata))
+
+    async def _main(self, userdata: Any) -> Any:
+        import asyncio
+
+        loop = asyncio.get_running_loop()
+        task = asyncio.ensure_future(self._execute(userdata))
+
+        def cancel() -> None:
+            loop.call_soon_threadsafe(_cancel, task)
+
+        forget = on_preempt(self._state, cancel)
+        try:
+            return await task
+        except asyncio.CancelledError as error:
+            if not self._state.preempt_requested():
+                own = asyncio.current_task()
+                if own is not None and own.cancelling():
+                    raise  # somebody ends the loop: Ctrl-C in a program that handles it itself
+                raise RuntimeError("the coroutine was cancelled, by no preempt") from error
+            self._state.service_preempt()
+            return "preempted"
+        finally:
+            forget()
+
+
+def _cancel(task: asyncio.Task[Any]) -> None:
+    task.cancel()
+
+
+class _WithOptions:
+    """Runs a state with its hooks, timeout, retry and handlers of exceptions."""
+
+    def __init__(self, state: Child, options: Options, execute: Callable[[Any], Any]) -> None:
+        self._state = state
+        self._options = options
+        self._execute = execute
+
+    def __call__(self, userdata: Any) -> Any:
+        options = self._options
+        frame: Frame | None = current_frame()
+        assert frame is not None  # a container runs it
+        if options.on_enter is not None:
+            _call_hook(frame, options.on_enter, userdata)
+        outcome = self._attempts(frame, userdata)
+        if options.on_exit is not None:
+            _call_hook(frame, options.on_exit, userdata, outcome)
+        return outcome
+
+    def _attempts(self, frame: Frame, userdata: Any) -> Any:
+        """Run until an attempt is good, or the last one was made, or somebody asks it to stop."""
+        state, options, attempt = self._state, self._options, 1
+        while True:
+            timer = None if options.timeout is None else Timeout(frame, options.timeout)
+            result: Any = None
+            timed_out = False
+            try:
+                result = self._execute(userdata)
+            except (Exception, Interruption) as error:
+                if frame.dead:
+                    raise
+                result = error
+            finally:
+                if timer is not None:
+                    timed_out = timer.end(result)
+            asked = state._preempt_requested or (frame.visit is not None and frame.visit.is_asked())
+            decision = after_attempt(
+                result, options, attempt, asked=asked, timed_out=timed_out, applies=_applies
+            )
+            if isinstance(decision, Again):
+                wait, result = decision
+                frame.emit(Retried, attempt, _reason(result))
+                if not (wait and _waits_in_vain(state, wait)):
+                    attempt += 1
+                    continue
+                decision = after_attempt(
+                    result, options, attempt, asked=True, timed_out=False, applies=_applies
+                )
+            if isinstance(decision, BaseException):
+                raise decision
+            return decision
+
+
+def _call_hook(frame: Frame, hook: Callable[..., object], *arguments: Any) -> None:
+    try:
+        hook(*arguments)
+    except Exception as error:
+        where = frame.here()
+        name = getattr(hook, "__name__", repr(hook))
+        raise InvalidUserCodeError(
+            f"{where}: hook {name} raised {type(error).__name__}: {error}", path=where
+        ) from error
+
+
+def _waits_in_vain(state: Child, seconds: float) -> bool:
+    """Wait between two attempts; tell whether somebody asked `state` to stop meanwhile."""
+    wake = clock_of_run().event()
+    forget = on_preempt(state, wake.set)
+    try:
+        wake.wait(seconds)
+    finally:
+        forget()
+    return state._preempt_requested
+
+
+class Timeout:
+    """Asks what `frame` runs to stop when its time is over."""
+
+    def __init__(self, frame: Frame, seconds: float) -> None:
+        self._frame = frame
+        self._step: Step = frame.step
+        self._seconds = seconds
+        self._passed = False
+        self._ended = False  # both are changed with the run's lock held
+        self._timer = frame.run.clock.call_later(seconds, self._over)
+
+    def end(self, result: object) -> bool:
+        """The attempt has ended with `result`; tell whether nothing but the timeout had asked.
+
+        Then the request ends with the attempt, and the next one begins anew. A request of somebody
+        else stays.
+        """
+        self._timer.cancel()
+        frame = self._frame
+        with frame.run.lock:
+            self._ended = True
+            if not self._passed or frame.dead:
+                return False
+        visit = frame.visit
+        if visit is None or visit.step is not self._step:
+            return False
+        if frame.run.watched and visit.has_answered(result):
+            visit.service()
+        with frame.run.lock:
+            alone = visit.by_timeout and not frame.dead
+            if alone:
+                visit.happen(Event.NEXT_ATTEMPT)
+        visit.settle()
+        return alone
+
+    def _over(self) -> None:
+        frame = self._frame
+        with asking("timeout", frame.here(), f"{self._seconds:g} s"), frame.run.lock:
+            if self._ended or frame.dead:
+                return
+            self._passed = ask(frame, self._step, timeout=self._seconds)
+        frame.run.flush_soon()
+
+
+def _reason(result: Any) -> str:
+    return f"{type(result).__name__}: {result}" if isinstance(result, Exception) else str(result)
+
+
+def _applies(wanted: Callable[[BaseException], bool], error: BaseException) -> bool:
+    """Tell whether `wanted` is true of `error`, or of what a container made it from.
+
+    Several children of a concurrence may have raised; an error that nobody wants must not
+    disappear beside one that somebody does, so it must be true of all. A group that a state
+    itself has raised is one error.
+    """
+    if wanted(error):
+        return True
+    cause = error.__cause__ if isinstance(error, InvalidUserCodeError) else None
+    if cause is None:
+        return False
+    if isinstance(cause, ChildErrors):
+        return wanted(cause) or all(_applies(wanted, one) for one in cause.exceptions)
+    return _applies(wanted, cause)
+
+
+# -- with its events ---------------------------------------------------------------------------
+
+
+def run_watched(frame: Frame, step: Step) -> Any:
+    """Run a step and publish that it was entered and left."""
+    run = frame.run
+    clock = run.clock
+    path = step.path_in(frame)
+    if run.pending:
+        run.flush()
+    frame.publish(_new(Entered, (path, clock.now(), clock.time_ns())))
+    try:
+        window = step.watched_userdata(frame) if step.writes else step.userdata
+        outcome = step.execute(window)
+    except BaseException as error:
+        publish_raised(frame, error)
+        raise
+    if frame.visit is not None or run.pending or run.control is not None:
+        publish_left(frame, step, outcome)
+    else:
+        frame.publish(_new(Left, (path, clock.now(), clock.time_ns(), outcome)))
+    return outcome
+
+
+def publish_raised(frame: Frame, error: BaseException) -> None:
+    """Publish that the step that runs was ended by `error`."""
+    if isinstance(error, Interruption):
+        frame.emit(Left, "preempted")
+    else:
+        frame.emit(Failed, f"{type(error).__name__}: {error}")
+
+
+def publish_left(frame: Frame, step: Step, outcome: Any) -> None:
+    """Publish that `step` has just ended, and what goes with it."""
+    run = frame.run
+    clock = run.clock
+    visit = frame.visit
+    if visit is not None and visit.step is step and visit.has_answered(outcome):
+        visit.service()
+    if run.pending:
+        run.flush()
+    frame.publish(_new(Left, (step.path_in(frame), clock.now(), clock.time_ns(), outcome)))
+    if run.control is not None:
+        run.control.note_outcome(frame, step, outcome)
+
+
+def only_tape(frame: Frame) -> Tape | None:
+    """Return the tape that is the only one to hear the events of `frame`; None if there is none."""
+    subscribers = frame.subscribers
+    if subscribers is None or subscribers.version is not SUBSCRIPTIONS.version:
+        subscribers = frame.find_subscribers()
+    return subscribers.tape
+
+
+# -- its end -----------------------------------------------------------------------------------
+
+
+def end_visit(frame: Frame, outcome: Any) -> Decision:
+    """End the visit of what `frame` runs, which ended with `outcome`, and decide what comes now.
+
+    Called when somebody may have asked it, or its container, to stop. The frame's `answered` says
+    afterwards whether the container's own request was taken up.
+
+    Raises:
+        InvalidTransitionError: it has no such outcome.
+        Interruption: its thread was left behind meanwhile.
+    """
+    step = frame.step
+    state: Child = step.state
+    with frame.run.lock:  # whoever passes a request on is done after this
+        if frame.dead:
+            raise Interruption
+        visit = frame.visit
+        if visit is not None and visit.step is not step:  # it was for the one before
+            forget_visit(frame)
+            visit = None
+        answered = visit is not None and visit.has_answered(outcome)
+        asked = state._preempt_requested or (visit is not None and visit.is_asked())
+        override = None if visit is None else visit.override
+        if visit is not None:
+            visit.happen(Event.END)
+        frame.visit = None
+        state._preempt_requested = False
+        run_asked = frame.is_asked()
+        if asked or run_asked:
+            decision = after(
+                outcome, step.next, run_asked=run_asked, answered=answered, override=override
+            )
+        else:
+            target = step.next.get(outcome) if isinstance(outcome, str) else None
+            decision = Decision(Why.UNKNOWN if target is None else Why.FOLLOWED, target)
+        frame.answered = answered
+        if decision.why is Why.ANSWERED:
+            frame.container._preempt_requested = frame.answered = False
+    if visit is not None:
+        visit.settle()
+    if decision.why is Why.UNKNOWN:
+        raise unknown_outcome(step.path_in(frame), state._smachpy.outcomes, outcome) from None
+    if decision.why is Why.FORCED and override is not None:
+        frame.emit(OutcomeForced, override.outcome)
+    return decision
+
+
+def forget_visit(frame: Frame) -> None:
+    """End a visit that nobody follows: it was asked just when it had ended, or its frame ends."""
+    with frame.run.lock:
+        visit = frame.visit
+        if visit is None or frame.dead:
+            return
+        frame.visit = None
+        visit.happen(Event.END)
+    visit.settle()
+
+
+# -- what goes wrong ---------------------------------------------------------------------------
+
+
+class ChildErrors(ExceptionGroup[Exception]):
+    """What the children of a concurrence raised; not a group that one of them raised itself."""
+
+
+def user_error(path: str, state: Child, error: BaseException) -> InvalidUserCodeError:
+    """Return the error for code of a state that raised; raise it `from error`."""
+    return InvalidUserCodeError(
+        f"{path}: {type(state).__name__} raised {type(error).__name__}: {error}", path=path
+    )
+
+
+def unknown_outcome(path: str, outcomes: Iterable[str], got: object) -> InvalidTransitionError:
+    """Return the error for a child that returned none of its outcomes."""
+    known = sorted(outcomes)
+    hint = did_you_mean(got, known) if isinstance(got, str) else ""
+    if got is None:
+        hint = " Try a `return` at the end of every way through execute."
+    elif inspect.iscoroutine(got):
+        got.close()
+        hint = " Try `async def execute`, or `await` it."
+    return InvalidTransitionError(
+        f"{path}: unknown outcome: got {got!r}; expected one of {known}.{hint}"
+    )

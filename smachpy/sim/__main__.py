@@ -1,0 +1,7 @@
+"""`python -m smachpy.sim` is `smachpy robot`."""
+
+import sys
+
+from smachpy.command import main
+
+sys.exit(main(["robot", *sys.argv[1:]]))

@@ -1,0 +1,199 @@
+"""Every parameter of the simulated robot, with its unit, its limits and its default.
+
+The YAML file has one section per class here, one line per field:
+
+    robot:
+      radius: 0.25        # [m]
+      max_speed: 0.8      # [m/s]
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, TypeVar, get_type_hints
+
+from smachpy.sim.checked_yaml import REQUIRED, Document, Limits
+from smachpy.sim.geometry import ORIGIN, Pose2D, wrap_angle
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from smachpy.sim.checked_yaml import Section
+
+S = TypeVar("S")
+
+
+def _quantity(  # the one way to declare a parameter
+    default: float,
+    unit: str,
+    doc: str,
+    *,
+    low: float | None = None,
+    above: float | None = None,
+    high: float | None = None,
+) -> float:
+    limits = Limits(low=low, above=above, high=high)
+    metadata = {"unit": unit, "doc": doc, "limits": limits}
+    result: float = field(default=default, metadata=metadata)
+    return result
+
+
+def _count(default: int, doc: str, *, low: int, high: int) -> int:
+    limits = Limits(low=low, high=high)
+    result: int = field(default=default, metadata={"unit": "", "doc": doc, "limits": limits})
+    return result
+
+
+@dataclass(frozen=True, slots=True)
+class RobotConfig:
+    """The body: a disc that drives like a unicycle."""
+
+    radius: float = _quantity(0.25, "m", "Radius of the body.", above=0, high=5)
+    max_speed: float = _quantity(0.8, "m/s", "Fastest forward speed.", above=0, high=10)
+    max_reverse_speed: float = _quantity(0.2, "m/s", "Fastest speed backwards.", above=0, high=10)
+    max_turn_rate: float = _quantity(1.5, "rad/s", "Fastest turn.", above=0, high=20)
+    acceleration: float = _quantity(0.8, "m/s^2", "Speeding up.", above=0, high=50)
+    braking: float = _quantity(1.2, "m/s^2", "Slowing down.", above=0, high=50)
+    turn_acceleration: float = _quantity(3.0, "rad/s^2", "Change of turn rate.", above=0, high=100)
+    sight: float = _quantity(3.0, "m", "How far it sees new obstacles.", above=0, high=100)
+
+
+@dataclass(frozen=True, slots=True)
+class PlannerConfig:
+    """How ways are chosen on the map."""
+
+    margin: float = _quantity(0.03, "m", "Room kept beside the body at all times.", low=0, high=2)
+    wall_distance: float = _quantity(
+        0.6, "m", "Closer than this to something solid, a way costs more.", low=0, high=10
+    )
+    wall_weight: float = _quantity(
+        4.0, "1", "How much more: extra cost of a metre right beside a wall.", low=0, high=100
+    )
+    unknown_is_free: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ControlConfig:
+    """How the way is followed and when the goal counts as reached."""
+
+    rate: float = _quantity(20.0, "Hz", "Control steps a second.", low=5, high=1000)
+    feedback_rate: float = _quantity(5.0, "Hz", "Feedback messages a second.", above=0, high=10)
+    override_time: float = _quantity(
+        0.5, "s", "A message on cmd_vel counts so long.", above=0, high=60
+    )
+    xy_tolerance: float = _quantity(0.05, "m", "Distance that counts as there.", low=0.01, high=2)
+    yaw_tolerance: float = _quantity(0.05, "rad", "Heading error allowed.", low=0.01, high=3.2)
+    lookahead_time: float = _quantity(0.7, "s", "It steers to where it is then.", above=0, high=5)
+    lookahead_min: float = _quantity(0.3, "m", "But to no nearer point.", low=0.05, high=5)
+    turn_on_spot: float = _quantity(
+        0.8, "rad", "Beyond this heading error it stops and turns first.", above=0.1, high=3.2
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class RecoveryConfig:
+    """What it tries when no way is left."""
+
+    attempts: int = _count(3, "Recoveries before the goal is aborted.", low=0, high=100)
+    back_up: float = _quantity(0.3, "m", "How far it backs up.", low=0, high=5)
+    patience: float = _quantity(1.0, "s", "Wait before it looks again.", low=0, high=600)
+    traffic_patience: float = _quantity(
+        20.0, "s", "It waits so long for somebody in its way.", low=0, high=3600
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class ScanConfig:
+    """The laser scanner, in the middle of the robot."""
+
+    rate: float = _quantity(5.0, "Hz", "Scans a second, while somebody listens.", above=0, high=50)
+    rays: int = _count(271, "Rays of a scan.", low=2, high=10_000)
+    field: float = _quantity(
+        4.712389, "rad", "Angle from the first ray to the last.", above=0, high=6.2832
+    )
+    range_min: float = _quantity(0.05, "m", "Nearer than this it sees nothing.", low=0, high=10)
+    range_max: float = _quantity(8.0, "m", "Nor farther than this.", above=0, high=100)
+    noise: float = _quantity(0.0, "m", "Standard deviation of a range.", low=0, high=1)
+
+
+@dataclass(frozen=True, slots=True)
+class BatteryConfig:
+    """The battery and the charger of the dock."""
+
+    capacity: float = _quantity(1.0, "Wh", "Energy when full.", above=0, high=1e5)
+    charge: float = _quantity(0.6, "1", "Fraction left at the start.", low=0, high=1)
+    voltage: float = _quantity(24.0, "V", "Nominal voltage.", above=0, high=1000)
+    idle_power: float = _quantity(4.0, "W", "Drain at rest.", low=0, high=1e4)
+    drive_power: float = _quantity(40.0, "W", "Further drain at full speed.", low=0, high=1e5)
+    charge_power: float = _quantity(600.0, "W", "What the dock gives.", above=0, high=1e6)
+    period: float = _quantity(0.5, "s", "Time between battery messages.", low=0.05, high=60)
+
+
+@dataclass(frozen=True, slots=True)
+class SimConfig:
+    """All of it.
+
+    Attributes:
+        start: Where the robot stands when the process starts, in the map frame.
+        dock: Where it stands while it charges, in the map frame; None when there is no dock.
+    """
+
+    robot: RobotConfig = RobotConfig()
+    planner: PlannerConfig = PlannerConfig()
+    control: ControlConfig = ControlConfig()
+    recovery: RecoveryConfig = RecoveryConfig()
+    scan: ScanConfig = ScanConfig()
+    battery: BatteryConfig = BatteryConfig()
+    start: Pose2D = ORIGIN
+    dock: Pose2D | None = None
+
+
+def load_config(path: Path) -> SimConfig:
+    """Read a robot's YAML file; sections and fields that are left out keep their defaults.
+
+    Raises:
+        InputFileError: with every problem found.
+    """
+    document = Document(path)
+    top = document.top
+    config = SimConfig(
+        robot=_read(top.section("robot"), RobotConfig),
+        planner=_read(top.section("planner"), PlannerConfig),
+        control=_read(top.section("control"), ControlConfig),
+        recovery=_read(top.section("recovery"), RecoveryConfig),
+        scan=_read(top.section("scan"), ScanConfig),
+        battery=_read(top.section("battery"), BatteryConfig),
+        start=read_pose(top.section("start")) if "start" in top else ORIGIN,
+        dock=read_pose(top.section("dock")) if "dock" in top else None,
+    )
+    top.allow("start", "dock")
+    top.close()
+    document.check()
+    return config
+
+
+def read_pose(section: Section) -> Pose2D:
+    """Read the fields x [m], y [m] and yaw [rad, 0 when left out], and close the section."""
+    x = section.number("x", REQUIRED, unit="m")
+    y = section.number("y", REQUIRED, unit="m")
+    yaw = section.number("yaw", 0.0, unit="rad")
+    section.close()
+    return Pose2D(x, y, wrap_angle(yaw))
+
+
+def _read(section: Section, kind: type[S]) -> S:
+    """Read one parameter class from its section."""
+    values: dict[str, object] = {}
+    hints = get_type_hints(kind)
+    for item in dataclasses.fields(kind):  # type: ignore[arg-type]
+        if hints[item.name] is bool:
+            values[item.name] = section.flag(item.name, item.default)
+        elif hints[item.name] is int:
+            limits = item.metadata["limits"]
+            values[item.name] = section.integer(item.name, item.default, limits)
+        else:
+            limits, unit = item.metadata["limits"], item.metadata["unit"]
+            values[item.name] = section.number(item.name, item.default, limits, unit)
+    section.close()
+    return kind(**values)

@@ -1,0 +1,37 @@
+"""What missions and the simulated robot raise.
+
+MissionError
+├── InputFileError        a YAML file, map or waypoint list is wrong: all problems at once
+└── NavigationError       the robot cannot do what a goal asks
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from smachpy.exceptions import SmachError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from smachpy.sim.checked_yaml import Problem
+
+
+class MissionError(SmachError):
+    """The root of this package's errors."""
+
+
+class InputFileError(MissionError):
+    """A file that a user wrote is wrong.
+
+    Attributes:
+        problems: Every problem found, in the order of the file.
+    """
+
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        self.problems = tuple(problems)
+        super().__init__("\n".join(str(problem) for problem in self.problems))
+
+
+class NavigationError(MissionError):
+    """The robot cannot do what a goal asks; the text is the abort text of the goal."""

@@ -1,0 +1,306 @@
+"""One drive from here to a goal, as a script: plan, follow, plan again, recover, give up.
+
+`drive_to` is a generator. Each `next` returns the command for one control step; between two of
+them the robot has moved. It knows nothing of clocks, threads or actions.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import Enum, auto
+from typing import TYPE_CHECKING, Final
+
+from smachpy.sim.exceptions import NavigationError
+from smachpy.sim.follower import Follower, Stage
+from smachpy.sim.geometry import Pose2D, wrap_angle
+from smachpy.sim.planner import keep_right
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+    from smachpy.sim.costmap import Costmap
+    from smachpy.sim.planner import Point
+    from smachpy.sim.world import Robot
+
+Command = tuple[float, float]  # speed [m/s], turn rate [rad/s]
+STOP: Final[Command] = (0.0, 0.0)
+_LOOK_EVERY: Final = 4  # control steps between two looks around
+_CREEP_OUT: Final = 0.5  # [m] of a way that may lead out of somewhere too narrow
+_LATE_FACTOR: Final = 20.0  # a drive may take so many times its shortest time
+_LATE_SECONDS: Final = 60.0  # and this [s] besides
+_SEARCH_RATE: Final = 0.7  # share of the turn rate used to look around
+_HEED: Final = 1.5  # [m] ahead, besides braking: closer than this, others on the way matter
+_KEPT_AWAY: Final = 0.1  # [m] it stops so far before somebody
+_NO_CREEPING: Final = 0.03  # [m] more than that, and it stays where it is
+_SHARE: Final = 0.8  # of the braking power that is counted on
+_RETHINK: Final = 0.5  # [s] between two searches for a way around somebody
+_HOLD: Final = 1.0  # [s] it stands before somebody until it tries something else
+_CLOSER: Final = 1e-3  # [m] nearer than now: to drive off from somebody is no meeting
+_PROGRESS: Final = 1.0  # [m] driven since it was held up last: a new matter
+_YIELD_WAIT: Final = 6.0  # [s] it waits at most where it made room
+
+
+class End(Enum):
+    """How following a way ended."""
+
+    ARRIVED = auto()
+    CHANGED = auto()  # something that stands blocks the way
+    BUMPED = auto()
+    HELD = auto()  # somebody stands in the way
+
+
+def drive_to(robot: Robot, goal: Pose2D) -> Generator[Command]:
+    """Yield commands until the robot stands on `goal`.
+
+    Raises:
+        NavigationError: the goal cannot be reached, or only after too many recoveries. The robot
+            may still be moving then.
+    """
+    try:
+        yield from _drive_to(robot, goal)
+    finally:
+        robot.follower = None
+
+
+def _drive_to(robot: Robot, goal: Pose2D) -> Generator[Command]:
+    robot.check_place(goal.x, goal.y)
+    robot.set_out()
+    robot.look()
+    recoveries, patience = 0, _Patience(robot)
+    while True:
+        trouble = yield from _try(robot, goal, patience)
+        if trouble == "":
+            return
+        if trouble is None:
+            continue
+        if recoveries >= robot.config.recovery.attempts:
+            raise NavigationError(f"{trouble}; gave up after {recoveries} recoveries")
+        recoveries += 1
+        yield from _recover(robot)
+
+
+def _try(robot: Robot, goal: Pose2D, patience: _Patience) -> Generator[Command, None, str | None]:
+    """Plan a way and follow it.
+
+    Returns:
+        "" when it arrived, None when another way is to be tried at once, else what went wrong.
+    """
+    try:
+        way = robot.planner.plan((robot.body.x, robot.body.y), (goal.x, goal.y))
+    except NavigationError as error:
+        if not robot.known_obstacles:
+            raise
+        doors = robot.closed_doors()
+        return f"{error}; closed: {doors}" if doors else str(error)
+    if len(robot.world.robots) > 1:
+        way = keep_right(robot.planner.costmap, way)
+    end = yield from _follow(robot, way, goal)
+    if end is End.ARRIVED:
+        return ""
+    if end is End.BUMPED:
+        return f"bumped into something at ({robot.body.x:.2f}, {robot.body.y:.2f})"
+    trouble = patience.trouble() if end is End.HELD else ""
+    if end is End.HELD and not trouble:
+        yield from _give_way(robot)
+    return trouble or None
+
+
+def brake(robot: Robot) -> Generator[Command]:
+    """Yield commands until the robot stands."""
+    while not robot.body.standing:
+        yield STOP
+
+
+class _Patience:
+    """Tells when a robot has stood long enough before those in its way."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._since = 0.0
+        self._odometer = -math.inf
+
+    def trouble(self) -> str:
+        """Return what is in the way, when it has been for too long; else ""."""
+        robot = self._robot
+        if robot.odometer - self._odometer > _PROGRESS:
+            self._since, self._odometer = robot.now, robot.odometer
+        if robot.now - self._since < robot.config.recovery.traffic_patience:
+            return ""
+        self._odometer = -math.inf
+        who = robot.held_by
+        assert who is not None
+        return f"{who.name} stands in the way at ({who.x:.2f}, {who.y:.2f})"
+
+
+def _follow(
+    robot: Robot, way: list[Point], goal: Pose2D, *, asked: bool = False
+) -> Generator[Command, None, End]:
+    """Follow a way, around those who stand on it if there is room.
+
+    Args:
+        robot: It drives.
+        way: Where.
+        goal: Its end, and the heading there.
+        asked: It makes room for somebody, and does not stop for more requests.
+    """
+    follower = Follower(way, goal, robot.config.robot, robot.config.control)
+    count, longest, dt = 0, _longest(robot, follower.remaining), _dt(robot)
+    gap, think, held = math.inf, -math.inf, 0.0
+    while count < longest:
+        robot.follower = follower
+        speed, turn_rate = follower.command(robot.body)
+        if follower.stage is Stage.DONE:
+            return End.ARRIVED
+        if robot.traffic or gap < math.inf:
+            gap = _gap(robot, follower) if count % 2 == 0 else gap - abs(robot.body.speed) * dt
+            if gap < math.inf and robot.now > think:
+                around = _around(robot, follower)
+                think = robot.now + (_RETHINK if around else 2.0 * _RETHINK)
+                if around:
+                    follower, gap = (
+                        Follower(around, goal, follower.robot, follower.control),
+                        math.inf,
+                    )
+                    continue
+            speed = min(speed, _safe_speed(robot, gap))
+            held = held + dt if speed == 0.0 and gap < math.inf else 0.0
+            if held > _HOLD or (held and not asked and robot.asked_by() is not None):
+                return End.HELD
+        yield speed, turn_rate
+        if robot.bumped:
+            return End.BUMPED if robot.held_by is None else End.HELD
+        count += 1
+        if count % _LOOK_EVERY == 0 and robot.look():
+            costmap = robot.planner.costmap
+            if not _is_clear(costmap, list(follower.rest())):
+                return End.CHANGED
+    raise NavigationError(f"no progress: {longest * _dt(robot):.0f} s were not enough for this way")
+
+
+def _gap(robot: Robot, follower: Follower) -> float:
+    """Return how far [m] along the way it can go before it meets somebody; notes whom.
+
+    Who is too far off to matter now does not count: infinite. Neither does who is only left behind.
+    """
+    body, margin = robot.body, robot.config.planner.margin
+    far = body.braking_distance() + _HEED
+    robot.held_by = None
+    near = [
+        (seen, now, seen.radius + body.radius + margin)
+        for seen in robot.traffic.values()
+        if (now := math.hypot(seen.x - body.x, seen.y - body.y)) < far + _HEED
+    ]
+    if not near:
+        return math.inf
+    points, lengths = follower.ahead(far)
+    found = math.inf
+    for seen, now, reach in near:
+        # To come no nearer than it is now is no meeting: it only drives off.
+        dx, dy = points[:, 0] - seen.x, points[:, 1] - seen.y
+        meets = dx * dx + dy * dy < min(reach, now - _CLOSER) ** 2
+        first = int(meets.argmax())
+        if meets[first] and lengths[first] < found:
+            found, robot.held_by = float(lengths[first]), seen
+    return found
+
+
+def _around(robot: Robot, follower: Follower) -> list[Point] | None:
+    place = (robot.body.x, robot.body.y)
+    return robot.planner.around(place, follower.rest(), robot.traffic.values())
+
+
+def _safe_speed(robot: Robot, gap: float) -> float:
+    """Return the speed [m/s] from which it can stop within a gap [m]."""
+    if math.isinf(gap):
+        return gap
+    if gap < _KEPT_AWAY + _NO_CREEPING:
+        return 0.0
+    return math.sqrt(2.0 * _SHARE * robot.config.robot.braking * (gap - _KEPT_AWAY))
+
+
+def _give_way(robot: Robot) -> Generator[Command]:
+    """Make room for who asked for it, or ask who stands in the way; wait a moment."""
+    yield from brake(robot)
+    other = robot.asked_by()
+    if other is not None:
+        yield from _make_room(robot, other)
+        return
+    robot.ask_for_room()
+    yield from _stand(robot, _RETHINK)
+    robot.look()
+
+
+def _make_room(robot: Robot, other: Robot) -> Generator[Command]:
+    """Drive off another robot's way and wait there until it has passed."""
+    here = (robot.body.x, robot.body.y)
+    clearance = other.body.radius + robot.planner.costmap.radius + _KEPT_AWAY
+    robot.look()
+    way = robot.planner.refuge(here, other.ahead(), clearance, robot.traffic.values())
+    if way is not None:
+        yield from _follow(robot, way, Pose2D(*way[-1], robot.body.yaw), asked=True)
+        yield from brake(robot)
+    robot.follower = None
+    until = robot.now + _YIELD_WAIT
+    while robot.now < until and _comes_near(other, here, clearance):
+        yield from _stand(robot, _RETHINK)
+
+
+def _comes_near(other: Robot, place: Point, clearance: float) -> bool:
+    return any(math.dist(point, place) < clearance for point in other.ahead())
+
+
+def _stand(robot: Robot, seconds: float) -> Generator[Command]:
+    for _ in range(max(1, round(seconds * robot.config.control.rate))):
+        yield STOP
+
+
+def _longest(robot: Robot, distance: float) -> float:
+    """Return the control steps after which a drive over `distance` metres has gone wrong."""
+    limits = robot.config.robot
+    seconds = distance / limits.max_speed + 2.0 * math.pi / limits.max_turn_rate
+    return (_LATE_FACTOR * seconds + _LATE_SECONDS) / _dt(robot)
+
+
+def _dt(robot: Robot) -> float:
+    return 1.0 / robot.config.control.rate
+
+
+def _is_clear(costmap: Costmap, way: list[Point]) -> bool:
+    """Tell whether the way is free; its beginning may lead out of somewhere too narrow."""
+    start = 0
+    while start < len(way) - 1 and not costmap.is_free(*way[start]):
+        if math.dist(way[0], way[start]) > _CREEP_OUT:
+            return False
+        start += 1
+    return costmap.polyline_is_free(way[start:])
+
+
+def _recover(robot: Robot) -> Generator[Command]:
+    """Stop, back up, turn round once, wait a little, forget what is out of sight."""
+    config = robot.config
+    yield from brake(robot)
+    yield from _back_up(robot)
+    yield from brake(robot)
+    turned, yaw = 0.0, robot.body.yaw
+    while turned < 2.0 * math.pi:
+        yield 0.0, _SEARCH_RATE * config.robot.max_turn_rate
+        turned += abs(wrap_angle(robot.body.yaw - yaw))
+        yaw = robot.body.yaw
+    yield from brake(robot)
+    yield from _stand(robot, config.recovery.patience)
+    robot.forget()
+
+
+def _back_up(robot: Robot) -> Generator[Command]:
+    """Drive back, as far as set and as long as there is room behind."""
+    body, distance = robot.body, robot.config.recovery.back_up
+    x, y = body.x, body.y
+    costmap, radius = robot.planner.costmap, robot.config.robot.radius
+    while math.hypot(body.x - x, body.y - y) + body.braking_distance() < distance:
+        behind_x = body.x - radius * math.cos(body.yaw)
+        behind_y = body.y - radius * math.sin(body.yaw)
+        if costmap.touches(behind_x, behind_y):
+            return
+        yield -robot.config.robot.max_reverse_speed, 0.0
+        if robot.bumped:
+            return

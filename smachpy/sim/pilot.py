@@ -1,0 +1,152 @@
+"""Decides what one robot does next: an override, the drive to its goal, or a stop."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING, Final
+
+from smachpy.sim.exceptions import NavigationError
+from smachpy.sim.navigation import STOP, brake, drive_to
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator
+
+    from smachpy.sim.geometry import Pose2D
+    from smachpy.sim.navigation import Command
+    from smachpy.sim.world import Robot
+
+_LOOKED_AHEAD: Final = 0.15  # [m] besides the braking distance, when it is driven by hand
+_BATTERY_EVERY: Final = 4  # steps between two looks at the battery
+_SHARE: Final = 0.8  # of the braking power that is counted on
+
+
+class Pilot:
+    """Steers one robot, one control step at a time.
+
+    An override (somebody drives by hand) goes before the drive to a goal, which waits meanwhile and
+    is planned anew from where the override left the robot. A robot with nothing to do brakes.
+
+    Threads: none of its own; the owner's lock keeps the calls apart.
+
+    Attributes:
+        robot: What it steers.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self._script: Generator[Command, None, str] | None = None
+        self._goal: Pose2D | None = None
+        self._done: Callable[[str], object] | None = None
+        self._ended: list[Callable[[], object]] = []
+        self._override: Command = STOP
+        self._override_until = -math.inf
+        self._plan_anew = False
+        self._now = -math.inf
+
+    # -- orders --------------------------------------------------------------------------------
+
+    def drive(self, goal: Pose2D, done: Callable[[str], object]) -> None:
+        """Drive to `goal` in place of what it does; nobody is told the end of that.
+
+        Args:
+            goal: In the map frame.
+            done: Called once at the end, by `take_ends`, with what went wrong; "" for nothing.
+        """
+        self._goal, self._done = goal, done
+        self._script, self._plan_anew = self._journey(goal), False
+
+    def stop(self, done: Callable[[str], object]) -> None:
+        """Brake in place of what it does; `done("")` is called when it stands."""
+        self._goal, self._done = None, done
+        self._script, self._plan_anew = self._halt(), False
+
+    def let_go(self) -> None:
+        """Drop what it does without telling anybody; it brakes unless there is a new order."""
+        self._goal = self._done = self._script = None
+
+    def override(self, now: float, command: Command) -> None:
+        """Drive by hand from `now` [s] on, for `override_time` seconds."""
+        self._override = command
+        self._override_until = now + self.robot.config.control.override_time
+
+    def plan_anew(self) -> None:
+        """Choose the way to the goal again, from what the robot knows now."""
+        self._plan_anew = self._goal is not None
+
+    # -- steps ---------------------------------------------------------------------------------
+
+    def is_busy(self, now: float) -> bool:
+        """Tell whether steps would change anything."""
+        return (
+            self._script is not None or now < self._override_until or not self.robot.body.standing
+        )
+
+    def step(self, now: float, dt: float) -> None:
+        """Drive from `now` [s] on for `dt` seconds."""
+        self._now = now
+        self.robot.step(now, dt, self._command(now))
+
+    def take_ends(self) -> list[Callable[[], object]]:
+        """Return the calls that tell what has ended since; to be made without any lock."""
+        ended, self._ended = self._ended, []
+        return ended
+
+    def _command(self, now: float) -> Command:
+        if now < self._override_until:
+            if self._goal is None:
+                self._end("")  # an order to stop: somebody else says now when it stands
+            self.plan_anew()
+            return self._by_hand(now)
+        if self._script is None:
+            return STOP
+        if self._plan_anew and self._goal is not None:
+            self._plan_anew, self._script = False, self._journey(self._goal)
+        try:
+            return next(self._script)
+        except StopIteration as end:
+            self._end(end.value)
+            return STOP
+
+    def _end(self, trouble: str) -> None:
+        if self._done is not None:
+            self._ended.append(partial(self._done, trouble))
+        self.let_go()
+
+    def _journey(self, goal: Pose2D) -> Generator[Command, None, str]:
+        """Drive to `goal`; returns what went wrong, at rest."""
+        try:
+            for count, command in enumerate(drive_to(self.robot, goal)):
+                if count % _BATTERY_EVERY == 0:
+                    self._check_battery()
+                yield command
+        except NavigationError as error:
+            yield from brake(self.robot)
+            return str(error)
+        return ""
+
+    def _check_battery(self) -> None:
+        if not self.robot.battery.charge(self._now):
+            raise NavigationError("the battery is empty")
+
+    def _halt(self) -> Generator[Command, None, str]:
+        yield from brake(self.robot)
+        return ""
+
+    def _by_hand(self, now: float) -> Command:
+        """Return the override, slowed down so that it ends before what stands in the way.
+
+        It ends where it could be sent to as well: the margin of goals away, and two cells more,
+        as bodies and goals are measured in cells.
+        """
+        speed, turn_rate = self._override
+        robot = self.robot
+        if not robot.battery.charge(now):
+            return STOP
+        if speed == 0.0:
+            return self._override
+        braking = _SHARE * robot.config.robot.braking
+        kept_away = robot.config.planner.margin + 2.0 * robot.world.map.resolution
+        room = max(0.0, robot.room(self._override, kept_away + _LOOKED_AHEAD) - kept_away)
+        most = math.sqrt(2.0 * braking * room)
+        return math.copysign(min(abs(speed), most), speed), turn_rate

@@ -1,0 +1,116 @@
+"""What moves on the floor besides the robot itself: other robots and moving obstacles."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, Protocol
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from smachpy.sim.world import World
+
+_ACCELERATION: Final = 1.0  # [m/s^2] of moving obstacles
+_KEPT_AWAY: Final = 0.15  # [m] they stop so far before a robot
+
+
+class Disc(Protocol):
+    """Something round that moves.
+
+    Attributes:
+        name: What to call it.
+        x: [m], map frame.
+        y: [m], map frame.
+        radius: [m].
+    """
+
+    name: str
+    x: float
+    y: float
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """Where something that moves was seen last.
+
+    Attributes:
+        x: [m], map frame.
+        y: [m], map frame.
+        radius: [m].
+        name: What to call it.
+    """
+
+    x: float
+    y: float
+    radius: float
+    name: str
+
+
+class Mover:
+    """A moving obstacle: it walks from place to place in straight lines, and waits for robots.
+
+    Args:
+        world: The floor it walks on.
+        name: What to call it.
+        places: Where it walks, (x, y) [m]; the first is where it begins.
+        radius: [m].
+        speed: [m/s].
+        loop: From the last place straight to the first; else back the way it came.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        name: str,
+        places: Sequence[tuple[float, float]],
+        *,
+        radius: float = 0.3,
+        speed: float = 0.8,
+        loop: bool = False,
+    ) -> None:
+        self.name = name
+        self.radius = radius
+        self.x, self.y = places[0]
+        self._world = world
+        turned = list(places) if loop else [*places, *reversed(places[1:-1])]
+        self._places = turned
+        self._next = 1 % len(turned)
+        self._top = speed
+        self._speed = 0.0
+        self._heading = 0.0
+
+    def step(self, dt: float) -> None:
+        """Walk for `dt` seconds."""
+        if len(self._places) == 1:
+            return
+        x, y = self._places[self._next]
+        left = math.hypot(x - self.x, y - self.y)
+        if left > 0.0:
+            self._heading = math.atan2(y - self.y, x - self.x)
+        room = self._room()
+        wanted = min(self._top, math.sqrt(2.0 * _ACCELERATION * room))
+        self._speed = min(self._speed + _ACCELERATION * dt, wanted)
+        way = min(self._speed * dt, left)
+        self.x += way * math.cos(self._heading)
+        self.y += way * math.sin(self._heading)
+        if way >= left:
+            self._next = (self._next + 1) % len(self._places)
+
+    def _room(self) -> float:
+        """Return how far [m] it can walk straight on before it meets a robot."""
+        ux, uy = math.cos(self._heading), math.sin(self._heading)
+        far = self._top * self._top / (2.0 * _ACCELERATION) + _KEPT_AWAY
+        room = far
+        for robot in self._world.robots:
+            other = robot.body
+            dx, dy = other.x - self.x, other.y - self.y
+            reach = other.radius + self.radius + _KEPT_AWAY
+            along = dx * ux + dy * uy
+            if along <= 0.0 or along > far + reach:
+                continue
+            beside = abs(dy * ux - dx * uy)
+            if beside < reach:
+                room = min(room, max(0.0, along - math.sqrt(reach * reach - beside * beside)))
+        return room

@@ -1,0 +1,53 @@
+"""Ready-made states for robot missions, and what they are made from.
+
+Each is a state for `sm.add(...)`, or a function that makes one: `drive_to`, `turn`, `locate`,
+`AskOperator`, `AwaitMessage`, `Wait`, `Serve`. The lessons in `missions` use them.
+"""
+
+from __future__ import annotations
+
+from smachpy.sim.exceptions import InputFileError, MissionError, NavigationError
+from smachpy.sim.geometry import Pose2D
+from smachpy.states.ask_operator import AskOperator
+from smachpy.states.driving import (
+    DRIVE_TIMEOUT,
+    SIGNAL_TIMEOUT,
+    TURN_TIMEOUT,
+    drive_back,
+    drive_to,
+    goal_at,
+    locate,
+    pose_of,
+    turn,
+)
+from smachpy.states.progress import Progress
+from smachpy.states.serving import Serve, serve_during, serving_machine
+from smachpy.states.waiting import AwaitMessage, Wait
+from smachpy.states.waypoints import PlaceFile, Route, Waypoint, load_route
+
+__all__ = [
+    "DRIVE_TIMEOUT",
+    "SIGNAL_TIMEOUT",
+    "TURN_TIMEOUT",
+    "AskOperator",
+    "AwaitMessage",
+    "InputFileError",
+    "MissionError",
+    "NavigationError",
+    "PlaceFile",
+    "Pose2D",
+    "Progress",
+    "Route",
+    "Serve",
+    "Wait",
+    "Waypoint",
+    "drive_back",
+    "drive_to",
+    "goal_at",
+    "load_route",
+    "locate",
+    "pose_of",
+    "serve_during",
+    "serving_machine",
+    "turn",
+]

@@ -1,0 +1,83 @@
+"""Servers that a mission brings along: for one run of a machine, or for one state."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+
+from smachpy import State, StateMachine, UserData
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from smachpy.machines.container import Container
+
+
+class Closeable(Protocol):
+    """Something that is on the network from when it is made until `close`: a `Service`."""
+
+    def close(self) -> None:
+        """Leave the network."""
+        ...
+
+
+class Stoppable(Protocol):
+    """Something that is on the network from when it is made until `stop`: an action server."""
+
+    def stop(self) -> None:
+        """Leave the network."""
+        ...
+
+
+Server: TypeAlias = Closeable | Stoppable
+
+
+def serve_during(machine: Container, *makers: Callable[[], Server]) -> None:
+    """Make servers when `machine` starts; when it has ended, close them, the last one first.
+
+    Args:
+        machine: Whose runs.
+        *makers: Each makes one server.
+    """
+    stack = ExitStack()
+
+    def start(_userdata: UserData, _initial: object) -> None:
+        _open(stack, makers)
+
+    def end(_userdata: UserData, _final: object, _outcome: str) -> None:
+        stack.close()
+
+    machine.register_start_cb(start)
+    machine.register_termination_cb(end)
+
+
+def _open(stack: ExitStack, makers: Iterable[Callable[[], Server]]) -> None:
+    for make in makers:
+        server: Any = make()
+        stack.callback(server.close if hasattr(server, "close") else server.stop)
+
+
+class Serve(State):
+    """Keeps servers on the network until the state is preempted, by Ctrl-C for example."""
+
+    def __init__(self, *makers: Callable[[], Server]) -> None:
+        super().__init__(outcomes=["preempted"])
+        self._makers = makers
+
+    def execute(self, userdata: UserData) -> str:
+        """Serve until then.
+
+        Blocks: until the preempt.
+        """
+        del userdata
+        with ExitStack() as stack:
+            _open(stack, self._makers)
+            self.wait_preempt()
+        return "preempted"
+
+
+def serving_machine(name: str, *makers: Callable[[], Server]) -> StateMachine:
+    """Return a machine that serves until it is preempted."""
+    sm = StateMachine(outcomes=["preempted"], name=name)
+    sm.add("SERVE", Serve(*makers))
+    return sm

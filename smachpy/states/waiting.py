@@ -1,0 +1,81 @@
+"""States that wait: for some time, or for a message."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.pubsub.topic import Subscriber
+from smachpy import State, UserData
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from smachpy.introspection import Kind
+
+
+class AwaitMessage(State):
+    """Waits for a message that is accepted. Outcomes: 'came', 'timeout', 'preempted'.
+
+    Args:
+        topic: Name of the topic.
+        msg_type: Class of its messages.
+        wanted: Called with each message, in the subscriber's thread; true ends the wait.
+        timeout: Longest wait [s].
+    """
+
+    def __init__(
+        self, topic: str, msg_type: Any, wanted: Callable[[Any], bool], *, timeout: float
+    ) -> None:
+        super().__init__(outcomes=["came", "timeout", "preempted"])
+        self._topic = topic
+        self._msg_type = msg_type
+        self._wanted = wanted
+        self._longest = timeout
+
+    def execute(self, userdata: UserData) -> str:
+        """Wait.
+
+        Blocks: until the message, `timeout` or a preempt.
+        """
+        del userdata
+        came: list[bool] = []
+        wake = self.clock().event(f"a message on {self._topic}")
+
+        def on_message(message: Any) -> None:
+            if self._wanted(message):
+                came.append(True)
+                wake.set()
+
+        forget = self.on_preempt(wake.set)
+        try:
+            with Subscriber(self._topic, self._msg_type, on_message):
+                wake.wait(self._longest)
+        finally:
+            forget()
+        if came:
+            return "came"
+        return "preempted" if self.preempt_requested() else "timeout"
+
+    def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
+        """Add the topic and the limit."""
+        _, details = super().describe_details()
+        own = (("topic", self._topic), ("timeout", f"{self._longest:g} s -> timeout"))
+        return "monitor", (*own, *details)
+
+
+class Wait(State):
+    """Lets some time pass. Outcomes: 'done', 'preempted'.
+
+    Args:
+        seconds: How long [s]; None takes the userdata key `seconds`.
+    """
+
+    def __init__(self, seconds: float | None = None) -> None:
+        keys = ["seconds"] if seconds is None else []
+        super().__init__(outcomes=["done", "preempted"], input_keys=keys)
+        self.seconds = seconds
+
+    def execute(self, userdata: UserData) -> str:
+        """Wait; a preempt ends it early."""
+        seconds = userdata.seconds if self.seconds is None else self.seconds
+        return "preempted" if self.sleep(seconds) else "done"

@@ -1,0 +1,170 @@
+"""Named places to drive to, read from files and checked against the map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from actionlib_core.exceptions import InvalidNameError
+from actionlib_core.names import check_name
+from smachpy.sim.checked_yaml import REQUIRED, Document, Limits
+from smachpy.sim.config import SimConfig, load_config
+from smachpy.sim.exceptions import NavigationError
+from smachpy.sim.geometry import Pose2D, wrap_angle
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from smachpy.sim.checked_yaml import Section
+    from smachpy.sim.floor import Floor
+
+_SHARE: Final = Limits(low=0.0, high=1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Waypoint:
+    """A named place to drive to.
+
+    Attributes:
+        name: What to call it in logs and pictures.
+        pose: In the map frame.
+    """
+
+    name: str
+    pose: Pose2D
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """What a patrol needs to know of a floor.
+
+    Attributes:
+        waypoints: Where to go, in this order.
+        dock: Where the robot charges.
+        low_battery: Drive to the dock below this charge, 0 to 1.
+        charge_until: Leave the dock at this charge, 0 to 1.
+    """
+
+    waypoints: tuple[Waypoint, ...]
+    dock: Waypoint
+    low_battery: float
+    charge_until: float
+
+
+class PlaceFile(Document):
+    """A YAML or CSV file that names places, for readers of kinds of files.
+
+    With the field `map` (and `robot`, for its radius) every place is checked against that floor;
+    without it only the robot's server can refuse places where the robot cannot stand.
+
+    Args:
+        path: The file.
+        map_file: The floor to check against when the file has no field `map`.
+        csv_rows: The key under which the rows of a CSV file are found; "": no CSV file will do.
+        csv_texts: Columns of a CSV file that hold texts, whatever they look like.
+
+    Attributes:
+        floor: The floor, inflated by the robot; None when nothing names one.
+
+    Raises:
+        InputFileError: it cannot be read, or the map or the robot's file is wrong.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        map_file: Path | None = None,
+        csv_rows: str = "",
+        csv_texts: Sequence[str] = (),
+    ) -> None:
+        super().__init__(path, csv_rows, csv_texts)
+        self.floor: Floor | None = None
+        robot = SimConfig()
+        if "robot" in self.top:
+            robot = load_config(path.parent / self.top.text("robot", REQUIRED))
+        if "map" in self.top:
+            map_file = path.parent / self.top.text("map", REQUIRED)
+        if map_file is not None:
+            from smachpy.sim.floor import Floor
+            from smachpy.sim.occupancy import load_map
+
+            self.floor = Floor(load_map(map_file), robot.robot.radius, robot.planner)
+
+    def place(self, section: Section, default_name: str) -> Waypoint:
+        """Read a name and a pose, and close the section."""
+        name = section.text("name", default_name)
+        found = section.problem_count
+        x = section.number("x", REQUIRED, unit="m")
+        y = section.number("y", REQUIRED, unit="m")
+        known = section.problem_count == found
+        yaw = section.number("yaw", 0.0, unit="rad")
+        section.close()
+        if self.floor is not None and known:
+            try:
+                self.floor.check_place(x, y)
+            except NavigationError as error:
+                reason = str(error).removeprefix("goal ")
+                section.problem("x", "a place where the robot can stand", f"{name}: {reason}.")
+        return Waypoint(name, Pose2D(x, y, wrap_angle(yaw)))
+
+    def named_places(self, key: str) -> tuple[Waypoint, ...]:
+        """Read a list of places whose names differ."""
+        names: set[str] = set()
+        places = []
+        for row in self.top.rows(key):
+            self.check_name(row, names)
+            places.append(self.place(row, "-"))
+        return tuple(places)
+
+    def check_name(self, row: Section, names: set[str]) -> None:
+        """Note a problem when the row has no name, or one of `names`, and add it to these."""
+        name = row.text("name", REQUIRED)
+        if name in names:
+            row.problem("name", "a name that no other place has")
+        names.add(name)
+
+    def charges(self) -> tuple[float, float]:
+        """Read the battery charge below which to charge, and up to which; 0 to 1."""
+        low = self.top.number("low_battery", 0.3, _SHARE)
+        until = self.top.number("charge_until", 0.9, _SHARE)
+        if "charge_until" in self.top and until <= low:
+            self.top.problem("charge_until", f"more than low_battery ({low:g})")
+        return low, until
+
+    def close(self) -> None:
+        """Finish reading.
+
+        Raises:
+            InputFileError: with the line and field of every problem.
+        """
+        self.top.close()
+        self.check()
+
+
+def network_name(row: Section, key: str) -> str:
+    """Read a name of the network; "" when it is not there."""
+    if key not in row:
+        row.text(key, "-")
+        return ""
+    name = row.text(key, REQUIRED)
+    try:
+        return check_name(name, key)
+    except InvalidNameError as error:
+        row.problem(key, "a name of the network", f"{error.reason}.")
+        return "-"
+
+
+def load_route(path: str | Path) -> Route:
+    """Read a patrol's file: `dock`, `waypoints`, `low_battery`, `charge_until`; see `PlaceFile`.
+
+    Raises:
+        InputFileError: with the line and field of every problem.
+    """
+    file = PlaceFile(Path(path))
+    low, until = file.charges()
+    dock = file.place(file.top.section("dock"), "dock")
+    rows = file.top.rows("waypoints")
+    waypoints = tuple(file.place(row, f"waypoint {i}") for i, row in enumerate(rows, 1))
+    file.close()
+    return Route(waypoints, dock, low, until)

@@ -1,1 +1,0 @@
-"""Deciding which runs to try: choices in, the next choices out."""

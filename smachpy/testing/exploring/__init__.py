@@ -1,0 +1,1 @@
+"""Exploration: many runs of one machine, with other results, preempts and interleavings."""

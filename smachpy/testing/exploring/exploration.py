@@ -1,0 +1,456 @@
+"""Running a mission over everything that can happen, and the shortest run that goes wrong."""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import copy
+import inspect
+import logging
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.clock import RealClock, VirtualClock
+from smachpy.exceptions import SmachError
+from smachpy.introspection import describe
+from smachpy.machines.container import Container
+from smachpy.machines.problems import unknown_arguments
+from smachpy.testing import session
+from smachpy.testing.doubles import Double, Places
+from smachpy.testing.exploring.explorer import DEFAULTS, FAULTS, Explorer, RunOptions
+from smachpy.testing.exploring.search import Search
+from smachpy.testing.exploring.verdicts import judge
+from smachpy.testing.kit import MissionKit, check_machine
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from typing import Self, TypeAlias, Unpack
+
+    from smachpy.introspection import StateRecord
+    from smachpy.testing.exploring.search import Choice
+    from smachpy.testing.exploring.verdicts import Verdict
+    from smachpy.testing.runs import Run
+
+    Machine: TypeAlias = Container | Callable[[], Container]
+
+COMPUTER = RealClock()  # of the computer: a run's own time is virtual
+SHRINKING_RUNS = 300
+
+
+class ReplayError(SmachError):
+    """A run to be repeated came to another choice than the one that was noted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Counterexample:
+    """A run that breaks an invariant.
+
+    Attributes:
+        reason: What is wrong with it.
+        run: The run.
+        choices: What was chosen in it, as texts for `replay`.
+        script: A program that repeats it.
+        picture: The machine with this run; None when nothing that draws is installed.
+        is_cut: `max_time` ended its shortening: a faster computer may find a shorter one. Otherwise
+            it is the same on all.
+    """
+
+    reason: str
+    run: Run
+    choices: tuple[str, ...]
+    script: str
+    picture: Path | None = None
+    is_cut: bool = False
+
+    def __str__(self) -> str:
+        shown = "" if self.picture is None else f"\npicture: {self.picture}"
+        if self.is_cut:
+            shown += "\n(max_time ended its shortening: a faster computer may find a shorter one)"
+        return f"{self.reason}\n{self.run.explain()}{shown}\nTo repeat it:\n\n{self.script}"
+
+
+@dataclass(frozen=True, slots=True)
+class Exploration:
+    """What `explore` found.
+
+    Attributes:
+        ok: Whether every run kept all invariants.
+        runs: Number of runs, those for shrinking left out.
+        exhaustive: Whether there are no further runs: every choice was tried in every situation.
+        stopped_by: Why it is not: "max_runs", "max_time", "max_depth" or "counterexample".
+        counterexample: A shortest run that breaks an invariant.
+        seconds: How long it took.
+        not_raised: Exceptions that `on_exception` or `retry` name and no run raised, since they
+            cannot be made from a text alone.
+    """
+
+    ok: bool
+    runs: int
+    exhaustive: bool
+    stopped_by: str
+    counterexample: Counterexample | None
+    seconds: float
+    not_raised: tuple[str, ...] = ()
+
+    def __bool__(self) -> bool:
+        return self.ok
+
+    def assert_ok(self) -> None:
+        """Fail with the whole counterexample if there is one.
+
+        Raises:
+            AssertionError: a run breaks an invariant.
+        """
+        __tracebackhide__ = True
+        if not self.ok:
+            raise AssertionError(str(self))
+
+    def __str__(self) -> str:
+        extent = "all there are" if self.exhaustive else f"stopped by {self.stopped_by}"
+        names = ", ".join(self.not_raised)
+        left_out = f" (not raised, as they want arguments: {names})" if names else ""
+        head = f"{self.runs} runs in {self.seconds:.1f} s, {extent}"
+        if self.counterexample is None:
+            return f"{head}: no counterexample{left_out}"
+        return f"{head}{left_out}: {self.counterexample}"
+
+
+def explore(
+    machine: Machine,
+    *,
+    max_runs: int = 1_000,
+    max_time: float = 60.0,
+    max_depth: int = 60,
+    invariants: Iterable[Callable[[Run], object]] = (),
+    grace: float = 10.0,
+    folder: Callable[[], Path] | None = None,
+    on_run: Callable[[Run], object] | None = None,
+    **options: Unpack[RunOptions],
+) -> Exploration:
+    """Run a mission over every leaf outcome, preempt point, fault and interleaving.
+
+    Each leaf is replaced by a double that takes one second and ends with each of its outcomes in
+    turn. Of those that run at once, each may be the next to end, and outlasts the others then.
+    Other times are not varied: those of states that are kept, of retries' pauses, of scripted
+    servers. Runs with few unusual choices come first. Without invariants of your own, situations
+    that are equal (active states, outcomes, items, userdata, threads that can continue) are entered
+    once, which makes machines with loops finite; what states keep elsewhere is not seen. An own
+    invariant may look at the whole past, so then every sequence of choices is a case of its own.
+
+    These always hold, or are reported: the mission ends; it does not raise; after a preempt it ends
+    within `grace`; no goal is left running.
+
+    Args:
+        machine: A container, or a function that makes one; needed when its items run out.
+        max_runs: Most runs.
+        max_time: Longest time [s of the computer], for slow ones: what it cuts off depends on the
+            computer, and `stopped_by` says so. Shortening what was found may take as long again;
+            `Counterexample.is_cut` says when that was too short.
+        max_depth: Choices of a run after this many are not varied.
+        invariants: Called with each run. Anything false but None, or an exception, is a
+            counterexample.
+        grace: Longest time from a preempt to the end [s].
+        folder: Gives the folder for the picture.
+        on_run: Called with each run, for coverage; without it that of the session, if it measures.
+        **options: See `RunOptions`.
+
+    Raises:
+        TypeError: `machine` is neither a container nor a function, or there is no such option.
+        ValueError: there is no such fault.
+        UnknownStateError: `keep` or `writes` names a state that the machine does not have, or
+            `writes` one of several.
+    """
+    check_machine(machine, "explore", functions=True)
+    own = tuple(invariants)
+    on_run = on_run or session.current().on_run
+    begun = COMPUTER.now()
+    search = Search(max_depth)
+    runs = 0
+    stopped_by = ""
+    example: Counterexample | None = None
+    with Runner("explore", machine, options, merges=not own) as runner:
+
+        def verdict_on(run: Run, error: Exception | None) -> Verdict | None:
+            return judge(run, error, runner.explorer, grace=grace, invariants=own)
+
+        while example is None and (prefix := search.next()) is not None:
+            # There is always one run, however slow the computer is.
+            if runs >= max_runs or (runs > 0 and COMPUTER.now() - begun > max_time):
+                stopped_by = "max_runs" if runs >= max_runs else "max_time"
+                break
+            run, error = runner.run(prefix)
+            runs += 1
+            if on_run is not None:
+                on_run(run)
+            verdict = verdict_on(run, error)
+            if verdict is not None:
+                stopped_by = "counterexample"
+                example = _shrunk(runner, verdict_on, max_time, verdict, run)
+            else:
+                search.add(prefix, runner.explorer.choices)
+    stopped_by = stopped_by or ("max_depth" if search.is_cut else "")
+    if example is not None and folder is not None:
+        file = folder() / f"{example.run.record.label}-counterexample.svg"
+        example = replace(example, picture=example.run.draw(file))
+    seconds = COMPUTER.now() - begun
+    left_out = runner.explorer.not_raised
+    return Exploration(
+        example is None, runs, not stopped_by, stopped_by, example, seconds, left_out
+    )
+
+
+def replay(machine: Machine, choices: Sequence[str], **options: Unpack[RunOptions]) -> Run:
+    """Repeat a run of `explore`.
+
+    Args:
+        machine: As in `explore`.
+        choices: Those of the counterexample; what comes after them is as usual.
+        **options: Those that `explore` had.
+
+    Raises:
+        ReplayError: the machine has changed.
+        Exception: what the run raised.
+    """
+    check_machine(machine, "replay", functions=True)
+    with Runner("replay", machine, options) as runner:
+        run, error = runner.run(choices)
+    if error is not None:
+        raise error
+    return run
+
+
+class Runner:
+    """Runs a machine again and again, each time from the same beginning.
+
+    Args:
+        call: The function that the user has called, for errors.
+        machine: The machine, or a function that makes it.
+        given: The options that differ from the defaults.
+        merges: See `Explorer`.
+
+    Raises:
+        TypeError: there is no such option.
+        ValueError: there is no such fault.
+    """
+
+    def __init__(
+        self, call: str, machine: Machine, given: RunOptions, *, merges: bool = True
+    ) -> None:
+        unknown = unknown_arguments(given, DEFAULTS)
+        if unknown:
+            raise TypeError(f"{call}: {unknown}")
+        options: RunOptions = {**DEFAULTS, **given}
+        # Whoever gave an iterator: one look would use it up.
+        options["faults"], options["keep"] = tuple(options["faults"]), tuple(options["keep"])
+        faults = sorted(set(options["faults"]) - FAULTS)
+        if faults:
+            raise ValueError(f"{call}: faults: got {faults}; expected some of {sorted(FAULTS)}.")
+        self.source = machine
+        self.options = options
+        self._call = call
+        self._merges = merges
+        self._places = Places()
+        self._around = contextlib.ExitStack()
+        self._machine: Container
+        self._whole: StateRecord | None
+
+    def __enter__(self) -> Self:
+        with contextlib.ExitStack() as around:
+            # `time` is patched once for all runs: each of them only adds its own clock.
+            clock = around.enter_context(VirtualClock())
+            around.enter_context(clock.patched())
+            around.enter_context(_silence())
+            self._prepare()
+            self._around = around.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._around.close()
+        self._restore()
+        self._places.restore()
+
+    def _prepare(self) -> None:
+        """Make the machine, and put doubles into it."""
+        self._places.restore()  # the machine before
+        source = self.source
+        machine = self._machine = source if isinstance(source, Container) else source()
+        self._whole = describe(machine) if self.options["doubles"] else None
+        for path, make, made in self.options["doubles"]:
+            made[:] = [self._places.put(machine, path, make)]
+        self.explorer = Explorer(machine, self.options, self._places, merges=self._merges)
+        containers = list(_containers(machine))
+        self._userdata = [
+            (c.userdata, {key: c.userdata[key] for key in c.userdata.keys()})  # noqa: SIM118
+            for c in containers
+        ]
+        states = [state for c in containers for state in c.get_children().values()]
+        self._scripts = [(state, state.script) for state in states if isinstance(state, Double)]
+        self._restore()  # so that no run changes what is kept here
+
+    def _restore(self) -> None:
+        """Bring the userdata and the test's doubles back to the beginning."""
+        for double, script in self._scripts:
+            double.script = script
+        for userdata, values in self._userdata:
+            for key in userdata.keys():  # noqa: SIM118
+                del userdata[key]
+            userdata.update(copy.deepcopy(values))
+
+    def run(self, prefix: Sequence[int | str]) -> tuple[Run, Exception | None]:
+        """Run once, with these choices first; what it raised comes back with the run.
+
+        Raises:
+            ReplayError: it came to other choices.
+        """
+        if not isinstance(self.source, Container) and self.explorer.choices:
+            self._restore()  # the function may give the same machine each time
+            self._prepare()
+        self._restore()
+        explorer, options = self.explorer, self.options
+        runs: list[Run] = []
+        error: Exception | None = None
+        # A kit for each run: what still waits in one must not reach into the next.
+        kit = MissionKit(choose=explorer.turn, on_run=runs.append)
+        explorer.begin(kit, prefix)
+        unsubscribe = self._machine.subscribe(explorer.on_event)
+        with kit:
+            kit.draws, kit.call = False, self._call
+            for server in options["servers"]:
+                server.copy_to(kit)
+            if options["real_actions"]:
+                explorer.serve_actions()
+            try:
+                userdata = copy.deepcopy(options["userdata"])
+                kit(self._machine, userdata, limit=options["limit"], steps=options["steps"])
+            except Exception as caught:  # noqa: BLE001  judged by the caller
+                error = caught
+            finally:
+                unsubscribe()
+                explorer.end()
+        if explorer.mismatch:
+            raise ReplayError(explorer.mismatch) from error
+        run = runs[0]
+        return (run if self._whole is None else replace(run, whole=self._whole)), error
+
+
+@contextlib.contextmanager
+def _silence() -> Iterator[None]:
+    """Log nothing: what goes wrong in a run is reported as its verdict."""
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logging.disable(before)
+
+
+def _containers(container: Container) -> Iterator[Container]:
+    yield container
+    for child in container.get_children().values():
+        if isinstance(child, Container):
+            yield from _containers(child)
+
+
+# -- the counterexample ----------------------------------------------------------------------------
+
+
+def _shrunk(
+    runner: Runner,
+    verdict_on: Callable[[Run, Exception | None], Verdict | None],
+    max_time: float,
+    verdict: Verdict,
+    run: Run,
+) -> Counterexample:
+    """Return the shortest run that can be found that is wrong in the same way."""
+    choices = runner.explorer.choices
+    reason = verdict.reason
+    end = COMPUTER.now() + max_time
+    tries = 0
+    simpler = _simpler(choices)
+    late = False
+    while (prefix := next(simpler, None)) is not None and tries < SHRINKING_RUNS:
+        tries += 1
+        late = COMPUTER.now() > end
+        if late:
+            break
+        try:
+            found, error = runner.run(prefix)
+        except ReplayError:
+            continue  # there is no such run
+        why = verdict_on(found, error)
+        others = runner.explorer.choices
+        if why is None or why.kind != verdict.kind:
+            continue
+        if _size(found, others) < _size(run, choices):
+            run, choices, reason = found, others, why.reason
+            simpler = _simpler(choices)
+    last = max((number for number, choice in enumerate(choices, 1) if choice.picked), default=0)
+    texts = tuple(map(str, choices[:last]))  # what comes after them is as usual
+    script = _script(runner, texts, reason)
+    return Counterexample(reason, run, texts, script, is_cut=late)
+
+
+def _simpler(choices: list[Choice]) -> Iterator[tuple[int, ...]]:
+    """Yield beginnings of runs that may be shorter, the shortest first."""
+    picks = tuple(choice.picked for choice in choices)
+    for number, choice in enumerate(choices):
+        for other in range(len(choice.options)):
+            if other != choice.picked:
+                yield (*picks[:number], other)
+                if number + 1 < len(picks):
+                    yield (*picks[:number], other, picks[number + 1])
+
+
+def _size(run: Run, choices: list[Choice]) -> tuple[int, int]:
+    return len(run.path), sum(choice.picked != 0 for choice in choices)
+
+
+def _script(runner: Runner, choices: tuple[str, ...], reason: str) -> str:
+    """Return a program that repeats a run."""
+    options: dict[str, Any] = dict(runner.options)
+    call, note = "replay", "from smachpy.testing import replay\n"
+    of_test = [f"mission.replace(...) of {path}" for path, _, _ in options.pop("doubles")]
+    of_test += [f"{type(end).__name__} {end.name!r}" for end in options.pop("servers")]
+    if of_test:
+        call, note = "mission.replay", f"# in the test, after its {', '.join(of_test)}\n"
+    defaults: dict[str, Any] = dict(DEFAULTS)
+    extra = ""
+    for name, value in options.items():
+        usual = defaults[name]
+        if value != usual and (value or usual):
+            text, mark, gap = _literal(value).partition("  #")
+            extra += f"    {name}={text},{mark}{gap}\n"
+    listed = "".join(f"        {choice!r},\n" for choice in choices)
+    return (
+        f"# {reason.splitlines()[0]}\n{note}\n{_import_of(runner.source)}\n\n"
+        f"run = {call}(\n    machine,\n    [\n{listed}    ],\n{extra})\nprint(run.explain())\n"
+    )
+
+
+def _import_of(source: Any) -> str:
+    """Return the line of a script that gets what makes the machine, or says what belongs there."""
+    module = sys.modules.get(getattr(source, "__module__", None) or "")
+    names = [] if module is None else [n for n, v in vars(module).items() if v is source]
+    if module is not None and names:
+        home = module.__name__
+        if home == "__main__":  # a script: its file can be imported
+            home = Path(getattr(module, "__file__", None) or "?").stem
+        if all(word.isidentifier() for word in (*home.split("."), names[0])):
+            return f"from {home} import {names[0]} as machine"
+    given = "the machine, or a function that makes it"
+    if inspect.isfunction(source):
+        code = source.__code__
+        given = f"the function of line {code.co_firstlineno} of {Path(code.co_filename).name}"
+    return f"machine = ...  # put in {given}"
+
+
+def _literal(value: object) -> str:
+    """Return a value as it stands in a program, or a gap and what belongs there."""
+    text = repr(value)
+    try:
+        ast.literal_eval(text)
+    except (ValueError, SyntaxError):
+        return f"...  # as it was given to explore: {' '.join(text.split())}"
+    return text

@@ -1,0 +1,536 @@
+"""The choices of an explored run: made by doubles of leaves, by servers, and by the clock."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypedDict
+
+from actionlib_core.interfaces import get_action
+from smachpy.events import Entered, Failed, Finished, Iterated, Left, Retried
+from smachpy.introspection import describe
+from smachpy.machines.container import Container
+from smachpy.machines.state import get_options
+from smachpy.run.origin import asking
+from smachpy.testing.doubles import Double, Places
+from smachpy.testing.exploring.search import Choice
+from smachpy.testing.recorder import STEPS
+from smachpy.testing.runs import find_path
+from smachpy.testing.servers import Reply
+from smachpy.userdata.readonly import writable
+
+if TYPE_CHECKING:
+    from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+
+    from actionlib_core.clock import Timer
+    from smachpy.events import Event
+    from smachpy.introspection import StateRecord
+    from smachpy.machines.state import State
+    from smachpy.testing.doubles import Replacement
+    from smachpy.testing.kit import MissionKit
+    from smachpy.testing.servers import ScriptedEnd
+
+PREEMPTED = "preempted"
+FAULTS = frozenset({"hang", "raise", "deaf"})
+STEP_S = 1.0  # how long a double or server takes, unless it outlasts others
+WITHIN = 0.9  # part of the rest of its timeout for which a double outlasts others
+_OUTSIDE = frozenset({"monitor", "condition", "service"})
+
+# What a run may choose besides outcomes.
+TURN = "turn"
+PREEMPT = "is preempted"
+HANGS = "never finishes"
+RAISES = "raises"
+RAISES_ONE = "raises {}"
+DEAF = "ignores a preempt"
+LATE = "{} as a preempt comes"
+OUTLASTS = "outlasts the others"
+STAYS = "is left alone"
+ASKED = "runs as a preempt comes"
+RAISED = "raised by the test"  # text of the exceptions
+
+# What a server may do with a goal.
+REPLIES: dict[str, Reply] = {
+    "succeeds": Reply(duration=STEP_S),
+    "aborts": Reply(status="aborted", duration=STEP_S),
+    "rejects": Reply(status="rejected"),
+    "accepts late": Reply(duration=STEP_S, accept_after=30.0),
+    "dies": Reply(status=None, die_after=STEP_S),
+    "dies and comes back": Reply(status=None, die_after=STEP_S, back_after=5.0),
+    "loses the result": Reply(duration=STEP_S, lose_result=True),
+    "delivers twice": Reply(duration=STEP_S, twice=True),
+    "is slow and ignores a cancel": Reply(duration=3 * STEP_S, ignore_cancel=True),
+}
+# The same with a preempt of the mission while the goal is active.
+PREEMPTED_REPLIES: dict[str, Reply] = {
+    "works as a preempt comes": Reply(duration=3 * STEP_S),
+    "works as a preempt comes, and ignores the cancel": Reply(
+        duration=3 * STEP_S, ignore_cancel=True
+    ),
+}
+
+
+class RunOptions(TypedDict, total=False):
+    """What the runs of `explore` and `replay` vary, and when one counts as endless.
+
+    Keys:
+        faults: "hang": any leaf may never finish; "raise": may raise a RuntimeError, and whatever
+            `on_exception` and `retry` of it and of its containers name, if that can be made from a
+            text alone; "deaf": may ignore a preempt. Leaves with a timeout, and watchers beside
+            others, may hang in any case.
+        preempts: Most preempts per run; 1.
+        interleavings: Whether to vary which thread continues first, and which leaf outlasts the
+            others; True.
+        max_steps: Most doubles that run; with more the run counts as endless; 200.
+        limit: Longest run [s of its own clock, without what outlasts others]; also endless; an
+            hour.
+        steps: Most steps while no time passes, as in `mission(...)`; also endless.
+        keep: Leaves, or containers with all leaves in them, that stay as they are; a name may mean
+            several. A preempt comes as soon as such a leaf waits.
+        writes: Leaf -> userdata that its double writes.
+        real_actions: Put doubles only in the places of services, monitors and conditions. Scripted
+            servers do to each goal all that servers do: succeed, abort, reject, accept late, die,
+            come back, lose the result, deliver twice, ignore a cancel; preempts come while one
+            works.
+        userdata: Put into the machine's userdata before each run.
+        doubles: The doubles of `mission.replace`; each run begins with their whole scripts.
+        servers: The servers and topics of the test; each run has them with the same scripts.
+    """
+
+    faults: Iterable[str]
+    preempts: int
+    interleavings: bool
+    max_steps: int
+    limit: float
+    steps: int
+    keep: Iterable[str]
+    writes: Mapping[str, Mapping[str, Any]] | None
+    real_actions: bool
+    userdata: Mapping[str, Any] | None
+    doubles: Iterable[Replacement]
+    servers: Iterable[ScriptedEnd]
+
+
+DEFAULTS: RunOptions = {
+    "faults": (),
+    "preempts": 1,
+    "interleavings": True,
+    "max_steps": 200,
+    "limit": 3600.0,
+    "steps": STEPS,
+    "keep": (),
+    "writes": {},
+    "real_actions": False,
+    "userdata": {},
+    "doubles": (),
+    "servers": (),
+}
+
+
+class Explorer:
+    """Makes and notes the choices of one run after the other.
+
+    Args:
+        root: The machine; the explorer puts its doubles into it.
+        options: What is varied, complete.
+        places: Puts the leaves back in the end.
+        merges: Whether equal situations are told apart from others.
+
+    Attributes:
+        doubles: Paths of the leaves with doubles of the explorer.
+        choices: What was chosen in the run, in order.
+        too_long: It had too many leaves.
+        mismatch: Why it could not follow the choices that were given.
+        not_raised: Names of the exceptions that should be raised and cannot be made.
+    """
+
+    def __init__(
+        self, root: Container, options: RunOptions, places: Places, *, merges: bool
+    ) -> None:
+        record = describe(root)
+        states = list(record.walk())
+        self._root, self._root_path = root, record.path
+        self._options = options
+        self._merges = merges
+        self._parallel = {s.path for s in states if s.kind == "concurrence"}
+        # It makes no difference how long these have been active.
+        self._timeless = {
+            s.path for s in states if s.is_container and "timeout" not in dict(s.details)
+        }
+        self._leaves = {s.path for s in states if not s.is_container}
+        # Here a server chooses when the preempt comes.
+        self._served = {s.path for s in states if options["real_actions"] and s.kind == "action"}
+        self._writes = {find_path(record, n): w for n, w in (options["writes"] or {}).items()}
+        raised = dict(_raised_in(root, record.path)) if "raise" in options["faults"] else {}
+        can = {kind: _can_be_made(kind) for kinds in raised.values() for kind in kinds.values()}
+        self.not_raised = tuple(sorted({k.__name__ for k, is_made in can.items() if not is_made}))
+        self._raised = {
+            path: {text: kind for text, kind in kinds.items() if can[kind]}
+            for path, kinds in raised.items()
+        }
+        # Longer than all the leaves of a run one after the other.
+        self._long_s = (options["max_steps"] + 1) * STEP_S
+        self.doubles: set[str] = set()
+        self._bounded: set[str] = set()
+        self._replace_leaves(places, root, record.path, _kept_by(record, options["keep"]))
+        self.choices: list[Choice] = []
+
+    # -- the run -------------------------------------------------------------------------------
+
+    def begin(self, kit: MissionKit, prefix: Sequence[int | str]) -> None:
+        """Forget the last run; the next one begins with these choices, as indices or texts."""
+        self._kit, self._clock = kit, kit.clock
+        self._prefix = prefix
+        self.choices = []
+        self.too_long = False
+        self.mismatch = ""
+        self._visits: dict[str, int] = {}
+        self._steps = 0
+        self._past: list[tuple[str, int]] = []
+        self._preempts = self._options["preempts"]
+        self._active: dict[str, float] = {}
+        self._ended: dict[str, str] = {}
+        self._items: dict[str, int] = {}
+        self._attempts: dict[str, int] = {}
+        self._hanging: set[str] = set()
+        self._outlasting: set[str] = set()  # since the last end of a leaf
+        self._outlasted: list[tuple[float, float]] = []
+        self._request: Timer | None = None
+        self._over = False
+
+    def end(self) -> None:
+        """Cancel a preempt that the run did not wait for."""
+        if self._request is not None:
+            self._request.cancel()
+
+    def outlasted_s(self, since: float) -> float:
+        """Return for how long, from `since` on, leaves ran only to outlast others [s]."""
+        total = 0.0
+        for begin, end in sorted(self._outlasted):
+            total += max(0.0, end - max(begin, since))
+            since = max(since, end)
+        return total
+
+    def choose(self, where: str, options: Sequence[str], situation: Hashable = None) -> int:
+        """Choose, as given or the first, and note it.
+
+        A choice without a situation, as of a server, is part of all situations after it.
+        """
+        number = len(self.choices)
+        picked = 0
+        if number < len(self._prefix):
+            given = self._prefix[number]
+            texts = [f"{where}: {option}" for option in options]
+            index = texts.index(given) if given in texts else given
+            if isinstance(index, int) and index < len(options):
+                picked = index
+            else:  # not raised here, where the clock asks as well
+                self.mismatch = self.mismatch or (
+                    f"replay: choice {number}: got {given!r}; expected one of {texts}. Has the "
+                    "machine changed, or does it depend on something outside?"
+                )
+        self.choices.append(Choice(where, tuple(options), picked, situation))
+        if situation is None and self._merges:
+            self._past.append((where, picked))
+        return picked
+
+    def turn(self, names: list[str]) -> int:
+        """Choose which thread continues; for `VirtualClock(choose=...)`."""
+        if self._over or not self._options["interleavings"] or len(set(names)) == 1:
+            return 0
+        return self.choose(TURN, names, self._situation((TURN, *sorted(names))))
+
+    def on_event(self, event: Event) -> None:
+        """Follow the run."""
+        if isinstance(event, Entered):
+            self._active[event.path] = event.t
+            self._attempts.pop(event.path, None)
+            self._forget_ends(event.path)
+            if event.path in self._leaves:
+                self._begin_leaf(event.path)
+        elif isinstance(event, Finished) and event.path == self._root_path:
+            self._over = True
+        elif isinstance(event, Left | Failed):
+            self._active.pop(event.path, None)
+            self._hanging.discard(event.path)
+            # The whole text: it holds the error of a state further down.
+            left = event.outcome if isinstance(event, Left) else f"raised {event.error}"
+            self._ended[event.path] = left
+            if event.path in self._leaves:
+                self._outlasting.clear()  # another one may be the next to end
+        elif isinstance(event, Retried):
+            self._attempts[event.path] = event.attempt
+            self._forget_ends(event.path)
+        elif isinstance(event, Iterated):
+            self._items[event.path] = event[3]  # tuples have an `index` of their own
+
+    def _forget_ends(self, path: str) -> None:
+        """Forget how the states in a container ended: it begins again."""
+        inside = path + "/"
+        self._ended = {p: o for p, o in self._ended.items() if not p.startswith(inside)}
+
+    def _begin_leaf(self, path: str) -> None:
+        """Choose whether a preempt comes while a leaf runs that stays as it is."""
+        if path in self.doubles or path in self._served or not self._preempts:
+            return
+        if self.choose(path, (STAYS, ASKED), self._situation((path, ASKED))):
+            self._preempts -= 1
+            self._request = self._clock.call_later(0.0, self._preempt)  # as soon as it waits
+
+    def _situation(self, about: Hashable) -> Hashable:
+        """Return all that the rest of the run depends on."""
+        if not self._merges:
+            return None
+        now = self._clock.now()
+        running = {self._root_path, *self._active}
+        parallel = running & self._parallel
+        return (
+            about,
+            self._preempts,
+            self._attempts.get(self._root_path, 0),
+            frozenset(
+                (path, self._age(path, now - t), self._attempts.get(path, 0))
+                for path, t in self._active.items()
+            ),
+            frozenset(self._hanging),
+            frozenset(self._outlasting),
+            frozenset(e for e in self._ended.items() if e[0].rpartition("/")[0] in parallel),
+            frozenset(item for item in self._items.items() if item[0] in running),
+            tuple(self._past),
+            tuple(end.situation() for end in self._kit.ends),
+            _userdata(self._root),
+        )
+
+    def _age(self, path: str, age: float) -> float:
+        """Return what an active state's age [s] means to the rest of the run, if anything."""
+        if path in self._timeless or path in self._hanging:
+            return -1.0
+        if age > STEP_S and path in self.doubles - self._bounded:
+            return math.inf  # it outlasts others, however long that takes
+        return round(age, 6)
+
+    def _preempt(self) -> None:
+        with asking("test"):
+            self._root.request_preempt()
+
+    # -- servers -------------------------------------------------------------------------------
+
+    def serve_actions(self) -> None:
+        """Offer every action that the machine uses and the test does not offer.
+
+        Those of action states are there from the beginning, those of other clients come with them.
+        """
+        kit = self._kit
+        names = {kit.node.resolve(end.name) for end in kit.ends}
+
+        def serve(name: str, type_name: str) -> None:
+            if kit.node.resolve(name) not in names:
+                names.add(kit.node.resolve(name))
+                server = kit.action_server(name, get_action(type_name))
+                server.choose_by(partial(self._choose_reply, server.name))
+
+        for state in describe(self._root).walk():
+            details = dict(state.details)
+            if state.kind == "action" and {"action", "type"} <= details.keys():
+                serve(details["action"], details["type"])
+        kit.node.on_client = serve
+
+    def _choose_reply(self, name: str) -> Reply:
+        replies = {**REPLIES, **(PREEMPTED_REPLIES if self._preempts else {})}
+        picked = list(replies)[self.choose(f"server {name}", list(replies))]
+        if picked in PREEMPTED_REPLIES:
+            self._preempts -= 1
+            self._clock.call_later(STEP_S, self._preempt)
+        return replies[picked]
+
+    # -- doubles -------------------------------------------------------------------------------
+
+    def _replace_leaves(
+        self, places: Places, container: Container, path: str, kept: set[str]
+    ) -> None:
+        real = self._options["real_actions"]
+        for label, state in list(container.get_children().items()):
+            where = f"{path}/{label}"
+            if isinstance(state, Container):
+                self._replace_leaves(places, state, where, kept)
+            elif where in kept or isinstance(state, Double):
+                continue
+            elif not real or state._smachpy_kind in _OUTSIDE:
+                self.doubles.add(where)
+                options = get_options(state)
+                if options.timeout is not None or options.retry is not None:
+                    self._bounded.add(where)
+                places.exchange(container, label, partial(self._double, path=where))
+
+    def _double(self, state: State, path: str) -> Double:
+        def execute(ud: Any) -> str:
+            return self._execute(double, path, ud)
+
+        double = Double(state, execute=execute)
+        return double
+
+    def _execute(self, double: Double, path: str, ud: Any) -> str:
+        outcomes = double.get_registered_outcomes()
+        self._attempts[path] = self._attempts.get(path, 0) + 1
+        self._steps += 1
+        if self._steps > self._options["max_steps"]:
+            self.too_long = True
+            self._root.request_preempt()
+            return PREEMPTED if PREEMPTED in outcomes else outcomes[0]
+        self._visits[path] = self._visits.get(path, -1) + 1
+        begun = self._clock.now()
+        seconds, picked = STEP_S, OUTLASTS
+        while picked == OUTLASTS:
+            if self._sleep(double, seconds) and PREEMPTED in outcomes:
+                double.service_preempt()
+                return PREEMPTED
+            seconds = self._longer_s(double, path, begun)
+            picked = self._pick(double, path, outcomes, may_outlast=seconds > 0)
+            if picked == OUTLASTS:
+                self._outlasting.add(path)
+        for key, value in self._writes.get(path, {}).items():
+            ud[key] = value
+        return self._act(double, path, picked, outcomes)
+
+    def _sleep(self, double: Double, seconds: float) -> bool:
+        """Let a double's time pass; return whether a preempt ended it."""
+        if seconds <= STEP_S:
+            return double.sleep(seconds)
+        if self._clock.limit is not None:
+            self._clock.limit += seconds  # a long run, but not an endless one
+        begin = self._clock.now()
+        asked = double.sleep(seconds)
+        self._outlasted.append((begin, self._clock.now()))
+        return asked
+
+    def _longer_s(self, double: Double, path: str, begun: float) -> float:
+        """Return how long a double would go on to outlast the others [s]; 0: it ends now.
+
+        So each of the leaves that run at once may be the next to end. The last one does end: the
+        fault "hang" is for those that never do.
+        """
+        others = self._active.keys() & self._leaves - self._hanging - self._outlasting - {path}
+        if (
+            not others
+            or not self._options["interleavings"]
+            or path in self._outlasting
+            or double.preempt_requested()
+        ):
+            return 0.0
+        timeout = get_options(double).timeout
+        if timeout is None:
+            return self._long_s
+        left = (timeout - (self._clock.now() - begun)) * WITHIN
+        return 0.0 if left <= STEP_S else min(left, self._long_s)
+
+    def _pick(
+        self, double: Double, path: str, outcomes: tuple[str, ...], *, may_outlast: bool
+    ) -> str:
+        plain = [outcome for outcome in outcomes if outcome != PREEMPTED] or list(outcomes)
+        first = self._visits[path] % len(plain)  # each is the usual one in turn: loops end
+        options = plain[first:] + plain[:first]
+        options += [OUTLASTS] if may_outlast else []
+        if self._preempts:
+            options += [PREEMPT] if PREEMPTED in outcomes else []
+            options += [LATE.format(outcome) for outcome in plain]
+        faults = self._options["faults"]
+        if get_options(double).timeout is not None or "hang" in faults or self._waits(double, path):
+            options.append(HANGS)
+        options += [RAISES, *self._raised.get(path, ())] if "raise" in faults else []
+        options += [DEAF] if "deaf" in faults and self._preempts else []
+        return options[self.choose(path, options, self._situation((path, *sorted(options))))]
+
+    def _waits(self, double: Double, path: str) -> bool:
+        """Tell whether it is a watcher beside others: it is preempted when those end."""
+        kind, details = double.describe_details()
+        if kind not in {"monitor", "condition"} or "checks" in dict(details):
+            return False
+        parent = path.rpartition("/")[0]
+        return any(p.rpartition("/")[0] == parent and p != path for p in self._active)
+
+    def _act(self, double: Double, path: str, picked: str, outcomes: tuple[str, ...]) -> str:
+        if picked == RAISES:
+            raise RuntimeError(RAISED)
+        if picked in self._raised.get(path, ()):
+            raise _made(self._raised[path][picked])
+        if picked == HANGS:
+            if get_options(double).timeout is None:
+                self._hanging.add(path)
+            double.wait_preempt()
+            self._hanging.discard(path)
+            double.service_preempt()
+            return PREEMPTED if PREEMPTED in outcomes else outcomes[0]
+        if picked in outcomes:
+            return picked
+        self._preempts -= 1
+        self._preempt()
+        if picked == DEAF:
+            self._clock.event("nothing: it ignores its preempt").wait()
+        if picked == PREEMPT:
+            double.service_preempt()
+            return PREEMPTED
+        return next(outcome for outcome in outcomes if picked == LATE.format(outcome))
+
+
+def _raised_in(
+    container: Container, path: str, around: tuple[type[BaseException], ...] = ()
+) -> Iterator[tuple[str, dict[str, type[BaseException]]]]:
+    """Yield each leaf below `container`, with the exceptions that it or its containers expect."""
+    around += _expected(container)
+    for label, state in container.get_children().items():
+        where = f"{path}/{label}"
+        if isinstance(state, Container):
+            yield from _raised_in(state, where, around)
+        else:
+            kinds = (*_expected(state), *around)
+            yield where, {RAISES_ONE.format(k.__name__): k for k in kinds if k is not RuntimeError}
+
+
+def _expected(state: State) -> tuple[type[BaseException], ...]:
+    """Return the exceptions that the options of a state name."""
+    options = get_options(state)
+    again = () if options.retry is None else options.retry.on
+    return (*options.on_exception, *(kind for kind in again if isinstance(kind, type)))
+
+
+def _made(kind: type[BaseException]) -> BaseException:
+    try:
+        return kind(RAISED)
+    except Exception:  # noqa: BLE001  it takes other arguments, which do not matter here
+        return kind.__new__(kind, RAISED)
+
+
+def _can_be_made(kind: type[BaseException]) -> bool:
+    try:
+        str(_made(kind))
+    except Exception:  # noqa: BLE001  whatever is missing in it
+        return False
+    return True
+
+
+def _userdata(container: Container) -> Hashable:
+    """Return the userdata of a container and of all below it, to be compared."""
+    data = container.userdata
+    own = tuple((key, repr(writable(data[key]))) for key in sorted(data.keys()))
+    children = container.get_children().values()
+    return (own, *[_userdata(child) for child in children if isinstance(child, Container)])
+
+
+def _kept_by(record: StateRecord, names: Iterable[str]) -> set[str]:
+    """Return the paths of the leaves that stay as they are.
+
+    Args:
+        record: The machine.
+        names: Paths, or ends of paths, which may mean several; a container means all in it.
+
+    Raises:
+        UnknownStateError: there is no such state.
+    """
+    leaves = [state.path for state in record.walk() if not state.is_container]
+    kept: set[str] = set()
+    for name in names:
+        end = "/" + name.strip("/")
+        found = [s.path for s in record.walk() if s.path == name or s.path.endswith(end)]
+        tops = found or [find_path(record, name)]  # which says what there is
+        kept.update(leaf for leaf in leaves if any(f"{leaf}/".startswith(f"{t}/") for t in tops))
+    return kept

@@ -1,0 +1,1 @@
+"""Userdata: keys, remapping, read-only views, typed values."""

@@ -1,0 +1,158 @@
+"""Userdata as JSON text: what introspection sends instead of pickles.
+
+Reading it builds data only: numbers, texts, containers, ROS times and messages. No class is
+looked up by name except message types, so a text from the network runs no code.
+
+Python values that JSON does not have are objects with one key that begins with `$`:
+
+    {"$tuple": [...]}  {"$set": [...]}  {"$bytes": "base64"}  {"$float": "nan" | "inf" | "-inf"}
+    {"$time": [secs, nsecs]}  {"$duration": [secs, nsecs]}
+    {"$msg": "pkg/Type", "fields": {...}}       a message
+    {"$items": [[key, value], ...]}             a dict whose keys are not plain texts
+    {"$repr": "text"}                           a value of which only the text is sent
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import contextlib
+import json
+import math
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.exceptions import ActionlibError
+from actionlib_core.time import Duration, Time
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+_DEPTH = 40
+_SIZED = (str, bytes, bytearray, list, tuple, dict, set, frozenset)
+
+
+def dumps(values: Mapping[str, Any], *, longest: int | None = None) -> str:
+    """Return `values` as JSON text; what has no JSON form becomes a `$repr`.
+
+    Args:
+        values: By name.
+        longest: Texts, bytes and containers with more elements become a `$repr` of their size, for
+            showing; None: everything is written.
+    """
+    encoded = {key: _encode(value, longest, 0) for key, value in values.items()}
+    return json.dumps(encoded, allow_nan=False)
+
+
+def loads(text: str) -> dict[str, Any]:
+    """Rebuild the values of a `dumps` text; "" is an empty dict.
+
+    Raises:
+        ValueError: The text is no JSON object, or a value in it cannot be rebuilt: a `$repr`, an
+            unknown message type, fields that do not fit. Names the place.
+    """
+    if not text:
+        return {}
+    try:
+        data = json.loads(text)
+        if not isinstance(data, dict):
+            raise ValueError(f"userdata: got {type(data).__name__}; expected a JSON object.")  # noqa: TRY004
+        return {key: _decode(value, f"$.{key}") for key, value in data.items()}
+    except RecursionError as error:
+        raise ValueError("userdata: nested too deeply.") from error
+
+
+def find_lost(values: Mapping[str, Any]) -> list[str]:
+    """Return the keys whose values `dumps` cannot carry over, in order."""
+    return [key for key, value in values.items() if '{"$repr"' in dumps({"_": value})]
+
+
+def _encode(value: Any, longest: int | None, depth: int) -> Any:
+    """Return what JSON knows in place of a value; `longest` as in `dumps`."""
+    if value is None or isinstance(value, bool):
+        return value
+    if longest is not None and isinstance(value, _SIZED) and len(value) > longest:
+        return {"$repr": f"<{type(value).__name__} of {len(value)} elements>"}
+    if isinstance(value, str):
+        return str(value)
+    if depth < _DEPTH:
+        inside = partial(_encode, longest=longest, depth=depth + 1)
+        for kind, encode in _ENCODERS:
+            if isinstance(value, kind):
+                return encode(value, inside)
+        if hasattr(value, "_md5sum") and hasattr(value, "to_dict"):
+            with contextlib.suppress(ActionlibError):  # a field holds what it cannot carry: show it
+                return {"$msg": value._type, "fields": inside(value.to_dict())}
+    return {"$repr": _repr(value)}
+
+
+def _encode_dict(value: dict[Any, Any], inside: Callable[[Any], Any]) -> Any:
+    if all(isinstance(key, str) and not key.startswith("$") for key in value):
+        return {key: inside(item) for key, item in value.items()}
+    return {"$items": [[inside(key), inside(item)] for key, item in value.items()]}
+
+
+_ENCODERS: tuple[tuple[Any, Callable[[Any, Callable[[Any], Any]], Any]], ...] = (
+    (int, lambda value, _: int(value)),
+    (float, lambda x, _: float(x) if math.isfinite(x) else {"$float": str(float(x))}),
+    (list, lambda value, inside: [inside(item) for item in value]),
+    (tuple, lambda value, inside: {"$tuple": [inside(item) for item in value]}),
+    (dict, _encode_dict),
+    ((set, frozenset), lambda value, inside: {"$set": sorted(map(inside, value), key=repr)}),
+    ((bytes, bytearray), lambda value, _: {"$bytes": base64.b64encode(value).decode()}),
+    (Time, lambda value, _: {"$time": [value.secs, value.nsecs]}),
+    (Duration, lambda value, _: {"$duration": [value.secs, value.nsecs]}),
+)
+
+
+def _repr(value: Any) -> str:
+    try:
+        return repr(value)
+    except Exception as error:  # noqa: BLE001  foreign code: its failure is what there is to show
+        return f"<{type(value).__name__}: its repr raised {type(error).__name__}>"
+
+
+def _decode(data: Any, where: str) -> Any:
+    if isinstance(data, list):
+        return _decode_list(data, where)
+    if not isinstance(data, dict):
+        return data
+    marks = [key for key in data if key.startswith("$")]
+    if not marks:
+        return {key: _decode(value, f"{where}.{key}") for key, value in data.items()}
+    decode = _DECODERS.get(marks[0])
+    if decode is None:
+        reason = "its sender could only show it" if marks[0] == "$repr" else "unknown"
+        raise ValueError(
+            f"userdata: {where}: got {data!r}: {reason}; expected one of {sorted(_DECODERS)}."
+        )
+    try:
+        return decode(data, where)
+    except (TypeError, ValueError, KeyError, binascii.Error, ActionlibError) as error:
+        if isinstance(error, ValueError) and str(error).startswith("userdata: "):
+            raise
+        raise ValueError(f"userdata: {where}: {error}") from error
+
+
+def _decode_list(data: Any, where: str) -> list[Any]:
+    if not isinstance(data, list):
+        raise TypeError(f"got {data!r}; expected a list.")
+    return [_decode(item, f"{where}[{i}]") for i, item in enumerate(data)]
+
+
+def _decode_message(data: dict[str, Any], where: str) -> Any:
+    from actionlib_core.interfaces import get_message
+
+    return get_message(data["$msg"]).from_dict(_decode(data["fields"], where))
+
+
+_DECODERS: dict[str, Callable[[dict[str, Any], str], Any]] = {
+    "$tuple": lambda data, where: tuple(_decode_list(data["$tuple"], where)),
+    "$set": lambda data, where: set(_decode_list(data["$set"], where)),
+    "$items": lambda data, where: dict(_decode_list(data["$items"], where)),
+    "$bytes": lambda data, _: base64.b64decode(data["$bytes"], validate=True),
+    "$float": lambda data, _: float(data["$float"]),
+    "$time": lambda data, _: Time(*data["$time"]),
+    "$duration": lambda data, _: Duration(*data["$duration"]),
+    "$msg": _decode_message,
+}

@@ -1,0 +1,242 @@
+"""Read-only views of values, which are still instances of the value's class.
+
+The view of a list, dict or set is an instance of a subclass that holds read-only elements and whose
+mutating methods raise. The view of an object is an instance of a subclass that shares the object's
+attributes and returns them read-only, so that its methods, operators and `isinstance` work. Objects
+of classes that cannot be subclassed so (locks, files, functions, modules) are returned as they are.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import enum
+import functools
+import types
+from collections import OrderedDict, deque
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from smachpy.context import current_path
+from smachpy.exceptions import ReadOnlyError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_HEAP_TYPE = 1 << 9  # Py_TPFLAGS_HEAPTYPE: the class was not compiled into the interpreter
+
+# Types whose instances cannot change: they need no view.
+ATOMS: frozenset[type] = frozenset(
+    {int, float, complex, bool, str, bytes, type(None), type(Ellipsis), range, type}
+    | {types.FunctionType, types.BuiltinFunctionType, types.MethodType, types.ModuleType}
+)
+
+
+def read_only(value: Any, key: str = "") -> Any:
+    """Return a read-only view of `value`, or `value` itself when it needs none.
+
+    Args:
+        value: Anything.
+        key: The userdata key that it, or what it is part of, was read from; for errors.
+    """
+    kind = type(value)
+    if kind in ATOMS:
+        return value
+    maker = _maker(kind)  # type: ignore[arg-type]  # a type is hashable
+    return value if maker is None else maker(value, key)
+
+
+def writable(value: Any) -> Any:
+    """Undo `read_only`, also inside lists, tuples, sets and dicts; others come back as they are."""
+    kind = type(value)
+    if kind in ATOMS:
+        return value
+    if issubclass(kind, _View):
+        return value._smach_original  # noqa: SLF001  our own view
+    if kind is list or kind is tuple or kind is set or kind is frozenset:
+        if any(_holds_view(item) for item in value):
+            return kind(writable(item) for item in value)
+        return value
+    if kind is dict and any(_holds_view(item) for item in value.values()):
+        return {key: writable(item) for key, item in value.items()}
+    return value
+
+
+def _holds_view(value: Any) -> bool:
+    kind = type(value)
+    if kind in ATOMS:
+        return False
+    if issubclass(kind, _View):
+        return True
+    if kind is list or kind is tuple or kind is set or kind is frozenset:
+        return any(map(_holds_view, value))
+    return kind is dict and any(map(_holds_view, value.values()))
+
+
+class _View:
+    """Base of all views; `_smach_original` is the viewed object, `_smach_key` its userdata key."""
+
+    __slots__ = ()
+    _smach_original: Any
+    _smach_key: str
+
+
+def _refuse(self: Any, *_args: Any, **_kwargs: Any) -> NoReturn:
+    name, key = type(self).__name__, self._smach_key
+    path = current_path()
+    raise ReadOnlyError(
+        f"{path or 'userdata'}: read-only value{f' of {key!r}' if key else ''}: got a change of a "
+        f"{name}; expected reading only, because its userdata key is declared as input. Try "
+        f"declaring it with io_keys{f'=[{key!r}]' if key else ''}.",
+        key=key,
+        path=path,
+    )
+
+
+_SEQUENCE = (
+    *("append", "extend", "insert", "remove", "pop", "clear", "reverse"),
+    *("__setitem__", "__delitem__", "__iadd__", "__imul__"),
+)
+_CHANGES: dict[type, tuple[str, ...]] = {
+    list: (*_SEQUENCE, "sort"),
+    bytearray: _SEQUENCE,
+    deque: (*_SEQUENCE, "appendleft", "extendleft", "popleft", "rotate"),
+    dict: (
+        *("update", "clear", "pop", "popitem", "setdefault"),
+        *("__setitem__", "__delitem__", "__ior__"),
+    ),
+    set: (
+        *("add", "discard", "remove", "pop", "clear", "update", "difference_update"),
+        *("intersection_update", "symmetric_difference_update"),
+        *("__iand__", "__ior__", "__isub__", "__ixor__"),
+    ),
+}
+
+
+@functools.lru_cache(maxsize=1024)
+def _maker(kind: type) -> Callable[[Any, str], Any] | None:
+    """Return the function that makes a view of an instance of `kind`, or None for none."""
+    if issubclass(kind, (_View, type, enum.Enum, BaseException, frozenset)):
+        return None
+    if kind.__module__ == "numpy" and kind.__name__ == "ndarray":
+        return _array_view
+    if issubclass(kind, tuple):
+        if kind is tuple:
+            return _tuple_view
+        return _named_tuple_view if hasattr(kind, "_make") else None
+    base = next((base for base in _CHANGES if issubclass(kind, base)), None)
+    if base is None and not kind.__flags__ & _HEAP_TYPE:  # a class of C: a handle
+        return None
+    return _view_maker(kind, base)
+
+
+def _tuple_view(value: tuple[Any, ...], key: str) -> tuple[Any, ...]:
+    if all(type(item) in ATOMS for item in value):
+        return value
+    return tuple([read_only(item, key) for item in value])
+
+
+def _named_tuple_view(value: Any, key: str) -> Any:
+    if all(type(item) in ATOMS for item in value):
+        return value
+    return type(value)._make([read_only(item, key) for item in value])
+
+
+def _array_view(value: Any, _key: str) -> Any:
+    view = value.view()
+    view.flags.writeable = False
+    return view
+
+
+def _view_maker(kind: type, base: type | None) -> Callable[[Any, str], Any] | None:
+    view_class = _view_class(kind, base)
+    if view_class is None:
+        return None
+    new: Any = object.__new__ if base is None else base.__new__
+    try:
+        new(view_class)
+    except TypeError:  # made in C: only its own constructor makes instances
+        return None
+    slots = _slots_of(kind)
+    has_dict = kind.__dictoffset__ != 0
+
+    def make(value: Any, key: str) -> Any:
+        view = new(view_class)
+        if base is not None:
+            _fill(base, view, value, key)
+        for slot in slots:
+            with contextlib.suppress(AttributeError):  # an empty slot
+                object.__setattr__(view, slot, object.__getattribute__(value, slot))
+        if has_dict:
+            object.__setattr__(view, "__dict__", value.__dict__)
+        object.__setattr__(view, "_smach_original", value)
+        object.__setattr__(view, "_smach_key", key)
+        return view
+
+    return make
+
+
+def _view_class(kind: type, base: type | None) -> Any:
+    """Return the class of views of `kind`; None when it cannot be subclassed."""
+    getter: Any = kind.__getattribute__
+
+    def __getattribute__(self: Any, name: str) -> Any:  # noqa: N807
+        value = getter(self, name)
+        if type(value) in ATOMS or name[:2] == "__" or name == "_smach_original":
+            return value
+        return read_only(value, self._smach_key)
+
+    body: dict[str, Any] = dict.fromkeys(() if base is None else _CHANGES[base], _refuse)
+    body |= {
+        "__slots__": ("_smach_key", "_smach_original"),
+        "__class__": property(lambda _self: kind),  # dataclasses compare `__class__`
+        "__module__": kind.__module__,
+        "__qualname__": kind.__qualname__,
+        "__doc__": kind.__doc__,
+        "__hash__": kind.__hash__,
+        "__reduce_ex__": _reduce,
+    }
+    if kind is not base:
+        body |= {
+            "__getattribute__": __getattribute__,
+            "__setattr__": _refuse,
+            "__delattr__": _refuse,
+        }
+    try:
+        return types.new_class(kind.__name__, (kind, _View), exec_body=lambda ns: ns.update(body))
+    except TypeError:  # a final class, or a metaclass with demands of its own
+        return None
+
+
+def _fill(base: type, view: Any, value: Any, key: str) -> None:
+    """Give a new view of a built-in container its read-only elements."""
+    if isinstance(value, OrderedDict):
+        for name, item in value.items():
+            OrderedDict.__setitem__(view, name, read_only(item, key))
+    elif base is dict:
+        dict.update(view, {n: read_only(item, key) for n, item in dict.items(value)})
+    elif base is set:
+        set.update(view, value)
+    elif base is bytearray:
+        bytearray.extend(view, value)
+    elif base is deque:
+        deque.__init__(view, [read_only(item, key) for item in value], value.maxlen)
+    else:
+        list.extend(
+            view, [x if type(x) in ATOMS else read_only(x, key) for x in list.__iter__(value)]
+        )
+
+
+def _reduce(self: Any, protocol: Any) -> Any:
+    """Copy and pickle as the original: a copy may be changed."""
+    return self._smach_original.__reduce_ex__(protocol)
+
+
+def _slots_of(kind: type) -> tuple[str, ...]:
+    found: list[str] = []
+    for cls in kind.__mro__:
+        slots = cls.__dict__.get("__slots__", ())
+        for slot in (slots,) if isinstance(slots, str) else slots:
+            if slot in {"__dict__", "__weakref__"}:
+                continue
+            mangled = slot.startswith("__") and not slot.endswith("__")
+            found.append(f"_{cls.__name__.lstrip('_')}{slot}" if mangled else slot)
+    return tuple(found)

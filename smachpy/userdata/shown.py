@@ -1,0 +1,156 @@
+"""The text of a value for display: its `repr`, unless that would take too long.
+
+`repr` has no limit, so the parts of the value are counted first. Known are Python's containers,
+messages, dataclasses, namespaces and exceptions, and everything that has a length; the `__repr__`
+of any other class is called without a check.
+"""
+
+from __future__ import annotations
+
+from collections import UserDict, UserList, deque
+from collections.abc import ItemsView, KeysView, ValuesView
+from dataclasses import fields
+from itertools import chain
+from types import MappingProxyType, SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+LONGEST_TEXT = 4_000
+LONGEST_LIST = 1_000
+DEEPEST = 20
+MOST_ITEMS = 10_000
+MOST_TEXT = 100_000
+WIDEST_INT = 1_024  # bits
+"""Limits of values in a record, which are for display, not for computing.
+
+The first three hold for each part, the next two for a whole record, so that making one takes some
+milliseconds at most.
+"""
+
+_MOST_READ = 4 * LONGEST_TEXT  # characters that a `repr` may be made of, of which most are cut
+_DEEPEST_REPR = 100
+_SMALL = frozenset({type(None), bool, float, complex, range, type})
+_MAPPINGS = (dict, UserDict, MappingProxyType)
+_LISTS = (list, tuple, set, frozenset, deque, UserList, KeysView, ValuesView, ItemsView)
+
+
+class Room:
+    """How much may still be put into a record."""
+
+    __slots__ = ("items", "text")
+
+    def __init__(self, items: int = MOST_ITEMS, text: int = MOST_TEXT) -> None:
+        self.items = items
+        self.text = text
+
+
+def text_of(value: Any, room: Room, depth: int = 0) -> str:
+    """Return `repr(value)`, or a text with only the sizes of the parts that are too large.
+
+    It may be longer than the room for text: the caller cuts it. Every part that was visited is
+    taken from the room for items. If the value's own code raises, the text says so.
+    """
+    try:
+        left = Room(room.items, min(room.text, _MOST_READ))
+        fits = _fits(value, left, set())
+        spent = room.items - max(left.items, 0)
+        room.items -= spent if fits else spent // 4  # counting costs less than formatting
+        return repr(value) if fits else _outline(value, room, depth)
+    except Exception as error:  # noqa: BLE001  foreign code: its failure is what there is to show
+        return f"<{type(value).__name__}: its repr raised {type(error).__name__}>"
+
+
+def _fits(value: Any, left: Room, above: set[int]) -> bool:
+    """Return whether the `repr` is short enough; take its parts from `left`."""
+    kind: Any = type(value)
+    if kind in _SMALL or kind.__repr__ is object.__repr__:
+        return True
+    if isinstance(value, int):
+        return value.bit_length() <= WIDEST_INT
+    if isinstance(value, (str, bytes, bytearray)):
+        left.text -= len(value)
+        return left.text >= 0 and (isinstance(value, str) or len(value) <= LONGEST_LIST)
+    size = _size(value)
+    if size is not None and size > min(LONGEST_LIST, left.items):
+        return False
+    inside = _inside(value)
+    return inside is None or id(value) in above or _all_fit(inside, left, {*above, id(value)})
+
+
+def _all_fit(inside: Iterable[Any], left: Room, above: set[int]) -> bool:
+    if len(above) > _DEEPEST_REPR:
+        return False
+    for one in inside:
+        left.items -= 1
+        if left.items < 0 or not _fits(one, left, above):
+            return False
+    return True
+
+
+def _size(value: Any) -> int | None:
+    if not hasattr(type(value), "__len__"):
+        return None
+    try:
+        return len(value)
+    except Exception:  # noqa: BLE001  foreign code: an array of no dimensions has no length
+        return None
+
+
+def _inside(value: Any) -> Iterable[Any] | None:
+    """Return the parts of a value's `repr`; None if they are not known."""
+    if isinstance(value, _LISTS):
+        return value
+    if isinstance(value, _MAPPINGS):
+        return chain(value, value.values())
+    named = _fields(value)
+    return None if named is None else [part for _, part in named]
+
+
+def _fields(value: Any) -> list[tuple[str, Any]] | None:
+    """Return pairs (prefix, part) of a value whose `repr` looks like a call."""
+    kind: Any = type(value)
+    if hasattr(kind, "__dataclass_fields__") and hasattr(kind.__repr__, "__wrapped__"):
+        names = [field.name for field in fields(value) if field.repr]
+        return [(f"{name}=", getattr(value, name)) for name in names]
+    if hasattr(kind, "_md5sum") and hasattr(kind, "__slots__"):
+        return [(f"{name}=", getattr(value, name, None)) for name in kind.__slots__]
+    if isinstance(value, SimpleNamespace):
+        return [(f"{name}=", part) for name, part in vars(value).items()]
+    if isinstance(value, BaseException):
+        return [("", part) for part in value.args]
+    return None
+
+
+def _outline(value: Any, room: Room, depth: int) -> str:
+    """Return the text of a value that does not fit: its few named parts, else its size."""
+    kind: Any = type(value)
+    if isinstance(value, int):
+        return f"<int of {value.bit_length()} bits>"
+    if isinstance(value, str):
+        return repr(value[: min(LONGEST_TEXT, max(room.text, 0))]) + "\u2026"
+    named = _fields(value)
+    size = len(value if named is None else named)
+    if size > min(LONGEST_LIST, room.items) or depth >= DEEPEST:
+        return f"<{kind.__name__} of {size} elements>"
+    room.items -= size
+    if named is not None:
+        return _joined(f"{kind.__qualname__}(", named, ")", room, depth)
+    if kind.__repr__ is dict.__repr__:
+        pairs = ((f"{text_of(key, room, depth + 1)}: ", part) for key, part in value.items())
+        return _joined("{", pairs, "}", room, depth)
+    return f"<{kind.__name__} of {size} elements>"
+
+
+def _joined(
+    before: str, pairs: Iterable[tuple[str, Any]], after: str, room: Room, depth: int
+) -> str:
+    """Join the parts' texts, up to the longest text of a record."""
+    parts, length = [], 0
+    for name, part in pairs:
+        parts.append(name + text_of(part, room, depth + 1))
+        length += len(parts[-1])
+        if length > LONGEST_TEXT:
+            break
+    return f"{before}{', '.join(parts)}{after}"

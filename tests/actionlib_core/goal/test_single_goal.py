@@ -1,0 +1,141 @@
+"""One goal at a time: the three policies."""
+
+from __future__ import annotations
+
+import hypothesis.strategies as st
+import pytest
+from hypothesis import given
+
+from actionlib_core.goal.single import POLICIES, SingleGoal
+
+
+def test_newer_goal_preempts_and_the_waiting_one_is_recalled():
+    policy = SingleGoal()
+    assert policy.on_goal("a", 1).announce
+    assert policy.accept() == ("a", None)
+    first = policy.on_goal("b", 2)
+    assert (first.preempt, first.recall) == (True, ())
+    second = policy.on_goal("c", 3)
+    assert (second.preempt, second.recall) == (True, ("b",))
+    assert policy.preempt_requested
+    policy.on_ended("a")
+    assert policy.accept() == ("c", None)
+    assert not policy.preempt_requested
+
+
+def test_goal_with_an_older_stamp_is_recalled():
+    policy = SingleGoal()
+    policy.on_goal("a", 5)
+    policy.accept()
+    decision = policy.on_goal("old", 4)
+    assert decision.recall == ("old",)
+    assert not decision.preempt
+    assert policy.on_goal("same", 5).announce
+
+
+def test_accepting_while_one_runs_pushes_it_aside():
+    policy = SingleGoal()
+    policy.on_goal("a", 1)
+    policy.accept()
+    policy.on_goal("b", 2)
+    assert policy.accept() == ("b", "a")
+
+
+def test_cancel_of_the_waiting_goal_recalls_it_or_starts_it_preempted():
+    policy = SingleGoal()
+    policy.on_goal("a", 1)
+    assert policy.on_cancel("a", recall_waiting=True).recall == ("a",)
+    assert policy.accept() == (None, None)
+    policy.on_goal("b", 2)
+    assert policy.on_cancel("b", recall_waiting=False).recall == ()
+    policy.accept()
+    assert policy.preempt_requested
+
+
+def test_each_goal_of_a_queue_is_cancelled_for_itself():
+    """A cancel counted only for the goal that was next."""
+    policy, names = SingleGoal("queue"), ["a", "b", "c", "d"]
+    for name in names:
+        policy.on_goal(name, 1)
+    assert policy.on_cancel("c", recall_waiting=False).recall == ()
+    policy.on_cancel("d", recall_waiting=False)
+    preempted = []
+    for name in names:
+        assert policy.accept()[0] == name
+        preempted.append(policy.preempt_requested)
+        policy.on_ended(name)
+    assert preempted == [False, False, True, True]
+
+
+@pytest.mark.parametrize("policy_name", POLICIES)
+def test_cancel_of_a_goal_that_is_withdrawn_preempts_no_other(policy_name):
+    """The next goal began as if it had been cancelled."""
+    policy = SingleGoal(policy_name)
+    policy.on_goal("a", 1)
+    policy.on_cancel("a", recall_waiting=False)
+    assert policy.withdraw() == "a"
+    policy.on_goal("b", 2)
+    assert policy.accept() == ("b", None)
+    assert not policy.preempt_requested
+
+
+def test_queue_runs_goals_in_order_and_preempts_none():
+    policy = SingleGoal("queue")
+    policy.on_goal("a", 3)
+    policy.accept()
+    for name, stamp in (("b", 2), ("c", 1)):
+        decision = policy.on_goal(name, stamp)
+        assert (decision.preempt, decision.recall) == (False, ())
+    policy.on_ended("a")
+    assert policy.accept()[0] == "b"
+    policy.on_ended("b")
+    assert policy.accept()[0] == "c"
+
+
+def test_reject_turns_goals_away_while_one_runs_or_waits():
+    policy = SingleGoal("reject")
+    policy.on_goal("a", 1)
+    assert policy.on_goal("b", 2).reject == "b"
+    policy.accept()
+    assert policy.on_goal("c", 3).reject == "c"
+    policy.on_ended("a")
+    assert policy.on_goal("d", 4).announce
+
+
+def test_unknown_policy_names_the_known():
+    with pytest.raises(ValueError, match=r"'fifo'.*'preempt', 'queue', 'reject'"):
+        SingleGoal("fifo")
+
+
+@given(
+    st.sampled_from(POLICIES),
+    st.lists(st.tuples(st.sampled_from("gcae"), st.integers(0, 5)), max_size=40),
+)
+def test_every_goal_is_accepted_or_turned_away_once(policy_name, events):
+    policy = SingleGoal(policy_name)
+    sent, fate = [], {}
+
+    def note(goals, what):
+        for goal in goals:
+            assert goal not in fate
+            fate[goal] = what
+
+    for kind, number in events:
+        if kind == "g":
+            goal = f"g{len(sent)}"
+            sent.append(goal)
+            decision = policy.on_goal(goal, number)
+            note(decision.recall, "recalled")
+            note([decision.reject] if decision.reject else [], "rejected")
+        elif kind == "c" and sent:
+            decision = policy.on_cancel(sent[number % len(sent)], recall_waiting=True)
+            note(decision.recall, "recalled")
+        elif kind == "a" and not policy.running:
+            new, pushed = policy.accept()
+            assert pushed is None
+            note([new] if new else [], "accepted")
+        elif kind == "e" and policy.current:
+            policy.on_ended(policy.current)
+    while policy.waiting:
+        note([policy.accept()[0]], "accepted")
+    assert set(fate) == set(sent)

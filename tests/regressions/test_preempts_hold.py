@@ -1,0 +1,785 @@
+"""Preempts hold whatever children, callbacks and listeners do, and no flag outlives its run."""
+
+from __future__ import annotations
+
+import io
+import logging
+import os
+import signal
+import sys
+import threading
+
+import pytest
+
+import smachpy
+from actionlib_core import shutdown
+from actionlib_core.clock import RealClock, use_clock
+from actionlib_core.node import Node
+from actionlib_core.shutdown import Shutdown, use_shutdown
+from actionlib_core.transport.memory import MemoryNetwork
+from smachpy import Concurrence, Iterator, State, StateMachine
+from smachpy.events import (
+    Abandoned,
+    CallbackFailed,
+    Left,
+    PreemptRequested,
+    PreemptServiced,
+    Resumed,
+)
+from smachpy.network.server import IntrospectionServer
+from smachpy.run.child import on_preempt
+
+LONG_S = 20.0
+
+
+class Work(State):
+    """Works for `seconds`, unless it is asked to stop."""
+
+    def __init__(self, seconds=1.0, **options):
+        super().__init__(["done", "preempted"], output_keys=["n"], **options)
+        self.seconds = seconds
+
+    def execute(self, userdata):
+        if self.sleep(self.seconds):
+            return "preempted"
+        userdata.n = 1
+        return "done"
+
+
+def both(*states, **options):
+    made = Concurrence(
+        ["done", "other", "preempted"],
+        "other",
+        outcome_map={"done": {f"S{i}": "done" for i in range(len(states))}},
+        **options,
+    )
+    for number, state in enumerate(states):
+        made.add(f"S{number}", state)
+    return made
+
+
+def chain(*states, **options):
+    made = StateMachine(["done", "preempted"], **options)
+    for number, state in enumerate(states):
+        target = "done" if number == len(states) - 1 else f"S{number + 1}"
+        ways = dict.fromkeys(("done", "other"), target)
+        known = state.get_registered_outcomes()
+        made.add(f"S{number}", state, {o: way for o, way in ways.items() if o in known})
+    return made
+
+
+# -- no flag outlives its run -------------------------------------------------------------------
+
+
+def test_a_preempt_in_a_start_callback_leaves_nothing_for_the_next_run(clock):
+    machine = both(Work(3.0), Work(3.0), preempt_timeout=1.0)
+    asked = []
+    machine.register_start_cb(lambda *_: asked or (asked.append(1), machine.request_preempt()))
+    heard = []
+    machine.subscribe(heard.append)
+    assert machine.execute() == "preempted"
+    told = [e.path for e in heard if isinstance(e, PreemptRequested)]
+    assert told == ["/SM_ROOT"]  # children that never began are told nothing
+    assert machine.execute() == "done"
+    assert clock.now() == 3.0
+    assert not any(isinstance(e, Abandoned) for e in heard)
+
+
+@pytest.mark.parametrize("where", ["execute", "on_exit"])
+def test_the_request_of_a_state_itself_does_not_survive_what_it_raises(clock, where):
+    class Breaks(State):
+        broken = True
+
+        def __init__(self):
+            super().__init__(["done", "preempted"], on_exit=self.leave)
+
+        def leave(self, *_):
+            if self.broken and where == "on_exit":
+                raise OSError("gripper")
+
+        def execute(self, userdata):
+            if self.broken:
+                self.request_preempt()
+                if where == "execute":
+                    raise OSError("gripper")
+                return "done"
+            return "preempted" if self.sleep(1.0) else "done"
+
+    for wrap in (
+        lambda state: chain(state),
+        lambda state: both(state, Work()),
+        lambda state: Iterator(["done", "preempted"], [], [], it=[1, 2], exhausted_outcome="done"),
+    ):
+        state = Breaks()
+        machine = wrap(state)
+        if isinstance(machine, Iterator):
+            machine.set_contained_state("W", state, loop_outcomes=["done"])
+        with pytest.raises(smachpy.InvalidUserCodeError):
+            machine.execute()
+        assert not state.preempt_requested()
+        state.broken = False
+        assert machine.execute() == "done"
+
+
+def test_a_preempt_at_a_branch_that_a_pause_holds_back_lets_it_go(clock):
+    machine = both(Work(), Work(), child_termination_cb=lambda _: True)
+    machine.control.add_breakpoint("/SM_ROOT/S1")
+    paused = []
+
+    def listen(event):
+        if isinstance(event, smachpy.events.Paused):
+            paused.append(event.path)
+
+    machine.subscribe(listen)
+    held = clock.spawn(lambda: (clock.sleep(2.0), machine.control.resume()), name="operator")
+    assert machine.execute() in {"other", "preempted"}
+    held.join()
+    assert not machine["S1"].preempt_requested()
+    machine.control.remove_breakpoint("/SM_ROOT/S1")
+    machine.control.resume()
+
+
+# -- a child's own request_preempt --------------------------------------------------------------
+
+
+class Own(Work):
+    """Overrides `request_preempt` as programs for SMACH do; `what` is what else it does."""
+
+    def __init__(self, what, seconds=30.0, **options):
+        super().__init__(seconds, **options)
+        self.what = what
+        self.calls = 0
+
+    def request_preempt(self):
+        self.calls += 1
+        super().request_preempt()
+        self.what(self)
+
+
+def raises(error):
+    def what(_state):
+        raise error
+
+    return what
+
+
+@pytest.mark.parametrize(
+    "error", [ConnectionError("no answer"), SystemExit(1), KeyboardInterrupt()], ids=repr
+)
+@pytest.mark.parametrize("kind", [both, chain])
+def test_a_request_that_raises_stops_nothing(clock, kind, error):
+    machine = kind(Own(raises(error)), Work(30.0), Work(30.0))
+    heard = []
+    machine.subscribe(heard.append)
+    clock.call_later(1.0, machine.request_preempt)
+    assert machine.execute() == "preempted"
+    assert clock.now() == 1.0
+    failed = [e for e in heard if isinstance(e, CallbackFailed)]
+    assert [e.path for e in failed] == ["/SM_ROOT/S0"]
+    assert type(error).__name__ in failed[0].error
+    assert not any(state.preempt_requested() for state in machine.get_children().values())
+
+
+def test_a_request_that_raises_keeps_the_grace(clock):
+    class Deaf(Own):
+        def execute(self, userdata):
+            self.clock().sleep(30.0)
+            return "done"
+
+    machine = both(Deaf(raises(OSError("bus"))), Work(30.0), preempt_timeout=2.0)
+    clock.call_later(1.0, machine.request_preempt)
+    assert machine.execute() == "preempted"
+    assert clock.now() == 3.0
+
+
+def test_a_request_that_does_not_pass_it_on_has_a_grace_too(clock):
+    class Refuses(Work):
+        def request_preempt(self):
+            """Say nothing."""
+
+        def execute(self, userdata):
+            self.clock().sleep(30.0)
+            return "done"
+
+    machine = both(Refuses(), Work(30.0), preempt_timeout=2.0)
+    clock.call_later(1.0, machine.request_preempt)
+    assert machine.execute() == "preempted"
+    assert clock.now() == 3.0
+
+
+@pytest.mark.parametrize("kind", [both, chain])
+def test_a_request_that_blocks_holds_nobody_up(clock, kind):
+    never = clock.event("never")
+    machine = kind(Own(lambda _: never.wait(500.0)), Work(30.0), Work(30.0), preempt_timeout=2.0)
+    heard = []
+    machine.subscribe(heard.append)
+    clock.call_later(1.0, machine.request_preempt)
+    assert machine.execute() == "preempted"
+    assert clock.now() <= 3.0
+    told = {e.path: e.t for e in heard if isinstance(e, PreemptRequested)}
+    assert set(told.values()) == {1.0}
+    never.set()
+
+
+@pytest.mark.parametrize("kind", [both, chain])
+def test_a_request_that_asks_the_root_or_itself_ends(clock, kind):
+    def again(state):
+        machine.request_preempt()
+        if state.calls < 100:
+            state.request_preempt()
+
+    state = Own(again)
+    machine = kind(state, Work(30.0))
+    clock.call_later(1.0, machine.request_preempt)
+    assert machine.execute() == "preempted"
+    assert clock.now() == 1.0
+    assert not state.preempt_requested()
+
+
+def test_a_container_that_overrides_it_is_told_and_called_once(clock):
+    class Mine(StateMachine):
+        calls = 0
+
+        def request_preempt(self):
+            self.calls += 1
+            super().request_preempt()
+            raise RuntimeError("mine")
+
+    inner = Mine(["done", "preempted"])
+    inner.add("X", Work(30.0))
+    machine = chain(inner)
+    clock.call_later(1.0, machine.request_preempt)
+    clock.call_later(1.0, machine.request_preempt)
+    assert machine.execute() == "preempted"
+    assert clock.now() == 1.0
+    assert inner.calls == 1
+    assert not inner.preempt_requested()
+
+
+def test_what_a_late_request_does_meets_no_later_visit(clock):
+    """The next visit waits for the request of the last one."""
+    order = []
+
+    class Slow(Own):
+        def execute(self, userdata):
+            order.append("run")
+            return super().execute(userdata)
+
+    def slow(_state):
+        clock.sleep(0.5)
+        order.append("told")
+
+    state = Slow(slow, 2.0)
+    machine = StateMachine(["done", "preempted"])
+    machine.add("S", state, {"preempted": "S", "done": "done"})
+    clock.call_later(1.0, machine.request_preempt)
+    assert machine.execute() == "done"
+    assert order == ["run", "told", "run"]
+
+
+@pytest.mark.parametrize("what", ["raises", "blocks"])
+def test_ctrl_c_requests_the_shutdown_whatever_the_root_makes_of_it(what):
+    blocked = threading.Event()
+
+    class Root(StateMachine):
+        def request_preempt(self, **options):
+            super().request_preempt(**options)
+            if what == "raises":
+                raise ConnectionError("no answer")
+            blocked.wait(LONG_S)
+
+    ending = Shutdown()
+    with use_clock(RealClock()), use_shutdown(ending):
+        machine = Root(["done", "preempted"])
+        machine.add("S", Own(raises(OSError("bus"))))
+        machine.register_start_cb(lambda *_: os.kill(os.getpid(), signal.SIGINT))
+        assert machine.execute() == "preempted"
+        assert shutdown.event().wait(LONG_S)
+        blocked.set()
+
+
+def test_a_callback_that_raises_does_not_keep_the_others_from_a_request(clock):
+    """As a state registers it itself, to be told at once."""
+
+    class Hears(Work):
+        def execute(self, userdata):
+            forget = self.on_preempt(raises_at_once)
+            try:
+                return super().execute(userdata)
+            finally:
+                forget()
+
+    def raises_at_once():
+        raise OSError("bus")
+
+    machine = both(Hears(30.0), Work(30.0))
+    heard = []
+    machine.subscribe(heard.append)
+    clock.call_later(1.0, machine.request_preempt)
+    assert machine.execute() == "preempted"
+    assert clock.now() == 1.0
+    assert [e.path for e in heard if isinstance(e, CallbackFailed)] == ["/SM_ROOT/S0"]
+
+
+# -- from a signal handler ----------------------------------------------------------------------
+
+
+def first_handler(machine):
+    return lambda *_: machine.request_preempt()
+
+
+def handler_that_leaves(machine):
+    def handle(number, _frame):
+        signal.signal(number, signal.SIG_IGN)  # the second one is not to disturb
+        machine.request_preempt()
+
+    return handle
+
+
+def handler_object(machine):
+    class Handler:
+        def __call__(self, _number, _frame):
+            machine.request_preempt()
+
+    return Handler()
+
+
+class ListenerWithLock:
+    def __init__(self):
+        self.lock = threading.Lock()
+        self.heard = []
+
+    def __call__(self, event):
+        with self.lock:
+            self.heard.append(event)
+
+
+LOCKS = {
+    "listener": lambda m: m.listener.lock,
+    "tape that is thinned": lambda m: m.tape._cut,
+    "tape that is read": lambda m: m.tape._lock,
+    "control": lambda m: m.machine.control._lock,
+    "container": lambda m: m.machine._smachpy.frame.run.lock,
+    "child": lambda m: m.machine["S0"]._smachpy.frame.run.lock,
+    "feed": lambda m: m.server._feed._lock,
+    "feed's executor": lambda m: m.server._feed._executor._lock,
+    "introspection's executor": lambda m: m.server._topics.executor._lock,
+    "network": lambda m: m.network.lock,
+    "log": lambda m: m.log.lock,
+    "timers": lambda m: m.clock._timers._lock,
+    "threads": lambda m: threading._active_limbo_lock,
+}
+
+
+class Heard:
+    """A machine in another thread, and all sorts of listeners to it."""
+
+    def __init__(self):
+        self.log = logging.StreamHandler(io.StringIO())
+        self.clock = RealClock()
+        self.network = MemoryNetwork(self.clock)
+        self.listener = ListenerWithLock()
+        self.machine = chain(both(Work(60.0), Own(raises(OSError("bus")), 60.0)))
+        self.outcomes = []
+
+    def __enter__(self):
+        logging.getLogger("smachpy").addHandler(self.log)
+        self.node = Node("robot", transport=self.network.session(), clock=self.clock)
+        self.server = IntrospectionServer("viewer", self.machine, "/SM_ROOT", node=self.node)
+        self.server.start()
+        self.tape = self.machine.tape(limit=1)
+        self.machine.subscribe(self.listener)
+        running = threading.Event()
+        self.machine["S0"].register_start_cb(lambda *_: running.set())
+        self.runner = threading.Thread(target=self.run)
+        self.runner.start()
+        assert running.wait(LONG_S)
+        return self
+
+    def run(self):
+        with use_clock(self.clock):
+            self.outcomes.append(self.machine.execute())
+
+    def __exit__(self, *_):
+        self.runner.join(LONG_S)
+        self.server.stop()
+        self.node.close()
+        logging.getLogger("smachpy").removeHandler(self.log)
+
+
+@pytest.mark.parametrize("make", [first_handler, handler_that_leaves, handler_object])
+@pytest.mark.parametrize("lock", LOCKS)
+def test_a_signal_handler_may_ask_whatever_lock_it_interrupts(lock, make):
+    with Heard() as heard:
+        before = signal.signal(signal.SIGUSR1, make(heard.machine))
+        try:
+            with LOCKS[lock](heard):
+                signal.raise_signal(signal.SIGUSR1)
+        finally:
+            signal.signal(signal.SIGUSR1, before)
+    assert heard.outcomes == ["preempted"]
+    asked = [event for event in heard.listener.heard if isinstance(event, PreemptRequested)]
+    assert {event.source for event in asked} == {"signal"}
+
+
+def test_a_signal_handlers_request_is_for_the_run_that_is_on():
+    with use_clock(RealClock()):
+        machine = chain(Work(0.0))
+        before = signal.signal(signal.SIGUSR1, first_handler(machine))
+        try:
+            machine.register_termination_cb(lambda *_: os.kill(os.getpid(), signal.SIGUSR1))
+            for _ in range(20):
+                assert machine.execute() == "done"
+        finally:
+            signal.signal(signal.SIGUSR1, before)
+
+
+def test_a_signal_handlers_request_before_the_run_ends_it():
+    with use_clock(RealClock()):
+        machine = chain(Work(LONG_S))
+        before = signal.signal(signal.SIGUSR1, first_handler(machine))
+        try:
+            os.kill(os.getpid(), signal.SIGUSR1)
+            assert machine.execute() == "preempted"
+        finally:
+            signal.signal(signal.SIGUSR1, before)
+
+
+# -- nothing waits for a user's callback --------------------------------------------------------
+
+
+@pytest.mark.parametrize("who", ["listener", "log"])
+def test_no_timer_waits_for_whoever_hears_of_an_overdue_state(who):
+    """A listener holds up the machine, but not the clock's thread, which has other timers."""
+    free, blocked = threading.Event(), threading.Event()
+
+    def block(*_):
+        blocked.set()
+        free.wait(LONG_S)
+
+    class Deaf(State):
+        def __init__(self):
+            super().__init__(["done"])
+
+        def execute(self, userdata):
+            free.wait(LONG_S)
+            return "done"
+
+    log = logging.Handler()
+    log.emit = block if who == "log" else lambda _: None
+    logging.getLogger("smachpy").addHandler(log)
+    clock = RealClock()
+    outcomes = []
+
+    def run():
+        with use_clock(clock):
+            outcomes.append(machine.execute())
+
+    machine = both(Deaf(), Work(60.0), preempt_timeout=0.05)
+    machine.subscribe(lambda e: block() if isinstance(e, Abandoned) and who == "listener" else None)
+    machine.register_start_cb(lambda *_: clock.call_later(0.05, machine.request_preempt))
+    runner = threading.Thread(target=run)
+    try:
+        runner.start()
+        assert blocked.wait(LONG_S)
+        tick = clock.event()
+        clock.call_later(0.3, tick.set)
+        assert tick.wait(LONG_S / 2)
+        assert not free.is_set()
+    finally:
+        free.set()
+        runner.join()
+        logging.getLogger("smachpy").removeHandler(log)
+    assert outcomes == ["preempted"]
+
+
+def test_the_listeners_hear_the_end_of_what_was_left_behind_in_order(clock):
+    class Stone(State):
+        """Can not be broken into."""
+
+        def __init__(self):
+            super().__init__(["done"])
+
+        def execute(self, userdata):
+            end = clock.now() + 50.0
+            while clock.now() < end:
+                try:
+                    clock.sleep(end - clock.now())
+                except BaseException:  # what a stone does
+                    continue
+            return "done"
+
+    machine = both(chain(Stone()), Work(), preempt_timeout=2.0)
+    heard = []
+    machine.subscribe(heard.append)
+    clock.call_later(1.5, machine.request_preempt)
+    assert machine.execute() == "preempted"
+    ends = [
+        (type(e).__name__, e.path)
+        for e in heard
+        if isinstance(e, (Abandoned, Left)) and e.path.startswith("/SM_ROOT/S0")
+    ]
+    assert ends == [
+        ("Abandoned", "/SM_ROOT/S0/S0"),
+        ("Left", "/SM_ROOT/S0/S0"),
+        ("Left", "/SM_ROOT/S0"),
+    ]
+    clock.sleep(100.0)
+
+
+# -- leaving a state behind ---------------------------------------------------------------------
+
+
+def test_a_state_is_left_behind_while_others_write_userdata():
+    """The copy that its thread keeps is taken in one step."""
+    free, stop = threading.Event(), threading.Event()
+
+    class Deaf(State):
+        def __init__(self):
+            super().__init__(["ok"], input_keys=["x"], output_keys=["y"])
+
+        def execute(self, userdata):
+            free.wait(LONG_S)
+            userdata.y = "late"
+            return "ok"
+
+    def write(userdata):
+        number = 0
+        while not stop.is_set():
+            userdata[f"k{number % 5000}"] = number
+            if number % 7 == 0 and f"k{(number - 2500) % 5000}" in userdata:
+                del userdata[f"k{(number - 2500) % 5000}"]
+            number += 1
+
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-5)
+    try:
+        with use_clock(RealClock()):
+            machine = Concurrence(["ok", "preempted"], "ok", preempt_timeout=0.05)
+            machine.userdata.x = 1
+            for number in range(2000):
+                machine.userdata[f"a{number}"] = number
+            machine.add("DEAF", Deaf())
+            ended = threading.Event()
+            runner = threading.Thread(target=lambda: (machine.execute(), ended.set()))
+            writer = threading.Thread(target=write, args=(machine.userdata,))
+            begun = threading.Event()
+            machine.register_start_cb(lambda *_: begun.set())
+            writer.start()
+            runner.start()
+            assert begun.wait(LONG_S)
+            machine.request_preempt()
+            assert ended.wait(LONG_S / 2)
+    finally:
+        sys.setswitchinterval(interval)
+        stop.set()
+        free.set()
+        writer.join()
+        runner.join()
+    assert "y" not in machine.userdata
+
+
+def test_who_waits_for_the_end_hears_of_a_machine_that_was_left_behind(clock):
+    class Stone(State):
+        def __init__(self):
+            super().__init__(["done"])
+
+        def execute(self, userdata):
+            end = clock.now() + 50.0
+            while clock.now() < end:
+                try:
+                    clock.sleep(end - clock.now())
+                except BaseException:  # what a stone does
+                    continue
+            return "done"
+
+    inner = chain(Stone())
+    machine = both(inner, Work(), preempt_timeout=2.0)
+    ended = []
+    waiter = clock.spawn(
+        lambda: (clock.sleep(1.0), inner.wait_ended(10.0), ended.append(clock.now())),
+        name="waiter",
+    )
+    clock.call_later(1.5, machine.request_preempt)
+    assert machine.execute() == "preempted"
+    waiter.join()
+    assert ended == [pytest.approx(3.6)]
+    clock.sleep(100.0)
+
+
+# -- one state, once ----------------------------------------------------------------------------
+
+
+def test_one_state_in_two_branches_is_refused():
+    state = Work()
+    machine = Concurrence(["done"], "done")
+    machine.add("A", state)
+    with pytest.raises(smachpy.InvalidStateError):
+        machine.add("B", state)
+
+
+def test_one_state_below_two_branches_is_refused(clock):
+    shared = Work()
+    machine = both(chain(shared), chain(chain(Work(), shared)), chain(Work()))
+    with pytest.raises(smachpy.InconsistentMachineError) as caught:
+        machine.check_consistency()
+    assert len(caught.value.problems) == 1
+    with pytest.raises(smachpy.InconsistentMachineError):
+        machine.execute()
+    one = chain(shared, shared)  # one after the other is fine
+    assert one.execute() == "done"
+
+
+def test_a_container_in_itself_is_refused():
+    outer, inner = StateMachine(["done"]), StateMachine(["done"])
+    outer.add("INNER", inner)
+    for container in (inner, outer):
+        with pytest.raises(smachpy.InvalidStateError):
+            container.add("SELF", outer)
+
+
+@pytest.mark.parametrize("asked", [False, True])
+def test_a_state_that_runs_the_machine_around_it_is_told_so(clock, asked):
+    raised = []
+
+    class Runs(State):
+        def __init__(self):
+            super().__init__(["done", "preempted"])
+
+        def execute(self, userdata):
+            self.wait_preempt(5.0)
+            try:
+                machine.execute()
+            except smachpy.SmachError as error:
+                raised.append(type(error))
+            return "done"
+
+    machine = chain(chain(Runs()))
+    if asked:
+        clock.call_later(1.0, machine.request_preempt)
+    assert machine.execute() == "done"
+    assert raised == [smachpy.InvalidStateError]
+
+
+def test_pausing_one_item_again_and_again_nests_nothing(clock):
+    depths = []
+
+    class Deep(Work):
+        def execute(self, userdata):
+            frame, depth = sys._getframe(), 0
+            while frame is not None:
+                frame, depth = frame.f_back, depth + 1
+            depths.append(depth)
+            return super().execute(userdata)
+
+    machine = Iterator(["done", "preempted"], [], [], it=[1], exhausted_outcome="done")
+    machine.set_contained_state("W", Deep(1.0), loop_outcomes=["done"])
+    resumed = []
+    machine.subscribe(lambda e: resumed.append(e) if isinstance(e, Resumed) else None)
+
+    def operate():
+        for _ in range(50):
+            clock.sleep(0.3)
+            machine.control.pause(running="cancel")
+            clock.sleep(0.3)
+            machine.control.resume()
+
+    operator = clock.spawn(operate, name="operator")
+    assert machine.execute() == "done"
+    operator.join()
+    assert len(depths) == 51
+    assert len(resumed) == 50
+    assert max(depths) - min(depths) <= 5
+
+
+# -- one visit per child --------------------------------------------------------------------------
+
+
+def test_each_child_that_takes_a_preempt_up_says_so(clock):
+    machine = StateMachine(["done", "preempted"])
+    machine.add("DRIVE", Work(5.0), {"preempted": "STOP"})
+    machine.add("STOP", Work(5.0))
+    heard = []
+    machine.subscribe(heard.append)
+    for moment in (1.0, 2.0):
+        clock.call_later(moment, machine.request_preempt)
+    assert machine.execute() == "preempted"
+    serviced = [event.path for event in heard if isinstance(event, PreemptServiced)]
+    assert serviced == ["/SM_ROOT/DRIVE", "/SM_ROOT/STOP", "/SM_ROOT"]
+
+
+def test_a_preempt_wins_over_an_operator_who_forced_an_outcome(clock):
+    class Unregistered(State):
+        def __init__(self):
+            super().__init__(["done"])
+
+        def execute(self, userdata):
+            self.wait_preempt()
+            clock.sleep(1.0)  # time for the second request
+            return "preempted"
+
+    machine = StateMachine(["done", "preempted"])
+    machine.add("DRIVE", Unregistered())
+    control = machine.control
+    clock.call_later(1.0, lambda: control.force_outcome("/SM_ROOT/DRIVE", "done"))
+    clock.call_later(1.5, machine.request_preempt)
+    assert machine.execute() == "preempted"
+
+
+def test_a_request_between_two_attempts_of_the_root_is_heard_and_told(clock):
+    machine = StateMachine(["done", "aborted", "preempted"], retry=(3, 2.0, ["aborted"]))
+    made = Work(0.5)
+    made.register_outcomes(["aborted"])
+    made.execute = lambda userdata: "aborted"
+    machine.add("DRIVE", made)
+    heard = []
+    machine.subscribe(heard.append)
+    clock.call_later(1.0, lambda: machine.request_preempt(by="desk"))
+    assert machine.execute() == "aborted"
+    assert clock.now() == 1.0
+    asked = [(e.path, e.by) for e in heard if isinstance(e, PreemptRequested)]
+    assert asked == [("/SM_ROOT", "desk")]
+    assert not machine.preempt_requested()
+
+
+def test_requests_that_begin_at_different_containers_do_not_wait_for_each_other():
+    """A callback below asks the root while another thread passes the root's request on."""
+    below, above = threading.Event(), threading.Event()
+
+    class Both(State):
+        def __init__(self):
+            super().__init__(["done", "preempted"])
+
+        def execute(self, userdata):
+            def callback():
+                below.set()
+                above.wait(0.2)  # the other thread is on its way down by now
+                machine.request_preempt()
+
+            forget = on_preempt(self, callback)
+            try:
+                return "preempted" if self.sleep(30.0) else "done"
+            finally:
+                forget()
+
+    inner = chain(Both())
+    machine = chain(inner)
+
+    def ask_root():
+        below.wait(LONG_S)
+        machine.request_preempt()
+
+    with use_clock(RealClock()):
+        started = threading.Event()
+        inner.register_start_cb(lambda *_: started.set())
+        outcomes = []
+        threads = [
+            threading.Thread(target=lambda: outcomes.append(machine.execute())),
+            threading.Thread(target=lambda: started.wait(LONG_S) and inner.request_preempt()),
+            threading.Thread(target=ask_root),
+        ]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(LONG_S)
+    assert outcomes == ["preempted"]

@@ -1,0 +1,3 @@
+from tests.simulated_robot import office
+
+__all__ = ["office"]

@@ -1,0 +1,211 @@
+"""The ready-made states under the test kit; `AskOperator` has a file of its own."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
+from actionlib_core.interfaces.nav_msgs.msg import Odometry
+from actionlib_core.interfaces.std_msgs.msg import Bool
+from smachpy import StateMachine
+from smachpy.states import (
+    AwaitMessage,
+    Pose2D,
+    Serve,
+    Wait,
+    Waypoint,
+    drive_back,
+    drive_to,
+    goal_at,
+    locate,
+    pose_of,
+    serve_during,
+    turn,
+)
+
+PLACE = Pose2D(1.0, 2.0, 0.5)
+ENDS = ["succeeded", "aborted", "preempted"]
+
+
+@pytest.fixture
+def base(mission):
+    server = mission.action_server("move_base", MoveBaseAction)
+    server.default_result(duration=5.0)
+    return server
+
+
+def alone(state, **userdata):
+    """A machine with this one state."""
+    sm = StateMachine(state.get_registered_outcomes(), name="ALONE")
+    sm.userdata.update(userdata)
+    sm.add("STATE", state)
+    return sm
+
+
+def target(goal):
+    return pytest.approx(pose_of(goal.target_pose.pose))
+
+
+def test_a_goal_holds_the_pose():
+    goal = goal_at(PLACE, frame="base_link")
+    assert goal.target_pose.header.frame_id == "base_link"
+    assert target(goal) == PLACE
+
+
+def test_it_drives_to_a_fixed_pose(mission, base):
+    mission(alone(drive_to(PLACE))).assert_outcome("succeeded")
+    assert [goal.target_pose.header.frame_id for goal in base.goals] == ["map"]
+    assert target(base.goals[0]) == PLACE
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        PLACE,
+        Waypoint("desk", PLACE),
+        goal_at(PLACE).target_pose,
+        goal_at(PLACE).target_pose.pose,
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_it_drives_to_whatever_pose_the_userdata_holds(mission, base, value):
+    mission(alone(drive_to("place"), place=value)).assert_outcome("succeeded")
+    assert target(base.goals[0]) == PLACE
+
+
+def test_a_value_that_is_no_pose_is_an_error_of_the_state(mission, base):
+    with pytest.raises(Exception, match="STATE"):
+        mission(alone(drive_to("place"), place="the kitchen"))
+
+
+def test_other_keys_and_callbacks_of_the_caller_are_kept(mission, base):
+    def note(userdata, _status, _result):
+        userdata.visits = userdata.visits + 1
+
+    state = drive_to("place", result_cb=note, input_keys=["visits"], output_keys=["visits"])
+    machine = alone(state, place=PLACE, visits=2)
+    mission(machine).assert_outcome("succeeded")
+    assert machine.userdata.visits == 3
+
+
+def test_a_drive_ends_after_its_limit(mission, base):
+    base.default_result(duration=10_000.0)
+    run = mission(alone(drive_to(PLACE)))
+    run.assert_outcome("aborted")
+    assert run.duration == pytest.approx(600.0, abs=1.0)
+
+
+def test_driving_back_tries_three_times(mission, base):
+    base.default_result(status="aborted")
+    mission(alone(drive_back(), home=PLACE)).assert_outcome("aborted")
+    assert len(base.goals) == 3
+
+
+def test_a_turn_is_a_goal_in_the_robots_own_frame(mission, base):
+    mission(alone(turn(90.0))).assert_outcome("succeeded")
+    assert base.goals[0].target_pose.header.frame_id == "base_link"
+    assert target(base.goals[0]) == (0.0, 0.0, math.pi / 2)
+
+
+def test_locating_writes_the_pose(mission):
+    here = Odometry()
+    here.pose.pose = goal_at(PLACE).target_pose.pose
+    mission.topic("odom", Odometry).publish(here, latch=True)
+    machine = alone(locate("home"))
+    mission(machine).assert_outcome("valid")
+    assert machine.userdata.home == pytest.approx(PLACE)
+
+
+def test_locating_gives_up_without_odometry(mission):
+    run = mission(alone(locate()))
+    run.assert_outcome("aborted")
+    assert run.duration == 5.0
+
+
+@pytest.mark.parametrize(
+    ("values", "outcome", "seconds"),
+    [([False, True], "came", 2.0), ([False, False], "timeout", 10.0)],
+)
+def test_it_waits_for_a_message_that_is_accepted(mission, values, outcome, seconds):
+    topic = mission.topic("button", Bool)
+    for at, value in enumerate(values, 1):
+        topic.publish_at(float(at), Bool(data=value))
+    run = mission(alone(AwaitMessage("button", Bool, lambda m: m.data, timeout=10.0)))
+    run.assert_outcome(outcome)
+    assert run.duration == seconds
+
+
+def test_a_preempt_ends_waits_at_once(mission):
+    for state in (Wait(100.0), AwaitMessage("button", Bool, bool, timeout=100.0), Serve()):
+        mission.preempt(on="STATE", after=1.0)
+        run = mission(alone(state))
+        run.assert_outcome("preempted")
+        assert run.duration == 1.0
+
+
+def test_a_wait_takes_its_seconds_from_the_userdata(mission):
+    assert mission(alone(Wait(), seconds=3.0)).duration == 3.0
+
+
+class Server:
+    def __init__(self, told, name):
+        self.told, self.name = told, name
+        told.append(f"make {name}")
+
+
+class Closing(Server):
+    def close(self):
+        self.told.append(f"close {self.name}")
+
+
+class Stopping(Server):
+    def stop(self):
+        self.told.append(f"stop {self.name}")
+
+
+MADE = ["make a", "make b", "stop b", "close a"]
+
+
+def makers(told):
+    return (lambda: Closing(told, "a")), (lambda: Stopping(told, "b"))
+
+
+def test_servers_are_there_during_each_run(mission):
+    told = []
+    machine = alone(Wait(1.0))
+    serve_during(machine, *makers(told))
+    for _ in range(2):
+        mission(machine)
+    assert told == MADE * 2
+
+
+def test_the_state_serve_closes_its_servers_when_it_is_preempted(mission):
+    told = []
+    mission.preempt(on="STATE", after=1.0)
+    mission(alone(Serve(*makers(told)))).assert_outcome("preempted")
+    assert told == MADE
+
+
+def test_a_server_that_cannot_be_made_leaves_none_behind(mission):
+    told = []
+
+    def broken():
+        raise OSError("no network")
+
+    with pytest.raises(Exception, match="no network"):
+        mission(alone(Serve(makers(told)[0], broken)))
+    assert told == ["make a", "close a"]
+
+
+def test_a_machine_whose_server_cannot_be_made_closes_the_others_when_it_ends(mission):
+    told = []
+
+    def broken():
+        raise OSError("no network")
+
+    machine = alone(Wait(1.0))
+    serve_during(machine, makers(told)[0], broken)
+    mission(machine).assert_outcome("done")  # what a start callback raises is logged, as in SMACH
+    assert told == ["make a", "close a"]

@@ -1,0 +1,178 @@
+"""The files and models that a page is made of, served or folded into one file."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import hashlib
+import html
+import json
+from dataclasses import asdict
+from functools import cache, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from viz.model.extract import extract
+from viz.pictures.theme import THEMES, Theme
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from smachpy.introspection import StateRecord
+    from viz.model.machine import Node
+
+WEB = Path(__file__).resolve().parent.parent / "web"
+ALL_LEVELS = 1_000_000
+
+ROOMS = ("core", "drawing", "panels")
+"""Folders of the page's modules; each imports only of those before it."""
+
+
+def _files(folder: str) -> list[str]:
+    return [f"{folder}/{path.name}" for path in sorted((WEB / folder).iterdir())]
+
+
+SCRIPTS = [*(name for room in ROOMS for name in _files(f"js/{room}")), "js/app.js"]
+VENDOR = _files("vendor")
+FILES = frozenset(["app.css", *SCRIPTS, *VENDOR])
+"""What is served; other files beside them are for development."""
+
+MODULES = {
+    "preact": "vendor/preact.js",
+    "preact/hooks": "vendor/preact-hooks.js",
+    "htm": "vendor/htm.js",
+    "@preact/signals-core": "vendor/signals-core.js",
+    "@preact/signals": "vendor/signals.js",
+    **{f"#{name.removeprefix('js/')}": name for name in SCRIPTS},
+}
+"""What modules import each other by: the same names in the served page, in a file and in Node."""
+
+TYPES = {
+    ".js": "text/javascript; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".woff2": "font/woff2",
+    ".txt": "text/plain; charset=utf-8",
+    ".html": "text/html; charset=utf-8",
+}
+
+
+def read(name: str) -> bytes | None:
+    """Return a file of the page; None when there is no such file."""
+    return (WEB / name).read_bytes() if name in FILES else None
+
+
+@cache
+def version() -> str:
+    """Return a word that changes with any file of the page."""
+    digest = hashlib.sha256()
+    for name in sorted({"index.html", *FILES}):
+        digest.update((WEB / name).read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def import_map() -> str:
+    """Return the import map of the served page."""
+    return json.dumps({"imports": {name: f"/{path}" for name, path in MODULES.items()}})
+
+
+def index() -> str:
+    """Return the served page."""
+    text = (WEB / "index.html").read_text(encoding="utf-8")
+    head = (
+        '<link rel="stylesheet" href="/theme.css"><link rel="stylesheet" href="/app.css">'
+        f'<script type="importmap">{import_map()}</script>'
+        '<script type="module" src="/js/app.js"></script>'
+    )
+    return text.replace("<!-- head -->", head)
+
+
+def script_hash() -> str:
+    """Return the content security policy's word for the only inline script, the import map."""
+    digest = hashlib.sha256(import_map().encode()).digest()
+    return f"'sha256-{base64.b64encode(digest).decode()}'"
+
+
+def theme_css() -> str:
+    """Return the colours of the themes as CSS variables, by the system's taste or by choice."""
+    light, dark = (_variables(THEMES[name]) for name in ("light", "dark"))
+    return (
+        f":root{{color-scheme:light;{light}}}\n"
+        f"@media (prefers-color-scheme:dark){{:root{{color-scheme:dark;{dark}}}}}\n"
+        f':root[data-theme="light"]{{color-scheme:light;{light}}}\n'
+        f':root[data-theme="dark"]{{color-scheme:dark;{dark}}}\n'
+    )
+
+
+def _variables(theme: Theme) -> str:
+    pairs = {
+        "background": theme.background,
+        "ink": theme.ink,
+        "muted": theme.muted,
+        "faint": theme.faint,
+        "edge": theme.edge,
+        "border": theme.border,
+        **{f"depth{depth}": theme.container(depth) for depth in range(12)},
+    }
+    for name in ("inactive", "active", "success", "failure", "preempted", "other", "waiting"):
+        swatch = getattr(theme, name)
+        pairs |= {name: swatch.stroke, f"{name}-fill": swatch.fill, f"{name}-text": swatch.text}
+    return "".join(f"--{name}:{value};" for name, value in pairs.items())
+
+
+def model(record: StateRecord, draw: Callable[..., Node] | None = None) -> dict[str, Any]:
+    """Return all that the page draws a machine from, with and without implicit transitions.
+
+    Args:
+        record: The machine.
+        draw: Makes the drawing, with `depth` and `show_implicit` as `extract` takes them; None
+            draws the machine as it is.
+    """
+    draw = draw or partial(extract, record)
+    return {
+        "explicit": asdict(draw(depth=ALL_LEVELS)),
+        "implicit": asdict(draw(depth=ALL_LEVELS, show_implicit=True)),
+        "keys": {
+            state.path: {
+                "inputs": state.input_keys,
+                "outputs": state.output_keys,
+                "remapping": state.remapping,
+            }
+            for state in record.walk()
+            if state.input_keys or state.output_keys or state.remapping
+        },
+    }
+
+
+def standalone(run: dict[str, Any], title: str) -> str:
+    """Return one HTML file that shows a run without a server or a network.
+
+    Args:
+        run: `model` of the machine, and a snapshot as the server sends it.
+        title: Of the page.
+    """
+    style = theme_css() + (WEB / "app.css").read_text(encoding="utf-8")
+    for font in ("inter", "jetbrains-mono"):
+        data = base64.b64encode((WEB / "vendor" / f"{font}.woff2").read_bytes()).decode()
+        style = style.replace(f"/vendor/{font}.woff2", f"data:font/woff2;base64,{data}")
+    modules = {name: _data_url((WEB / path).read_bytes()) for name, path in MODULES.items()}
+    layouter = (WEB / "vendor" / "elk-worker.min.js").read_bytes()
+    parts = [
+        f"<style>{style}</style>",
+        f'<script type="importmap">{json.dumps({"imports": modules})}</script>',
+        _packed("elk", layouter),
+        _packed("run", json.dumps(run).encode()),
+        '<script type="module">import "#app.js";</script>',
+    ]
+    text = (WEB / "index.html").read_text(encoding="utf-8")
+    text = text.replace("<title>smachpy</title>", f"<title>{html.escape(title)}</title>")
+    return text.replace("<!-- head -->", "\n".join(parts))
+
+
+def _data_url(content: bytes) -> str:
+    return f"data:text/javascript;base64,{base64.b64encode(content).decode()}"
+
+
+def _packed(name: str, content: bytes) -> str:
+    """A block of data in a page: base64 of gzip, so that no text in it can end the block."""
+    data = base64.b64encode(gzip.compress(content, mtime=0)).decode()
+    return f'<script type="application/octet-stream" id="{name}-data">{data}</script>'

@@ -1,0 +1,208 @@
+"""From a machine's introspection record to the model of a picture."""
+
+from __future__ import annotations
+
+import difflib
+from collections import Counter
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from smachpy.exceptions import SmachError
+from smachpy.outcome_classes import is_good
+from viz.model.machine import MISSING, Edge, Node, Pill, Rule
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Sequence
+
+    from smachpy.introspection import StateRecord, TransitionRecord
+
+READABLE = 60
+"""Most states a picture shows when nobody asks for a depth."""
+
+
+class UnknownPathError(SmachError):
+    """No state has this path.
+
+    Attributes:
+        path: What was asked for.
+    """
+
+    def __init__(self, path: str, paths: Sequence[str]) -> None:
+        self.path = path
+        near = difflib.get_close_matches(path, paths, n=3, cutoff=0.5) or list(paths[:5])
+        super().__init__(
+            f"picture: no state {path!r}; expected a path such as {', '.join(map(repr, near))}."
+        )
+
+
+def find(record: StateRecord, path: str) -> StateRecord:
+    """Return the record at `path`; the name of the root may be left out.
+
+    Raises:
+        UnknownPathError: there is none.
+    """
+    wanted = "/" + path.strip("/")
+    for candidate in record.walk():
+        if candidate.path in {wanted, record.path.rstrip("/") + wanted}:
+            return candidate
+    raise UnknownPathError(path, [candidate.path for candidate in record.walk()])
+
+
+def readable_depth(record: StateRecord, most: int = READABLE) -> int:
+    """Return the greatest depth at which at most `most` states are visible, at least 1."""
+    level: list[StateRecord] = [record]
+    visible = depth = 0
+    while level:
+        visible += len(level)
+        if visible > most and depth > 1:
+            break
+        depth += 1
+        level = [child for state in level for child in state.children]
+    return max(depth - 1, 1)
+
+
+def extract(record: StateRecord, *, depth: int | None = None, show_implicit: bool = False) -> Node:
+    """Return what a picture of `record` shows.
+
+    Args:
+        record: The machine, or any part of it.
+        depth: Number of container levels to open; None opens as many as stay readable.
+        show_implicit: Draw the transitions nobody wrote down as well. Without it only those of
+            an ordinary end are drawn, not those of failure and preemption.
+    """
+    levels = readable_depth(record) if depth is None else depth
+    return _node(record, levels, frozenset(record.outcomes), show_implicit=show_implicit)
+
+
+def _node(record: StateRecord, levels: int, wired: frozenset[str], *, show_implicit: bool) -> Node:
+    if levels <= 0 or not record.children:
+        return _closed(record)
+    labels = {child.label for child in record.children}
+    shown = [
+        _checked(t, record, labels)
+        for t in record.transitions
+        if t.source in labels and (show_implicit or _is_drawn(t))
+    ]
+    edges = _edges(record, shown)
+    uses = _outcomes_used(record, shown)
+    children = tuple(
+        _node(child, levels - 1, uses.get(child.label, frozenset()), show_implicit=show_implicit)
+        for child in record.children
+    )
+    return Node(
+        path=record.path,
+        label=record.label,
+        kind=record.kind,
+        type_name=record.type_name,
+        doc=record.doc,
+        details=record.details,
+        outcomes=record.outcomes,
+        children=children + _missing(record, edges, labels),
+        initial=record.initial,
+        edges=edges,
+        rules=tuple(Rule(r.outcome, r.conditions, r.text) for r in record.rules),
+        default_outcome=record.default_outcome,
+        pills=_pills(record, edges, wired),
+    )
+
+
+def _checked(
+    transition: TransitionRecord, record: StateRecord, labels: Collection[str]
+) -> TransitionRecord:
+    """The same transition, leading to a state when it names an outcome that does not exist."""
+    is_outcome = transition.target in record.outcomes and (
+        transition.target_is_outcome or transition.target not in labels
+    )
+    return replace(transition, target_is_outcome=is_outcome)
+
+
+def _missing(
+    record: StateRecord, edges: Iterable[Edge], labels: Collection[str]
+) -> tuple[Node, ...]:
+    """States that an inconsistent machine speaks of and does not have."""
+    targets = [edge.target for edge in edges if not edge.to_outcome]
+    names = dict.fromkeys(name for name in (*record.initial, *targets) if name not in labels)
+    return tuple(Node(f"{record.path}/{name}", name, MISSING) for name in names)
+
+
+def _closed(record: StateRecord) -> Node:
+    return Node(
+        path=record.path,
+        label=record.label,
+        kind=record.kind,
+        type_name=record.type_name,
+        doc=record.doc,
+        details=record.details,
+        outcomes=record.outcomes,
+        hidden=sum(1 for _ in record.walk()) - 1,
+    )
+
+
+def _is_drawn(transition: TransitionRecord) -> bool:
+    """Whether a transition is drawn when those that nobody wrote down are not asked for."""
+    if not transition.implicit:
+        return True
+    return is_good(transition.outcome)
+
+
+def _edges(record: StateRecord, transitions: Iterable[TransitionRecord]) -> tuple[Edge, ...]:
+    """One edge for all outcomes of a state that lead to the same place."""
+    merged: dict[tuple[str, str, bool, bool], list[str]] = {}
+    for t in transitions:
+        key = (t.source, t.target, t.target_is_outcome, t.implicit)
+        merged.setdefault(key, []).append(t.outcome)
+    backward = _backward(record, [(s, t) for s, t, is_outcome, _ in merged if not is_outcome])
+    return tuple(
+        Edge(source, target, to_outcome, tuple(outcomes), implicit, (source, target) in backward)
+        for (source, target, to_outcome, implicit), outcomes in merged.items()
+    )
+
+
+def _backward(record: StateRecord, arrows: Sequence[tuple[str, str]]) -> frozenset[tuple[str, str]]:
+    """Arrows that close a loop when one reads from the initial states in declared order."""
+    following: dict[str, list[str]] = {}
+    for tail, head in arrows:
+        following.setdefault(tail, []).append(head)
+    found: set[tuple[str, str]] = set()
+    done: set[str] = set()
+    for start in (*record.initial, *(child.label for child in record.children)):
+        if start in done:
+            continue
+        trail = {start}
+        stack = [(start, iter(following.get(start, ())))]
+        while stack:
+            here, ahead = stack[-1]
+            target = next(ahead, None)
+            if target is None:
+                stack.pop()
+                trail.discard(here)
+                done.add(here)
+            elif target in trail:
+                found.add((here, target))
+            elif target not in done:
+                trail.add(target)
+                stack.append((target, iter(following.get(target, ()))))
+    return frozenset(found)
+
+
+def _outcomes_used(
+    record: StateRecord, shown: Iterable[TransitionRecord]
+) -> dict[str, frozenset[str]]:
+    """By child, the outcomes from which an arrow starts."""
+    pairs = [(t.source, t.outcome) for t in shown]
+    pairs += [pair for rule in record.rules for pair in rule.conditions]
+    uses: dict[str, set[str]] = {}
+    for label, outcome in pairs:
+        uses.setdefault(label, set()).add(outcome)
+    return {label: frozenset(outcomes) for label, outcomes in uses.items()}
+
+
+def _pills(record: StateRecord, edges: Sequence[Edge], wired: frozenset[str]) -> tuple[Pill, ...]:
+    written = Counter(edge.target for edge in edges if edge.to_outcome and not edge.implicit)
+    written.update(rule.outcome for rule in record.rules)
+    drawn = {edge.target for edge in edges if edge.to_outcome}
+    return tuple(
+        Pill(outcome, by_default=not written[outcome])
+        for outcome in record.outcomes
+        if written[outcome] or outcome in drawn or outcome in wired
+    )

@@ -1,0 +1,36 @@
+"""Names, glyphs and texts that the pictures and the terminal share."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from smachpy.outcome_classes import OutcomeClass
+
+LABEL_LENGTH = 40
+# Glyphs that Liberation Sans and Arial have: no picture shows empty boxes for them.
+GLYPHS = {"action": "\u25ba", "service": "\u2194", "monitor": "\u25cf", "condition": "?"}
+KIND_WORDS = {
+    "concurrence": "concurrent",
+    "iterator": "repeats",
+    "sequence": "sequence",
+    "missing": "missing",
+}
+ENDINGS: dict[OutcomeClass, str] = {
+    "success": "\u221a",
+    "failure": "\u00d7",
+    "preempted": "\u25a0",
+    "other": "",
+}
+
+
+def one_line(text: str) -> str:
+    """Return all of a text on one line, with a sign for every character that cannot be shown."""
+    line = " ".join(text.split())
+    return line if line.isprintable() else "".join(c if c.isprintable() else "\ufffd" for c in line)
+
+
+def shorten(text: str, length: int = LABEL_LENGTH) -> str:
+    """Return one line of at most `length` printable characters, whatever `text` holds."""
+    line = one_line(text[: 4 * length])
+    return line if len(line) <= length else line[: length - 1] + "\u2026"

@@ -1,0 +1,167 @@
+"""What a picture shows: the states of a machine as far as they are opened, and marks on them.
+
+Everything here is frozen and knows nothing of colours, layouts or files.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+MISSING = "missing"
+"""Kind of a state that a machine speaks of and does not have."""
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """The transitions of one container from one state to one target.
+
+    Attributes:
+        source: Label of a child.
+        target: Label of a child, or an outcome of the container.
+        to_outcome: Whether `target` is an outcome.
+        outcomes: The outcomes of `source` that lead there.
+        implicit: Nobody wrote these transitions down: an outcome of the same name took them.
+        back: Points against the reading direction.
+        change: `added` or `removed`, where two versions are compared.
+        note: Numbers, for its label.
+    """
+
+    source: str
+    target: str
+    to_outcome: bool
+    outcomes: tuple[str, ...]
+    implicit: bool = False
+    back: bool = False
+    change: str = ""
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """How a container comes to an outcome when several children decide together.
+
+    Attributes:
+        outcome: The container's outcome.
+        conditions: Pairs (child label, child outcome).
+        text: The rule in words.
+        change: As that of `Edge`.
+    """
+
+    outcome: str
+    conditions: tuple[tuple[str, str], ...]
+    text: str
+    change: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Pill:
+    """An outcome on the border of an open container.
+
+    Attributes:
+        by_default: Only transitions that nobody wrote down lead to it.
+    """
+
+    outcome: str
+    by_default: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A state in a picture.
+
+    Attributes:
+        path: `/ROOT/CHILD`.
+        kind: As in `smachpy.introspection.StateRecord`, or `MISSING`.
+        details: Pairs (name, value) for the tooltip.
+        hidden: Number of states inside that the picture does not show.
+        children: Empty for a plain state and for a closed container.
+        initial: Labels of the children that start first.
+        pills: Outcomes drawn on the border of an open container.
+        change: `added`, `removed` or `changed`, where two versions are compared.
+        note: Numbers, for a second line of its label.
+    """
+
+    path: str
+    label: str
+    kind: str
+    type_name: str = ""
+    doc: str = ""
+    details: tuple[tuple[str, str], ...] = ()
+    outcomes: tuple[str, ...] = ()
+    hidden: int = 0
+    children: tuple[Node, ...] = ()
+    initial: tuple[str, ...] = ()
+    edges: tuple[Edge, ...] = ()
+    rules: tuple[Rule, ...] = ()
+    default_outcome: str | None = None
+    pills: tuple[Pill, ...] = ()
+    change: str = ""
+    note: str = ""
+
+    @property
+    def is_open(self) -> bool:
+        """Whether its children are drawn."""
+        return bool(self.children)
+
+    def walk(self) -> Iterator[Node]:
+        """Yield this node and everything below, parents first."""
+        yield self
+        for child in self.children:
+            yield from child.walk()
+
+
+@dataclass(frozen=True, slots=True)
+class Marks:
+    """What a run left on a machine.
+
+    Attributes:
+        active: Paths of the states that are running, containers included.
+        visits: Times each state was entered, by path.
+        last: Outcome with which each state was last left, by path.
+        taken: Times each transition was taken, by (path of the state left, outcome).
+        runs: Number of recorded runs that were counted; 0: it is one run, and its end is shown.
+        heat: How hot each state is, 0 to 1, by path.
+        notes: Numbers for a second line of a state's label, by path.
+    """
+
+    active: frozenset[str] = frozenset()
+    visits: Mapping[str, int] = field(default_factory=dict)
+    last: Mapping[str, str] = field(default_factory=dict)
+    taken: Mapping[tuple[str, str], int] = field(default_factory=dict)
+    runs: int = 0
+    heat: Mapping[str, float] = field(default_factory=dict)
+    notes: Mapping[str, str] = field(default_factory=dict)
+
+    def share(self, path: str, outcomes: Sequence[str]) -> float | None:
+        """Return the share of a state's ends that were one of `outcomes`; None without ends."""
+        ends = {key: n for key, n in self.taken.items() if key[0] == path}
+        total = sum(ends.values())
+        return sum(ends.get((path, o), 0) for o in outcomes) / total if total else None
+
+    @property
+    def has_run(self) -> bool:
+        """Whether there is a history, so that untouched parts can stand back."""
+        return bool(self.visits)
+
+
+@dataclass(frozen=True, slots=True)
+class Diagram:
+    """A picture without its look.
+
+    Attributes:
+        root: The outermost state.
+        marks: What to highlight.
+        links: Address of the page of a container, by path, for linked pages.
+        legend: What the signs mean, as pairs (change or "", words); beside the title.
+        compared: Whether two versions are compared, so that what is the same stands back.
+    """
+
+    root: Node
+    marks: Marks = field(default_factory=Marks)
+    links: Mapping[str, str] = field(default_factory=dict)
+    legend: tuple[tuple[str, str], ...] = ()
+    compared: bool = False

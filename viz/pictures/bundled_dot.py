@@ -1,0 +1,92 @@
+"""A `dot` program made of the Graphviz library inside the pygraphviz wheel.
+
+Run as a process of its own (`python -m viz.pictures.bundled_dot -Tsvg file.gv`), never imported: a
+fault in the C library must not reach a robot. Understands what `graphviz_process` and the package
+`graphviz` pass: `-K`, `-T`, `-o`, `-G/-N/-E name=value`, `-V`, and input files or a stream of
+graphs on standard input, each ended by the line `// end of graph`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+try:
+    import pygraphviz
+except ImportError as failure:  # its wheel needs glib and X11's libraries, which bare systems lack
+    sys.exit(
+        f"the package pygraphviz cannot be used: {failure}. Try: sudo apt-get install graphviz"
+    )
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+END = b"// end of graph"  # the END of graphviz_process, which this process does not import
+
+
+def main(arguments: list[str]) -> int:
+    """Draw every input one after another; returns the exit code."""
+    options = _parser().parse_args(arguments)
+    if options.version:
+        sys.stderr.write(f"dot - graphviz version {pygraphviz.__graphviz_version__}\n")
+        return 0
+    out = options.output.open("wb") if options.output else sys.stdout.buffer
+    try:
+        for text in _texts(options.files):
+            out.write(_draw(text, options))
+            out.flush()
+    except (ValueError, OSError, pygraphviz.DotError) as error:
+        sys.stderr.write(f"Error: {error}\n")
+        return 1
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="dot", allow_abbrev=False)
+    parser.add_argument("-K", dest="engine", default="dot")
+    parser.add_argument("-T", dest="format", default="dot")
+    parser.add_argument("-o", dest="output", type=Path)
+    parser.add_argument("-V", dest="version", action="store_true")
+    parser.add_argument("-q", dest="quiet", action="store_true")
+    for kind in "GNE":
+        parser.add_argument(f"-{kind}", dest=kind, action="append", default=[])
+    parser.add_argument("files", nargs="*", type=Path)
+    return parser
+
+
+def _texts(files: list[Path]) -> Iterator[str]:
+    """Every file; without any, every graph on standard input as soon as it is complete."""
+    if files:
+        yield from (file.read_text(encoding="utf-8") for file in files)
+        return
+    lines: list[str] = []
+    for line in iter(sys.stdin.buffer.readline, b""):
+        lines.append(line.decode("utf-8"))
+        if line.rstrip() == END:
+            yield "".join(lines)
+            lines = []
+    if "".join(lines).strip():
+        yield "".join(lines)
+
+
+def _draw(text: str, options: argparse.Namespace) -> bytes:
+    picture = pygraphviz.AGraph(string=text)
+    for kind, attributes in (
+        ("G", picture.graph_attr),
+        ("N", picture.node_attr),
+        ("E", picture.edge_attr),
+    ):
+        for assignment in getattr(options, kind):
+            name, _, value = assignment.partition("=")
+            attributes[name] = value or "true"
+    data: bytes = picture.draw(format=options.format, prog=options.engine)
+    return data
+
+
+if __name__ == "__main__":
+    code = main(sys.argv[1:])
+    sys.stdout.flush()
+    os._exit(code)  # the library's clean-up at exit costs time and can fault

@@ -1,0 +1,297 @@
+"""One container as a page for `dot`, and what comes back.
+
+The containers inside are boxes of known size, with a port for their entry on the upper border and
+one per outcome on the lower one. Lengths are points (1/72 inch), y points up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from math import ceil
+from typing import TYPE_CHECKING, Any
+
+import graphviz
+
+from viz.pictures import style
+from viz.pictures.curves import around, crossings, length, point, trace, with_stem
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from viz.pictures.shapes import Anchor, Arrow, Box
+    from viz.pictures.theme import Theme
+
+    Point = tuple[float, float]
+
+MARGIN = 12
+DOT_RADIUS = 4
+PORT = 8
+INCH = 72.0
+DETOUR = 250.0
+"""How much longer arrows may be to avoid one crossing [points]."""
+LOOP = 9
+"""Distance between arrows that leave a container and come back into it [points]."""
+LOOP_LABEL = 26
+"""Room for the label of such an arrow [points]."""
+CORNER = 6
+"""Radius of its corners [points]."""
+
+
+# What a layout depends on; leaving the looks out halves the time it takes to write and read.
+_SIZES = frozenset(
+    {"arrowsize", "fixedsize", "fontname", "fontsize", "height", "label", "margin", "peripheries"}
+    | {"shape", "weight", "width"}
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Try:
+    """A way to lay a container out; of several the one with the shortest arrows is kept.
+
+    Attributes:
+        side: Where arrows come back into a container inside, `e` or `w`.
+        corner: Whether arrows that lead back leave an outcome towards that side.
+        back_first: Whether arrows that lead back are placed before the others.
+        plain: Straight arrows without regard to sides, for what makes `dot` crash otherwise.
+    """
+
+    side: str = "e"
+    corner: bool = False
+    back_first: bool = False
+    plain: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """One container, laid out.
+
+    Attributes:
+        width, height: Outer size with the dot and the pills that stand over the border.
+        dx, dy: From coordinates of the page to coordinates of the outer box.
+        floor: Height of the lower border in the outer box.
+        ports: Centre and width along x in the outer box, by part.
+    """
+
+    width: int
+    height: int
+    dx: float
+    dy: float
+    floor: float
+    title: tuple[float, float]
+    ports: dict[str, tuple[float, float]]
+    spots: dict[str, tuple[float, float]]
+    curves: dict[str, dict[str, str]]
+
+
+def tries(box: Box) -> tuple[Try, ...]:
+    """Ways to lay a container out; they differ only for arrows that lead back."""
+    back = [arrow for arrow in box.arrows if arrow.back]
+    if not back:
+        return (Try(),)
+    if not any(arrow.head.is_open or arrow.tail.is_open for arrow in back):
+        return (Try(), Try(back_first=True))
+    return tuple(Try(*choice) for choice in product("ew", (False, True), (False, True)))
+
+
+def page_text(box: Box, how: Try, theme: Theme, pages: Mapping[int, Page]) -> str:
+    """Return a container as DOT text; `pages` has the containers inside, by `id`."""
+    dot = graphviz.Digraph(graph_attr={**style.graph(theme), "label": box.attributes["label"]})
+    dot.attr("graph", labelloc="t", pad="0", splines="line" if how.plain else "true")
+    dot.attr("node", **_sizes(style.node_defaults(theme)))
+    dot.attr("edge", **_sizes(style.edge_defaults(theme)))
+    assert box.entry is not None
+    dot.node(box.entry.name, label="", shape="point", width="0.03", height="0.03")
+    for child in box.boxes:
+        dot.node(child.name, **_block(child, pages.get(id(child)), loop_room(box, child)))
+    for vertex in box.joins:
+        dot.node(vertex.name, **_sizes(vertex.attributes))
+    if box.pills:
+        with dot.subgraph() as bottom:
+            bottom.attr(rank="sink")
+            for vertex in box.pills:
+                bottom.node(vertex.name, **_sizes(vertex.attributes))
+    loops = {arrow.name for child in box.boxes for arrow in _loops(box, child)}
+    for arrow in sorted(box.arrows, key=lambda arrow: how.back_first and not arrow.back):
+        if arrow.name not in loops:
+            _write_arrow(dot, box, arrow, how)
+    return str(dot.source)
+
+
+def _block(child: Box, page: Page | None, room: tuple[int, int]) -> Mapping[str, str]:
+    """The node that stands for a child: itself, or a table of the size of its page and loops."""
+    if page is None:
+        return _sizes(child.attributes)
+    right, below = room
+    width = page.width + right
+    rows = [
+        _strip(width, {part: span for part, span in page.ports.items() if part == "in"}),
+        f'<td fixedsize="true" width="{width}" height="{page.height - 4}"></td>',
+        _strip(width, {part: span for part, span in page.ports.items() if part != "in"}),
+    ]
+    if below:
+        rows.append(f'<td fixedsize="true" width="{width}" height="{below}"></td>')
+    table = '<table border="0" cellborder="0" cellspacing="0" cellpadding="0">'
+    body = "".join(f"<tr>{row}</tr>" for row in rows)
+    return {"label": f"<{table}{body}</table>>", "margin": "0", "shape": "plain"}
+
+
+def _sizes(attributes: Mapping[str, str]) -> dict[str, str]:
+    return {name: value for name, value in attributes.items() if name in _SIZES}
+
+
+def _loops(box: Box, child: Box) -> list[Arrow]:
+    """Arrows that leave an open child by an outcome and come straight back into it."""
+    if child.entry is None:
+        return []
+    return [
+        arrow
+        for arrow in box.arrows
+        if arrow.tail.box == arrow.head.box == child.name and arrow.tail.part
+    ]
+
+
+def loop_room(box: Box, child: Box) -> tuple[int, int]:
+    """Return how much room a child needs on its right and below for such arrows [points]."""
+    loops = _loops(box, child)
+    if not loops:
+        return 0, 0
+    label = LOOP_LABEL if any("label" in arrow.attributes for arrow in loops) else 0
+    return LOOP * (len(loops) + 2) + label, LOOP * len(loops)
+
+
+def _draw_loops(box: Box, pages: Mapping[int, Page], page: Page) -> None:
+    """Draw what `dot` does badly: it leads such arrows across whatever is near."""
+    for child in box.boxes:
+        inner = pages.get(id(child))
+        for i, arrow in enumerate(_loops(box, child)):
+            assert inner is not None
+            right, below = loop_room(box, child)
+            x, y = page.spots[child.name]
+            left, bottom = x - (inner.width + right) / 2, y - (inner.height + below) / 2 + below
+            start = (left + inner.ports[arrow.tail.part][0], bottom)
+            wall = left + inner.width
+            lane = wall + LOOP * (i + 2) - CORNER / 2
+            middle = bottom + inner.floor + 0.6 * (inner.height - inner.floor) - 2 * LOOP * i
+            page.curves[arrow.name] = {
+                "pos": around(start, (wall, middle), lane, bottom - LOOP * (i + 1) + 1, CORNER),
+                "lp": f"{lane + LOOP_LABEL / 2 + 1},{middle - 2 * LOOP}",
+            }
+
+
+def _strip(width: int, ports: Mapping[str, tuple[float, float]]) -> str:
+    """A row two points high with a named cell per port."""
+    cells = []
+    at = 0
+    for part, (centre, span) in sorted(ports.items(), key=lambda item: item[1][0]):
+        left = max(at, round(centre - span / 2))
+        if left > at:
+            cells.append(_cell(left - at))
+        at = min(width, max(left + 1, round(centre + span / 2)))
+        cells.append(_cell(at - left, f' port="{part}"'))
+    if at < width:
+        cells.append(_cell(width - at))
+    return (
+        '<td><table border="0" cellborder="0" cellspacing="0" cellpadding="0"><tr>'
+        f"{''.join(cells)}</tr></table></td>"
+    )
+
+
+def _cell(width: int, port: str = "") -> str:
+    return f'<td fixedsize="true" width="{width}" height="2"{port}></td>'
+
+
+def _write_arrow(dot: graphviz.Digraph, box: Box, arrow: Arrow, how: Try) -> None:
+    towards = how.side if arrow.back and how.corner else ""
+    tail, head = _end(arrow.tail, box, f"s{towards}"), _end(arrow.head, box, how.side)
+    if how.plain:
+        tail, head = tail.partition(":")[0], head.partition(":")[0]
+    attributes = {**_sizes(arrow.attributes), "id": arrow.name}
+    if arrow.back:
+        dot.edge(head, tail, dir="back", **attributes)
+    else:
+        dot.edge(tail, head, **attributes)
+
+
+def _end(anchor: Anchor, box: Box, side: str) -> str:
+    if anchor.box == box.name:
+        return f"{anchor.box}_{anchor.part}"
+    if anchor.is_open and anchor.part:
+        return f"{anchor.box}:{anchor.part}:{'n' if anchor.part == 'in' else side}"
+    return f"{anchor.box}:{side}" if anchor.is_open else anchor.box
+
+
+def read_page(box: Box, result: Mapping[str, Any], pages: Mapping[int, Page]) -> Page:
+    """Return the page of `box` from what `dot` made of its text.
+
+    Args:
+        box: The container.
+        result: Graphviz' JSON.
+        pages: The pages of the containers inside, by `id`.
+    """
+    found = {item["name"]: item for item in result.get("objects", ()) if "pos" in item}
+    curves = {
+        edge["id"]: {key: edge[key] for key in ("pos", "lp") if key in edge}
+        for edge in result.get("edges", ())
+    }
+    left, right, top = _extent(result, curves)
+    spots = {name: point(item["pos"]) for name, item in found.items()}
+    assert box.entry is not None
+    entry_x, _ = spots[box.entry.name]
+    first = next((arrow.name for arrow in box.arrows if arrow.tail.part == "in"), None)
+    if first is not None:
+        curves[first]["pos"] = with_stem(curves[first]["pos"], entry_x, top)
+    spots[box.entry.name] = (entry_x, top)
+    title_x, right = _title(result, entry_x, left, right)
+    dx, dy, floor = MARGIN - left, float(MARGIN), 0.0
+    ports = {"in": (entry_x + dx, float(PORT))}
+    if box.pills:
+        dy = -min(spots[p.name][1] - _size(found[p.name], "height") / 2 for p in box.pills)
+        floor = spots[box.pills[0].name][1] + dy
+        for i, vertex in enumerate(box.pills):
+            ports[f"o{i}"] = (spots[vertex.name][0] + dx, _size(found[vertex.name], "width"))
+    page = Page(
+        width=ceil(right + dx + MARGIN),
+        height=ceil(top + dy + DOT_RADIUS),
+        dx=dx,
+        dy=dy,
+        floor=floor,
+        title=(title_x, point(result["lp"])[1]),
+        ports=ports,
+        spots=spots,
+        curves=curves,
+    )
+    _draw_loops(box, pages, page)
+    return page
+
+
+def _extent(
+    result: Mapping[str, Any], curves: Mapping[str, Mapping[str, str]]
+) -> tuple[float, float, float]:
+    """Left, right and upper end of a page; loops may leave the box that Graphviz reports."""
+    left, _, right, top = map(float, result["bb"].split(","))
+    for attributes in curves.values():
+        for x, _ in trace(attributes["pos"]):
+            left, right = min(left, x), max(right, x)
+    return left, right, top
+
+
+def untidiness(result: Mapping[str, Any]) -> float:
+    """Length of all arrows [points]; a crossing counts as much as a long way round."""
+    traces = [trace(edge["pos"]) for edge in result.get("edges", ())]
+    return sum(map(length, traces)) + DETOUR * crossings([line[::2] for line in traces])
+
+
+def _title(
+    result: Mapping[str, Any], entry_x: float, left: float, right: float
+) -> tuple[float, float]:
+    """Centre of the title, left of the line from the entry if it fits, else beside it."""
+    width = float(result["lwidth"]) * INCH
+    if left + width + DOT_RADIUS <= entry_x:
+        return left + width / 2 - 2, right
+    beside = entry_x + DOT_RADIUS + 2
+    return beside + width / 2, max(right, beside + width - DOT_RADIUS)
+
+
+def _size(item: Mapping[str, Any], side: str) -> float:
+    return float(item[side]) * INCH

@@ -1,0 +1,249 @@
+"""Pictures of machines, from the record to the file."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from smachpy.exceptions import SmachError
+from smachpy.introspection import StateRecord, describe
+from viz.model import extract
+from viz.model.history import History
+from viz.model.machine import Diagram, Marks
+from viz.pictures import graphviz_process, layout
+from viz.pictures.container_layout import INCH
+from viz.pictures.dot import dot_text
+from viz.pictures.mermaid import mermaid_text
+from viz.pictures.outline import outline_text
+from viz.pictures.shapes import shapes_of
+from viz.pictures.theme import THEMES, Theme
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from smachpy.events import Event
+    from smachpy.machines.state import State
+
+
+SHARP = 144
+"""Dots per inch of a PNG."""
+MOST_PIXELS = 16000
+"""Longest side of a PNG."""
+
+
+FORMATS = ("dot", "gv", "json", "mmd", "pdf", "png", "svg", "txt")
+
+
+class PictureError(SmachError):
+    """The picture cannot be made as asked for."""
+
+
+def render(
+    machine: State | StateRecord,
+    file: str | os.PathLike[str],
+    *,
+    theme: str = "light",
+    depth: int | None = None,
+    path: str | None = None,
+    active: Iterable[str] = (),
+    run: History | Iterable[Event] | Marks | None = None,
+    show_implicit: bool = False,
+    legend: tuple[tuple[str, str], ...] = (),
+) -> Path:
+    """Draw a machine into a file.
+
+    Args:
+        machine: A state machine, any container, or its record.
+        file: Where to; the ending names the format: svg, png, pdf, dot, json, mmd or txt.
+        theme: `light` or `dark`.
+        depth: Container levels to open; None opens as many as stay readable (60 states).
+        path: Draw only the container at this path.
+        active: Paths of states to mark as running.
+        run: The history or the events of a run, whose states and transitions are marked; or the
+            marks of many (`viz.runs.statistics.marks_of`).
+        show_implicit: Draw the transitions nobody wrote down as well.
+        legend: What signs mean, beside the title (`viz.model.machine.Diagram`).
+
+    Returns:
+        The file.
+
+    Raises:
+        PictureError: unknown format or theme, or the file cannot be written.
+        UnknownPathError: `path` or one of `active` names no state.
+        EngineError: there is no `dot` program, or it failed.
+
+    Blocks: while `dot` runs, usually well under a second; never past its time limit.
+    """
+    target = Path(file)
+    content = picture(
+        machine,
+        target.suffix.lstrip(".").lower(),
+        theme=theme,
+        depth=depth,
+        path=path,
+        active=active,
+        run=run,
+        show_implicit=show_implicit,
+        legend=legend,
+    )
+    return write(content, target)
+
+
+def picture(
+    machine: State | StateRecord,
+    form: str,
+    *,
+    theme: str = "light",
+    depth: int | None = None,
+    path: str | None = None,
+    active: Iterable[str] = (),
+    run: History | Iterable[Event] | Marks | None = None,
+    show_implicit: bool = False,
+    legend: tuple[tuple[str, str], ...] = (),
+) -> bytes:
+    """Return what `render` would write into a file of the format `form`.
+
+    Raises, Blocks: as `render`.
+    """
+    whole = machine if isinstance(machine, StateRecord) else describe(machine)
+    record = whole if path is None else extract.find(whole, path)
+    marks = _marks(whole, active, run)
+    if form == "json":  # the record is the structure, whole and without a look
+        return (record.to_json(indent=2) + "\n").encode("utf-8", "replace")
+    node = extract.extract(record, depth=depth, show_implicit=show_implicit)
+    return draw(Diagram(node, marks, legend=legend), form, theme=theme)
+
+
+def draw(diagram: Diagram, form: str, *, theme: str = "light") -> bytes:
+    """Return a picture of a diagram that somebody has made, in any format but JSON.
+
+    Text and Mermaid do not show how two versions differ.
+
+    Raises, Blocks: as `render`.
+    """
+    match form:
+        case "svg" | "png" | "pdf":
+            return _draw(diagram, form, _theme(theme))
+        case "dot" | "gv":
+            colours = _theme(theme)
+            text = dot_text(shapes_of(diagram, colours), colours)
+        case "mmd" if not diagram.compared:
+            text = mermaid_text(diagram, _theme(theme))
+        case "txt" if not diagram.compared:
+            text = outline_text(diagram)
+        case _:
+            forms = ("svg", "png", "pdf", "dot") if diagram.compared else FORMATS
+            raise PictureError(
+                f"picture: format: got {form!r}; expected one of {', '.join(forms)}."
+            )
+    return text.encode("utf-8", "replace")
+
+
+def write(content: bytes, file: str | os.PathLike[str]) -> Path:
+    """Write a picture into a file, whole or not at all: a viewer never sees half of it.
+
+    Raises:
+        PictureError: it cannot be written.
+    """
+    target = Path(file)
+    draft = target.with_name(f".{target.name}.{os.urandom(4).hex()}")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            draft.write_bytes(content)
+            draft.replace(target)
+        finally:
+            draft.unlink(missing_ok=True)
+    except OSError as error:
+        raise PictureError(
+            f"picture: {str(target)!r} cannot be written: {error.strerror}"
+        ) from error
+    return target
+
+
+def svg(machine: State | StateRecord) -> str:
+    """Return a machine as SVG text, as a notebook shows it."""
+    return picture(machine, "svg").decode("utf-8")
+
+
+def atlas(
+    machine: State | StateRecord,
+    folder: str | os.PathLike[str],
+    *,
+    theme: str = "light",
+    run: History | Iterable[Event] | Marks | None = None,
+    show_implicit: bool = False,
+    legend: tuple[tuple[str, str], ...] = (),
+) -> Path:
+    """Draw one SVG page per container into `folder`, each state linked to its own page.
+
+    Returns:
+        The page of the outermost container, `index.svg`.
+
+    Raises, Blocks: as `render`.
+    """
+    record = machine if isinstance(machine, StateRecord) else describe(machine)
+    colours = _theme(theme)
+    marks = _marks(record, (), run)
+    parents = [state for state in record.walk() if state.children] or [record]
+    names = {state.path: f"page{i}.svg" for i, state in enumerate(parents)}
+    names[record.path] = "index.svg"
+    above = {child.path: state.path for state in parents for child in state.children}
+    pages = []
+    for state in parents:
+        node = extract.extract(state, depth=1, show_implicit=show_implicit)
+        links = {path: names[path] for path in (c.path for c in state.children) if path in names}
+        if state.path in above:
+            links[state.path] = names[above[state.path]]
+        shown = legend if state is record else ()
+        pages.append(shapes_of(Diagram(node, marks, links, shown), colours))
+    geometries = graphviz_process.lay_out(partial(layout.compose_all, pages, colours))
+    texts = [dot_text(p, colours, g) for p, g in zip(pages, geometries, strict=True)]
+    place = Path(folder)
+    for state, content in zip(parents, graphviz_process.draw_pages(texts), strict=True):
+        write(content, place / names[state.path])
+    return place / "index.svg"
+
+
+def _marks(
+    record: StateRecord, active: Iterable[str], run: History | Iterable[Event] | Marks | None
+) -> Marks:
+    marks = run if isinstance(run, Marks) else _history(run).marks()
+    named = {extract.find(record, path).path for path in active}
+    paths = {
+        state.path
+        for state in record.walk()
+        if any(path == state.path or path.startswith(state.path + "/") for path in named)
+    }
+    return replace(marks, active=marks.active | paths)
+
+
+def _history(run: History | Iterable[Event] | None) -> History:
+    if isinstance(run, History):
+        return run
+    history = History()
+    for event in run or ():
+        history.on_event(event)
+    return history
+
+
+def _theme(name: str) -> Theme:
+    if name not in THEMES:
+        raise PictureError(f"picture: theme: got {name!r}; expected one of {sorted(THEMES)}.")
+    return THEMES[name]
+
+
+def _draw(diagram: Diagram, form: graphviz_process.Format, theme: Theme) -> bytes:
+    shapes = shapes_of(diagram, theme)
+    places = graphviz_process.lay_out(partial(layout.compose, shapes, theme))
+    text = dot_text(shapes, theme, places)
+    return graphviz_process.draw(text, form, dots_per_inch=_resolution(places))
+
+
+def _resolution(places: layout.Geometry) -> int:
+    """Sharp on any screen, but never more pixels than image viewers can open."""
+    width, height = layout.canvas_size(places)
+    return int(min(SHARP, MOST_PIXELS * INCH / max(width, height)))

@@ -1,0 +1,132 @@
+"""Where every piece of a picture goes: each container is laid out on its own, innermost first.
+
+A container becomes a page for `dot`, in which the containers inside are boxes of known size with
+a port for their entry on the upper border and one per outcome on the lower one. So no arrow ever
+crosses a border except at an entry or an outcome, and the time grows with the number of states,
+while one layout of everything takes minutes for 500 states. All containers of one height share
+one run of `dot`. Lengths are points (1/72 inch), y points up.
+"""
+
+from __future__ import annotations
+
+from itertools import islice
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from smachpy.exceptions import SmachError
+from viz.pictures.container_layout import (
+    DOT_RADIUS,
+    Page,
+    Try,
+    loop_room,
+    page_text,
+    read_page,
+    tries,
+    untidiness,
+)
+from viz.pictures.curves import shift
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from viz.pictures.shapes import Box
+    from viz.pictures.theme import Theme
+
+    Engine = Callable[[Sequence[str]], Sequence[dict[str, Any] | None]]
+
+Geometry: TypeAlias = dict[str, dict[str, str]]
+
+CANVAS = "canvas"
+"""Name of the geometry of the whole picture."""
+PAD = 14
+"""Room around a picture [points]."""
+
+
+class LayoutError(SmachError):
+    """A container cannot be laid out, however simply."""
+
+
+def compose(root: Box, theme: Theme, run: Engine) -> Geometry:
+    """Return the positions of everything in `root`, as Graphviz attributes by name.
+
+    Args:
+        root: The picture.
+        theme: Fonts and sizes.
+        run: Lays DOT texts out and returns Graphviz' JSON for each, None for one it crashed on.
+
+    Raises:
+        LayoutError: `dot` crashes on a container.
+
+    Blocks: while `run` does, once per nesting level.
+    """
+    return compose_all([root], theme, run)[0]
+
+
+def compose_all(roots: Sequence[Box], theme: Theme, run: Engine) -> list[Geometry]:
+    """`compose` for several pictures with as few runs as for the deepest one."""
+    containers = [box for root in roots for box in root.containers()]
+    pages: dict[int, Page] = {}
+    for height in range(1, max(root.height() for root in roots) + 1):
+        level = [box for box in containers if box.height() == height]
+        texts = [page_text(box, how, theme, pages) for box in level for how in tries(box)]
+        results = iter(run(texts))
+        for box in level:
+            found = [r for r in islice(results, len(tries(box))) if r is not None]
+            if not found:
+                found = [_simplest(box, theme, pages, run)]
+            best = found[0] if len(found) == 1 else min(found, key=untidiness)
+            pages[id(box)] = read_page(box, best, pages)
+    return [_geometry(root, pages) for root in roots]
+
+
+def _simplest(box: Box, theme: Theme, pages: Mapping[int, Page], run: Engine) -> dict[str, Any]:
+    """Lay out what made `dot` crash."""
+    (result,) = run([page_text(box, Try(plain=True), theme, pages)])
+    if result is None:
+        raise LayoutError(
+            f"picture: {box.attributes['id']}: `dot` crashes on it, whatever the settings. "
+            "Try another version of Graphviz, or -o FILE.dot."
+        )
+    return result
+
+
+def _geometry(root: Box, pages: Mapping[int, Page]) -> Geometry:
+    page = pages.get(id(root))
+    if page is None:  # a plain state, alone
+        return {CANVAS: {}, root.name: {"pos": "0,0"}}
+    width, height = page.width + 2 * PAD, page.height + 2 * PAD
+    view = f"{width},{height},1,{page.width / 2},{page.height / 2}"
+    geometry: Geometry = {CANVAS: {"viewport": view}}
+    _place(root, pages, (0.0, 0.0), geometry)
+    return geometry
+
+
+def canvas_size(geometry: Geometry) -> tuple[float, float]:
+    """Return width and height of a laid out picture in points, roughly for a plain state."""
+    width, height, *_ = geometry[CANVAS].get("viewport", "300,60").split(",")
+    return float(width), float(height)
+
+
+def _place(
+    box: Box, pages: Mapping[int, Page], origin: tuple[float, float], geometry: Geometry
+) -> None:
+    """Write absolute positions; `origin` is the lower left corner of the outer box."""
+    page = pages[id(box)]
+    ox, oy = origin
+    sx, sy = ox + page.dx, oy + page.dy
+    geometry[box.name] = {
+        "bb": f"{ox:.2f},{oy + page.floor:.2f},{ox + page.width:.2f},"
+        f"{oy + page.height - DOT_RADIUS:.2f}",
+        "lp": f"{sx + page.title[0]:.2f},{sy + page.title[1]:.2f}",
+    }
+    for name, (x, y) in page.spots.items():
+        geometry.setdefault(name, {})["pos"] = f"{sx + x:.2f},{sy + y:.2f}"
+    for name, attributes in page.curves.items():
+        geometry[name] = {key: shift(value, sx, sy) for key, value in attributes.items()}
+    for child in box.boxes:
+        inner = pages.get(id(child))
+        if inner is not None:
+            x, y = page.spots[child.name]
+            right, below = loop_room(box, child)
+            left = sx + x - (inner.width + right) / 2
+            bottom = sy + y - (inner.height + below) / 2 + below
+            _place(child, pages, (left, bottom), geometry)

@@ -1,0 +1,69 @@
+"""A picture as lines of text: the tree of states with what leads where."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from viz.model.labels import GLYPHS, KIND_WORDS, shorten
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from viz.model.machine import Diagram, Marks, Node
+
+STANDS = "\u25b8"
+"""Marks a state that is running."""
+
+
+def outline_text(diagram: Diagram) -> str:
+    """Return the picture as an indented tree.
+
+    A state's line has its outcomes and where they lead; the first state of a container has an
+    asterisk, one that is running a triangle.
+    """
+    return "\n".join(_lines(diagram.root, diagram.marks, "", "", first=False, exits="")) + "\n"
+
+
+def _lines(
+    node: Node, marks: Marks, lead: str, rest: str, *, first: bool, exits: str
+) -> Iterator[str]:
+    yield lead + _title(node, marks, first=first) + (f"  {exits}" if exits else "")
+    for i, child in enumerate(node.children):
+        last = i == len(node.children) - 1 and not node.rules
+        yield from _lines(
+            child,
+            marks,
+            rest + ("\u2514\u2500 " if last else "\u251c\u2500 "),
+            rest + ("   " if last else "\u2502  "),
+            first=child.label in node.initial,
+            exits=_exits(node, child.label),
+        )
+    for i, rule in enumerate(node.rules):
+        corner = "\u2514\u2500 " if i == len(node.rules) - 1 else "\u251c\u2500 "
+        words = rule.text or " and ".join(f"{label}:{oc}" for label, oc in rule.conditions)
+        yield f"{rest}{corner}{shorten(rule.outcome)} \u2190 {shorten(words, 120)}"
+
+
+def _title(node: Node, marks: Marks, *, first: bool) -> str:
+    glyph = GLYPHS.get(node.kind, "")
+    word = KIND_WORDS.get(node.kind, "")
+    count = marks.visits.get(node.path, 0)
+    parts = [
+        STANDS if node.path in marks.active else "",
+        "*" if first else "",
+        glyph,
+        shorten(node.label),
+        f"({word})" if word else "",
+        f"(+{node.hidden} states)" if node.hidden else "",
+        f"\u00d7{count}" if count > 1 else "",
+        f"[{shorten(marks.last[node.path])}]" if node.path in marks.last else "",
+    ]
+    return " ".join(part for part in parts if part)
+
+
+def _exits(parent: Node, label: str) -> str:
+    return ", ".join(
+        f"{shorten('/'.join(edge.outcomes))} \u2192 {shorten(edge.target)}"
+        for edge in parent.edges
+        if edge.source == label
+    )

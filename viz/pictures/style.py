@@ -1,0 +1,454 @@
+"""How each piece of a picture looks, as Graphviz attributes.
+
+Every text that comes from a machine passes through `shorten`, `markup` or `plain` here, so that no
+name can break a picture, whatever it contains.
+"""
+
+from __future__ import annotations
+
+import re
+from math import log2
+from string import punctuation
+from typing import TYPE_CHECKING
+
+import graphviz
+
+from smachpy.outcome_classes import outcome_class
+from viz.model.labels import ENDINGS, GLYPHS, KIND_WORDS, shorten
+from viz.model.machine import MISSING
+from viz.pictures.theme import FONT
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from smachpy.outcome_classes import OutcomeClass
+    from viz.model.machine import Diagram, Marks, Node
+    from viz.pictures.theme import Swatch, Theme
+
+    Attributes = dict[str, str]
+
+TOOLTIP_LENGTH = 600
+SIGNS = {"added": "+", "removed": "\u2212", "changed": "\u2260"}
+"""What stands before the name of what has changed: never its colour alone."""
+
+# Graphviz stumbles over more than XML's five characters, over a closing bracket for one.
+_ENTITIES = {ord(mark): f"&#{ord(mark)};" for mark in punctuation if mark not in "_-."}
+_BACKSLASH = re.compile(r"\\(?=[\w\\])")
+
+
+def markup(text: str) -> str:
+    """Return `text` safe inside an HTML-like label."""
+    return _inert(shorten(text)).translate(_ENTITIES) or " "
+
+
+def plain(text: str, length: int = TOOLTIP_LENGTH) -> str:
+    """Return `text` safe as the value of an ordinary attribute."""
+    lines = [shorten(line, length) for line in text[: 4 * length].splitlines()[:12]]
+    escaped = [graphviz.escape(_inert(line).replace("&", "&amp;")) for line in lines]
+    safe: str = graphviz.nohtml("\\n".join(escaped))
+    return safe
+
+
+def _inert(text: str) -> str:
+    """Part a backslash from a letter by a space without width.
+
+    Graphviz replaces a backslash and an N, a G and others by names of its own, also where the
+    backslash is escaped, because it looks more than once.
+    """
+    return _BACKSLASH.sub("\\\\\u200b", text)
+
+
+def graph(theme: Theme) -> Attributes:
+    """Attributes of a whole picture."""
+    return {
+        "bgcolor": theme.background,
+        "compound": "true",
+        "fontcolor": theme.ink,
+        "fontname": FONT,
+        "fontsize": "11",
+        "labeljust": "l",
+        "margin": "0",
+        "nodesep": "0.26",
+        "notranslate": "true",
+        "pad": "0.25",
+        "ranksep": "0.34",
+        "splines": "true",
+        "outputorder": "edgesfirst",
+        "tooltip": " ",
+    }
+
+
+def node_defaults(theme: Theme) -> Attributes:
+    """Attributes of every vertex that says nothing else."""
+    return {
+        "color": theme.inactive.stroke,
+        "fillcolor": theme.inactive.fill,
+        "fontcolor": theme.inactive.text,
+        "fontname": FONT,
+        "fontsize": "11",
+        "height": "0.34",
+        "margin": "0.14,0.05",
+        "penwidth": "1.1",
+        "shape": "box",
+        "style": "rounded,filled",
+        "width": "0.5",
+    }
+
+
+def edge_defaults(theme: Theme) -> Attributes:
+    """Attributes of every edge that says nothing else."""
+    return {
+        "arrowsize": "0.62",
+        "color": theme.edge,
+        "fontcolor": theme.muted,
+        "fontname": FONT,
+        "fontsize": "9",
+        "penwidth": "1.2",
+        "tooltip": " ",
+    }
+
+
+def state(node: Node, diagram: Diagram, theme: Theme) -> Attributes:
+    """A plain state, or a container that is closed."""
+    marks = diagram.marks
+    attributes = {**_identity(node, diagram), "label": _state_label(node, marks, theme)}
+    if node.hidden:
+        attributes["peripheries"] = "2"
+    if diagram.compared:
+        return attributes | _compared(node, theme)
+    swatch, extra = _status(node, marks, theme)
+    return attributes | _swatch(swatch) | extra | _heated(node, marks, theme)
+
+
+def container(node: Node, depth: int, diagram: Diagram, theme: Theme) -> Attributes:
+    """An open container."""
+    marks = diagram.marks
+    active = node.path in marks.active
+    word = KIND_WORDS.get(node.kind, "")
+    title = f"{_sign(node, theme)}<b>{markup(node.label)}</b>"
+    if word:
+        title += f'<font point-size="9" color="{theme.muted}">&#160;&#160;{word}</font>'
+    if not marks.notes:
+        title += _count(marks.visits.get(node.path, 0), theme.muted)
+    title += _note(node, marks, theme, before="&#160;&#160;")
+    if depth == 0 and diagram.legend:
+        title += f'<br align="left"/>{_legend(diagram, theme)}'
+    changed = _change_line(node, theme) if node.change else {}
+    return {
+        **_identity(node, diagram),
+        "color": theme.active.stroke if active else theme.border,
+        "fillcolor": theme.container(depth),
+        "fontcolor": theme.active.text if active else theme.ink,
+        "label": f"<{title}>",
+        "margin": "11",
+        "penwidth": "2.2" if active else "1",
+        "style": "rounded,filled,dashed" if node.kind == "concurrence" else "rounded,filled",
+    } | changed
+
+
+def entry(theme: Theme, *, touched: bool) -> Attributes:
+    """The dot where a container is entered."""
+    colour = theme.ink if touched else theme.muted
+    return {
+        "color": colour,
+        "fillcolor": colour,
+        "fixedsize": "true",
+        "height": "0.11",
+        "label": "",
+        "shape": "circle",
+        "style": "filled",
+        "tooltip": "start",
+        "width": "0.11",
+    }
+
+
+def pill(outcome: str, theme: Theme, *, by_default: bool, stands_back: bool) -> Attributes:
+    """An outcome on the border of a container."""
+    swatch = theme.outcome(outcome_class(outcome))
+    attributes = {
+        "fontsize": "9",
+        "height": "0.21",
+        "label": f"<{markup(outcome)}>",
+        "margin": "0.1,0.02",
+        "penwidth": "1.2",
+        "style": "rounded,filled,dashed" if by_default else "rounded,filled",
+        "tooltip": plain(f"outcome {outcome}"),
+        "width": "0.3",
+    } | _swatch(swatch)
+    if stands_back:
+        attributes["color"] = _see_through(swatch.stroke)
+    return attributes
+
+
+def join(text: str, theme: Theme) -> Attributes:
+    """The bar at which several states decide together."""
+    return {
+        "color": theme.muted,
+        "fillcolor": theme.muted,
+        "fixedsize": "true",
+        "height": "0.045",
+        "label": "",
+        "shape": "box",
+        "style": "filled",
+        "tooltip": plain(text),
+        "width": "0.5",
+    }
+
+
+def start(theme: Theme, *, fork: bool) -> Attributes:
+    """The arrow from the entry of a container to what runs first."""
+    return {
+        "arrowsize": "0.5",
+        "color": theme.muted,
+        "penwidth": "1",
+        "style": "dashed" if fork else "solid",
+        "weight": "3",
+    }
+
+
+def transition(
+    outcomes: Sequence[str],
+    theme: Theme,
+    marks: Marks,
+    *,
+    counts: Mapping[str, int],
+    labelled: bool,
+    implicit: bool,
+    change: str | None = None,
+    remark: str = "",
+) -> Attributes:
+    """An arrow that one or several outcomes of a state take.
+
+    Args:
+        outcomes: Their names.
+        theme: The colours.
+        marks: The run to show.
+        counts: Times each outcome was taken here.
+        labelled: Whether to write the names.
+        implicit: Whether nobody wrote the transition down.
+        change: Where two versions are compared, what has become of it, "" if nothing.
+        remark: Numbers, for the label.
+    """
+    if change is not None:
+        return _compared_transition(outcomes, theme, change, remark, labelled=labelled)
+    kinds = {outcome_class(outcome) for outcome in outcomes}
+    kind: OutcomeClass = kinds.pop() if len(kinds) == 1 else "other"
+    swatch = theme.outcome(kind)
+    taken = sum(counts.get(outcome, 0) for outcome in outcomes)
+    stands_back = marks.has_run and not taken
+    stroke = theme.edge if kind == "other" else swatch.stroke
+    attributes = {
+        "color": _see_through(stroke) if stands_back else stroke,
+        "tooltip": plain(", ".join(outcomes)),
+    }
+    if implicit:
+        attributes |= {"style": "dotted", "arrowsize": "0.5"}
+    if taken:
+        wide = min(4.0, 1.2 + 0.6 * log2(1 + taken)) if marks.runs else 2.6
+        attributes |= {"penwidth": f"{wide:.2g}"}
+    if labelled or taken > 1 or remark:
+        lines = [_outcome_line(o, theme, marks, counts, labelled=labelled) for o in outcomes]
+        if remark:
+            lines[-1] += f'<font color="{theme.muted}">&#160;{markup(remark)}</font>'
+        attributes["label"] = _beside(lines)
+    return attributes
+
+
+def _compared_transition(
+    outcomes: Sequence[str], theme: Theme, change: str, remark: str, *, labelled: bool
+) -> Attributes:
+    """An arrow of two versions: thick when added, dotted when removed, faint when neither."""
+    swatch = _change_swatch(change, theme)
+    look = {
+        "added": {"penwidth": "2.8"},
+        "removed": {"penwidth": "2", "style": "dotted"},
+    }.get(change, {"penwidth": "1.2"})
+    ink = swatch.text if change else theme.muted
+    sign = f"<b>{SIGNS[change]}</b>&#160;" if change else ""
+    names = [markup(outcome) if labelled else "" for outcome in outcomes]
+    lines = [f"{sign}{name}" for name in names] if sign or labelled else []
+    if remark:
+        lines.append(markup(remark))
+    attributes = {
+        "color": swatch.stroke if change else theme.border,
+        "tooltip": plain(", ".join(outcomes) + (f" ({change})" if change else "")),
+        **look,
+    }
+    if lines:
+        attributes["label"] = _beside([f'<font color="{ink}">{line}</font>' for line in lines])
+    return attributes
+
+
+def _change_swatch(change: str, theme: Theme) -> Swatch:
+    return {
+        "added": theme.success,
+        "removed": theme.failure,
+        "changed": theme.preempted,
+    }.get(change, theme.inactive)
+
+
+def _change_line(node: Node, theme: Theme) -> Attributes:
+    """The border of a state that has changed: thick, dotted or dashed."""
+    look = {
+        "added": ("2.8", "rounded,filled"),
+        "removed": ("2.2", "rounded,filled,dotted"),
+        "changed": ("2.4", "rounded,filled,dashed"),
+    }
+    width, line = look[node.change]
+    return {
+        "color": _change_swatch(node.change, theme).stroke,
+        "penwidth": width,
+        "style": line,
+    }
+
+
+def _compared(node: Node, theme: Theme) -> Attributes:
+    if not node.change:
+        return _swatch(theme.inactive) | {"color": theme.border, "penwidth": "1"}
+    return _swatch(_change_swatch(node.change, theme)) | _change_line(node, theme)
+
+
+def _sign(node: Node, theme: Theme) -> str:
+    if not node.change:
+        return ""
+    ink = _change_swatch(node.change, theme).text
+    return f'<font color="{ink}"><b>{SIGNS[node.change]}</b>&#160;</font>'
+
+
+def _legend(diagram: Diagram, theme: Theme) -> str:
+    parts = []
+    for change, words in diagram.legend:
+        if change == "heat":
+            parts.append(_heat_key(words, theme))
+            continue
+        ink = _change_swatch(change, theme).text if change else theme.muted
+        sign = f"<b>{SIGNS[change]}</b>&#160;" if change else ""
+        parts.append(f'<font point-size="9" color="{ink}">{sign}{markup(words)}</font>')
+    return "&#160;&#160;&#160;".join(parts)
+
+
+def _heat_key(words: str, theme: Theme) -> str:
+    """A row of ever warmer squares."""
+    steps = [_mix(theme.inactive.fill, theme.heat, share) for share in (0.25, 0.5, 0.75, 1.0)]
+    squares = "".join(f'<font point-size="11" color="{colour}">\u25a0</font>' for colour in steps)
+    return f'{squares}<font point-size="9" color="{theme.muted}">&#160;{markup(words)}</font>'
+
+
+def _note(node: Node, marks: Marks, theme: Theme, *, before: str) -> str:
+    text = node.note or marks.notes.get(node.path, "")
+    if not text:
+        return ""
+    ink = theme.ink if marks.heat.get(node.path) else theme.muted  # legible on every warmth
+    return f'{before}<font point-size="8.5" color="{ink}">{markup(text)}</font>'
+
+
+def _heated(node: Node, marks: Marks, theme: Theme) -> Attributes:
+    """The fill of a state by how hot it is."""
+    heat = marks.heat.get(node.path)
+    if not heat:
+        return {}
+    return {"fillcolor": _mix(theme.inactive.fill, theme.heat, heat)}
+
+
+def _mix(cold: str, hot: str, share: float) -> str:
+    """A colour between two, `share` of the way from the first."""
+    pairs = [(int(cold[i : i + 2], 16), int(hot[i : i + 2], 16)) for i in (1, 3, 5)]
+    return "#" + "".join(f"{round(a + (b - a) * share):02X}" for a, b in pairs)
+
+
+def note(text: str, theme: Theme) -> str:
+    """The label of an arrow that needs words of its own."""
+    return _beside([f'<font color="{theme.muted}">{markup(text)}</font>'])
+
+
+def _beside(lines: Sequence[str]) -> str:
+    """A label that keeps off its arrow."""
+    rows = "".join(f'<tr><td align="left">{line}</td></tr>' for line in lines)
+    return f'<<table border="0" cellborder="0" cellspacing="0" cellpadding="2">{rows}</table>>'
+
+
+def _outcome_line(
+    outcome: str, theme: Theme, marks: Marks, counts: Mapping[str, int], *, labelled: bool
+) -> str:
+    """One line of an arrow's label: the outcome and how often it was taken."""
+    count = counts.get(outcome, 0)
+    kind = outcome_class(outcome)
+    plain_ink = kind == "other" or (marks.has_run and not count)
+    ink = theme.muted if plain_ink else theme.outcome(kind).text
+    name = markup(outcome) if labelled else ""
+    return f'<font color="{ink}">{name}{_times(count)}</font>'
+
+
+def _identity(node: Node, diagram: Diagram) -> dict[str, str]:
+    """Id, tooltip and link: the same picture can be restyled and navigated by path."""
+    lines = [node.path, f"{node.kind} ({node.type_name})" if node.type_name else node.kind]
+    lines += [f"{name}: {value}" for name, value in node.details]
+    if node.doc:
+        lines.append(node.doc)
+    identity = {"id": plain(node.path), "tooltip": plain("\n".join(lines))}
+    if node.path in diagram.links:
+        identity["URL"] = graphviz.escape(diagram.links[node.path])
+        identity["target"] = "_self"
+    return identity
+
+
+def _state_label(node: Node, marks: Marks, theme: Theme) -> str:
+    glyph = GLYPHS.get(node.kind, "")
+    name = markup(node.label)
+    text = f'<font color="{theme.muted}" point-size="10">{glyph}&#160;</font>' if glyph else ""
+    text = _sign(node, theme) + text
+    text += f"<b>{name}</b>" if node.path in marks.active or node.hidden else name
+    if node.kind == MISSING:
+        return f"<{name} <i>missing</i>>"
+    if node.hidden:
+        word = KIND_WORDS.get(node.kind, "")
+        note = f"{word}, {node.hidden} states" if word else f"{node.hidden} states"
+        text += f'<br/><font point-size="8.5" color="{theme.muted}">{note}</font>'
+        return f"<{text}{_note(node, marks, theme, before='<br/>')}>"
+    if marks.notes or node.note:
+        return f"<{text}{_note(node, marks, theme, before='<br/>')}>"
+    text += _count(marks.visits.get(node.path, 0), theme.muted)
+    last = marks.last.get(node.path)
+    if last is not None and node.path not in marks.active and ENDINGS[outcome_class(last)]:
+        text += f"&#160;{ENDINGS[outcome_class(last)]}"
+    return f"<{text}>"
+
+
+def _times(count: int) -> str:
+    return f"&#160;\u00d7{count}" if count > 1 else ""
+
+
+def _count(count: int, ink: str) -> str:
+    return f'<font point-size="9" color="{ink}">&#160;{_times(count)}</font>' if count > 1 else ""
+
+
+def _status(node: Node, marks: Marks, theme: Theme) -> tuple[Swatch, Attributes]:
+    """Colours, line and fill of a state by what the run did with it."""
+    last = marks.last.get(node.path)
+    if node.kind == MISSING:
+        return theme.failure, {"penwidth": "2.2", "style": "rounded,filled,dotted"}
+    if node.path in marks.active:
+        return theme.active, {"penwidth": "2.4"}
+    if marks.runs and node.path in marks.visits:
+        return theme.inactive, {"penwidth": "1.6"}
+    if last is not None:
+        return _ended(outcome_class(last), theme)
+    if marks.has_run:
+        return theme.inactive, {"color": theme.faint, "fontcolor": theme.muted, "penwidth": "1"}
+    return theme.inactive, {}
+
+
+def _ended(kind: OutcomeClass, theme: Theme) -> tuple[Swatch, Attributes]:
+    look = {
+        "failure": {"penwidth": "2.2"},
+        "preempted": {"penwidth": "2", "style": "rounded,filled,dashed"},
+    }
+    return theme.outcome(kind), look.get(kind, {"penwidth": "1.8"})
+
+
+def _swatch(swatch: Swatch) -> Attributes:
+    return {"fillcolor": swatch.fill, "color": swatch.stroke, "fontcolor": swatch.text}
+
+
+def _see_through(colour: str) -> str:
+    return colour + "59"

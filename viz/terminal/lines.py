@@ -1,0 +1,145 @@
+"""One line of text for each event that people want to read."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rich.text import Text
+
+from smachpy import events as ev
+from smachpy.events.run_state import RAISED
+from smachpy.outcome_classes import OutcomeClass, outcome_class
+from viz.model.labels import one_line, shorten
+from viz.model.progress import progress_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from smachpy.introspection import StateRecord
+    from viz.model.history import History
+
+STYLES: dict[OutcomeClass, str] = {
+    "success": "green",
+    "failure": "red",
+    "preempted": "yellow",
+    "other": "cyan",
+}
+FEEDBACK_PERIOD = 5.0
+"""Time between two lines about one goal's feedback [s]."""
+ERROR_LENGTH = 200
+
+
+def outcome_text(outcome: str) -> Text:
+    """Return an outcome in its colour."""
+    return Text(shorten(outcome), STYLES[outcome_class(outcome)])
+
+
+class EventLines:
+    """Turns events into lines.
+
+    Args:
+        record: The machine, for the targets of transitions.
+        history: What happened before; an event gets its line before it is folded in.
+        panel: The lines stand above a panel, which shows goals' feedback; else feedback is worth
+            a line now and then, and no reason is cut.
+    """
+
+    def __init__(self, record: StateRecord, history: History, *, panel: bool) -> None:
+        self._root = record.path
+        self._history = history
+        self._panel = panel
+        self._feedback_lines: dict[str, float] = {}
+        self._targets = {
+            (f"{state.path}/{edge.source}", edge.outcome): edge
+            for state in record.walk()
+            for edge in state.transitions
+        }
+        self._by_type: dict[type, Callable[[Any], Text | None]] = {
+            ev.Started: lambda event: self._line(event, Text("started")),
+            ev.Left: self._left,
+            ev.Failed: self._failed,
+            ev.Finished: self._finished,
+            ev.PreemptRequested: lambda e: self._line(
+                e, Text(f"asked to stop by {self._reason(e.asker)}", "yellow")
+            ),
+            ev.CallbackFailed: lambda e: self._line(
+                e, Text(f"callback {shorten(e.callback)}: {self._reason(e.error)}", "red")
+            ),
+            ev.TimedOut: lambda e: self._line(e, Text(f"timeout of {e.timeout:g} s", "yellow")),
+            ev.Retried: lambda e: self._line(
+                e, Text(f"again, attempt {e.attempt} ended with {self._reason(e.reason)}", "yellow")
+            ),
+            ev.Abandoned: lambda e: self._line(
+                e, Text(f"left behind: it ignored its preempt for {e.grace:g} s", "red")
+            ),
+            ev.Paused: lambda e: self._line(
+                e, Text(f"paused ({self._reason(e.reason)})", "yellow")
+            ),
+            ev.Resumed: lambda e: self._line(e, Text("resumed")),
+            ev.GoalFeedback: self._goal_feedback,
+            ev.GoalDone: self._goal_done,
+        }
+
+    def line(self, event: ev.Event) -> Text | None:
+        """Return the line about `event`, None when it is not worth one."""
+        make = self._by_type.get(type(event))
+        return None if make is None else make(event)
+
+    def name(self, path: str) -> str:
+        """Return `path` without the root's name."""
+        return shorten(path.removeprefix(self._root).lstrip("/") or path.lstrip("/"), 70)
+
+    def _left(self, event: ev.Left) -> Text:
+        words = outcome_text(event.outcome)
+        edge = self._targets.get((event.path, event.outcome))
+        if edge is not None and not edge.target_is_outcome:
+            words = Text.assemble(words, f" \u2192 {shorten(edge.target)}")
+        return self._line(event, Text.assemble(words, self._duration(event)))
+
+    def _failed(self, event: ev.Failed) -> Text:
+        return self._line(
+            event, Text.assemble((self._reason(event.error), "bold red"), self._duration(event))
+        )
+
+    def _finished(self, event: ev.Finished) -> Text:
+        words = Text.assemble("ended: ", outcome_text(event.outcome or RAISED))
+        return self._line(event, Text.assemble(words, self._duration(event)))
+
+    def _goal_feedback(self, event: ev.GoalFeedback) -> Text | None:
+        if self._panel or event.t - self._feedback_lines.get(event.goal_id, -1e9) < FEEDBACK_PERIOD:
+            return None
+        goal = self._history.goal(event.goal_id)
+        if goal is None:
+            return None
+        self._feedback_lines[event.goal_id] = event.t
+        first = event.feedback if goal.first_feedback is None else goal.first_feedback
+        progress = progress_of(goal.goal, event.feedback, first)
+        words = [shorten(event.action)]
+        if progress.distance is not None:
+            words.append(f"{progress.distance:.2f} m left")
+        if progress.fraction is not None:
+            words.append(f"{progress.fraction:.0%}")
+        if progress.text:
+            words.append(shorten(progress.text))
+        return self._line(event, Text("  ".join(words), "dim"))
+
+    def _goal_done(self, event: ev.GoalDone) -> Text | None:
+        self._feedback_lines.pop(event.goal_id, None)
+        if event.status == "SUCCEEDED" or not event.text:
+            return None
+        words = f"{shorten(event.action)} {shorten(event.status)}: {self._reason(event.text)}"
+        return self._line(event, Text(words, "yellow"))
+
+    def _reason(self, text: str) -> str:
+        return shorten(text, ERROR_LENGTH) if self._panel else one_line(text)
+
+    def _duration(self, event: ev.Event) -> Text:
+        since = self._history.since(event.path)
+        return Text("" if since is None else f"  {event.t - since:.1f} s", "dim")
+
+    def _line(self, event: ev.Event, words: Text) -> Text:
+        started = self._history.started
+        elapsed = 0.0 if started is None else event.t - started
+        return Text.assemble(
+            (f"{elapsed:8.2f}  ", "dim"), (self.name(event.path), "bold"), "  ", words
+        )

@@ -1,0 +1,284 @@
+// Where events come from: a server, or the file that this page is; and what the page asks of the server.
+import { batch } from "@preact/signals";
+import * as store from "#core/store.js";
+
+const SILENT_BEATS = 2; // a server that says nothing for so long is lost
+const CAUGHT_UP_MS = 1000; // until then a stream may bring old events
+const RETRY_MS = 250; // between two tries to fetch a structure, at first
+const LONGEST_RETRY_MS = 4000;
+
+/** @type {EventSource | null} */
+let stream = null;
+let lastId = ""; // of the newest message of events
+let silence = 0; // half beats without a message
+let patience = SILENT_BEATS; // with a stream that is open; longer when one was cut before a beat came
+/** @type {ReturnType<typeof setInterval> | undefined} */
+let watchdog;
+let streamBegan = 0; // [ms]
+let loads = 0; // numbers the fetches of structures: only the newest one counts
+/** @type {string | null} */
+let token = null;
+/** @type {(events: RunEvent[]) => void} */
+let onEvents = () => {};
+let onMachine = () => {};
+
+/** Whether this page is a file that holds its run. */
+export const isFile = () => document.getElementById("run-data") !== null;
+
+/** @param {string} id of an element with base64 of gzip */
+async function unpack(id) {
+  const text = document.getElementById(id)?.textContent ?? "";
+  const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  const plain = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Response(plain).text();
+}
+
+export async function makeLayoutWorker() {
+  if (!isFile()) return new Worker("/vendor/elk-worker.min.js");
+  const code = await unpack("elk-data");
+  return new Worker(URL.createObjectURL(new Blob([code], { type: "text/javascript" })));
+}
+
+/** @param {{ onEvents: (events: RunEvent[]) => void, onMachine: () => void }} handlers */
+export async function connect(handlers) {
+  ({ onEvents, onMachine } = handlers);
+  readToken();
+  if (isFile()) {
+    const run = JSON.parse(await unpack("run-data"));
+    store.connection.value = "file";
+    await takeSnapshot(run.snap, run.model);
+    store.statistics.value = run.statistics ?? null;
+    return;
+  }
+  const asked = new URLSearchParams(location.search);
+  store.wanted.value = asked.get("machine") ?? "";
+  if (asked.has("actions")) showActions(true);
+  open();
+}
+
+/** The token stands in the fragment of the address, which no server is sent. */
+function readToken() {
+  const given = new URLSearchParams(location.hash.slice(1)).get("token");
+  try {
+    if (given) sessionStorage.setItem("smachpy.token", given);
+    token = given ?? sessionStorage.getItem("smachpy.token");
+  } catch {
+    token = given; // a file has no storage
+  }
+  if (given) history.replaceState(null, "", location.pathname + location.search);
+}
+
+export const hasToken = () => token !== null && store.settings.value.control;
+
+/** Pause and breakpoints of the machine; null when this page may not command it. */
+export function control() {
+  const facts = store.facts.value;
+  return hasToken() && store.connection.value === "live" && facts?.stale == null ? (facts?.control ?? null) : null;
+}
+
+/** Show the machine of that name. @param {string} name */
+export function choose(name) {
+  store.wanted.value = name;
+  const address = new URL(location.href);
+  address.searchParams.set("machine", name);
+  history.replaceState(null, "", address);
+  store.facts.value = null;
+  store.statistics.value = null;
+  lastId = "";
+  loads += 1;
+  open();
+}
+
+/** For an address; half of a pair of UTF-16, which a name may hold, has no place in one. @param {string} text */
+export const encoded = (text) => encodeURIComponent(text.replace(/\p{Surrogate}/gu, "\ufffd"));
+
+/** The address of something of the machine shown. @param {string} what @param {string} [more] */
+export const link = (what, more = "") => `/api/${what}?machine=${encoded(store.facts.value?.name ?? "")}${more}`;
+
+// -- the stream of events -----------------------------------------------------------------------
+
+function open() {
+  stream?.close();
+  const last = lastId ? `&last=${encoded(lastId)}` : "";
+  const opened = new EventSource(`/api/events?machine=${encoded(store.wanted.value)}${last}`);
+  stream = opened;
+  /** @type {(name: string, take: (data: any) => void) => void} */
+  const on = (name, take) =>
+    opened.addEventListener(name, (/** @type {MessageEvent} */ message) => {
+      silence = 0;
+      lastId = message.lastEventId || lastId;
+      take(JSON.parse(message.data));
+    });
+  on("settings", (/** @type {Settings} */ settings) => {
+    streamBegan = performance.now();
+    store.settings.value = settings;
+    store.connection.value = "live";
+    watch((settings.beat ?? 0) * 1000);
+  });
+  on("beat", (t) => {
+    patience = SILENT_BEATS;
+    store.connection.value = "live";
+    store.viewerLag.measure(t);
+  });
+  on("machines", (list) => {
+    store.machines.value = list;
+  });
+  on("actions", (found) => {
+    store.actions.value = { ...found, known: true };
+  });
+  on("facts", takeFacts);
+  on("snap", (snapshot) => takeSnapshot(snapshot));
+  on("gap", (count) => {
+    store.gap.value = count;
+  });
+  on("message", (events) => {
+    if (performance.now() - streamBegan > CAUGHT_UP_MS) store.robotLag.measure(events.at(-1).stamp_ns / 1e6);
+    onEvents(events);
+  });
+  opened.onopen = () => {
+    store.connection.value = "live";
+  };
+  opened.onerror = () => {
+    if (opened !== stream) return;
+    store.connection.value = "lost";
+    if (opened.readyState === EventSource.CLOSED) setTimeout(() => opened === stream && open(), 1000);
+  };
+}
+
+/**
+ * A connection that was cut shows no error for minutes: it is lost when the beats stay away.
+ * So they do while a long message comes over a slow link: the next time it is given twice as long.
+ * @param {number} beat [ms]
+ */
+function watch(beat) {
+  clearInterval(watchdog);
+  silence = 0;
+  if (!(beat > 0)) return; // a server of an older version
+  watchdog = setInterval(() => {
+    const isOpen = stream?.readyState === EventSource.OPEN;
+    silence += 1;
+    if (silence <= 2 * (isOpen ? patience : SILENT_BEATS)) return;
+    if (isOpen) patience *= 2;
+    reconnect();
+  }, beat / 2);
+}
+
+/** Ask for what comes after the last message. */
+export function reconnect() {
+  silence = 0;
+  store.connection.value = "lost";
+  open();
+}
+
+/** @param {MachineFacts} facts */
+async function takeFacts(facts) {
+  const before = store.facts.value;
+  store.facts.value = facts;
+  if (before && before.revision !== facts.revision && before.epoch === facts.epoch) await load(facts);
+}
+
+/** @param {Snapshot} snapshot @param {MachinePayload} [payload] */
+async function takeSnapshot(snapshot, payload) {
+  store.wanted.value ||= snapshot.name;
+  const known = store.facts.value;
+  const same = known?.name === snapshot.name && known.epoch === snapshot.epoch;
+  if (!same) store.robotLag.forget();
+  batch(() => {
+    store.facts.value = snapshot;
+    store.problems.value = snapshot.problems;
+    store.startRun(snapshot.base, snapshot.events);
+    store.tick.value += 1;
+    store.slowTick.value += 1;
+  });
+  if (payload) {
+    store.setModel(payload);
+    onMachine();
+  } else if (same && store.model.value && known.revision === snapshot.revision) onEvents([]);
+  else await load(snapshot);
+}
+
+/** Fetch the structure of a machine, until it comes or another one is wanted. @param {MachineFacts} facts */
+async function load(facts) {
+  loads += 1;
+  const mine = loads;
+  /** @type {MachinePayload | null} */
+  let payload = null;
+  for (let pause = RETRY_MS; !payload; pause = Math.min(2 * pause, LONGEST_RETRY_MS)) {
+    payload = await fetchModel(facts.name);
+    if (!payload) await new Promise((done) => setTimeout(done, pause));
+    if (mine !== loads) return;
+  }
+  store.setModel(payload);
+  onMachine();
+  const statistics = await ask(link("statistics"));
+  if (mine !== loads) return;
+  const failed = statistics?.ok === false;
+  store.statistics.value = failed ? null : /** @type {Statistics | null} */ (/** @type {unknown} */ (statistics));
+  if (failed) store.notify(`Recorded runs: ${statistics.text}`, "error");
+}
+
+/** @param {string} name @returns {Promise<MachinePayload | null>} */
+async function fetchModel(name) {
+  try {
+    const answer = await fetch(`/api/model?machine=${encoded(name)}`);
+    return answer.ok ? await answer.json() : null;
+  } catch {
+    return null; // the connection shows that the server is gone
+  }
+}
+
+// -- questions and commands ---------------------------------------------------------------------
+
+/**
+ * The JSON answer of the server; when it gives none, the same shape.
+ * @param {string} address
+ * @param {RequestInit} [options]
+ * @returns {Promise<Answer>}
+ */
+export async function ask(address, options = {}) {
+  let answer;
+  let text;
+  try {
+    answer = await fetch(address, options);
+    text = await answer.text();
+  } catch (error) {
+    return { ok: false, text: `The viewer's server does not answer (${messageOf(error)}).` };
+  }
+  try {
+    return JSON.parse(text);
+  } catch {
+    const status = `${answer.status} ${answer.statusText}`.trim();
+    const reason = [status, text.trim().slice(0, 300)].filter(Boolean).join(": ");
+    return { ok: false, text: `The viewer's server answered ${reason}` };
+  }
+}
+
+export const messageOf = (/** @type {unknown} */ error) => (error instanceof Error ? error.message : String(error));
+
+/** @param {string} address @param {object} data */
+const post = (address, data) =>
+  ask(address, {
+    method: "POST",
+    headers: { "content-type": "application/json", "x-smachpy-token": token ?? "" },
+    body: JSON.stringify(data),
+  });
+
+/** Check or send a goal, or cancel one. @param {object} data */
+export const askAction = (data) => post("/api/action", data);
+
+/** Give the machine shown a command. @param {string} name @param {Record<string, unknown>} [more] */
+export async function command(name, more = {}) {
+  const result = await post(link("control"), { command: name, ...more });
+  if (result.ok) store.notify(`${name}${more.path ? ` ${more.path}` : ""}: done`);
+  else store.notify(`${name}: ${result.text ?? "refused"}`, "error");
+  return result.ok;
+}
+
+/** @param {boolean} open */
+export function showActions(open) {
+  store.actionsOpen.value = open;
+  const address = new URL(location.href);
+  if (open) address.searchParams.set("actions", "");
+  else address.searchParams.delete("actions");
+  history.replaceState(null, "", address);
+}

@@ -1,0 +1,181 @@
+// What the events of a machine add up to, by the same rules as smachpy's `RunState`:
+// tests/data/folds.json holds for both. Times here are nanoseconds since the epoch.
+
+export const RAISED = "exception"; // stands for the outcome of a state that raised
+const CUT_SHORT = "a new run began before it ended"; // text of a LOST goal
+const ENDED_GOALS = 20; // so many goals that have ended are kept
+const NO_PREEMPT = { preempt: null, asked: null, serviced: null, abandoned: null };
+
+/** @returns {RunState} */
+export const emptyState = () => ({
+  run: 0,
+  started: null,
+  ended: null,
+  outcome: null,
+  states: {},
+  goals: {},
+  userdata: {},
+});
+
+/** @param {number | null | undefined} ns */
+export const ms = (ns) => (ns == null ? null : ns / 1e6);
+
+/**
+ * What a map whose keys come from a mission holds; names like "constructor" are keys as all others.
+ * @template T
+ * @param {Record<string, T> | null | undefined} map
+ * @param {string} key
+ * @returns {T | undefined}
+ */
+export const own = (map, key) => (map && Object.hasOwn(map, key) ? map[key] : undefined);
+
+/**
+ * @template T
+ * @param {Record<string, T>} map
+ * @param {string} key
+ * @param {T} value
+ * @returns {T}
+ */
+function put(map, key, value) {
+  if (key !== "__proto__") map[key] = value;
+  else Object.defineProperty(map, key, { value, writable: true, enumerable: true, configurable: true });
+  return value;
+}
+
+/** @param {RunEvent} e */
+export const requestOf = (e) => ({
+  source: e.source ?? null,
+  by: e.by ?? null,
+  why: e.why ?? null,
+  grace: e.grace ?? null,
+});
+
+/**
+ * Take one event in; kinds that change nothing are passed over.
+ * @param {RunState} data
+ * @param {RunEvent} e
+ */
+export function foldOne(data, e) {
+  if (e.dropped) data.dropped = (data.dropped ?? 0) + e.dropped; // so many are missing before it
+  own(RULES, e.kind)?.(data, e);
+}
+
+/** @type {Record<string, (data: RunState, e: RunEvent) => void>} */
+const RULES = {
+  Started(data, e) {
+    data.run += 1;
+    Object.assign(data, { started: e.stamp_ns, ended: null, outcome: null });
+    // What an earlier run of this root left open was cut short: nothing will say that it ended.
+    const below = `${e.path}/`;
+    for (const [path, state] of Object.entries(data.states))
+      if (path === e.path || path.startsWith(below)) Object.assign(state, { since: null, waits: null, ...NO_PREEMPT });
+    for (const goal of Object.values(data.goals))
+      if (goal.ended == null && goal.path.startsWith(below))
+        Object.assign(goal, { status: "LOST", text: CUT_SHORT, ended: e.stamp_ns });
+    enter(data, e);
+  },
+  Finished(data, e) {
+    const outcome = e.outcome || RAISED;
+    leave(data, e, outcome);
+    Object.assign(data, { ended: e.stamp_ns, outcome });
+  },
+  Entered: enter,
+  Left: (data, e) => leave(data, e, e.outcome),
+  Failed(data, e) {
+    leave(data, e, RAISED);
+    stateOf(data, e.path).error = e.error;
+  },
+  PreemptRequested(data, e) {
+    const state = stateOf(data, e.path);
+    if (state.since == null || state.preempt) return;
+    Object.assign(state, { preempt: e.stamp_ns, asked: requestOf(e) });
+  },
+  PreemptServiced: (data, e) => answerPreempt(data, e, "serviced"),
+  Abandoned: (data, e) => answerPreempt(data, e, "abandoned"),
+  Retried(data, e) {
+    stateOf(data, e.path).attempt = e.attempt + 1;
+  },
+  Iterated(data, e) {
+    stateOf(data, e.path).item = e.number;
+  },
+  Paused(data, e) {
+    stateOf(data, e.path).waits = e.reason;
+  },
+  Resumed(data, e) {
+    stateOf(data, e.path).waits = null;
+  },
+  UserdataWritten(data, e) {
+    const container = containerOf(e.path);
+    put(data.userdata, `${container} ${e.key}`, {
+      key: e.key,
+      value: e.value,
+      writer: e.path,
+      at: e.stamp_ns,
+      container,
+    });
+  },
+  GoalSent(data, e) {
+    put(data.goals, e.goal_id, {
+      path: e.path,
+      action: e.action,
+      since: e.stamp_ns,
+      goal: e.goal,
+      feedback: null,
+      first_feedback: null,
+      status: "ACTIVE",
+      text: "",
+      result: null,
+      ended: null,
+      attempt: stateOf(data, e.path).attempt ?? 1,
+    });
+    // Not in the order of the object: JavaScript puts ids that look like numbers first.
+    const ended = Object.entries(data.goals).filter(([, goal]) => goal.ended != null);
+    ended.sort(([a, one], [b, other]) => one.since - other.since || (a < b ? -1 : 1));
+    for (const [id] of ended.slice(0, Math.max(0, ended.length - ENDED_GOALS))) delete data.goals[id];
+  },
+  GoalFeedback(data, e) {
+    const goal = own(data.goals, e.goal_id);
+    if (!goal) return;
+    goal.feedback = e.feedback;
+    goal.first_feedback ??= e.feedback;
+    if (e.progress) goal.progress = e.progress;
+  },
+  GoalDone(data, e) {
+    const goal = own(data.goals, e.goal_id);
+    if (goal) Object.assign(goal, { status: e.status, text: e.text, result: e.result, ended: e.stamp_ns });
+  },
+};
+
+/** @param {string} path */
+export const containerOf = (path) => path.slice(0, Math.max(0, path.lastIndexOf("/"))) || path;
+
+/**
+ * @param {RunState} data
+ * @param {string} path
+ * @returns {StateRun}
+ */
+function stateOf(data, path) {
+  const known = own(data.states, path);
+  return known ?? put(data.states, path, { visits: 0, since: null, outcome: null, outcomes: {}, seconds: 0 });
+}
+
+/** @param {RunState} data @param {RunEvent} e */
+function enter(data, e) {
+  const state = stateOf(data, e.path);
+  state.visits += 1;
+  Object.assign(state, { since: e.stamp_ns, waits: null, error: null, attempt: 1, ...NO_PREEMPT });
+}
+
+/** @param {RunState} data @param {RunEvent} e @param {string} outcome */
+function leave(data, e, outcome) {
+  const state = stateOf(data, e.path);
+  if (state.since != null) state.seconds += (e.stamp_ns - state.since) / 1e9;
+  Object.assign(state, { since: null, left: e.stamp_ns, outcome, waits: null, ...NO_PREEMPT });
+  put(state.outcomes, outcome, (own(state.outcomes, outcome) ?? 0) + 1);
+}
+
+/** @param {RunState} data @param {RunEvent} e @param {"serviced" | "abandoned"} fact */
+function answerPreempt(data, e, fact) {
+  const state = stateOf(data, e.path);
+  if (state.preempt) state[fact] = e.stamp_ns;
+}

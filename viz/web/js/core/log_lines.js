@@ -1,0 +1,56 @@
+// An event as a line of the log.
+import { RAISED, requestOf } from "#core/fold.js";
+import { outcomeClass } from "#core/outcomes.js";
+import { askerText, duration } from "#core/text.js";
+import { brief } from "#core/values.js";
+
+/** @type {Record<string, (e: RunEvent) => [string, string]>} */
+const LINES = {
+  Started: () => ["started", "active"],
+  Finished: (e) => [`ended: ${e.outcome || RAISED}`, outcomeClass(e.outcome || RAISED)],
+  Left: (e) => [e.outcome, outcomeClass(e.outcome)],
+  Failed: (e) => [e.error, "failure"],
+  PreemptRequested: (e) => [requestText(e), "preempted"],
+  PreemptServiced: () => ["preempt serviced", "preempted"],
+  Abandoned: (e) => [`abandoned after ${e.grace} s`, "failure"],
+  TimedOut: (e) => [`timeout of ${e.timeout} s`, "preempted"],
+  Retried: (e) => [`retry: ${e.reason}`, "preempted"],
+  Iterated: (e) => [`item ${e.number + 1}`, "other"],
+  CallbackFailed: (e) => [`${e.callback}: ${e.error}`, "failure"],
+  Paused: (e) => [`paused (${e.reason})`, "waiting"],
+  Resumed: () => ["resumed", "active"],
+  Jumped: (e) => [`jump to ${e.label}`, "waiting"],
+  OutcomeForced: (e) => [`forced: ${e.outcome}`, "waiting"],
+  GoalSent: (e) => [`goal to ${e.action}`, "active"],
+  GoalDone: (e) => [`${e.action}: ${e.status.toLowerCase()} ${e.text}`.trim(), outcomeClass(e.status)],
+  UserdataWritten: (e) => [`${e.key} = ${brief(e.value).slice(0, 60)}`, "other"],
+};
+
+/** @param {RunEvent} e */
+function requestText(e) {
+  const asker = askerText(requestOf(e));
+  return `asked to stop${asker ? ` by ${asker}` : ""}${e.grace != null ? `, within ${duration(e.grace)}` : ""}`;
+}
+
+/** The text of an event's line, and the class of its colour. @param {RunEvent} e of one of `KINDS_OF` */
+export function lineOf(e) {
+  const [text, kind] = LINES[e.kind](e);
+  return { text, kind };
+}
+
+/** Kinds of events by the name of a filter. @type {Record<string, Set<string>>} */
+export const KINDS_OF = {
+  all: new Set(Object.keys(LINES).filter((kind) => kind !== "UserdataWritten")),
+  transitions: new Set(["Started", "Finished", "Left", "Failed"]),
+  goals: new Set(["GoalSent", "GoalDone"]),
+  userdata: new Set(["UserdataWritten"]),
+  trouble: new Set([
+    "Failed",
+    "PreemptRequested",
+    "PreemptServiced",
+    "Abandoned",
+    "TimedOut",
+    "Retried",
+    "CallbackFailed",
+  ]),
+};

@@ -1,0 +1,141 @@
+// The machine as the page draws it: an index over the structure that the server sends.
+import { shorten } from "#core/text.js";
+
+// What stands before the name of what has changed between two versions.
+export const CHANGE_SIGNS = { added: "+", removed: "\u2212", changed: "\u2260", numbers: "\u00d7" };
+
+/** @param {Change | undefined} change @param {string} name */
+export const signed = (change, name) => (change ? `${CHANGE_SIGNS[change]} ${name}` : name);
+
+/** @type {Record<string, string>} */
+export const KIND_NAMES = {
+  state: "state",
+  callback: "function",
+  action: "action",
+  service: "service call",
+  monitor: "monitor",
+  condition: "condition",
+  machine: "state machine",
+  sequence: "sequence",
+  concurrence: "concurrence",
+  iterator: "iterator",
+  missing: "missing state",
+};
+
+const READABLE = 40; // so many boxes are readable at a glance
+
+export class Model {
+  /** @type {Map<string, StateNode>} */
+  byPath = new Map();
+  /** @type {StateNode[]} */
+  order = []; // parents first
+
+  /**
+   * @param {MachinePayload} payload
+   * @param {boolean} implicit whether to show implicit transitions
+   */
+  constructor(payload, implicit) {
+    this.payload = payload;
+    this.keys = payload.keys;
+    this.root = implicit ? payload.implicit : payload.explicit;
+    this.#index(this.root, null, 0);
+  }
+
+  /** @param {StateNode} node @param {StateNode | null} parent @param {number} depth */
+  #index(node, parent, depth) {
+    Object.assign(node, { parent, depth, number: this.order.length });
+    node.name = shorten(node.label);
+    node.shown = signed(node.change, node.name);
+    this.byPath.set(node.path, node);
+    this.order.push(node);
+    node.total = 1;
+    for (const child of node.children) {
+      this.#index(child, node, depth + 1);
+      node.total += child.total;
+    }
+    node.links = linksOf(node);
+    const wired = new Map();
+    for (const link of node.links)
+      for (const outcome of link.outcomes) wired.set(link.source, (wired.get(link.source) ?? new Set()).add(outcome));
+    for (const child of node.children) child.wired = child.outcomes.filter((o) => wired.get(child.label)?.has(o));
+  }
+
+  /** @param {string | null | undefined} path */
+  get(path) {
+    return path == null ? undefined : this.byPath.get(path);
+  }
+
+  /** The containers around a state, outermost first. @param {string} path */
+  ancestors(path) {
+    const found = [];
+    for (let node = this.get(path)?.parent; node; node = node.parent) found.unshift(node);
+    return found;
+  }
+
+  /** Where an outcome of a state leads to. @param {StateNode} node @param {string} outcome */
+  linkOf(node, outcome) {
+    return node.parent?.links.find((link) => link.source === node.label && link.outcomes.includes(outcome));
+  }
+
+  /** @param {string} text */
+  search(text) {
+    const words = text.toLowerCase().split(/\s+/).filter(Boolean);
+    if (!words.length) return [];
+    const found = this.order.filter((node) => words.every((word) => node.path.toLowerCase().includes(word)));
+    const rank = (/** @type {StateNode} */ node) => (node.label.toLowerCase().startsWith(words[0]) ? 0 : 1);
+    return found.sort((a, b) => rank(a) - rank(b) || a.number - b.number);
+  }
+
+  /** Paths of the containers down to `depth` levels. @param {number} depth */
+  toDepth(depth) {
+    return new Set(this.order.filter((node) => node.children.length && node.depth < depth).map((node) => node.path));
+  }
+
+  /** The greatest depth at which a page is readable at a glance. */
+  readableDepth(most = READABLE) {
+    let visible = 0;
+    let depth = 0;
+    let level = [this.root];
+    while (level.length) {
+      visible += level.length;
+      if (visible > most && depth > 1) break;
+      depth += 1;
+      level = level.flatMap((node) => node.children);
+    }
+    return Math.max(depth - 1, 1);
+  }
+}
+
+/**
+ * The arrows of a container: its transitions, and what its rules make of its children's outcomes.
+ * @param {StateNode} node
+ * @returns {Link[]}
+ */
+function linksOf(node) {
+  /** @type {Link[]} */
+  const found = node.edges.map((edge) => ({ ...edge, rule: null }));
+  const known = new Set(found.flatMap((edge) => edge.outcomes.map((o) => `${edge.source}\n${o}\n${edge.target}`)));
+  for (const rule of node.rules)
+    for (const [source, outcome] of rule.conditions) {
+      const key = `${source}\n${outcome}\n${rule.outcome}`;
+      if (known.has(key) || !node.children.some((child) => child.label === source)) continue;
+      known.add(key);
+      const same = found.find(
+        (edge) => edge.rule && edge.source === source && edge.target === rule.outcome && edge.change === rule.change,
+      );
+      if (same) same.outcomes = [...same.outcomes, outcome];
+      else
+        found.push({
+          source,
+          target: rule.outcome,
+          to_outcome: true,
+          outcomes: [outcome],
+          implicit: false,
+          back: false,
+          rule: rule.text || rule.outcome,
+          change: rule.change,
+          note: "",
+        });
+    }
+  return found;
+}

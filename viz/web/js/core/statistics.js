@@ -1,0 +1,97 @@
+// Numbers on the graph: of the run shown, of recorded runs, or how they differ.
+// Counted as in viz/runs/statistics.py: tests/data/statistics.json holds for both.
+import { own } from "#core/fold.js";
+import { outcomeClass } from "#core/outcomes.js";
+
+/** @type {[string, string][]} */
+export const MODES = [
+  ["none", "No numbers"],
+  ["counts", "Counts of this run"],
+  ["time", "Time in this run"],
+  ["runs", "Recorded runs"],
+  ["failures", "Failures in recorded runs"],
+  ["compare", "This run against recorded runs"],
+];
+export const OF_RECORDED_RUNS = ["runs", "failures", "compare"];
+
+/** @typedef {Record<string, number> | null | undefined} Outcomes */
+
+/** @param {Outcomes} outcomes */
+const total = (outcomes) => Object.values(outcomes ?? {}).reduce((a, b) => a + b, 0);
+
+/** The share of ends that failed or raised, 0 to 1. @param {Outcomes} outcomes */
+export function failureShare(outcomes) {
+  const all = total(outcomes);
+  const failed = Object.entries(outcomes ?? {}).filter(([outcome]) => outcomeClass(outcome) === "failure");
+  return all ? failed.reduce((sum, [, count]) => sum + count, 0) / all : 0;
+}
+
+/**
+ * @typedef {(path: string, outcome: string) => { count: number, share: number } | null} CountOf of a transition
+ * @typedef {(path: string) => number} HeatOf of a state, 0 to 1
+ */
+
+/**
+ * What `Diagram.showNumbers` needs for the chosen mode: counts of transitions and the heat of states.
+ * @param {string} mode
+ * @param {Record<string, StateRun>} run the states of the run shown
+ * @param {Statistics | null} statistics of recorded runs
+ * @param {import("#core/model.js").Model | null} model
+ * @returns {{ countOf: CountOf | null, heatOf: HeatOf | null }}
+ */
+export function numbersFor(mode, run, statistics, model) {
+  const recorded = statistics?.states ?? {};
+  /** @type {(states: Record<string, { outcomes: Record<string, number> }>) => CountOf} */
+  const counts = (states) => (path, outcome) => {
+    const outcomes = own(states, path)?.outcomes;
+    const count = own(outcomes, outcome);
+    return count ? { count, share: count / total(outcomes) } : null;
+  };
+  switch (mode) {
+    case "counts":
+      return { countOf: counts(run), heatOf: null };
+    case "time": {
+      const leaves = Object.entries(run).filter(([path]) => !model?.get(path)?.children.length);
+      const most = Math.max(0.001, ...leaves.map(([, state]) => state.seconds));
+      return { countOf: counts(run), heatOf: (path) => Math.min(1, (own(run, path)?.seconds ?? 0) / most) };
+    }
+    case "runs":
+      return { countOf: counts(recorded), heatOf: null };
+    case "failures":
+      return { countOf: counts(recorded), heatOf: (path) => own(recorded, path)?.failures ?? 0 };
+    case "compare":
+      return { countOf: counts(run), heatOf: (path) => slower(own(run, path), own(recorded, path)) };
+    default:
+      return { countOf: null, heatOf: null };
+  }
+}
+
+/**
+ * By how much a state took longer than it used to: 1 is twice as long, or longer.
+ * @param {StateRun | undefined} state
+ * @param {StateStatistics | undefined} recorded
+ */
+function slower(state, recorded) {
+  if (!state || !recorded?.median) return 0;
+  const ended = total(state.outcomes);
+  return ended ? Math.min(1, Math.max(0, state.seconds / ended / recorded.median - 1)) : 0;
+}
+
+/**
+ * How many of the explicit transitions were taken.
+ * @param {import("#core/model.js").Model | null} model
+ * @param {Record<string, StateRun>} run
+ */
+export function coverage(model, run) {
+  let taken = 0;
+  let all = 0;
+  for (const node of model?.order ?? [])
+    for (const edge of node.edges) {
+      if (edge.implicit) continue;
+      for (const outcome of edge.outcomes) {
+        all += 1;
+        if (own(own(run, `${node.path}/${edge.source}`)?.outcomes, outcome)) taken += 1;
+      }
+    }
+  return { taken, all };
+}

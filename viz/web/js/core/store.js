@@ -1,0 +1,315 @@
+// What the page knows and what its user chose. Panels read signals; the diagram reads `shown()`.
+import { batch, computed, signal } from "@preact/signals";
+import { emptyState, ms } from "#core/fold.js";
+import { Model } from "#core/model.js";
+import { Run } from "#core/run.js";
+
+/** @template T @typedef {import("@preact/signals").Signal<T>} Signal */
+
+/** @param {string} name @param {any} fallback */
+function saved(name, fallback) {
+  try {
+    return JSON.parse(localStorage.getItem(`smachpy.${name}`) ?? "null") ?? fallback;
+  } catch {
+    return fallback; // a file has no storage
+  }
+}
+/** @param {string} name @param {unknown} value */
+export function save(name, value) {
+  try {
+    localStorage.setItem(`smachpy.${name}`, JSON.stringify(value));
+  } catch {
+    // a file has no storage
+  }
+}
+
+// -- what the server sends ----------------------------------------------------------------------
+
+/** @type {Signal<"connecting" | "live" | "lost" | "file">} */
+export const connection = signal("connecting");
+/** @type {Signal<Settings>} */
+export const settings = signal({ follow: false, control: false });
+/** @type {Signal<MachineSummary[]>} */
+export const machines = signal([]);
+/** @type {Signal<MachineFacts | null>} */
+export const facts = signal(null); // of the machine shown
+/** @type {Signal<Problem[]>} */
+export const problems = signal([]);
+/** @type {Signal<Model | null>} */
+export const model = signal(null);
+/** @type {Signal<Statistics | null>} */
+export const statistics = signal(null);
+/** @type {Signal<number | null>} */
+export const gap = signal(null); // so many events went by this page
+/** @type {Signal<ActionsSeen>} */
+export const actions = signal({ actions: [], gone: [], goals: [], known: false });
+/** @type {Signal<Comparison | null>} */
+export const comparison = signal(null);
+/** @type {Signal<string | null>} */
+export const failure = signal(null); // why there is nothing to see
+
+// -- what the user chose ------------------------------------------------------------------------
+
+export const wanted = signal(""); // name of the machine to show
+/** @type {Signal<string | null>} */
+export const selected = signal(null); // path of a state
+export const query = signal(""); // of the search
+export const follow = signal(false);
+/** @type {Signal<boolean>} */
+export const implicit = signal(saved("implicit", false));
+export const numbers = signal("none"); // a key of statistics.MODES
+/** @type {Signal<Theme>} */
+export const theme = signal(saved("theme", "system"));
+/** @type {Signal<Set<string>>} */
+export const opened = signal(new Set()); // paths of containers
+export const help = signal(false);
+export const actionsOpen = signal(false);
+/** @type {Signal<string | null>} */
+export const chosenAction = signal(null);
+export const logFilter = signal("all");
+/** @type {Signal<{ text: string, kind: "info" | "error" } | null>} */
+export const notice = signal(null);
+
+// -- the run, now and at an earlier instant -----------------------------------------------------
+
+export const tick = signal(0); // counts the changes that panels should show
+export const slowTick = signal(0); // the same, for panels with much text
+/** @type {Signal<number | null>} */
+export const cursor = signal(null); // the instant shown [ms]; null: now
+/** @type {Signal<number | null>} */
+const position = signal(null); // so many events have happened there: several may share an instant
+export const instant = computed(() => [cursor.value, position.value]);
+
+export let run = new Run(emptyState(), []);
+/** @type {RunState | null} */
+let stateAtCursor = null;
+
+/** @param {RunState | null} base @param {RunEvent[]} events */
+export function startRun(base, events) {
+  run = new Run(base, events);
+  stateAtCursor = null;
+  batch(() => {
+    cursor.value = null;
+    position.value = null;
+    gap.value = null;
+  });
+}
+
+export const shown = () => (cursor.value === null ? run.now : (stateAtCursor ?? run.now));
+
+/**
+ * Take new events in; the oldest are forgotten when there are more than the server keeps.
+ * @param {RunEvent[]} events
+ */
+export function addEvents(events) {
+  run.push(events);
+  const gone = run.trim(settings.value.kept ?? Infinity);
+  if (gone && position.value !== null) position.value = Math.max(0, position.value - gone);
+}
+
+/** @param {number | null} t @param {number | null} count */
+function show(t, count) {
+  stateAtCursor = count === null ? null : run.after(count);
+  batch(() => {
+    cursor.value = t;
+    position.value = count;
+    tick.value += 1;
+    slowTick.value += 1;
+  });
+}
+
+/** Show the instant t [ms]; null: now. @param {number | null} t */
+export function seek(t) {
+  if (t === null) {
+    show(null, null);
+    return;
+  }
+  const within = Math.max(run.first() ?? t, Math.min(t, run.last() ?? t));
+  show(within, run.indexAt(within));
+}
+
+/** Show what the first `count` events add up to. @param {number} count */
+export function seekTo(count) {
+  const event = run.events[count - 1];
+  if (event) show(event.stamp_ns / 1e6, count);
+}
+
+/** Go so many events on, or back. @param {number} step */
+export function seekEvent(step) {
+  const to = Math.max(1, eventsShown() + step);
+  if (to >= run.events.length && step > 0) seek(null);
+  else seekTo(Math.min(to, run.events.length));
+}
+
+/** So many of the kept events have happened by what is shown. */
+export const eventsShown = () => position.value ?? run.events.length;
+
+// -- clocks -------------------------------------------------------------------------------------
+
+const LAG_WINDOW_MS = 30_000; // a clock that was set is believed after twice that at most
+
+// How far another clock is behind this one [ms], transport included: the least of the newest lags.
+class Lag {
+  since = performance.now();
+  least = Infinity; // since then
+  before = Infinity; // in the time before that
+  forget() {
+    this.since = performance.now();
+    this.least = Infinity;
+    this.before = Infinity;
+  }
+  /** @param {number} t time on that clock when it spoke [ms] */
+  measure(t) {
+    if (performance.now() - this.since > LAG_WINDOW_MS) {
+      this.since = performance.now();
+      this.before = this.least;
+      this.least = Infinity;
+    }
+    this.least = Math.min(this.least, Date.now() - t);
+  }
+  get value() {
+    const least = Math.min(this.least, this.before);
+    return least === Infinity ? null : least;
+  }
+}
+export const robotLag = new Lag();
+export const viewerLag = new Lag();
+
+/** The instant shown, on the robot's clock [ms since the epoch]. */
+export function nowMs() {
+  if (cursor.value !== null) return cursor.value;
+  const ended = run.now.ended != null || facts.value?.stale != null || connection.value === "file";
+  const lag = robotLag.value ?? (viewerLag.value ?? 0) + (ms(facts.value?.behind) ?? 0);
+  const robot = Date.now() - lag;
+  return ended ? (run.last() ?? robot) : Math.max(robot, run.last() ?? 0);
+}
+
+// -- what follows from it -----------------------------------------------------------------------
+
+export const activePaths = computed(() => {
+  tick.value;
+  return Object.entries(shown().states)
+    .filter(([, state]) => state.since != null)
+    .map(([path]) => path);
+});
+export const activeLeaves = computed(() => {
+  const all = activePaths.value;
+  return all.filter((path) => !all.some((other) => other.startsWith(`${path}/`)));
+});
+
+export const runStatus = computed(() => {
+  tick.value;
+  const data = shown();
+  const about = facts.value;
+  const cutShort = data.ended == null && data.started != null;
+  if (!about) return { word: "waiting", kind: "other" };
+  if (cursor.value !== null) return { word: "replay", kind: "preempted" };
+  if (connection.value === "file" && cutShort) return { word: "recording ends here", kind: "active" };
+  if (about.stale != null && data.ended == null) return { word: "stale", kind: "waiting" };
+  if (connection.value === "lost") return { word: "reconnecting", kind: "waiting" };
+  if (data.ended != null) return { word: `ended: ${data.outcome}`, kind: "done" };
+  if (about.control?.paused) return { word: "paused", kind: "waiting" };
+  if (data.states[model.value?.root.path ?? ""]?.preempt) return { word: "preempting", kind: "preempted" };
+  if (data.started == null) return { word: "not started", kind: "other" };
+  return { word: about.recorded ? "recording ends here" : "running", kind: "active" };
+});
+
+// Names of the actions that have a server and of those that had one, as JSON, so that equal lists
+// are equal; null before the server has looked.
+export const serversSeen = computed(() => {
+  const { actions: there, gone, known } = actions.value;
+  return known ? JSON.stringify([there.map((one) => one.name), gone]) : null;
+});
+
+/**
+ * Whether a goal seems to wait for a server. One behind a bridge shows no presence, only answers.
+ * @param {GoalRun | null | undefined} goal
+ */
+export function hasNoServer(goal) {
+  if (serversSeen.value === null || !goal || goal.ended != null || goal.feedback != null) return false;
+  if (connection.value !== "live" || cursor.value !== null) return false;
+  if (facts.value?.stale != null || facts.value?.recorded) return false;
+  const plain = (/** @type {string} */ name) => name.replace(/^\//, "");
+  const name = plain(goal.action);
+  const [there, gone] = JSON.parse(serversSeen.value);
+  if (there.includes(name)) return false;
+  if (gone.includes(name)) return true;
+  const answered = (/** @type {GoalRun} */ one) =>
+    plain(one.action) === name && (one.feedback != null || one.result != null);
+  return !Object.values(run.now.goals).some(answered);
+}
+
+// -- the machine, and which of its containers are open ------------------------------------------
+
+let autoDepth = 0; // levels opened without the user; 0: the user has chosen
+
+/** @param {MachinePayload} payload */
+export function setModel(payload) {
+  const next = new Model(payload, implicit.value);
+  model.value = next;
+  if (payload !== comparison.value?.model) comparison.value = null;
+  /** @type {string[]} */
+  const known = saved(`open.${next.root.label}`, []).filter(
+    (/** @type {string} */ path) => next.get(path)?.children.length,
+  );
+  autoDepth = known.length ? 0 : next.readableDepth();
+  opened.value = autoDepth ? next.toDepth(autoDepth) : new Set(known);
+}
+
+/** @param {boolean} on */
+export function setImplicit(on) {
+  implicit.value = on;
+  save("implicit", on);
+  if (model.value) model.value = new Model(model.value.payload, on);
+}
+
+/** Open one level less, unless the user has chosen; false when there is no less. */
+export function openOneLevelLess() {
+  if (autoDepth < 2 || !model.value) return false;
+  autoDepth -= 1;
+  opened.value = model.value.toDepth(autoDepth);
+  return true;
+}
+
+/** @param {Set<string>} paths */
+export function keepOpened(paths) {
+  opened.value = paths;
+  autoDepth = 0;
+}
+
+/** @param {Set<string>} paths */
+export function setOpened(paths) {
+  keepOpened(paths);
+  if (model.value) save(`open.${model.value.root.label}`, [...paths]);
+}
+
+/** @param {string} path */
+export function toggle(path) {
+  const next = new Set(opened.value);
+  if (!next.delete(path)) next.add(path);
+  follow.value = false;
+  setOpened(next);
+}
+
+/** Open the containers around a state; false when they are open. @param {string} path */
+export function reveal(path) {
+  const closed = model.value?.ancestors(path).filter((node) => !opened.value.has(node.path)) ?? [];
+  if (closed.length) setOpened(new Set([...opened.value, ...closed.map((node) => node.path)]));
+  return closed.length > 0;
+}
+
+// -- notices ------------------------------------------------------------------------------------
+
+/** @type {ReturnType<typeof setTimeout> | undefined} */
+let noticeTimer;
+/** @param {string} text @param {"info" | "error"} [kind] */
+export function notify(text, kind = "info") {
+  notice.value = { text, kind };
+  clearTimeout(noticeTimer);
+  noticeTimer = setTimeout(
+    () => {
+      notice.value = null;
+    },
+    kind === "error" ? 8000 : 3000,
+  );
+}

@@ -1,0 +1,427 @@
+// The diagram: built once per layout, restyled by class when something happens.
+import { ms } from "#core/fold.js";
+import { CHANGE_SIGNS, KIND_NAMES, signed } from "#core/model.js";
+import { commonClass, outcomeClass } from "#core/outcomes.js";
+import { duration } from "#core/text.js";
+import { measure } from "#drawing/measure.js";
+import { arrowHeads, el, icon, middleOfLongest, roundedLine } from "#drawing/svg.js";
+
+/** @typedef {import("#drawing/layout.js").ContainerLayout} ContainerLayout */
+/** @typedef {import("#drawing/layout.js").PlacedBox} PlacedBox */
+/** @typedef {import("#drawing/layout.js").PlacedEdge} PlacedEdge */
+/** @typedef {import("#drawing/viewport.js").Viewport} Viewport */
+
+const SEP = "\u0001";
+const FLASH_MS = 380;
+const FADE_MS = 5000;
+const BRIEF_MS = 400; // a state that has run for less shows no clock
+const CLASSES = ["success", "failure", "preempted", "other"];
+/** @type {Record<string, string>} */
+const TAGS = { concurrence: "concurrent", iterator: "repeats", sequence: "sequence" };
+
+/**
+ * The elements of a state that change while it runs. A text is laid out again whenever it is set,
+ * so what was set last is kept.
+ * @typedef {{
+ *   group: SVGElement, frame: SVGElement, badge: TextOf, glyph: TextOf, bar: SVGElement | null,
+ *   part: number, label: string, node: StateNode,
+ * }} StateView
+ * @typedef {{ element: SVGElement, text: string }} TextOf
+ * @typedef {{ line: SVGElement, edge: PlacedEdge, count: SVGElement | null, note: string }} Arrow
+ */
+
+export class Diagram {
+  /** @type {Map<string, StateView>} */
+  states = new Map();
+  /** @type {Map<string, Arrow[]>} */
+  arrows = new Map(); // by path of the state and outcome
+  /** @type {Map<string, Box>} */
+  boxes = new Map();
+  /** @type {Map<string, SVGElement>} */
+  minimapRects = new Map();
+  /** @type {Map<string, boolean>} */
+  minimapDue = new Map(); // what the minimap does not show yet: whether states are active
+  /** @type {Map<SVGElement, number>} */
+  flashing = new Map(); // until when [ms]
+  /** @type {Map<string, Problem[]>} */
+  problems = new Map();
+  /** @type {Box | null} */
+  size = null;
+  /** @type {SVGElement | null} */
+  window = null; // the part in view, on the minimap
+
+  /** @param {SVGSVGElement} svg @param {SVGSVGElement} minimap */
+  constructor(svg, minimap) {
+    this.svg = svg;
+    this.minimap = minimap;
+    this.world = el("g", { class: "world" });
+    svg.replaceChildren(arrowHeads(), this.world);
+  }
+
+  /**
+   * @param {ContainerLayout} layout
+   * @param {import("#core/model.js").Model} model
+   * @param {Problem[]} problems
+   */
+  draw(layout, model, problems) {
+    for (const map of [this.states, this.arrows, this.boxes, this.minimapRects, this.minimapDue]) map.clear();
+    this.problems = groupByPath(problems);
+    const isCompared = model.order.some((n) => n.change || n.note || n.edges.some((e) => e.change || e.note));
+    this.svg.classList.toggle("compared", isCompared);
+    this.size = { x: 0, y: 0, w: layout.w + 16, h: layout.h + 16 };
+    const picture = document.createDocumentFragment();
+    this.#container(layout, 8, 8, picture);
+    this.world.replaceChildren(picture);
+    this.#drawMinimap(this.size);
+  }
+
+  /** @param {string | null} path */
+  boxOf(path) {
+    return path === null ? undefined : this.boxes.get(path);
+  }
+
+  // -- building ---------------------------------------------------------------------------------
+
+  /** @param {ContainerLayout} layout @param {number} x @param {number} y @param {DocumentFragment} into */
+  #container(layout, x, y, into) {
+    const { node } = layout;
+    const box = { x, y, w: layout.w, h: layout.h };
+    this.boxes.set(node.path, box);
+    const group = this.#group(node, `box ${node.kind}`);
+    const frame = el("rect", { class: "frame", x, y, width: box.w, height: box.h, rx: 9 });
+    frame.style.fill = `var(--depth${Math.min(node.depth, 11)})`;
+    const title = el("text", { x: x + 24, y: y + 16.5, class: "title" }, node.shown);
+    if (TAGS[node.kind]) title.append(el("tspan", { dx: 7, class: "tag" }, TAGS[node.kind]));
+    group.append(frame, icon(node.kind, x + 9, y + 7.5), title);
+    this.#register(node, group, frame, null, { ...box, h: 26 }, box.w);
+    into.append(group);
+    for (const edge of layout.edges) into.append(this.#edge(edge, x, y));
+    for (const child of layout.boxes) {
+      if (child.inner) this.#container(child.inner, x + child.x, y + child.y, into);
+      else this.#leaf(child, x + child.x, y + child.y, into);
+    }
+    for (const edge of layout.edges) this.#edgeLabels(edge, x, y, into);
+    if (layout.entry)
+      into.append(el("circle", { class: "entry", cx: x + layout.entry.x, cy: y + layout.entry.y, r: 4.5 }));
+    for (const pill of layout.pills) into.append(outcomePill(node, pill, x, y));
+  }
+
+  /** @param {StateNode} node @param {string} className */
+  #group(node, className) {
+    const kind = KIND_NAMES[node.kind] ?? node.kind;
+    const group = el("g", {
+      class: `${className}${node.change ? ` cmp-${node.change}` : ""}`,
+      "data-path": node.path,
+      role: "button",
+      tabindex: -1,
+      "aria-label": `${node.label}, ${kind}`,
+    });
+    const details = node.details.map(([name, value]) => `${name}: ${value}`).join("\n");
+    const found = (this.problems.get(node.path) ?? []).map((one) => `\u26a0 ${one.text}`).join("\n");
+    const lines = [node.path, node.change, node.note, `${node.type_name} (${kind})`, node.doc, details, found];
+    queueMicrotask(() => group.prepend(el("title", {}, lines.filter(Boolean).join("\n").slice(0, 2000))));
+    return group;
+  }
+
+  /** @param {PlacedBox} place @param {number} x @param {number} y @param {DocumentFragment} into */
+  #leaf(place, x, y, into) {
+    const { node, w, h } = place;
+    this.boxes.set(node.path, { x, y, w, h });
+    const closed = node.children.length > 0;
+    const group = this.#group(node, `leaf ${node.kind}${closed ? " closed" : ""}`);
+    const frame = el("rect", { class: "frame", x, y, width: w, height: h, rx: 7 });
+    group.append(frame);
+    if (closed)
+      group.append(el("rect", { class: "inner", x: x + 2.5, y: y + 2.5, width: w - 5, height: h - 5, rx: 5 }));
+    const bar = el("rect", { class: "progress", x: x + 6, y: y + h - 4.6, width: w - 12, height: 2.6, rx: 1.3 });
+    bar.style.transformOrigin = `${x + 6}px 0`;
+    bar.style.transform = "scaleX(0)";
+    group.append(bar);
+    const nameWidth = measure(node.shown, 11, true) + 14;
+    const spare = closed ? 20 + measure(String(node.total - 1), 9) : 0;
+    const left = place.hasRows ? x + 10 : x + (w - nameWidth - spare) / 2;
+    const middle = y + h / 2;
+    group.append(icon(node.kind, left, middle - 5));
+    group.append(el("text", { class: "name", x: left + 14, y: middle + 3.9 }, node.shown));
+    if (closed) {
+      const inside = `\u229e ${node.total - 1}`;
+      group.append(el("text", { class: "inside", x: left + nameWidth + 7, y: middle + 3.4 }, inside));
+    }
+    for (const dot of place.dots) {
+      const kind = outcomeClass(dot.outcome);
+      const end = { x: x + dot.x - 7, y: y + dot.y + 3.1, "text-anchor": "end" };
+      group.append(el("circle", { class: `dot ${kind}`, cx: x + dot.x, cy: y + dot.y, r: 3.2 }));
+      group.append(el("text", { class: `outcome ${kind}`, ...end }, dot.outcome));
+    }
+    const room = place.dots.length ? place.nameWidth : w; // its outcomes are right of that
+    this.#register(node, group, frame, bar, { x, y, w, h }, room);
+    into.append(group);
+  }
+
+  /**
+   * Add the badges that appear when there is something to show, and keep what changes.
+   * @param {StateNode} node
+   * @param {SVGElement} group
+   * @param {SVGElement} frame
+   * @param {SVGElement | null} bar
+   * @param {Box} box
+   * @param {number} room for the name
+   */
+  #register(node, group, frame, bar, box, room) {
+    const badge = el("text", { class: "badge", x: box.x + box.w - 5, y: box.y - 3, "text-anchor": "end" });
+    const glyph = el("text", { class: "glyph", x: box.x + room - 8, y: box.y + 10, "text-anchor": "middle" });
+    group.append(badge, glyph);
+    const found = this.problems.get(node.path);
+    if (found) {
+      group.classList.add("problem");
+      const worst = found.some((one) => one.severity === "error") ? "failure" : "preempted";
+      const centre = { x: box.x + 2, y: box.y + 5.4, "text-anchor": "middle" };
+      group.append(el("circle", { class: `warning ${worst}`, cx: box.x + 2, cy: box.y + 2, r: 6.5 }));
+      group.append(el("text", { class: "warning-text", ...centre }, "!"));
+    }
+    group.append(el("circle", { class: "stop", cx: box.x - 1, cy: box.y + Math.min(box.h, 26) / 2, r: 5 }));
+    this.states.set(node.path, {
+      group,
+      frame,
+      bar,
+      badge: { element: badge, text: "" },
+      glyph: { element: glyph, text: "" },
+      part: 0,
+      label: "",
+      node,
+    });
+  }
+
+  /** @param {PlacedEdge} edge @param {number} x @param {number} y */
+  #edge(edge, x, y) {
+    const points = edge.points.map((p) => ({ x: p.x + x, y: p.y + y }));
+    const kind = edge.kind === "link" ? commonClass(edge.outcomes) : edge.kind;
+    const implicit = edge.link?.implicit ? " implicit" : "";
+    const change = edge.link?.change ? ` cmp-${edge.link.change}` : "";
+    const line = el("path", {
+      class: `edge ${kind}${implicit}${change}`,
+      d: roundedLine(points),
+      "marker-end": `url(#arrow-${edge.kind === "link" ? kind : "plain"})`,
+    });
+    const arrow = { line, edge, count: null, note: "" };
+    for (const outcome of edge.outcomes) {
+      const key = edge.source + SEP + outcome;
+      this.arrows.set(key, [...(this.arrows.get(key) ?? []), arrow]);
+    }
+    return line;
+  }
+
+  /** @param {PlacedEdge} edge @param {number} x @param {number} y @param {DocumentFragment} into */
+  #edgeLabels(edge, x, y, into) {
+    for (const label of edge.labels) {
+      const place = { x: x + label.x, y: y + label.y + 9.2, "text-anchor": "middle" };
+      const name = signed(edge.link?.change, label.text);
+      into.append(el("text", { class: `label ${outcomeClass(label.text)}`, ...place }, name));
+    }
+    if (!edge.link) return;
+    const { change, note } = edge.link;
+    const text = [!edge.labels.length && change ? CHANGE_SIGNS[change] : "", note].filter(Boolean).join(" ");
+    const middle = middleOfLongest(edge.points);
+    const right = !edge.labels.some((label) => label.x > middle.x); // not where the names are
+    const place = {
+      x: x + middle.x + (right ? 4 : -4),
+      y: y + middle.y - 3,
+      "text-anchor": right ? "start" : "end",
+    };
+    const count = el("text", { class: "count", ...place }, text);
+    into.append(count);
+    for (const arrow of this.arrows.get(edge.source + SEP + edge.outcomes[0]) ?? [])
+      if (arrow.edge === edge) Object.assign(arrow, { count, note: text });
+  }
+
+  /** @param {Box} size */
+  #drawMinimap({ w, h }) {
+    this.minimap.setAttribute("viewBox", `0 0 ${w} ${h}`);
+    for (const [path, box] of this.boxes) {
+      const isOpen = this.states.get(path)?.group.classList.contains("box");
+      const place = { x: box.x, y: box.y, width: box.w, height: box.h, rx: 6 };
+      this.minimapRects.set(path, el("rect", { class: isOpen ? "area" : "spot", ...place }));
+    }
+    this.window = el("rect", { class: "window" });
+    this.minimap.replaceChildren(...this.minimapRects.values(), this.window);
+  }
+
+  /** Show on the minimap which part is in view. @param {Viewport} view */
+  showWindow(view) {
+    if (!this.window || !this.size) return;
+    const { x, y, k, width, height } = view;
+    const place = { x: -x / k, y: -y / k, width: width / k, height: height / k };
+    for (const [name, value] of Object.entries(place)) this.window.setAttribute(name, String(value));
+    const { w, h } = this.size;
+    this.window.style.strokeWidth = `${Math.max(w, h) / 70}px`;
+    const all = x >= -1 && y >= -1 && x + w * k <= width + 1 && y + h * k <= height + 1;
+    this.minimap.classList.toggle("idle", all);
+    this.svg.classList.toggle("far", k < 0.6);
+    this.svg.classList.toggle("farther", k < 0.35);
+    this.svg.style.setProperty("--title", `${Math.max(11, Math.min(11 / k, 44)).toFixed(1)}px`);
+  }
+
+  // -- restyling --------------------------------------------------------------------------------
+
+  /**
+   * @param {string} path
+   * @param {StateRun | undefined} state
+   * @param {number} now [ms]
+   * @param {GoalRun | null | undefined} goal what the state has sent and waits for
+   * @param {boolean} noServer no action server is seen that would take it
+   */
+  paint(path, state, now, goal, noServer = false) {
+    const view = this.states.get(path);
+    if (!view) return;
+    const active = state?.since != null;
+    const asked = active && Boolean(state?.preempt);
+    const kind = state?.outcome != null ? outcomeClass(state.outcome) : null;
+    const classes = view.group.classList;
+    classes.toggle("active", active);
+    classes.toggle("preempting", asked);
+    classes.toggle("serviced", asked && Boolean(state?.serviced));
+    classes.toggle("waiting", Boolean(state?.waits) || (active && noServer));
+    classes.toggle("visited", (state?.visits ?? 0) > 0);
+    for (const name of CLASSES) classes.toggle(`was-${name}`, !active && kind === name);
+    classes.toggle("raised", !active && Boolean(state?.error));
+    classes.toggle("faded", !active && state?.left != null && now - state.left / 1e6 > FADE_MS);
+    write(view.glyph, glyphOf(state, kind));
+    write(view.badge, active ? elapsed(state, now) : view.node.note || "");
+    const part = active ? (goal?.progress?.fraction ?? 0) : 0;
+    if (view.bar && view.part !== part) {
+      view.part = part;
+      view.bar.style.transform = `scaleX(${part})`;
+    }
+    const label = [path, statusOf(state, goal, noServer), view.node.change].filter(Boolean).join(", ");
+    if (view.label !== label) {
+      view.label = label;
+      view.group.setAttribute("aria-label", label);
+    }
+    this.minimapDue.set(path, active);
+  }
+
+  /** The minimap follows a few times a second: drawing it at every event costs as much as the rest. */
+  paintMinimap() {
+    for (const [path, active] of this.minimapDue) this.minimapRects.get(path)?.classList.toggle("active", active);
+    this.minimapDue.clear();
+  }
+
+  /**
+   * Bring the clock of a state that runs up to date.
+   * @param {string} path
+   * @param {StateRun} state
+   * @param {number} now
+   */
+  updateBadge(path, state, now) {
+    const view = this.states.get(path);
+    if (view && state.since != null) write(view.badge, elapsed(state, now));
+  }
+
+  /** Show that a transition was just taken. @param {string} path @param {string} outcome @param {number} now */
+  flash(path, outcome, now) {
+    for (const { line } of this.arrows.get(path + SEP + outcome) ?? []) {
+      line.classList.add("taken");
+      this.flashing.set(line, now + FLASH_MS);
+    }
+  }
+
+  /** End the flashes that are over; returns whether any is left. @param {number} now */
+  endFlashes(now) {
+    for (const [line, until] of this.flashing)
+      if (until < now) {
+        line.classList.remove("taken");
+        this.flashing.delete(line);
+      }
+    return this.flashing.size > 0;
+  }
+
+  /** Give these states, and no others, a class. @param {string[]} paths @param {string} name */
+  mark(paths, name) {
+    for (const group of this.world.querySelectorAll(`.${name}`)) group.classList.remove(name);
+    for (const path of paths) this.states.get(path)?.group.classList.add(name);
+  }
+
+  /**
+   * Show numbers on transitions and heat on states.
+   * @param {import("#core/statistics.js").CountOf | null} countOf
+   * @param {import("#core/statistics.js").HeatOf | null} heatOf
+   */
+  showNumbers(countOf, heatOf) {
+    this.svg.classList.toggle("heated", Boolean(countOf));
+    for (const { line, edge, count: text, note } of new Set([...this.arrows.values()].flat())) {
+      const found = edge.outcomes.map((outcome) => countOf?.(edge.source, outcome) ?? { count: 0, share: 0 });
+      const count = found.reduce((sum, one) => sum + one.count, 0);
+      const share = found.reduce((sum, one) => sum + one.share, 0);
+      line.style.strokeWidth = count ? `${Math.min(4, 1.2 + Math.log2(1 + count) * 0.6)}px` : "";
+      line.classList.toggle("never", Boolean(countOf) && !count);
+      const percent = share && share < 0.995 ? ` ${Math.round(share * 100)}%` : "";
+      if (text) text.textContent = count ? `\u00d7${count}${percent}` : note;
+    }
+    for (const [path, { frame, group }] of this.states) {
+      if (group.classList.contains("box")) continue;
+      const heat = Math.round((heatOf?.(path) ?? 0) * 100);
+      frame.style.fill = heat ? `color-mix(in srgb, var(--failure-fill) ${heat}%, var(--inactive-fill))` : "";
+    }
+  }
+}
+
+/** @param {StateNode} node @param {Box & { outcome: string }} pill @param {number} x @param {number} y */
+function outcomePill(node, pill, x, y) {
+  const byDefault = node.pills.find((one) => one.outcome === pill.outcome)?.by_default ? " default" : "";
+  const place = { x: x + pill.x, y: y + pill.y, width: pill.w, height: pill.h, rx: pill.h / 2 };
+  const centre = { x: place.x + pill.w / 2, y: place.y + pill.h / 2 + 3.1, "text-anchor": "middle" };
+  return el(
+    "g",
+    { class: `pill ${outcomeClass(pill.outcome)}${byDefault}` },
+    el("rect", place),
+    el("text", centre, pill.outcome),
+  );
+}
+
+/** @param {Problem[]} problems */
+function groupByPath(problems) {
+  /** @type {Map<string, Problem[]>} */
+  const found = new Map();
+  for (const one of problems) found.set(one.path, [...(found.get(one.path) ?? []), one]);
+  return found;
+}
+
+/** @param {StateRun | undefined} state @param {OutcomeClass | null} kind */
+function glyphOf(state, kind) {
+  if (state?.waits) return "\u23f8";
+  if (state?.since != null) return state.preempt ? (state.serviced ? "\u2713" : "\u25a0") : "";
+  if (!kind) return "";
+  if (state?.error) return "\u26a0";
+  return { success: "\u2713", failure: "\u2715", preempted: "\u25a0", other: "" }[kind];
+}
+
+/** @param {StateRun | undefined} state @param {GoalRun | null | undefined} goal @param {boolean} noServer */
+function statusOf(state, goal, noServer) {
+  if (state?.since == null) return state?.outcome ?? "not visited";
+  if (state.preempt) return `asked to stop${state.serviced ? ", cleaning up" : ""}`;
+  return noServer && goal ? `no server of ${goal.action} seen` : "running";
+}
+
+/** @param {TextOf} shown @param {string} text */
+function write(shown, text) {
+  if (shown.text === text) return;
+  shown.text = text;
+  shown.element.textContent = text;
+}
+
+/** How long a state has run, and what else its badge shows. @param {StateRun} state @param {number} now */
+function elapsed(state, now) {
+  const since = (/** @type {number | null | undefined} */ ns) => Math.max(0, now - (ms(ns) ?? now)) / 1000;
+  const attempt = state.attempt ?? 1;
+  if (since(state.since) * 1000 < BRIEF_MS && !state.preempt && attempt < 2) return "";
+  const parts = [];
+  if (state.item != null) parts.push(`#${state.item + 1}`);
+  if (attempt > 1) parts.push(`attempt ${attempt}`);
+  if (!state.preempt) parts.push(duration(since(state.since)));
+  else if (state.serviced) parts.push(`cleans up ${duration(since(state.serviced))}`);
+  else {
+    const grace = state.asked?.grace;
+    parts.push(`asked to stop ${duration(since(state.preempt))}${grace != null ? ` of ${duration(grace)}` : ""}`);
+  }
+  return parts.join(" \u00b7 ");
+}

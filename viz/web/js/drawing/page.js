@@ -1,0 +1,426 @@
+// The drawing as a whole: what happens reaches the diagram and the timeline, and the panels at
+// their own pace. What the user does comes in by the methods below.
+import { connect, isFile, makeLayoutWorker, messageOf } from "#core/connection.js";
+import { numbersFor } from "#core/statistics.js";
+import * as store from "#core/store.js";
+import { shorten } from "#core/text.js";
+import { Diagram } from "#drawing/diagram.js";
+import * as framing from "#drawing/framing.js";
+import { Layout } from "#drawing/layout.js";
+import { applyTheme, systemIsDark } from "#drawing/theme.js";
+import { Timeline } from "#drawing/timeline.js";
+import { drag, Viewport } from "#drawing/viewport.js";
+
+const PANELS_MS = 160; // the panels are drawn again at most so often
+const TEXT_MS = 400; // and those with much text
+const BEAT_MS = 200; // between two looks at what changes without events
+const BUSY = 15; // events in a second from which transitions do not fade one by one
+const ANNOUNCE_MS = 1000;
+const READABLE = 0.55; // the scale below which fewer levels are opened at first
+const BURST = 500; // so many events at once are a snapshot, whose delay is not measured
+
+export class Page {
+  /** @type {Set<string>} */
+  changed = new Set(); // paths to paint
+  /** @type {RunEvent[]} */
+  flashes = []; // transitions to flash
+  frame = 0; // of the browser, that is asked for
+  /** @type {Promise<void> | null} */
+  drawing = null; // the layout that is under way
+  drawAgain = false;
+  /** @type {{ frame: boolean | "follow", focus: string | null }} */
+  afterLayout = { frame: false, focus: null }; // what to show then
+  /** @type {string | null} */
+  toggled = null; // path of the container that is opened or closed
+  /** @type {import("#drawing/viewport.js").View | null} */
+  fitted = null; // the view that showed everything
+  followIsSet = false;
+  panelsAt = 0; // when they were drawn [ms]
+  textAt = 0;
+  announcedAt = 0;
+  newestSeq = 0;
+  /** @type {ReturnType<typeof setTimeout> | 0} */
+  panelsDue = 0;
+  /** @type {ReturnType<typeof setTimeout> | 0} */
+  mapsDue = 0;
+  layoutMs = 0; // the last layout took
+  /** @type {number[]} */
+  latencies = []; // from the event to the paint [ms], for benchmarks
+  /** @type {number[]} */
+  arrived = []; // stamps of events to paint
+  /** @type {number[]} */
+  painting = []; // stamps of events in the frame that is being painted
+  paintPort = new MessageChannel();
+  /** @type {Layout | null} */
+  layout = null;
+
+  /** @param {SVGSVGElement} svg @param {SVGSVGElement} minimap @param {HTMLCanvasElement} canvas */
+  constructor(svg, minimap, canvas) {
+    this.diagram = new Diagram(svg, minimap);
+    this.view = new Viewport(svg, this.diagram.world, () => this.diagram.showWindow(this.view));
+    this.timeline = new Timeline(canvas, { onPick: (path) => this.goTo(path) });
+    this.paintPort.port1.onmessage = () => this.#measureLatency();
+    svg.addEventListener("click", (e) => {
+      if (!this.view.moved) this.select(pathOf(e));
+    });
+    svg.addEventListener("dblclick", (e) => this.#toggle(store.model.value?.get(pathOf(e))));
+    minimap.addEventListener("pointerdown", (e) => this.#jump(e));
+    new ResizeObserver(() => {
+      if (this.fitted && this.view.is(this.fitted)) this.fit({ animate: false }); // who saw all sees all again
+      this.diagram.showWindow(this.view);
+      this.timeline.draw();
+    }).observe(svg);
+    systemIsDark.addEventListener("change", () => this.timeline.restyle());
+    store.instant.subscribe(() => {
+      this.paintAll();
+      this.timeline.draw();
+    });
+    store.serversSeen.subscribe(() => this.paintAll());
+    store.facts.subscribe(() => this.paintAll());
+  }
+
+  /** Begin when the elements are in the document, so that their fonts are loading. */
+  async start() {
+    setInterval(() => this.#beat(), BEAT_MS);
+    this.layout = new Layout(await makeLayoutWorker());
+    await document.fonts.ready;
+    await connect({ onEvents: (events) => this.takeEvents(events), onMachine: () => this.showMachine() });
+  }
+
+  // -- what happens -------------------------------------------------------------------------------
+
+  /** Show the machine that has come into the store. */
+  showMachine() {
+    store.selected.value = null;
+    framing.restart();
+    this.layout?.clear();
+    this.timeline.reset();
+    if (isFile() || store.facts.value?.recorded) this.timeline.fitAll();
+    if (store.settings.value.follow && !this.followIsSet) {
+      store.follow.value = true;
+      this.followIsSet = true;
+    }
+    document.title = `${store.facts.value?.label} \u2013 smachpy`;
+    this.relayout({ frame: true });
+  }
+
+  /** @param {RunEvent[]} events */
+  takeEvents(events) {
+    const live = store.cursor.value === null;
+    for (const e of events) {
+      this.changed.add(e.path);
+      if (live && (e.kind === "Left" || e.kind === "Failed")) this.flashes.push(e);
+      if (live && events.length < BURST) this.arrived.push(e.stamp_ns / 1e6);
+    }
+    store.addEvents(events);
+    if (!events.length) this.paintAll();
+    this.#schedule();
+  }
+
+  #schedule() {
+    if (!this.frame) this.frame = requestAnimationFrame(() => this.#draw());
+  }
+
+  #draw() {
+    this.frame = 0;
+    const moment = performance.now();
+    if (store.cursor.value === null) {
+      const now = store.nowMs();
+      for (const path of this.changed) this.#paint(path, store.run.now, now);
+      this.changed.clear();
+      for (const e of this.flashes.splice(0)) this.diagram.flash(e.path, e.outcome ?? "exception", moment);
+      if (this.arrived.length) {
+        this.painting.push(...this.arrived.splice(0));
+        this.paintPort.port2.postMessage(0);
+      }
+    }
+    if (this.diagram.endFlashes(moment)) this.#schedule();
+    if (moment - this.panelsAt > PANELS_MS) this.#panels(moment);
+    else this.panelsDue ||= setTimeout(() => this.#panels(performance.now()), PANELS_MS);
+  }
+
+  #measureLatency() {
+    const now = performance.timeOrigin + performance.now();
+    for (const stamp of this.painting.splice(0)) this.latencies.push(now - stamp);
+    if (this.latencies.length > 20_000) this.latencies.splice(0, 10_000);
+  }
+
+  /** @param {number} moment */
+  #panels(moment) {
+    clearTimeout(this.panelsDue);
+    this.panelsDue = 0;
+    this.panelsAt = moment;
+    store.tick.value += 1;
+    if (moment - this.textAt > TEXT_MS) {
+      this.textAt = moment;
+      store.slowTick.value += 1;
+      const newest = store.run.events.at(-1)?.seq ?? 0;
+      const isBusy = newest - this.newestSeq > 3 * BUSY * (TEXT_MS / 1000);
+      this.newestSeq = newest;
+      this.diagram.svg.classList.toggle("busy", isBusy);
+    }
+    // Not all in one long task
+    this.mapsDue ||= setTimeout(() => {
+      this.mapsDue = 0;
+      this.timeline.draw();
+      this.diagram.paintMinimap();
+    }, PANELS_MS / 2);
+    this.#announce(moment);
+    this.#follow();
+  }
+
+  /** What changes without events: clocks, the stale badge, folded containers. */
+  #beat() {
+    const data = store.shown();
+    const now = store.nowMs();
+    if (store.cursor.value === null)
+      for (const path of store.activePaths.value) {
+        const state = data.states[path];
+        if (state) this.diagram.updateBadge(path, state, now);
+      }
+    if (store.numbers.value !== "none") this.#showNumbers();
+    this.#panels(performance.now());
+  }
+
+  /** Tell screen readers what runs. @param {number} moment */
+  #announce(moment) {
+    const region = document.getElementById("announced");
+    if (!region || moment - this.announcedAt < ANNOUNCE_MS) return;
+    const names = store.activeLeaves.value.slice(0, 6).map(nameOf).join(", ");
+    const text = `${store.runStatus.value.word}: ${names}`;
+    if (region.textContent === text) return;
+    region.textContent = text;
+    this.announcedAt = moment;
+  }
+
+  /** @param {string} path @param {RunState} data @param {number} now */
+  #paint(path, data, now) {
+    if (!this.diagram.states.has(path)) return;
+    const goal = Object.values(data.goals).findLast((one) => one.path === path && one.ended == null);
+    this.diagram.paint(path, data.states[path], now, goal, store.hasNoServer(goal));
+  }
+
+  paintAll() {
+    if (!this.diagram.size) return;
+    const data = store.shown();
+    const now = store.nowMs();
+    const running = Object.values(data.goals).filter((goal) => goal.ended == null);
+    const goals = new Map(running.map((goal) => [goal.path, goal]));
+    for (const path of this.diagram.boxes.keys()) {
+      const goal = goals.get(path);
+      this.diagram.paint(path, data.states[path], now, goal, store.hasNoServer(goal));
+    }
+    const stops = store.facts.value?.control?.breakpoints ?? [];
+    const pathsOf = (/** @type {typeof stops} */ some) => some.map(([path]) => path);
+    this.diagram.mark(pathsOf(stops.filter(([, outcome]) => outcome === null)), "stopped");
+    this.diagram.mark(pathsOf(stops.filter(([, outcome]) => outcome !== null)), "stopped-after");
+    this.diagram.mark(store.selected.value ? [store.selected.value] : [], "selected");
+    this.#showNumbers();
+  }
+
+  #showNumbers() {
+    const { numbers, statistics, model } = store;
+    const { countOf, heatOf } = numbersFor(numbers.value, store.shown().states, statistics.value, model.value);
+    this.diagram.showNumbers(countOf, heatOf);
+  }
+
+  // -- layout -------------------------------------------------------------------------------------
+
+  /**
+   * Lay the machine out, and draw it; then show all of it, what runs, or one state.
+   * @param {{ frame?: boolean | "follow", focus?: string | null }} [then]
+   */
+  relayout({ frame = false, focus = null } = {}) {
+    if (frame) this.afterLayout.frame = frame;
+    this.afterLayout.focus = focus ?? this.afterLayout.focus;
+    if (this.drawing) this.drawAgain = true;
+    else this.drawing = this.#layoutLoop();
+    return this.drawing;
+  }
+
+  async #layoutLoop() {
+    try {
+      do {
+        this.drawAgain = false;
+        await this.#layoutOnce();
+      } while (this.drawAgain);
+      const { frame, focus } = this.afterLayout;
+      this.afterLayout = { frame: false, focus: null };
+      const size = this.diagram.size;
+      if (focus) this.#focus(focus);
+      else if (frame === "follow" && size)
+        this.view.frame(framing.boxToFrame(this.diagram, this.view, size), { most: 1.5 });
+      else if (frame) this.fit({ animate: false });
+      const { dataset } = document.documentElement;
+      dataset.drawn = String(Number(dataset.drawn ?? 0) + 1);
+    } catch (error) {
+      store.failure.value = `This machine could not be laid out: ${messageOf(error)}`;
+      console.error(error);
+    } finally {
+      this.drawing = null;
+    }
+  }
+
+  async #layoutOnce() {
+    const model = store.model.value;
+    if (!model || !this.layout) return;
+    const begun = performance.now();
+    const result = await this.layout.run(model.root, new Set(store.opened.value).add(model.root.path));
+    this.layoutMs = performance.now() - begun;
+    if (!result || model !== store.model.value) return;
+    const anchor = this.#anchor();
+    this.diagram.draw(result, model, store.problems.value);
+    this.#hold(anchor);
+    this.paintAll();
+    const size = this.diagram.size;
+    const tooSmall = size !== null && this.view.scaleFor(size) < READABLE;
+    if (this.afterLayout.frame === true && tooSmall && store.openOneLevelLess()) this.drawAgain = true;
+  }
+
+  /** What is in the middle of the view stays where it is when things around it move. */
+  #anchor() {
+    const { view, diagram } = this;
+    if (!diagram.size) return null;
+    const x = (view.width / 2 - view.x) / view.k;
+    const y = (view.height / 2 - view.y) / view.k;
+    const inside = (/** @type {Box} */ b) => x >= b.x && x <= b.x + b.w && y >= b.y && y <= b.y + b.h;
+    const path = this.toggled ?? [...diagram.boxes].findLast(([, box]) => inside(box))?.[0] ?? null;
+    this.toggled = null;
+    const box = diagram.boxOf(path);
+    return path !== null && box ? { path, x: box.x, y: box.y } : null;
+  }
+
+  /** @param {{ path: string, x: number, y: number } | null} anchor */
+  #hold(anchor) {
+    const box = anchor && this.diagram.boxOf(anchor.path);
+    if (!box) return;
+    const { x, y, k } = this.view;
+    this.view.set(x - (box.x - anchor.x) * k, y - (box.y - anchor.y) * k, k);
+  }
+
+  /** @param {string} path */
+  #focus(path) {
+    const box = this.diagram.boxOf(path);
+    if (box) this.view.frame(box, { margin: 110, most: Math.max(1, Math.min(this.view.k, 1.5)) });
+  }
+
+  #follow() {
+    if (!store.follow.value || store.cursor.value !== null || this.drawing) return;
+    const open = framing.containersToOpen(store.nowMs());
+    if (!open) return;
+    store.opened.value = open;
+    this.relayout({ frame: "follow" });
+  }
+
+  fit({ animate = true } = {}) {
+    if (this.diagram.size) this.fitted = this.view.frame(this.diagram.size, { animate, most: 1.5 });
+  }
+
+  // -- what the user does -------------------------------------------------------------------------
+
+  /** @param {string | null} path */
+  select(path) {
+    store.selected.value = path;
+    this.diagram.mark(path ? [path] : [], "selected");
+    this.timeline.draw();
+  }
+
+  /** Select a state and bring it into view. @param {string} path */
+  goTo(path) {
+    this.select(path);
+    if (store.reveal(path)) this.relayout({ focus: path });
+    else this.#focus(path);
+  }
+
+  /** Select the neighbour of the selected state in a direction. @param {number} dx @param {number} dy */
+  selectNeighbour(dx, dy) {
+    const from = this.diagram.boxOf(store.selected.value);
+    if (!from) return;
+    const centre = (/** @type {Box} */ b) => ({ x: b.x + b.w / 2, y: b.y + Math.min(b.h, 30) / 2 });
+    const here = centre(from);
+    /** @type {{ path: string, far: number } | null} */
+    let best = null;
+    for (const [path, box] of this.diagram.boxes) {
+      if (path === store.selected.value) continue;
+      const there = centre(box);
+      const along = (there.x - here.x) * dx + (there.y - here.y) * dy;
+      const aside = Math.abs((there.x - here.x) * dy) + Math.abs((there.y - here.y) * dx);
+      const far = along + 2 * aside;
+      if (along > 4 && (!best || far < best.far)) best = { path, far };
+    }
+    if (best) this.select(best.path);
+  }
+
+  toggleSelected() {
+    this.#toggle(store.model.value?.get(store.selected.value));
+  }
+
+  /** Open or close a container, unless it is the outermost. @param {StateNode | undefined} node */
+  #toggle(node) {
+    if (!node?.children.length || !node.parent) return;
+    this.toggled = node.path;
+    store.toggle(node.path);
+    this.relayout();
+  }
+
+  /** @param {boolean} on */
+  setFollow(on) {
+    store.follow.value = on;
+    framing.restart();
+    if (on) this.#follow();
+  }
+
+  /** @param {number} levels */
+  setDepth(levels) {
+    const model = store.model.value;
+    if (!model) return;
+    store.follow.value = false;
+    store.setOpened(model.toDepth(levels));
+    this.relayout({ frame: true });
+  }
+
+  /** @param {boolean} on */
+  setImplicit(on) {
+    store.setImplicit(on);
+    this.layout?.clear();
+    this.relayout();
+  }
+
+  /** @param {string} mode a key of statistics.MODES */
+  setNumbers(mode) {
+    store.numbers.value = mode;
+    this.#showNumbers();
+  }
+
+  /** @param {Theme} name */
+  setTheme(name) {
+    store.theme.value = name;
+    applyTheme();
+    this.timeline.restyle();
+    this.timeline.draw();
+  }
+
+  /** @param {string[]} paths */
+  markHits(paths) {
+    this.diagram.mark(paths, "hit");
+  }
+
+  /** Show what the minimap is pressed on. @param {PointerEvent} pressed */
+  #jump(pressed) {
+    const move = (/** @type {PointerEvent} */ e) => {
+      const matrix = this.diagram.minimap.getScreenCTM();
+      if (!matrix) return;
+      const point = new DOMPoint(e.clientX, e.clientY).matrixTransform(matrix.inverse());
+      this.view.centre(point.x, point.y);
+    };
+    drag(move);
+    move(pressed);
+  }
+}
+
+/** @param {MouseEvent} e */
+const pathOf = (e) =>
+  e.target instanceof Element ? (e.target.closest("[data-path]")?.getAttribute("data-path") ?? null) : null;
+
+/** @param {string} path */
+export const nameOf = (path) => store.model.value?.get(path)?.name ?? shorten(path.slice(path.lastIndexOf("/") + 1));

@@ -1,0 +1,429 @@
+// The run over time: a lane per container, in it a row for each child of a concurrence; drag to seek.
+import { ms } from "#core/fold.js";
+import { outcomeClass } from "#core/outcomes.js";
+import * as store from "#core/store.js";
+import { askerText } from "#core/text.js";
+import { drag } from "#drawing/viewport.js";
+
+// Sizes in CSS pixels
+const NAMES = 168; // for the names of the lanes
+const NAMES_NARROW = 84; // on a narrow page
+const RIGHT = 14;
+const FOOT = 18;
+const LANE = 19;
+const ROW = 13;
+const MOST_ROWS = 6; // of a concurrence that are given room
+const THINNEST = 0.5;
+const LIVE_MS = 30_000; // shown at first
+const SHORTEST_MS = 200; // that can be zoomed to
+const LONGEST_MS = 30 * 86_400_000;
+const STEPS_S = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600, 7200, 14_400];
+
+/** @typedef {import("#core/model.js").Model} Model */
+/** @typedef {{ from: number, to: number, x: (t: number) => number }} Scale what is shown [ms], and where [px] */
+/** @typedef {{ left: number, right: number, top: number, bottom: number, span: Span }} Hit */
+
+export class Timeline {
+  length = LIVE_MS; // shown [ms]
+  /** @type {number | null} */
+  end = null; // [ms]; null: follows now
+  top = 0; // scrolled by [px]
+  names = NAMES;
+  /** @type {StateNode[]} */
+  lanes = []; // in the order of the tree
+  /** @type {Map<string, Span[]>} */
+  spansOf = new Map(); // by path of the lane
+  /** @type {Model | null} */
+  model = null;
+  /** @type {Span[] | null} */
+  spans = null;
+  sorted = 0; // so many spans have been put into lanes
+  /** @type {Hit[]} */
+  hits = [];
+  /** @type {Map<string, string>} */
+  #colours = new Map();
+
+  /** @param {HTMLCanvasElement} canvas @param {{ onPick: (path: string) => void }} handlers */
+  constructor(canvas, { onPick }) {
+    this.canvas = canvas;
+    this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+    this.onPick = onPick;
+    canvas.addEventListener("pointerdown", (e) => this.#down(e));
+    canvas.addEventListener("wheel", (e) => this.#wheel(e), { passive: false });
+    canvas.addEventListener("pointermove", (e) => {
+      const span = this.#spanAt(e);
+      canvas.title = span ? describe(span) : "";
+    });
+    canvas.addEventListener("keydown", (e) => this.#key(e));
+  }
+
+  /** Read the colours again. */
+  restyle() {
+    this.#colours.clear();
+  }
+
+  reset() {
+    this.end = null;
+    this.length = LIVE_MS;
+    this.top = 0;
+    this.model = null;
+  }
+
+  /** Show the whole run. */
+  fitAll() {
+    const first = store.run.first();
+    const last = store.nowMs();
+    if (first == null) return;
+    this.length = Math.max(500, (last - first) * 1.04);
+    this.end = last + this.length * 0.02;
+  }
+
+  /** Follow now. */
+  live() {
+    this.end = null;
+    store.seek(null);
+  }
+
+  /** @param {string} name */
+  #colour(name) {
+    const known = this.#colours.get(name);
+    if (known !== undefined) return known;
+    const colour = getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+    this.#colours.set(name, colour);
+    return colour;
+  }
+
+  /** What is shown [ms]. @returns {[number, number]} */
+  #range() {
+    const now = store.nowMs();
+    let end = this.end ?? now + this.length * 0.01;
+    if (this.end === null && store.cursor.value !== null) end = now + this.length / 2;
+    const first = store.run.first(); // a young run begins at the left and grows
+    if (this.end === null && store.cursor.value === null && first != null)
+      end = Math.max(end, first + this.length * 0.98);
+    return [end - this.length, end];
+  }
+
+  /** @param {number} px */
+  #timeAt(px) {
+    const [from, to] = this.#range();
+    return from + ((px - this.names) / (this.canvas.clientWidth - this.names - RIGHT)) * (to - from);
+  }
+
+  /**
+   * Put new spans into lanes; a container has a lane when something in it has run.
+   * @param {Model} model
+   * @param {Span[]} spans
+   */
+  #makeLanes(model, spans) {
+    if (this.model !== model || this.spans !== spans) {
+      // another machine, another run, or spans were forgotten
+      this.spansOf.clear();
+      this.sorted = 0;
+      this.lanes = [];
+    }
+    this.model = model;
+    this.spans = spans;
+    const before = this.spansOf.size;
+    for (; this.sorted < spans.length; this.sorted++) {
+      const span = spans[this.sorted];
+      const lane = model.get(span.path)?.parent?.path;
+      if (lane === undefined) continue;
+      const known = this.spansOf.get(lane);
+      if (known) known.push(span);
+      else this.spansOf.set(lane, [span]);
+    }
+    if (this.spansOf.size !== before) this.lanes = model.order.filter((node) => this.spansOf.has(node.path));
+  }
+
+  draw() {
+    const { canvas, context: g } = this;
+    const model = store.model.value;
+    const width = canvas.clientWidth;
+    const height = canvas.clientHeight;
+    const ratio = devicePixelRatio || 1;
+    if (!width || !model) return;
+    this.names = width < 640 ? NAMES_NARROW : NAMES;
+    const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
+    if (canvas.width !== w || canvas.height !== h) Object.assign(canvas, { width: w, height: h });
+    g.setTransform(ratio, 0, 0, ratio, 0, 0);
+    g.clearRect(0, 0, width, height);
+    g.font = "11px Inter, Arial, sans-serif";
+    g.textBaseline = "middle";
+    this.#makeLanes(model, store.run.spans);
+    const [from, to] = this.#range();
+    const x = (/** @type {number} */ t) => this.names + ((t - from) / (to - from)) * (width - this.names - RIGHT);
+    const scale = { from, to, x };
+    this.#grid(scale, width, height);
+    const room = height - FOOT;
+    const lanes = this.#lanesToShow(scale, room);
+    const all = lanes.reduce((sum, lane) => sum + laneHeight(lane), 0);
+    this.top = Math.max(0, Math.min(this.top, all - room));
+    let y = 3 - this.top;
+    this.hits = [];
+    this.#clipped(0, 0, width, room, () => {
+      for (const lane of lanes) {
+        const tall = laneHeight(lane);
+        if (y + tall > 0 && y < room) this.#lane(lane, y, tall, scale, width);
+        y += tall;
+      }
+    });
+    this.#cursor(x, height);
+  }
+
+  /** @param {number} x @param {number} y @param {number} w @param {number} h @param {() => void} paint */
+  #clipped(x, y, w, h, paint) {
+    const g = this.context;
+    g.save();
+    g.beginPath();
+    g.rect(x, y, w, h);
+    g.clip();
+    paint();
+    g.restore();
+  }
+
+  /** All lanes where there is room, else those with something in them. @param {Scale} scale @param {number} room */
+  #lanesToShow({ from, to }, room) {
+    const tall = this.lanes.reduce((sum, lane) => sum + laneHeight(lane), 0);
+    if (tall <= room) return this.lanes;
+    return this.lanes.filter((lane) => {
+      const spans = this.spansOf.get(lane.path) ?? [];
+      for (let i = firstAfter(spans, from); i < spans.length && spans[i].from <= to; i++)
+        if ((spans[i].to ?? Infinity) >= from) return true;
+      return false;
+    });
+  }
+
+  /** @param {Scale} scale @param {number} width @param {number} height */
+  #grid({ from, to, x }, width, height) {
+    const g = this.context;
+    const begun = ms(store.shown().started) ?? store.run.first() ?? from;
+    const widthOf = (/** @type {number} */ s) => ((s * 1000) / (to - from)) * (width - this.names);
+    const step = 1000 * (STEPS_S.find((s) => widthOf(s) > 74) ?? 86_400 * Math.ceil((to - from) / 86_400_000 / 8));
+    g.fillStyle = this.#colour("muted");
+    g.strokeStyle = this.#colour("hair");
+    g.textAlign = "left";
+    g.lineWidth = 1;
+    for (let t = begun + Math.ceil((from - begun) / step) * step; t < to; t += step) {
+      const px = Math.round(x(t)) + 0.5;
+      g.beginPath();
+      g.moveTo(px, 0);
+      g.lineTo(px, height - FOOT);
+      g.stroke();
+      g.fillText(clock((t - begun) / 1000), px + 3, height - FOOT / 2);
+    }
+  }
+
+  /** @param {StateNode} lane @param {number} y @param {number} h @param {Scale} scale @param {number} width */
+  #lane(lane, y, h, { from, to, x }, width) {
+    const g = this.context;
+    g.fillStyle = this.#colour("muted");
+    g.textAlign = "left";
+    const indent = 10 + Math.min(lane.depth, 6) * 9;
+    this.#clipped(0, y, this.names - 8, h, () => g.fillText(lane.name, indent, y + h / 2));
+    const rows = lane.kind === "concurrence" ? lane.children.length : 1;
+    const spans = this.spansOf.get(lane.path) ?? [];
+    const now = store.nowMs();
+    let lastPx = -10;
+    for (let i = firstAfter(spans, from); i < spans.length; i++) {
+      const span = spans[i];
+      if (span.from > to) break;
+      const later = span.from > now; // than the instant shown
+      const ended = span.to !== null && (later || span.to <= now);
+      const until = span.to ?? Math.max(now, store.run.last() ?? now);
+      const node = this.model?.get(span.path);
+      if (until < from || !node) continue;
+      const left = Math.max(this.names, x(span.from));
+      const right = Math.min(width - RIGHT + 2, x(until));
+      if (rows === 1 && right - lastPx < THINNEST && ended) continue; // too thin to see
+      lastPx = right;
+      const row = rows > 1 ? lane.children.indexOf(node) : 0;
+      const top = y + 1.5 + (row * (h - 3)) / rows;
+      const tall = (h - 3) / rows - (rows > 1 ? 1.5 : 0);
+      const hit = { left, right: left + Math.max(2, right - left), top, bottom: top + tall, span };
+      g.globalAlpha = later ? 0.35 : 1;
+      this.#bar(hit, node.name, ended, x, later ? Infinity : now);
+      g.globalAlpha = 1;
+      this.hits.push(hit);
+    }
+  }
+
+  /**
+   * @param {Hit} hit
+   * @param {string} name
+   * @param {boolean} ended
+   * @param {(t: number) => number} x
+   * @param {number} now what is later has not happened [ms]
+   */
+  #bar({ left, right, top, bottom, span }, name, ended, x, now) {
+    const g = this.context;
+    const [wide, tall] = [right - left, bottom - top];
+    const asked = span.preempt !== null && span.preempt <= now ? span.preempt : null;
+    const kind = ended ? outcomeClass(span.outcome) : asked !== null ? "preempted" : "active";
+    g.fillStyle = this.#colour(`${kind}-fill`);
+    g.strokeStyle = this.#colour(kind);
+    g.lineWidth = store.selected.value === span.path ? 2.2 : 1.1;
+    g.beginPath();
+    g.roundRect(left, top, wide, tall, Math.min(4, tall / 2, wide / 2));
+    g.fill();
+    if (asked !== null) {
+      // hatch the time from the request to the end
+      g.save();
+      g.clip();
+      g.fillStyle = this.#colour("preempted");
+      g.globalAlpha *= 0.55;
+      for (let px = Math.max(left, x(asked)); px < right; px += 5) g.fillRect(px, top, 2.5, tall);
+      g.restore();
+    }
+    g.stroke();
+    this.#mark(span.serviced, "preempted", x, now, { right, top, tall });
+    this.#mark(span.abandoned, "failure", x, now, { right, top, tall });
+    if (wide <= 26 || tall <= 8) return;
+    g.fillStyle = this.#colour(`${kind}-text`);
+    g.font = `${tall > 13 ? 11 : 9.5}px Inter, Arial, sans-serif`;
+    g.textAlign = "left";
+    this.#clipped(left, top, wide - 3, tall, () => g.fillText(name, left + 4, top + tall / 2 + 0.5));
+    g.font = "11px Inter, Arial, sans-serif";
+  }
+
+  /**
+   * Mark the instant at which a preempt was serviced, or the state abandoned.
+   * @param {number | null} t
+   * @param {string} colour
+   * @param {(t: number) => number} x
+   * @param {number} now
+   * @param {{ right: number, top: number, tall: number }} bar
+   */
+  #mark(t, colour, x, now, { right, top, tall }) {
+    if (t === null || t > now) return;
+    const g = this.context;
+    const px = Math.min(x(t), right);
+    g.fillStyle = this.#colour(colour);
+    g.beginPath();
+    g.moveTo(px - 3.5, top - 1);
+    g.lineTo(px + 3.5, top - 1);
+    g.lineTo(px, top + 5);
+    g.fill();
+    g.fillRect(px - 0.75, top, 1.5, tall);
+  }
+
+  /** @param {(t: number) => number} x @param {number} height */
+  #cursor(x, height) {
+    const at = store.cursor.value;
+    if (at === null) return;
+    const g = this.context;
+    const px = x(at);
+    g.strokeStyle = this.#colour("active");
+    g.fillStyle = this.#colour("active");
+    g.lineWidth = 2;
+    g.beginPath();
+    g.moveTo(px, 0);
+    g.lineTo(px, height - FOOT);
+    g.stroke();
+    g.beginPath();
+    g.moveTo(px - 6, 0);
+    g.lineTo(px + 6, 0);
+    g.lineTo(px, 8);
+    g.fill();
+  }
+
+  /** @param {PointerEvent} e */
+  #spanAt(e) {
+    const box = this.canvas.getBoundingClientRect();
+    const [px, py] = [e.clientX - box.left, e.clientY - box.top];
+    const hit = this.hits.findLast((h) => px >= h.left - 1 && px <= h.right + 1 && py >= h.top && py <= h.bottom);
+    return hit?.span ?? null;
+  }
+
+  /** @param {PointerEvent} e */
+  #down(e) {
+    const { left } = this.canvas.getBoundingClientRect();
+    const from = e.clientX - left;
+    if (from < this.names) return;
+    const span = this.#spanAt(e);
+    let dragged = false;
+    const [, stop] = this.#range();
+    this.end ??= stop;
+    const seek = (/** @type {PointerEvent} */ m) =>
+      store.seek(Math.min(this.#timeAt(m.clientX - left), store.run.last() ?? stop));
+    const move = (/** @type {PointerEvent} */ m) => {
+      if (Math.abs(m.clientX - left - from) > 3) dragged = true;
+      if (dragged || !span) seek(m);
+    };
+    drag(move, (m) => {
+      seek(m);
+      if (!dragged && span) this.onPick(span.path);
+    });
+  }
+
+  /** @param {WheelEvent} e */
+  #wheel(e) {
+    e.preventDefault();
+    if (e.shiftKey || (!e.ctrlKey && e.deltaX === 0 && e.offsetX < this.names)) {
+      this.top += e.deltaY;
+      return;
+    }
+    const [, to] = this.#range();
+    if (Math.abs(e.deltaX) > Math.abs(e.deltaY)) {
+      this.end = to + (e.deltaX / this.canvas.clientWidth) * this.length;
+      return;
+    }
+    const at = this.#timeAt(e.offsetX);
+    const length = Math.max(SHORTEST_MS, Math.min(this.length * Math.exp(e.deltaY * 0.0016), LONGEST_MS));
+    if (this.end !== null || store.cursor.value !== null) this.end = at + ((to - at) * length) / this.length;
+    this.length = length;
+  }
+
+  /** @param {KeyboardEvent} e */
+  #key(e) {
+    const step = { ArrowLeft: -1, ArrowRight: 1, PageUp: -20, PageDown: 20 }[e.key];
+    if (step !== undefined) {
+      store.seekEvent(step);
+      e.stopPropagation();
+    } else if (e.key === "End") this.live();
+    else if (e.key === "Home") store.seek(store.run.first());
+    else return;
+    e.preventDefault();
+  }
+}
+
+/** @param {StateNode} lane */
+const laneHeight = (lane) =>
+  lane.kind === "concurrence" ? Math.max(LANE, ROW * Math.min(lane.children.length, MOST_ROWS) + 3) : LANE;
+
+/**
+ * Number of the first span to draw; spans begin in order, but may end in any.
+ * @param {Span[]} spans
+ * @param {number} t
+ */
+function firstAfter(spans, t) {
+  let low = 0;
+  let high = spans.length;
+  while (low < high) {
+    const mid = (low + high) >> 1;
+    if ((spans[mid].to ?? Infinity) < t) low = mid + 1;
+    else high = mid;
+  }
+  return Math.max(0, low - 16);
+}
+
+/** @param {number} s */
+function clock(s) {
+  const sign = s < -0.0005 ? "-" : "";
+  const v = Math.abs(s);
+  if (v < 60) return `${sign}${+v.toFixed(1)} s`;
+  return `${sign}${Math.floor(v / 60)}:${String(Math.floor(v % 60)).padStart(2, "0")}`;
+}
+
+/** @param {Span} span */
+function describe(span) {
+  const { from, to, preempt, serviced, abandoned } = span;
+  const seconds = (/** @type {number} */ some) => `${(some / 1000).toFixed(3)} s`;
+  const lines = [span.path, to === null ? "runs" : `${seconds(to - from)}, ${span.outcome ?? "its end is unknown"}`];
+  if (preempt !== null) {
+    lines.push(`asked to stop after ${seconds(preempt - from)} by ${askerText(span.asked) ?? "?"}`);
+    if (serviced !== null) lines.push(`preempt serviced ${seconds(serviced - preempt)} later`);
+    if (abandoned !== null) lines.push(`abandoned ${seconds(abandoned - preempt)} later`);
+  }
+  return lines.join("\n");
+}

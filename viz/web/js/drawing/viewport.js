@@ -1,0 +1,144 @@
+// Pan and zoom: at the pointer, by keys, by animation; events never move the view.
+
+const LEAST_SCALE = 0.04;
+const MOST_SCALE = 4;
+const FOOT = 22; // [px] that the legend covers
+const HEAD = 18; // and a banner
+
+/** @typedef {{ x: number, y: number, k: number }} View translation [px] and scale */
+
+export class Viewport {
+  x = 0;
+  y = 0;
+  k = 1;
+  moved = false; // whether the last press of the pointer moved the view
+  #animation = 0;
+
+  /** @param {SVGSVGElement} svg @param {SVGElement} world @param {() => void} onChange */
+  constructor(svg, world, onChange) {
+    this.svg = svg;
+    this.world = world;
+    this.onChange = onChange;
+    this.reducedMotion = matchMedia("(prefers-reduced-motion: reduce)");
+    svg.addEventListener("wheel", (e) => this.#wheel(e), { passive: false });
+    svg.addEventListener("pointerdown", (e) => this.#down(e));
+  }
+
+  get width() {
+    return this.svg.clientWidth || 1;
+  }
+  get height() {
+    return this.svg.clientHeight || 1;
+  }
+
+  /** @param {number} x @param {number} y @param {number} k */
+  set(x, y, k) {
+    Object.assign(this, { x, y, k });
+    this.world.setAttribute("transform", `translate(${x} ${y}) scale(${k})`);
+    this.onChange();
+  }
+
+  /**
+   * Show all of a box.
+   * @param {Box} box
+   * @param {{ margin?: number, most?: number, animate?: boolean }} [options]
+   * @returns {View}
+   */
+  frame(box, { margin = 28, most = 1.6, animate = true } = {}) {
+    const room = this.height - FOOT - HEAD;
+    const k = Math.min(most, (this.width - 2 * margin) / box.w, (room - 2 * margin) / box.h);
+    const x = (this.width - box.w * k) / 2 - box.x * k;
+    const y = HEAD + (room - box.h * k) / 2 - box.y * k;
+    if (animate) this.animateTo(x, y, k);
+    else this.set(x, y, k);
+    return { x, y, k };
+  }
+
+  /** @param {View} view */
+  is({ x, y, k }) {
+    return Math.abs(x - this.x) + Math.abs(y - this.y) < 1 && Math.abs(k - this.k) < 1e-3;
+  }
+
+  /** The scale at which a box fills the view. @param {Box} box */
+  scaleFor(box, margin = 28) {
+    return Math.min((this.width - 2 * margin) / box.w, (this.height - 2 * margin) / box.h);
+  }
+
+  /** @param {number} x @param {number} y @param {number} k */
+  animateTo(x, y, k, time = 380) {
+    cancelAnimationFrame(this.#animation);
+    if (this.reducedMotion.matches) {
+      this.set(x, y, k);
+      return;
+    }
+    const from = { x: this.x, y: this.y, k: this.k };
+    const begun = performance.now();
+    const step = (/** @type {number} */ now) => {
+      const part = Math.min(1, (now - begun) / time);
+      const ease = 1 - (1 - part) ** 3;
+      this.set(from.x + (x - from.x) * ease, from.y + (y - from.y) * ease, from.k + (k - from.k) * ease);
+      if (part < 1) this.#animation = requestAnimationFrame(step);
+    };
+    this.#animation = requestAnimationFrame(step);
+  }
+
+  /** @param {number} factor */
+  zoom(factor, px = this.width / 2, py = this.height / 2) {
+    cancelAnimationFrame(this.#animation);
+    const k = Math.max(LEAST_SCALE, Math.min(MOST_SCALE, this.k * factor));
+    this.set(px - ((px - this.x) * k) / this.k, py - ((py - this.y) * k) / this.k, k);
+  }
+
+  /** @param {number} dx @param {number} dy */
+  pan(dx, dy) {
+    cancelAnimationFrame(this.#animation);
+    this.set(this.x + dx, this.y + dy, this.k);
+  }
+
+  /** @param {number} x @param {number} y of the diagram */
+  centre(x, y) {
+    this.set(this.width / 2 - x * this.k, this.height / 2 - y * this.k, this.k);
+  }
+
+  /** @param {WheelEvent} e */
+  #wheel(e) {
+    e.preventDefault();
+    const box = this.svg.getBoundingClientRect();
+    const pixels = e.deltaMode ? e.deltaY * 16 : e.deltaY;
+    this.zoom(Math.exp(-pixels * 0.0016), e.clientX - box.left, e.clientY - box.top);
+  }
+
+  /** @param {PointerEvent} e */
+  #down(e) {
+    if (e.button !== 0) return;
+    let { clientX: x, clientY: y } = e;
+    this.moved = false;
+    drag(
+      (m) => {
+        if (!this.moved && Math.hypot(m.clientX - x, m.clientY - y) < 4) return;
+        this.moved = true;
+        this.svg.classList.add("grabbed");
+        this.pan(m.clientX - x, m.clientY - y);
+        ({ clientX: x, clientY: y } = m);
+      },
+      () => this.svg.classList.remove("grabbed"),
+    );
+  }
+}
+
+/**
+ * Follow the pointer until it is let go, or taken away.
+ * @param {(e: PointerEvent) => void} onMove
+ * @param {(e: PointerEvent) => void} [onEnd]
+ */
+export function drag(onMove, onEnd) {
+  const end = (/** @type {PointerEvent} */ e) => {
+    removeEventListener("pointermove", onMove);
+    removeEventListener("pointerup", end);
+    removeEventListener("pointercancel", end);
+    onEnd?.(e);
+  };
+  addEventListener("pointermove", onMove);
+  addEventListener("pointerup", end);
+  addEventListener("pointercancel", end);
+}

@@ -1,0 +1,93 @@
+// The operator's commands; there only when the server was started with --control.
+import { useState } from "preact/hooks";
+import { command, control } from "#core/connection.js";
+import * as store from "#core/store.js";
+import { fieldValue, html } from "#panels/html.js";
+
+/**
+ * A button that asks once more before it does something that cannot be taken back.
+ * @param {{
+ *   text: string, question: string, onConfirm: () => unknown, className?: string, id?: string, title?: string,
+ * }} props
+ */
+function Confirm({ text, question, onConfirm, className = "", id, title }) {
+  const [asked, setAsked] = useState(false);
+  const confirm = () => {
+    setAsked(false);
+    onConfirm();
+  };
+  if (!asked)
+    return html`<button id=${id} title=${title} class=${className} onClick=${() => setAsked(true)}>${text}</button>`;
+  return html`<span class="confirm" role="alertdialog" aria-label=${question}>${question}
+    <button class="warn" onClick=${confirm}>Yes</button>
+    <button onClick=${() => setAsked(false)}>No</button></span>`;
+}
+
+export function Controls() {
+  const paused = control()?.paused;
+  if (paused === undefined) return null;
+  const title = paused ? "continue (Space)" : "pause before the next state (Space)";
+  return html`<span class="controls">
+    <button id="pause" title=${title} onClick=${() => command(paused ? "resume" : "pause")}>
+      ${paused ? "Resume" : "Pause"}</button>
+    ${
+      !paused &&
+      html`<${Confirm} text="Pause now" id="pause-now"
+        question="Preempt the running states? They start again on resume."
+        title="preempt what runs instead of waiting for its end"
+        onConfirm=${() => command("pause", { running: "cancel" })} />`
+    }
+    <button id="step" disabled=${!paused} title="run one state, then pause again (s)"
+      onClick=${() => command("step")}>Step</button>
+    <${Confirm} text="Preempt" question="Preempt the mission?" className="warn"
+      onConfirm=${() => command("preempt", { path: store.model.value?.root.path })} />
+  </span>`;
+}
+
+/** A breakpoint after one outcome of a state. @param {{ node: StateNode, outcome: string }} props */
+export function OutcomeBreakpoint({ node, outcome }) {
+  const breakpoints = control()?.breakpoints;
+  if (!breakpoints || !node.parent) return null;
+  const on = breakpoints.some(([path, after]) => path === node.path && after === outcome);
+  return html`<button class=${`stop-after ${on ? "on" : ""}`} aria-pressed=${on}
+    aria-label=${`breakpoint after ${outcome}`} title=${`${on ? "do not pause" : "pause"} after ${outcome}`}
+    onClick=${() => command(on ? "unbreak" : "break", { path: node.path, outcome })}>\u25cf</button>`;
+}
+
+/** @param {{ node: StateNode, state: StateRun | undefined }} props */
+export function StateControls({ node, state }) {
+  const [outcome, setOutcome] = useState("");
+  const breakpoints = control()?.breakpoints;
+  if (!breakpoints) return null;
+  const { path, parent } = node;
+  const active = state?.since != null;
+  const stops = breakpoints.some(([at, after]) => at === path && after === null);
+  const chosen = node.outcomes.includes(outcome) ? outcome : node.outcomes[0];
+  const canJump = parent && parent.kind !== "concurrence";
+  return html`<div class="actions">
+    <button class=${stops ? "on" : ""} aria-pressed=${stops}
+      onClick=${() => command(stops ? "unbreak" : "break", { path })}>
+      ${stops ? "Remove breakpoint" : "Breakpoint"}</button>
+    ${
+      canJump &&
+      html`<${Confirm} text="Jump here" question=${`Continue at ${node.name}?`}
+        onConfirm=${() => command("jump", { path })} />
+      <button title="the next run of the container starts with this state"
+        onClick=${() => command("initial", { path: parent.path, states: [node.label] })}>Start here</button>`
+    }
+    ${
+      active &&
+      html`<${Confirm} text="Preempt" question=${`Preempt ${node.name}?`} className="warn"
+        onConfirm=${() => command("preempt", { path })} />`
+    }
+    ${
+      active &&
+      parent &&
+      html`<span class="force">
+        <select aria-label="outcome" value=${chosen} onChange=${(/** @type {Event} */ e) => setOutcome(fieldValue(e))}>
+          ${node.outcomes.map((one) => html`<option value=${one}>${one}</option>`)}</select>
+        <${Confirm} text="Force outcome" question=${`End with ${chosen}?`}
+          onConfirm=${() => command("force", { path, outcome: chosen })} /></span>`
+    }
+  </div>`;
+}

@@ -1,0 +1,61 @@
+// The keyboard: everything the pointer can do.
+import { command, control, isFile, showActions } from "#core/connection.js";
+import * as store from "#core/store.js";
+import { isDark } from "#drawing/theme.js";
+
+/** @typedef {import("#drawing/page.js").Page} Page */
+
+const STEP = 80; // [px]
+const PRESSED = "a[href], button, summary, tr[tabindex]"; // Enter and Space press these
+const ON_ACTIONS = ["a", "d", "?", "Escape"]; // the keys that work while the actions are shown
+/** @type {Record<string, [number, number]>} */
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+
+/** @param {Page} page */
+export function listenToKeys(page) {
+  /** @type {Record<string, () => unknown>} */
+  const actions = {
+    "/": () => document.getElementById("search")?.focus(),
+    f: () => page.fit(),
+    F: () => page.fit(),
+    o: () => page.setFollow(!store.follow.value),
+    "+": () => page.view.zoom(1.25),
+    "=": () => page.view.zoom(1.25),
+    "-": () => page.view.zoom(0.8),
+    ",": () => store.seekEvent(-1),
+    ".": () => store.seekEvent(1),
+    l: () => page.timeline.live(),
+    i: () => page.setImplicit(!store.implicit.value),
+    a: () => isFile() || showActions(!store.actionsOpen.value),
+    d: () => page.setTheme(isDark() ? "light" : "dark"),
+    "?": () => {
+      store.help.value = !store.help.value;
+    },
+    Enter: () => page.toggleSelected(),
+    Escape: () => {
+      if (store.help.value) store.help.value = false;
+      else if (store.actionsOpen.value) showActions(false);
+      else page.select(null);
+    },
+    " ": () => control() && command(control()?.paused ? "resume" : "pause"),
+    s: () => control() && command("step"),
+  };
+  document.addEventListener("keydown", (e) => {
+    const target = /** @type {HTMLElement} */ (e.target);
+    if (e.ctrlKey || e.metaKey || e.altKey) return;
+    if (["INPUT", "SELECT", "TEXTAREA"].includes(target.tagName)) {
+      if (e.key === "Escape") target.blur();
+      return;
+    }
+    if ((e.key === "Enter" || e.key === " ") && target.closest(PRESSED)) return;
+    if (store.actionsOpen.value && !ON_ACTIONS.includes(e.key)) return;
+    if (e.key in ARROWS) {
+      const [dx, dy] = ARROWS[e.key];
+      if (store.selected.value && !e.shiftKey) page.selectNeighbour(dx, dy);
+      else page.view.pan(-dx * STEP, -dy * STEP);
+    } else if (/^[1-9]$/.test(e.key)) page.setDepth(Number(e.key));
+    else if (Object.hasOwn(actions, e.key)) actions[e.key]();
+    else return;
+    e.preventDefault();
+  });
+}

@@ -1,0 +1,121 @@
+// What lies over the diagram: why there is nothing to see, banners, the legend, notices, help.
+import { choose, isFile } from "#core/connection.js";
+import { CHANGE_SIGNS } from "#core/model.js";
+import * as store from "#core/store.js";
+import { askerText, holdText, shorten } from "#core/text.js";
+import { html, StateLink } from "#panels/html.js";
+
+/** @typedef {import("#drawing/page.js").Page} Page */
+
+const MOST_NAMES = 12; // of machines
+const MOST_HOLDS = 3; // states that hold a preempt up, in the banner
+/** @type {[string, string][]} */
+const LEGEND = [
+  ["active", "running"],
+  ["success", "succeeded"],
+  ["failure", "failed"],
+  ["preempted", "preempted"],
+  ["waiting", "waiting"],
+];
+/** @type {[string, string][]} */
+const KEYS = [
+  ["/", "search"],
+  ["f", "fit everything"],
+  ["o", "follow the running states"],
+  ["+ \u2212", "zoom"],
+  ["\u2190 \u2191 \u2192 \u2193", "move the view, or select a neighbour of the selected state"],
+  ["Enter", "open or close the selected state"],
+  [", .", "one event back or forward"],
+  ["l", "back to now"],
+  ["1 \u2026 9", "levels to open"],
+  ["i", "implicit transitions"],
+  ["a", "actions"],
+  ["d", "dark or light"],
+  ["Space", "pause or resume (with control)"],
+  ["s", "step (with control)"],
+  ["Esc", "select nothing"],
+];
+
+/** @param {{ page: Page }} props */
+export function Overlay({ page }) {
+  const stale = store.facts.value?.stale;
+  if (store.failure.value) return html`<div class="empty"><p class="error">${store.failure.value}</p></div>`;
+  if (!store.model.value) return html`<${Empty} />`;
+  if (store.runStatus.value.word === "stale" && stale != null)
+    return html`<div class="banner waiting">Stale: no message from this machine since${" "}
+      ${new Date(stale / 1e6).toLocaleTimeString()}. You see its last known state.</div>`;
+  if (store.connection.value === "lost")
+    return html`<div class="banner waiting">The viewer's server does not answer. You see the last known state; this page
+      keeps trying.</div>`;
+  if (store.cursor.value !== null) {
+    const end = store.facts.value?.recorded || isFile() ? "the end" : "now";
+    return html`<div class="banner preempted">You see an earlier instant.
+      <button onClick=${() => page.timeline.live()}>Back to ${end}</button></div>`;
+  }
+  return html`<${PreemptBanner} page=${page} />`;
+}
+
+/** A preempt under way: who asked, and what holds it up. @param {{ page: Page }} props */
+function PreemptBanner({ page }) {
+  store.tick.value;
+  const now = store.nowMs();
+  const found = store.run.now.ended == null ? store.run.preemptAt(now) : null;
+  if (!found || found.to !== null) return null;
+  const by = askerText(found.rows[0].asked);
+  const more = found.holds.length - MOST_HOLDS;
+  return html`<div class="banner preempted preempt-banner" role="status">
+    <span>Preempt${by ? html` by <b>${by}</b>` : ""}. Held up by </span>
+    ${found.holds.slice(0, MOST_HOLDS).map(
+      (row, i) => html`${i > 0 ? ", " : ""}<${StateLink} path=${row.path} page=${page} />
+        <span class="times"> for ${holdText(row, now)}</span>`,
+    )}${more > 0 ? ` and ${more} more` : ""}</div>`;
+}
+
+function Empty() {
+  const name = store.wanted.value;
+  const list = store.machines.value;
+  if (store.connection.value === "lost")
+    return html`<div class="empty"><p>The viewer's server does not answer. This page keeps trying.</p></div>`;
+  const missing = name && !list.some((machine) => machine.name === name);
+  if (!missing && list.length) return null; // it comes
+  const text = missing ? `No machine is called \u201c${shorten(name, 80)}\u201d.` : "No machine on the network yet.";
+  const others = list.slice(0, MOST_NAMES);
+  const more = list.length - others.length;
+  const button = (/** @type {MachineSummary} */ one) =>
+    html`<button onClick=${() => choose(one.name)}>${shorten(one.name, 60)}</button>`;
+  return html`<div class="empty"><p>${text} This page shows it as soon as it runs.</p>
+    ${
+      list.length
+        ? html`<p>These are there:</p>
+          <p class="others">${others.map(button)}${more > 0 && `and ${more} more, in the list above`}</p>`
+        : html`<pre>smachpy run patrol --start-robot</pre>`
+    }</div>`;
+}
+
+export function Legend() {
+  if (store.comparison.value) {
+    const changes = /** @type {const} */ (["added", "removed", "changed"]);
+    return html`<div class="legend" aria-hidden="true">${changes.map(
+      (change) => html`<span><b class=${change}></b>${CHANGE_SIGNS[change]} ${change}</span>`,
+    )}</div>`;
+  }
+  return html`<div class="legend" aria-hidden="true">${LEGEND.map(
+    ([kind, text]) => html`<span><b class=${kind}></b>${text}</span>`,
+  )}</div>`;
+}
+
+export function Notice() {
+  const notice = store.notice.value;
+  return html`<div class="notices" aria-live="assertive">
+    ${notice && html`<div class=${`notice ${notice.kind}`}>${notice.text}</div>`}</div>`;
+}
+
+export function Help() {
+  if (!store.help.value) return null;
+  const close = () => {
+    store.help.value = false;
+  };
+  return html`<div class="veil" onClick=${close}><div class="card" role="dialog" aria-label="keys">
+    <h2>Keys</h2>
+    <dl>${KEYS.map(([key, text]) => html`<dt><kbd>${key}</kbd></dt><dd>${text}</dd>`)}</dl></div></div>`;
+}

@@ -1,0 +1,94 @@
+// A preempt as something that takes time: who asked, what has serviced it, what holds it up.
+import { ms } from "#core/fold.js";
+import * as store from "#core/store.js";
+import { askerText, duration, holdText } from "#core/text.js";
+import { html, Section, StateLink } from "#panels/html.js";
+
+/** @typedef {import("#drawing/page.js").Page} Page */
+
+const RECENT_MS = 30_000; // a preempt that is over is shown so long while the mission runs
+const MOST_ROWS = 24;
+
+/** @param {{ page: Page, data: RunState, now: number }} props */
+export function Preempts({ page, data, now }) {
+  const found = store.run.preemptAt(now);
+  if (!found || found.from < (ms(data.started) ?? 0)) return null;
+  if (found.to !== null && data.ended == null && now - found.to > RECENT_MS) return null;
+  const askers = [...new Set(found.rows.map((row) => askerText(row.asked) ?? "not recorded"))];
+  const depth = (/** @type {Span} */ row) => row.path.split("/").length;
+  const rows = [...found.rows].sort((a, b) => depth(a) - depth(b) || a.preempt - b.preempt).slice(0, MOST_ROWS);
+  const left = found.rows.length - rows.length;
+  return html`<${Section} title="Preempt"><div class="preempt">
+    <dl class="facts">
+      <dt>asked by</dt><dd>${askers.map((one) => html`<div>${one}</div>`)}</dd>
+      <dt>first asked</dt>
+      <dd><${StateLink} path=${found.rows[0].path} page=${page} /> ${duration((now - found.from) / 1000)} ago</dd>
+      <${Length} found=${found} now=${now} page=${page} />
+    </dl>
+    <div class="waterfall" role="list">
+      ${rows.map((row) => html`<${Row} row=${row} found=${found} now=${now} page=${page} />`)}
+      ${left > 0 && html`<div class="hint">and ${left} more</div>`}
+    </div>
+    <p class="hint key"><span><i class="preempted"></i> asked, not serviced</span>
+      <span><i class="asked"></i> until serviced</span> <span><i class="success"></i> cleaning up</span></p></div><//>`;
+}
+
+/** How long it takes, or took. @param {{ found: Preempt, now: number, page: Page }} props */
+function Length({ found, now, page }) {
+  if (found.to === null)
+    return html`<dt>held up by</dt><dd>${found.holds.map(
+      (row, i) =>
+        html`${i > 0 ? ", " : ""}<b><${StateLink} path=${row.path} page=${page} /></b> for ${holdText(row, now)}`,
+    )}</dd>`;
+  return html`<dt>took</dt><dd>${duration((found.to - found.from) / 1000)}; longest:${" "}
+    <${StateLink} path=${longest(found.rows).path} page=${page} /></dd>`;
+}
+
+/**
+ * A state that was asked, and its part of the time.
+ * @param {{ row: PreemptedSpan, found: Preempt, now: number, page: Page }} props
+ */
+function Row({ row, found, now, page }) {
+  const whole = Math.max((found.to ?? now) - found.from, 1);
+  const at = (/** @type {number} */ t) => `${((t - found.from) / whole) * 100}%`;
+  const bar = (/** @type {number} */ from, /** @type {number} */ to, /** @type {string} */ kind) => {
+    const width = `${Math.max(1.5, ((to - from) / whole) * 100)}%`;
+    return html`<i class=${kind} style=${{ left: at(from), width }}></i>`;
+  };
+  const until = row.to ?? now;
+  const answered = row.abandoned ?? row.serviced ?? until;
+  const waits = row.to === null && row.serviced === null;
+  return html`<div role="listitem" title=${titleOf(row)}><${StateLink} path=${row.path} page=${page} />
+    <span aria-hidden="true">
+      ${bar(row.preempt, answered, waits ? "preempted" : "asked")}
+      ${answered < until && bar(answered, until, row.abandoned !== null ? "failure" : "success")}
+      ${row.serviced !== null && html`<b style=${{ left: at(row.serviced) }}></b>`}
+    </span><small>${rowText(row, found, now)}</small></div>`;
+}
+
+/** @param {PreemptedSpan} row @param {Preempt} found @param {number} now */
+function rowText(row, found, now) {
+  const since = (/** @type {number} */ t) => duration((now - t) / 1000);
+  if (row.abandoned !== null) return "\u2715 abandoned";
+  if (row.to !== null) return `\u2713 ${duration((row.to - row.preempt) / 1000)}`;
+  if (row.serviced !== null) return `\u2713 cleaning up ${since(row.serviced)}`;
+  return found.holds.some((one) => one.path === row.path) ? `\u25a0 ${since(row.preempt)}` : "waits for children";
+}
+
+/** The innermost state that took longest. @param {PreemptedSpan[]} rows */
+function longest(rows) {
+  const leaves = rows.filter((row) => !rows.some((other) => other.path.startsWith(`${row.path}/`)));
+  const length = (/** @type {PreemptedSpan} */ row) => (row.to ?? row.preempt) - row.preempt;
+  return leaves.reduce((a, b) => (length(b) > length(a) ? b : a));
+}
+
+/** @param {PreemptedSpan} row */
+function titleOf(row) {
+  const after = (/** @type {number} */ t) => `after ${((t - row.preempt) / 1000).toFixed(3)} s`;
+  const lines = [row.path, `asked by ${askerText(row.asked) ?? "?"}`];
+  if (row.serviced !== null) lines.push(`serviced ${after(row.serviced)}`);
+  if (row.abandoned !== null) lines.push(`abandoned ${after(row.abandoned)}`);
+  if (row.to !== null) lines.push(`ended with ${row.outcome ?? "an unknown outcome"} ${after(row.to)}`);
+  if (row.asked?.grace != null) lines.push(`abandoned after ${row.asked.grace} s at the latest`);
+  return lines.join("\n");
+}

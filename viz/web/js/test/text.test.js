@@ -1,0 +1,77 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { KINDS_OF, lineOf } from "#core/log_lines.js";
+import { commonClass, FAILURE, outcomeClass, PREEMPTED_PREFIXES, SUCCESS } from "#core/outcomes.js";
+import { askerText, duration, holdText, shorten } from "#core/text.js";
+import { brief, pretty, wasShortened } from "#core/values.js";
+import { event, fixture } from "./fixtures.js";
+
+const texts = fixture("texts.json");
+
+test("names are shortened as in Python", () => {
+  for (const [text, length, short] of texts.shorten) assert.equal(shorten(text, length), short);
+});
+
+test("askers are called as in Python", () => {
+  for (const { text, ...asked } of texts.askers) assert.equal(askerText(asked), text);
+  assert.equal(askerText(null), null);
+  assert.equal(askerText({ source: null }), null);
+  assert.equal(askerText({ source: "constructor", by: "x" }), "constructor x");
+});
+
+test("outcomes are classed as in Python", () => {
+  const table = fixture("outcome_classes.json");
+  assert.deepEqual([...SUCCESS].sort(), table.success);
+  assert.deepEqual([...FAILURE].sort(), table.failure);
+  assert.deepEqual([...PREEMPTED_PREFIXES].sort(), [...table.preempted_prefixes].sort());
+  for (const [outcome, expected] of Object.entries(table.classes)) assert.equal(outcomeClass(outcome), expected);
+  assert.equal(commonClass(["succeeded", "done"]), "success");
+  assert.equal(commonClass(["succeeded", "aborted"]), "other");
+  assert.equal(commonClass([]), "other");
+});
+
+test("spans of time", () => {
+  const cases = {
+    0: "0.0 s",
+    9.94: "9.9 s",
+    9.99: "10.0 s",
+    61: "61 s",
+    121: "2 min 01",
+    3725: "62 min 05",
+    7260: "2 h 01",
+  };
+  for (const [seconds, text] of Object.entries(cases)) assert.equal(duration(Number(seconds)), text);
+});
+
+test("how long a state holds a preempt up", () => {
+  const asked = { source: "operator", by: "ann", why: "", grace: 5 };
+  const row = { path: "/A", from: 0, to: null, outcome: null, preempt: 1000, asked, serviced: null, abandoned: null };
+  assert.equal(holdText(row, 3000), "2.0 s of 5.0 s");
+  assert.equal(holdText({ ...row, asked: null, serviced: 2000 }, 3000), "2.0 s, cleaning up");
+});
+
+test("every kind of event that a filter lets through has a line", () => {
+  const facts = { outcome: "ok", error: "no", action: "drive", status: "SUCCEEDED", text: "", key: "x", value: 1 };
+  for (const kinds of Object.values(KINDS_OF))
+    for (const kind of kinds) {
+      const { text } = lineOf(event(kind, "/JOB", facts));
+      assert.ok(text && !text.endsWith(" "), `${kind}: ${text}`);
+    }
+  assert.equal(KINDS_OF.all.has("constructor"), false);
+  const asked = { source: "operator", by: "ann", why: "stop", grace: 5 };
+  assert.equal(
+    lineOf(event("PreemptRequested", "/JOB", asked)).text,
+    "asked to stop by operator ann: stop, within 5.0 s",
+  );
+});
+
+test("values on one line and on several", () => {
+  const pose = { $msg: "geometry_msgs/Point", fields: { x: 1 / 3, y: 2 } };
+  assert.equal(brief(pose), '{"geometry_msgs/Point":{"x":0.333333,"y":2}}');
+  assert.equal(brief("a\nb"), "a\nb");
+  assert.equal(brief(undefined), "");
+  assert.equal(pretty({ a: pose, b: '"c": ' }), '{\n a: {\n  x: 0.3333333333333333,\n  y: 2\n },\n b: "\\"c\\": "\n}');
+  assert.equal(pretty(undefined), "");
+  assert.equal(wasShortened(brief(["<list of 100000 elements>"])), true);
+  assert.equal(wasShortened(brief("short")), false);
+});

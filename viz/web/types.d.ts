@@ -1,0 +1,276 @@
+// Types of what the server sends (viz/live) and of what modules hand to each other; for the type checker only.
+
+type Theme = "system" | "light" | "dark";
+type OutcomeClass = "success" | "failure" | "preempted" | "other";
+
+// An event as `smachpy.events.to_record` writes it; which fields there are depends on `kind`.
+interface RunEvent {
+  kind: string;
+  path: string;
+  stamp_ns: number;
+  seq: number;
+  dropped?: number;
+  progress?: Progress;
+  [field: string]: any;
+}
+
+interface Progress {
+  fraction: number | null;
+  distance: number | null;
+  text: string;
+}
+
+interface PreemptRequest {
+  source: string | null;
+  by: string | null;
+  why: string | null;
+  grace: number | null;
+}
+
+// `smachpy.events.run_state.RunState`. Times are nanoseconds since the epoch, `seconds` is of finished visits.
+interface StateRun {
+  visits: number;
+  since: number | null;
+  left?: number | null;
+  outcome: string | null;
+  outcomes: Record<string, number>;
+  seconds: number;
+  error?: string | null;
+  attempt?: number;
+  item?: number;
+  waits?: string | null;
+  preempt?: number | null;
+  asked?: PreemptRequest | null;
+  serviced?: number | null;
+  abandoned?: number | null;
+}
+
+interface GoalRun {
+  path: string;
+  action: string;
+  since: number;
+  goal: any;
+  feedback: any;
+  first_feedback: any;
+  status: string;
+  text: string;
+  result: any;
+  ended: number | null;
+  attempt: number;
+  progress?: Progress;
+}
+
+interface UserdataEntry {
+  key: string;
+  value: any;
+  writer: string;
+  at: number;
+  container: string;
+}
+
+interface RunState {
+  run: number;
+  started: number | null;
+  ended: number | null;
+  outcome: string | null;
+  states: Record<string, StateRun>;
+  goals: Record<string, GoalRun>;
+  userdata: Record<string, UserdataEntry>;
+  dropped?: number;
+}
+
+// The time in which a state ran; `to` is null while it runs, `outcome` null when its end is unknown.
+interface Span {
+  path: string;
+  from: number;
+  to: number | null;
+  outcome: string | null;
+  preempt: number | null;
+  asked: PreemptRequest | null;
+  serviced: number | null;
+  abandoned: number | null;
+}
+interface PreemptedSpan extends Span {
+  preempt: number;
+}
+interface Preempt {
+  from: number;
+  to: number | null;
+  rows: PreemptedSpan[];
+  holds: PreemptedSpan[];
+}
+
+// A machine as `viz.live.page.model` draws it, with what the page's `Model` adds to each node.
+type Change = "" | "added" | "removed" | "changed" | "numbers";
+interface Edge {
+  source: string;
+  target: string;
+  to_outcome: boolean;
+  outcomes: string[];
+  implicit: boolean;
+  back: boolean;
+  change: Change;
+  note: string;
+}
+interface Link extends Edge {
+  rule: string | null;
+}
+interface StateNode {
+  path: string;
+  label: string;
+  kind: string;
+  type_name: string;
+  doc: string;
+  details: [string, string][];
+  outcomes: string[];
+  children: StateNode[];
+  initial: string[];
+  edges: Edge[];
+  rules: { outcome: string; conditions: [string, string][]; text: string; change: Change }[];
+  pills: { outcome: string; by_default: boolean }[];
+  change: Change;
+  note: string;
+  parent: StateNode | null;
+  depth: number;
+  number: number;
+  total: number;
+  name: string;
+  shown: string;
+  links: Link[];
+  wired: string[];
+}
+interface MachinePayload {
+  explicit: StateNode;
+  implicit: StateNode;
+  keys: Record<string, { inputs: string[]; outputs: string[]; remapping: [string, string][] }>;
+}
+
+// What the server sends of a machine besides its events.
+interface Control {
+  paused: boolean;
+  breakpoints: [string, string | null][];
+}
+interface Problem {
+  path: string;
+  text: string;
+  severity: string;
+}
+interface MachineFacts {
+  name: string;
+  label: string;
+  epoch: string;
+  revision: number;
+  stale: number | null;
+  control: Control | null;
+  recorded: boolean;
+  node: string;
+  behind: number | null;
+}
+interface MachineSummary extends MachineFacts {
+  active: string[];
+  started: number | null;
+  ended: number | null;
+  outcome: string | null;
+}
+interface Snapshot extends MachineFacts {
+  seq: number;
+  problems: Problem[];
+  base: RunState | null;
+  events: RunEvent[];
+}
+interface Settings {
+  follow: boolean;
+  control: boolean;
+  kept?: number;
+  beat?: number;
+}
+interface StateStatistics {
+  visits: number;
+  outcomes: Record<string, number>;
+  median: number | null;
+  p95: number | null;
+  total: number;
+  failures: number;
+}
+interface Statistics {
+  runs: number;
+  outcomes: Record<string, number>;
+  median: number | null;
+  p95: number | null;
+  states: Record<string, StateStatistics>;
+}
+interface Comparison {
+  with: string;
+  model: MachinePayload;
+  alone: MachinePayload;
+  listed: { path: string; change: Exclude<Change, "">; text: string }[];
+  runs: number[];
+}
+interface Answer {
+  ok?: boolean;
+  text?: string;
+  [fact: string]: any;
+}
+
+// Actions on the network, and the goals that were sent from the page.
+interface ActionServer {
+  name: string;
+  type: string;
+  node: string;
+  servers: number;
+}
+interface SentGoal {
+  id: string;
+  action: string;
+  state: string;
+  status: string;
+  text: string;
+  sent: number;
+  ended: number | null;
+  heard: number;
+  cancelled: boolean;
+  fraction: number | null;
+  distance: number | null;
+  feedback: string | null;
+  result: string | null;
+}
+interface ActionsSeen {
+  actions: ActionServer[];
+  gone: string[];
+  goals: SentGoal[];
+  known: boolean;
+}
+
+// A field of a goal's form (viz/live/forms.py), and a problem with the value of one.
+interface FormField {
+  name: string;
+  type: string;
+  base: string;
+  comment: string;
+  array: { length: number | null } | null;
+  choices: { name: string; value: string; comment: string }[];
+  kind: "bool" | "integer" | "float" | "string" | "time" | "message";
+  fields: FormField[];
+  about: string;
+  default: Record<string, any>;
+}
+interface FieldProblem {
+  path: string;
+  text: string;
+}
+
+interface Box {
+  x: number;
+  y: number;
+  w: number;
+  h: number;
+}
+interface Point {
+  x: number;
+  y: number;
+}
+type Direction = "DOWN" | "RIGHT";
+
+interface Window {
+  smachpy: unknown;
+}
