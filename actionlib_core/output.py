@@ -88,18 +88,19 @@ def run_program(name: str, run: Callable[[], int], *, draws: bool = False) -> in
             raise
     with contextlib.suppress(OSError, ValueError):
         sys.stdout.flush()
-    if file is not None and file.failed is not None:
+    failed = None if file is None else file.failed
+    if failed is not None:
         discard_output()  # first: what is still buffered is written when the wrapper is freed
     sys.stdout = before
-    if file is not None and file.failed is not None:
-        if not isinstance(file.failed, BrokenPipeError):
-            reason = file.failed.strerror or str(file.failed)
-            tell(name, f"standard output: got '{reason}'; expected to write all of it.")
-            return max(code, EXIT_OUTPUT)
-        return code  # the reader has seen enough; SystemExit is how `rich` takes that
-    if end is not None:
+    if failed is None and end is not None:
         raise end
-    return code
+    if failed is None or isinstance(failed, BrokenPipeError):
+        return code  # the reader has seen enough; SystemExit is how `rich` takes that
+    tell(
+        name,
+        f"standard output: got '{failed.strerror or failed}'; expected to write all of it.",
+    )
+    return max(code, EXIT_OUTPUT)
 
 
 def tell(name: str, text: str) -> None:
