@@ -82,6 +82,7 @@ class Config:
         lease: A link that is silent for this long [s] is dead, and so is what was behind it.
         connect_timeout: How long opening may try to reach `connect` [s].
         settle: How long opening waits to find others [s]; 0 opens at once and finds them meanwhile.
+        timestamping: Each message carries the time it was sent at, as ROS 2 nodes' messages do.
         tls: Encryption and certificates.
         user: Name to log in with.
         password: Password to log in with.
@@ -99,6 +100,7 @@ class Config:
     lease: float = 10.0
     connect_timeout: float = 5.0
     settle: float = 0.0
+    timestamping: bool = False
     tls: Tls = field(default_factory=Tls)
     user: str = ""
     password: str = field(default="", repr=False)

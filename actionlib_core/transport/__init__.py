@@ -21,12 +21,17 @@ class Sample(NamedTuple):
         payload: The bytes.
         encoding: What the bytes are, in the sender's words; "" when it said nothing.
         source: Session id of the sender; "" when unknown.
+        attachment: What the sender put beside the payload; None when nothing.
+        stamp_ns: When it was sent, by the clock of a session on its way (`Config.timestamping`), to
+            the microsecond [ns since the epoch]; 0 when nobody said. Only beside an attachment.
     """
 
     key: str
     payload: bytes
     encoding: str
     source: str
+    attachment: bytes | None = None
+    stamp_ns: int = 0
 
 
 class Presence(NamedTuple):
@@ -43,6 +48,7 @@ class Reply(NamedTuple):
     payload: bytes
     encoding: str
     error: bool
+    attachment: bytes | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +59,14 @@ class Quality:
         express: Send at once, never batched (goals, cancels, results).
         block: Wait for room rather than drop when the network is slower than the sender.
         latch: Keep the last message and give it to every subscriber that comes later.
+        cache: Keep so many of the last messages, in the way of zenoh's advanced publishers, for
+            subscribers that ask for them (`cached`); ROS 2 latches in this way.
     """
 
     express: bool = False
     block: bool = True
     latch: bool = False
+    cache: int = 0
 
 
 class Closable(Protocol):
@@ -74,8 +83,12 @@ class Closable(Protocol):
 class PublisherPort(Closable, Protocol):
     """The sending end of a key."""
 
-    def put(self, payload: bytes) -> None:
+    def put(self, payload: bytes, attachment: bytes | None = None) -> None:
         """Send `payload` to every subscriber of the key.
+
+        Args:
+            payload: The bytes.
+            attachment: More bytes, which arrive beside the payload; not for a key that latches.
 
         Raises:
             TransportError: the transport is closed.
@@ -98,8 +111,9 @@ class Query(Protocol):
     key: str
     payload: bytes
     encoding: str
+    attachment: bytes | None
 
-    def reply(self, payload: bytes, encoding: str = "") -> None:
+    def reply(self, payload: bytes, encoding: str = "", *, attachment: bytes | None = None) -> None:
         """Send an answer."""
         ...
 
@@ -141,7 +155,12 @@ class Transport(Protocol):
         ...
 
     def subscribe(
-        self, key: str, callback: Callable[[Sample], None], *, history: bool = True
+        self,
+        key: str,
+        callback: Callable[[Sample], None],
+        *,
+        history: bool = True,
+        cached: int = 0,
     ) -> Closable:
         """Receive what is put on `key`, own puts included.
 
@@ -150,11 +169,22 @@ class Transport(Protocol):
             callback: Gets each message.
             history: Ask latched publishers for their last message: one that was put before now
                 comes first, once. False saves the asking where nobody latches.
+            cached: Ask publishers with a cache (`Quality.cache`) for so many of their last
+                messages, now and when one appears later; `history` counts as False then.
         """
         ...
 
-    def queryable(self, key: str, callback: Callable[[Query], None]) -> Closable:
-        """Answer the queries on `key`; each ends with `Query.finish`."""
+    def queryable(
+        self, key: str, callback: Callable[[Query], None], *, complete: bool = False
+    ) -> Closable:
+        """Answer the queries on `key`; each ends with `Query.finish`.
+
+        Args:
+            key: An exact key.
+            callback: Gets each query.
+            complete: It knows all there is to answer, so that a query for one (`best`) may come
+                here and to nobody else.
+        """
         ...
 
     def query(
@@ -163,6 +193,8 @@ class Transport(Protocol):
         payload: bytes,
         *,
         encoding: str = "",
+        attachment: bytes | None = None,
+        best: bool = False,
         timeout: float,
         on_reply: Callable[[Reply], None],
         on_done: Callable[[], None],
@@ -177,6 +209,8 @@ class Transport(Protocol):
             key: An exact key.
             payload: The question.
             encoding: What the payload is.
+            attachment: More bytes beside the payload.
+            best: Ask one complete queryable only, however many there are; all if none is complete.
             timeout: After this [s] the query is done, whoever has not answered.
             on_reply: Gets each answer.
             on_done: Hears that no more answers come.

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from actionlib_core.clock._serial import report_thread_exception
 from actionlib_core.exceptions import TransportError
-from actionlib_core.transport import Presence, Reply, Sample
+from actionlib_core.transport import Presence, Quality, Reply, Sample
 from actionlib_core.transport._keys import compile_pattern
 
 if TYPE_CHECKING:
@@ -130,7 +130,7 @@ class Listener(Entry, Generic[T]):
 class Subscriber(Listener[Sample]):
     """Gets the messages of a key."""
 
-    __slots__ = ("_history", "_key")
+    __slots__ = ("_cached", "_history", "_key")
 
     def __init__(
         self,
@@ -139,17 +139,20 @@ class Subscriber(Listener[Sample]):
         callback: Callable[[Sample], None],
         *,
         history: bool,
+        cached: int = 0,
     ) -> None:
         super().__init__(session, callback)
         self._key = key
-        self._history = history
+        self._cached = cached
+        self._history = history and not cached
         _add(self.network.subscribers, key, self)
         self.link_back_locked()
 
     def link_back_locked(self) -> None:
-        for publisher in self.network.latches.get(self._key, ()) if self._history else ():
-            if publisher.last is not None:
-                self.post(publisher.sample(publisher.last))
+        for publisher in self.network.latches.get(self._key, ()):
+            wanted = self._cached if publisher.has_cache else int(self._history)
+            for sample in list(publisher.kept)[-wanted:] if wanted else ():
+                self.post(sample)
 
     def deliver(self, item: Sample) -> None:
         if not self.session.is_cut:
@@ -162,13 +165,19 @@ class Subscriber(Listener[Sample]):
 class Queryable(Listener["MemoryQuery"]):
     """Gets the queries on a key; one that it cannot answer any more is finished for it."""
 
-    __slots__ = ("_key",)
+    __slots__ = ("_key", "complete")
 
     def __init__(
-        self, session: MemoryTransport, key: str, callback: Callable[[MemoryQuery], None]
+        self,
+        session: MemoryTransport,
+        key: str,
+        callback: Callable[[MemoryQuery], None],
+        *,
+        complete: bool = False,
     ) -> None:
         super().__init__(session, callback)
         self._key = key
+        self.complete = complete
         _add(self.network.queryables, key, self)
 
     def deliver(self, item: MemoryQuery) -> None:
@@ -260,34 +269,35 @@ class Token(Entry):
 class Publisher(Entry):
     """The sending end of a key."""
 
-    __slots__ = ("_encoding", "_key", "_latch", "_source", "last")
+    __slots__ = ("_encoding", "_key", "_latch", "_source", "has_cache", "kept")
 
-    def __init__(self, session: MemoryTransport, key: str, encoding: str, *, latch: bool) -> None:
+    def __init__(self, session: MemoryTransport, key: str, encoding: str, quality: Quality) -> None:
         super().__init__(session)
         self._key = key
         self._encoding = encoding
-        self._latch = latch
+        self._latch = quality.latch or quality.cache > 0
         self._source = session.session_id
-        self.last: bytes | None = None
-        if latch:
+        self.has_cache = quality.cache > 0
+        self.kept: deque[Sample] = deque(maxlen=quality.cache or 1)
+        if self._latch:
             _add(self.network.latches, key, self)
 
-    def put(self, payload: bytes) -> None:
+    def put(self, payload: bytes, attachment: bytes | None = None) -> None:
         link = self.session.link
         if link is None or self.closed:
-            self._put(payload)
+            self._put(payload, attachment)
             return
         for delay in link.choose(self._key):
             if delay <= 0:
-                self._put(payload)
+                self._put(payload, attachment)
             else:
-                link.later(delay, partial(self._put_late, payload))
+                link.later(delay, partial(self._put_late, payload, attachment))
 
-    def _put_late(self, payload: bytes) -> None:
+    def _put_late(self, payload: bytes, attachment: bytes | None) -> None:
         if not self.closed:
-            self._put(payload)
+            self._put(payload, attachment)
 
-    def _put(self, payload: bytes) -> None:
+    def _put(self, payload: bytes, attachment: bytes | None) -> None:
         network = self.network
         with network.lock:
             if self.closed:
@@ -296,16 +306,15 @@ class Publisher(Entry):
                 raise TransportError(
                     f"{self._key}: the publisher is closed. Try sending before the node is closed."
                 )
+            subscribers = network.subscribers.get(self._key, ())
+            if not (subscribers or self._latch):
+                return
+            stamp_ns = 0 if attachment is None else network.clock.time_ns()
+            sample = Sample(self._key, payload, self._encoding, self._source, attachment, stamp_ns)
             if self._latch:
-                self.last = payload
-            subscribers = network.subscribers.get(self._key)
-            if subscribers:
-                sample = self.sample(payload)
-                for subscriber in subscribers:
-                    subscriber.post(sample)
-
-    def sample(self, payload: bytes) -> Sample:
-        return Sample(self._key, payload, self._encoding, self._source)
+                self.kept.append(sample)
+            for subscriber in subscribers:
+                subscriber.post(sample)
 
     def matching(self) -> bool:
         link = self.session.link
@@ -334,14 +343,21 @@ class Exchange(Entry):
         self._waiting = 1  # for the question to be asked; then for each that was asked
         self._timer = self.network.clock.call_later(timeout, self._time_out)
 
-    def ask(self, key: str, payload: bytes, encoding: str) -> None:
-        """Put the question to all who are there, unless time is up."""
+    def ask(
+        self, key: str, payload: bytes, encoding: str, attachment: bytes | None, *, best: bool
+    ) -> None:
+        """Put the question to all who are there or the best of them, unless time is up."""
         with self.network.lock:
             if not self._waiting:
                 return
-            for queryable in self.network.queryables.get(key, ()):
+            asked = self.network.queryables.get(key, [])
+            if best:
+                asked = [queryable for queryable in asked if queryable.complete][:1] or asked
+            for queryable in asked:
                 self._waiting += 1
-                queryable.post(MemoryQuery(self, queryable.session, key, payload, encoding))
+                queryable.post(
+                    MemoryQuery(self, queryable.session, key, payload, encoding, attachment)
+                )
             self.finish_locked()
 
     def _time_out(self) -> None:
@@ -387,10 +403,16 @@ class Exchange(Entry):
 class MemoryQuery(Entry):
     """A query as one queryable sees it."""
 
-    __slots__ = ("_exchange", "_finished", "encoding", "key", "payload")
+    __slots__ = ("_exchange", "_finished", "attachment", "encoding", "key", "payload")
 
     def __init__(
-        self, exchange: Exchange, session: MemoryTransport, key: str, payload: bytes, encoding: str
+        self,
+        exchange: Exchange,
+        session: MemoryTransport,
+        key: str,
+        payload: bytes,
+        encoding: str,
+        attachment: bytes | None,
     ) -> None:
         super().__init__(session)
         self._exchange = exchange
@@ -398,10 +420,11 @@ class MemoryQuery(Entry):
         self.key = key
         self.payload = payload
         self.encoding = encoding
+        self.attachment = attachment
         session.declared[self] = None
 
-    def reply(self, payload: bytes, encoding: str = "") -> None:
-        self._reply(Reply(self.key, payload, encoding, error=False))
+    def reply(self, payload: bytes, encoding: str = "", *, attachment: bytes | None = None) -> None:
+        self._reply(Reply(self.key, payload, encoding, error=False, attachment=attachment))
 
     def reply_error(self, text: str) -> None:
         self._reply(Reply(self.key, text.encode(), "", error=True))

@@ -60,6 +60,7 @@ def zenoh_settings(config: Config) -> dict[str, object]:
         "scouting/delay": round(config.settle * 1e3),
         "open/return_conditions/connect_scouted": config.settle > 0,
         "open/return_conditions/declares": config.settle > 0,
+        "timestamping/enabled": config.timestamping or config.mode == "router",
         "transport/link/tx/lease": round(config.lease * 1e3),
         # Shared memory saves nothing at our sizes, and a killed process leaves its segments behind.
         "transport/shared_memory/enabled": False,

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import itertools
 import threading
+from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
 from actionlib_core.clock import current_clock
@@ -112,17 +113,25 @@ class MemoryTransport:
         self, key: str, encoding: str = "", quality: Quality = DEFAULT_QUALITY
     ) -> Publisher:
         check_key(key)
-        return self._declare(lambda: Publisher(self, key, encoding, latch=quality.latch), key)
+        return self._declare(lambda: Publisher(self, key, encoding, quality), key)
 
     def subscribe(
-        self, key: str, callback: Callable[[Sample], None], *, history: bool = True
+        self,
+        key: str,
+        callback: Callable[[Sample], None],
+        *,
+        history: bool = True,
+        cached: int = 0,
     ) -> Subscriber:
         check_key(key)
-        return self._declare(lambda: Subscriber(self, key, callback, history=history), key)
+        make = partial(Subscriber, self, key, callback, history=history, cached=cached)
+        return self._declare(make, key)
 
-    def queryable(self, key: str, callback: Callable[[Query], None]) -> Queryable:
+    def queryable(
+        self, key: str, callback: Callable[[Query], None], *, complete: bool = False
+    ) -> Queryable:
         check_key(key)
-        return self._declare(lambda: Queryable(self, key, callback), key)
+        return self._declare(lambda: Queryable(self, key, callback, complete=complete), key)
 
     def query(
         self,
@@ -130,6 +139,8 @@ class MemoryTransport:
         payload: bytes,
         *,
         encoding: str = "",
+        attachment: bytes | None = None,
+        best: bool = False,
         timeout: float,
         on_reply: Callable[[Reply], None],
         on_done: Callable[[], None],
@@ -137,10 +148,11 @@ class MemoryTransport:
         check_key(key)
         exchange = self._declare(lambda: Exchange(self, timeout, on_reply, on_done), key)
         fate = DELIVERED if self.link is None else self.link.choose(key)
+        ask = partial(exchange.ask, key, payload, encoding, attachment, best=best)
         if self.link is not None and fate and fate[0] > 0:
-            self.link.later(fate[0], lambda: exchange.ask(key, payload, encoding))
+            self.link.later(fate[0], ask)
         elif fate:
-            exchange.ask(key, payload, encoding)
+            ask()
         return exchange
 
     def declare_alive(self, key: str) -> Token:

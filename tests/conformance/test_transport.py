@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from actionlib_core.exceptions import TransportError
-from actionlib_core.transport import Presence, Quality
+from actionlib_core.transport import Presence, Quality, Reply, Sample
 
 GOAL = "robot_0/move_base/goal"
 LATCH = Quality(latch=True)
@@ -27,7 +27,7 @@ def test_put_reaches_subscriber_with_key_encoding_and_source(network):
     publisher = a.publisher(GOAL, "ros1/pkg/Type;md5=12", Quality(express=True))
     network.meet(a, b)
     publisher.put(b"one")
-    assert inbox.wait_for(1) == [(GOAL, b"one", "ros1/pkg/Type;md5=12", a.session_id)]
+    assert inbox.wait_for(1) == [Sample(GOAL, b"one", "ros1/pkg/Type;md5=12", a.session_id)]
 
 
 def test_put_without_encoding_arrives_with_empty_encoding(network):
@@ -37,7 +37,7 @@ def test_put_without_encoding_arrives_with_empty_encoding(network):
     publisher = a.publisher(GOAL)
     network.meet(a, b)
     publisher.put(b"")
-    assert inbox.wait_for(1) == [(GOAL, b"", "", a.session_id)]
+    assert inbox.wait_for(1) == [Sample(GOAL, b"", "", a.session_id)]
 
 
 def test_messages_of_one_sender_keep_their_order(network):
@@ -183,7 +183,7 @@ def test_late_subscriber_gets_exactly_the_last_message(network):
     network.meet(a, b)
     inbox = network.inbox()
     b.subscribe(GOAL, inbox)
-    assert inbox.wait_for(1) == [(GOAL, b"3", "enc", a.session_id)]
+    assert inbox.wait_for(1) == [Sample(GOAL, b"3", "enc", a.session_id)]
     publisher.put(b"4")
     assert payloads(inbox.wait_for(2)) == [b"3", b"4"]
 
@@ -252,13 +252,122 @@ def test_without_history_the_latched_message_does_not_come(network):
     assert payloads(inbox.wait_for(1)) == [b"2"]
 
 
+# -- caches, in the way of zenoh's advanced publishers ---------------------------------------------
+
+
+def test_late_subscriber_gets_what_it_asks_for_of_a_cache(network):
+    a, b = network.session(), network.session()
+    publisher = a.publisher(GOAL, "", Quality(cache=3))
+    for number in range(5):
+        publisher.put(b"%d" % number, b"seq %d" % number)
+    network.meet(a, b)
+    two, ten, live = network.inbox(), network.inbox(), network.inbox()
+    b.subscribe(GOAL, two, cached=2)
+    b.subscribe(GOAL, ten, cached=10)
+    b.subscribe(GOAL, live)
+    assert payloads(two.wait_for(2)) == [b"3", b"4"]
+    assert payloads(ten.wait_for(3)) == [b"2", b"3", b"4"]
+    assert [sample.attachment for sample in ten.items] == [b"seq 2", b"seq 3", b"seq 4"]
+    network.meet(a, b)
+    publisher.put(b"end", b"seq 5")
+    assert payloads(two.wait_for(3)) == [b"3", b"4", b"end"]
+    assert payloads(ten.wait_for(4))[-1] == b"end"
+    assert payloads(live.wait_for(1)) == [b"end"]
+
+
+def test_early_subscriber_gets_every_cached_message_once(network):
+    a, b = network.session(), network.session()
+    inbox = network.inbox()
+    b.subscribe(GOAL, inbox, cached=1)
+    network.meet(a, b)
+    publisher = a.publisher(GOAL, "", Quality(cache=1))
+    network.meet(a, b)
+    for payload in (b"1", b"2", b"3"):
+        publisher.put(payload, b"att")
+    assert payloads(inbox.wait_for(3)) == [b"1", b"2", b"3"]
+    late = network.inbox()
+    b.subscribe(GOAL, late, cached=1)
+    late.wait_for(1)
+    publisher.put(b"end", b"att")
+    assert payloads(late.wait_for(2)) == [b"3", b"end"]
+    assert payloads(inbox.wait_for(4)) == [b"1", b"2", b"3", b"end"]
+    assert publisher.matching()
+
+
+def test_subscriber_of_a_cache_hears_a_publisher_without_one(network):
+    a, b = network.session(), network.session()
+    inbox = network.inbox()
+    b.subscribe(GOAL, inbox, cached=1)
+    publisher = a.publisher(GOAL)
+    network.meet(a, b)
+    publisher.put(b"x", b"att")
+    publisher.put(b"y", b"att")
+    assert payloads(inbox.wait_for(2)) == [b"x", b"y"]
+
+
+def test_closed_publisher_with_a_cache_is_forgotten(network):
+    a, b = network.session(), network.session()
+    publisher = a.publisher(GOAL, "", Quality(cache=1))
+    publisher.put(b"old", b"att")
+    publisher.close()
+    with pytest.raises(TransportError, match="closed"):
+        publisher.put(b"x", b"att")
+    new = a.publisher(GOAL)
+    network.meet(a, b)
+    inbox = network.inbox()
+    b.subscribe(GOAL, inbox, cached=1)
+    network.meet(a, b)
+    new.put(b"end")
+    assert payloads(inbox.wait_for(1)) == [b"end"]
+
+
+# -- attachments -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("attachment", [b"", b"123456789012", bytes(range(33))])
+def test_attachment_arrives_with_the_message(network, attachment):
+    a, b = network.session(), network.session()
+    inbox = network.inbox()
+    b.subscribe(GOAL, inbox, history=False)
+    publisher = a.publisher(GOAL)
+    network.meet(a, b)
+    publisher.put(b"x", attachment)
+    publisher.put(b"y")
+    assert [sample.attachment for sample in inbox.wait_for(2)] == [attachment, None]
+
+
+def test_attachments_go_with_question_and_answer(network):
+    a, b = network.session(), network.session()
+    seen = []
+
+    def answer(query):
+        seen.append(query.attachment)
+        query.reply(b"yes", attachment=b"number 1, again")
+        query.finish()
+
+    b.queryable("add", answer)
+    network.meet(a, b)
+    _, replies, done = ask(network, a, attachment=b"number 1")
+    done.wait_for(1)
+    assert replies.items == [Reply("add", b"yes", "", error=False, attachment=b"number 1, again")]
+    assert seen == [b"number 1"]
+    ask(network, a)[2].wait_for(1)
+    assert seen == [b"number 1", None]
+
+
 # -- queries ---------------------------------------------------------------------------------------
 
 
-def ask(network, session, key="add", payload=b"?", timeout=5.0):
+def ask(network, session, key="add", payload=b"?", timeout=5.0, **how):
     replies, done = network.inbox(), network.inbox()
     handle = session.query(
-        key, payload, encoding="q", timeout=timeout, on_reply=replies, on_done=lambda: done("done")
+        key,
+        payload,
+        encoding="q",
+        timeout=timeout,
+        on_reply=replies,
+        on_done=lambda: done("done"),
+        **how,
     )
     return handle, replies, done
 
@@ -278,7 +387,7 @@ def test_query_gets_the_answer_and_one_done(network):
     network.meet(a, b)
     _, replies, done = ask(network, a)
     done.wait_for(1)
-    assert replies.items == [("add", b"yes", "r", False)]
+    assert replies.items == [Reply("add", b"yes", "r", error=False)]
     assert seen == [("add", b"?", "q")]
     ask(network, a)[2].wait_for(1)
     assert done.items == ["done"]
@@ -330,6 +439,25 @@ def test_every_queryable_is_asked(network):
     _, replies, done = ask(network, a)
     done.wait_for(1)
     assert sorted(payloads(replies.items)) == [b"a", b"b", b"c"]
+
+
+@pytest.mark.parametrize("complete", [0, 1, 2, 3])
+def test_query_for_the_best_reaches_one_complete_queryable(network, complete):
+    a, *others = (network.session() for _ in range(4))
+    for number, session in enumerate(others):
+
+        def answer(query, number=number):
+            query.reply(b"%d" % number)
+            query.finish()
+
+        session.queryable("add", answer, complete=number < complete)
+    network.meet(a, *others)
+    for _ in range(3):
+        _, replies, done = ask(network, a, best=True)
+        done.wait_for(1)
+        answers = {int(payload) for payload in payloads(replies.items)}
+        assert len(replies.items) == (1 if complete else 3)
+        assert answers <= set(range(complete or 3))
 
 
 def test_query_that_nobody_answers_is_done_at_once(network):

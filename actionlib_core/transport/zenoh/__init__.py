@@ -48,6 +48,7 @@ from actionlib_core.transport._zenoh_config import (
 from actionlib_core.transport.zenoh._callbacks import direct, held
 from actionlib_core.transport.zenoh._declared import (
     Asking,
+    CachingPublisher,
     Declared,
     LatchedPublisher,
     Publisher,
@@ -121,17 +122,27 @@ class ZenohTransport:
         return SCOUT_S if looks else 2 * RETRY_S
 
     def publisher(self, key: str, encoding: str = "", quality: Quality = DEFAULT) -> Publisher:
-        kind = LatchedPublisher if quality.latch else Publisher
+        kind = Publisher
+        if quality.latch or quality.cache:
+            kind = CachingPublisher if quality.cache else LatchedPublisher
         return self._declare(lambda: kind(self, check_key(key), encoding, quality), key)
 
     def subscribe(
-        self, key: str, callback: Callable[[Sample], None], *, history: bool = True
+        self,
+        key: str,
+        callback: Callable[[Sample], None],
+        *,
+        history: bool = True,
+        cached: int = 0,
     ) -> Subscriber:
-        make = partial(Subscriber, self, check_key(key), callback, history=history)
+        make = partial(Subscriber, self, check_key(key), callback, history=history, cached=cached)
         return self._declare(make, key)
 
-    def queryable(self, key: str, callback: Callable[[Query], None]) -> Queryable:
-        return self._declare(lambda: Queryable(self, check_key(key), callback), key)
+    def queryable(
+        self, key: str, callback: Callable[[Query], None], *, complete: bool = False
+    ) -> Queryable:
+        make = partial(Queryable, self, check_key(key), callback, complete=complete)
+        return self._declare(make, key)
 
     def query(
         self,
@@ -139,6 +150,8 @@ class ZenohTransport:
         payload: bytes,
         *,
         encoding: str = "",
+        attachment: bytes | None = None,
+        best: bool = False,
         timeout: float,
         on_reply: Callable[[Reply], None],
         on_done: Callable[[], None],
@@ -146,7 +159,9 @@ class ZenohTransport:
         asking = self._declare(lambda: Asking(self, on_reply, on_done), check_key(key))
         callback = direct(asking.take_reply, asking.take_done)
         try:
-            self._get(key, callback, payload, encoding, timeout, asking.token)
+            self._get(
+                key, callback, payload, encoding, timeout, asking.token, attachment, best=best
+            )
         except TransportError:
             asking.close()
             raise
@@ -171,20 +186,26 @@ class ZenohTransport:
         encoding: str,
         timeout: float,
         token: zenoh.CancellationToken | None,
+        attachment: bytes | None = None,
+        *,
+        best: bool = False,
     ) -> None:
+        # The mark is for programs of ours; see `Publisher`.
+        mark = zenoh.SourceInfo(self.session.id, key_mark(key)) if attachment is None else None
         try:
             with inside:
                 self.session.get(
                     key,
                     callback,
-                    target=zenoh.QueryTarget.ALL,
+                    target=zenoh.QueryTarget.BEST_MATCHING if best else zenoh.QueryTarget.ALL,
                     consolidation=zenoh.ConsolidationMode.NONE,
                     timeout=timeout,
                     congestion_control=zenoh.CongestionControl.BLOCK,
                     express=True,
                     payload=payload,
                     encoding=encoding or None,
-                    source_info=zenoh.SourceInfo(self.session.id, key_mark(key)),
+                    attachment=attachment,
+                    source_info=mark,
                     cancellation_token=token,
                 )
         except zenoh.ZError as error:

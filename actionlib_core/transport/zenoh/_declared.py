@@ -9,11 +9,13 @@ import contextlib
 import logging
 import struct
 import threading
+from datetime import UTC, datetime, timedelta
 from functools import partial
 from threading import get_ident
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import zenoh
+import zenoh.ext
 
 from actionlib_core.clock._ending import ending
 from actionlib_core.exceptions import TransportError
@@ -35,6 +37,9 @@ log = logging.getLogger("actionlib_core")
 
 LATCH_RETRIES = 5  # how often a latched publisher that cannot be reached yet is asked
 LATCH_RETRY_S = 0.1
+HEARTBEAT_S = 0.5  # a publisher with a cache tells its last number so often, as those of ROS 2 do
+_EPOCH = datetime.fromtimestamp(0, UTC)
+_MICROSECOND = timedelta(microseconds=1)
 _PLAIN = "zenoh/bytes"  # what zenoh says of a payload without encoding
 _ERROR = "smachpy/error"  # marks the error replies that a queryable sent on purpose
 
@@ -106,7 +111,7 @@ class Publisher(Declared):
         try:
             if self._inlet.closed or process.forked:
                 self._check_open()
-            self._port.put(payload, source_info=self._source, attachment=attachment)
+            self._send(payload, attachment)
         except zenoh.ZError as error:
             raise TransportError(f"{self._key}: cannot send: {error}") from error
         finally:
@@ -116,6 +121,11 @@ class Publisher(Declared):
             self._users.pop()
             if self._inlet.closed:
                 self.close()
+
+    def _send(self, payload: bytes, attachment: bytes | None) -> None:
+        # The mark is for programs of ours: those of ROS 2 count on their own numbers there.
+        source = self._source if attachment is None else None
+        self._port.put(payload, source_info=source, attachment=attachment)
 
     def matching(self) -> bool:
         process.check(self._key)
@@ -157,8 +167,6 @@ class _LatchFilter:
 
     def take_live(self, session: str, numbers: bytes) -> bool:
         """Tell whether a message that came by itself is to be delivered."""
-        if len(numbers) != _NUMBERS.size:
-            return True
         who, message = _unpack(session, numbers)
         with self._lock:
             self._newest[who] = max(message, self._newest.get(who, 0))
@@ -210,6 +218,9 @@ class LatchedPublisher(Publisher):
             self._last = payload, attachment
         super().put(payload, attachment)
 
+    def _send(self, payload: bytes, attachment: bytes | None) -> None:
+        self._port.put(payload, source_info=self._source, attachment=attachment)
+
     def _on_query(self, query: zenoh.Query) -> None:
         # Inline is right here: it calls nothing foreign and takes no lock.
         with query:
@@ -219,8 +230,37 @@ class LatchedPublisher(Publisher):
             )
 
 
+class CachingPublisher(Publisher):
+    """Keeps its last messages as zenoh's advanced publishers do, for advanced subscribers.
+
+    The plain publisher beside it sends nothing: it is there to say whether anybody listens.
+    """
+
+    def __init__(
+        self, transport: ZenohTransport, key: str, encoding: str, quality: Quality
+    ) -> None:
+        super().__init__(transport, key, encoding, quality)
+        blocking, dropping = zenoh.CongestionControl.BLOCK, zenoh.CongestionControl.DROP
+        self._cache = zenoh.ext.declare_advanced_publisher(
+            transport.session,
+            key,
+            encoding=encoding or None,
+            express=quality.express,
+            congestion_control=blocking if quality.block else dropping,
+            cache=zenoh.ext.CacheConfig(quality.cache),
+            publisher_detection=True,
+            sample_miss_detection=zenoh.ext.MissDetectionConfig(
+                heartbeat=None, sporadic_heartbeat=HEARTBEAT_S
+            ),
+        )
+        self._keep(self._cache)
+
+    def _send(self, payload: bytes, attachment: bytes | None) -> None:
+        self._cache.put(payload, attachment=attachment)
+
+
 class Subscriber(Declared):
-    """Receives a key, and the last message of its latched publishers."""
+    """Receives a key, and the last messages of its publishers that latch or have a cache."""
 
     def __init__(
         self,
@@ -229,18 +269,30 @@ class Subscriber(Declared):
         callback: Callable[[Sample], None],
         *,
         history: bool,
+        cached: int = 0,
     ) -> None:
         super().__init__(transport)
         self._key = key
         self._mark = key_mark(key)
         self._callback = callback
-        self._filter = _LatchFilter() if history else None
+        self._filter = _LatchFilter() if history and not cached else None
         self._encoding = zenoh.Encoding("")
         self._encoding_text = ""
         self._latched: set[str] = set()
         session = transport.session
-        self._keep(session.declare_subscriber(key, direct(self._on_sample)))
-        if history:
+        if cached:
+            subscriber: _Undeclarable = zenoh.ext.declare_advanced_subscriber(
+                session,
+                key,
+                direct(self._on_sample),
+                history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=cached),
+                recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
+                subscriber_detection=True,
+            )
+        else:
+            subscriber = session.declare_subscriber(key, direct(self._on_sample))
+        self._keep(subscriber)
+        if self._filter is not None:
             tokens = session.liveliness().declare_subscriber(
                 f"{key}/@latch/*/*", direct(self._on_token), history=True
             )
@@ -261,14 +313,20 @@ class Subscriber(Declared):
             self._encoding_text = _convert_encoding(encoding)
             self._encoding = encoding
         source = "" if info is None else str(info.source_id.zid)
-        sample = Sample(self._key, payload, self._encoding_text, source)
-        if self._filter is None or self._is_news(self._filter, raw, sample.source):
-            self._callback(sample)
-
-    @staticmethod
-    def _is_news(latched: _LatchFilter, raw: zenoh.Sample, source: str) -> bool:
-        numbers = raw.attachment
-        return numbers is None or latched.take_live(source, numbers.to_bytes())
+        raw_attachment = raw.attachment
+        if raw_attachment is None:
+            self._callback(Sample(self._key, payload, self._encoding_text, source))
+            return
+        numbers = raw_attachment.to_bytes()
+        attachment: bytes | None = numbers
+        if self._filter is not None and len(numbers) == _NUMBERS.size:
+            if not self._filter.take_live(source, numbers):
+                return
+            attachment = None
+        stamp_ns = _convert_time(raw.timestamp)
+        self._callback(
+            Sample(self._key, payload, self._encoding_text, source, attachment, stamp_ns)
+        )
 
     def _on_token(self, token: zenoh.Sample) -> None:
         self._inlet.take(self._note_token, token)
@@ -309,7 +367,7 @@ class Subscriber(Declared):
 class ZenohQuery:
     """A query to a queryable of ours."""
 
-    __slots__ = ("_lock", "_raw", "encoding", "key", "payload")
+    __slots__ = ("_lock", "_raw", "attachment", "encoding", "key", "payload")
 
     def __init__(self, raw: zenoh.Query) -> None:
         self._raw: zenoh.Query | None = raw
@@ -317,12 +375,19 @@ class ZenohQuery:
         self.key = str(raw.key_expr)
         self.payload = b"" if raw.payload is None else raw.payload.to_bytes()
         self.encoding = "" if raw.encoding is None else _convert_encoding(raw.encoding)
+        self.attachment = _convert_attachment(raw.attachment)
 
-    def reply(self, payload: bytes, encoding: str = "") -> None:
+    def reply(self, payload: bytes, encoding: str = "", *, attachment: bytes | None = None) -> None:
         raw = self._raw
         if raw is not None:
             with inside, contextlib.suppress(zenoh.ZError):  # finished, or nobody is there any more
-                raw.reply(self.key, payload, encoding=encoding or None, express=True)
+                raw.reply(
+                    self.key,
+                    payload,
+                    encoding=encoding or None,
+                    attachment=attachment,
+                    express=True,
+                )
 
     def reply_error(self, text: str) -> None:
         raw = self._raw
@@ -343,13 +408,19 @@ class Queryable(Declared):
     """Answers queries."""
 
     def __init__(
-        self, transport: ZenohTransport, key: str, callback: Callable[[Query], None]
+        self,
+        transport: ZenohTransport,
+        key: str,
+        callback: Callable[[Query], None],
+        *,
+        complete: bool = False,
     ) -> None:
         super().__init__(transport)
         self._key = key
         self._mark = key_mark(key)
         self._callback = callback
-        self._keep(transport.session.declare_queryable(key, direct(self._on_query)))
+        queries = direct(self._on_query)
+        self._keep(transport.session.declare_queryable(key, queries, complete=complete))
 
     def _on_query(self, raw: zenoh.Query) -> None:
         self._inlet.take(self._answer, raw, self._refuse)
@@ -449,6 +520,15 @@ def _convert_encoding(raw: zenoh.Encoding) -> str:
     return "" if text == _PLAIN else text
 
 
+def _convert_attachment(raw: zenoh.ZBytes | None) -> bytes | None:
+    return None if raw is None else raw.to_bytes()
+
+
+def _convert_time(raw: zenoh.Timestamp | None) -> int:
+    """Return a timestamp in ns since the epoch, 0 for None; zenoh shows it to the microsecond."""
+    return 0 if raw is None else (raw.get_time() - _EPOCH) // _MICROSECOND * 1000
+
+
 def _is_astray(info: zenoh.SourceInfo | None, mark: int, key: str) -> bool:
     """Tell whether a message or question was for another key than `key`, whose mark is given."""
     if info is None or not is_for_another_key(info.source_sn, mark):
@@ -466,7 +546,9 @@ def _convert_reply(raw: zenoh.Reply) -> Reply | None:
     good = raw.ok
     if good is not None:
         encoding = _convert_encoding(good.encoding)
-        return Reply(str(good.key_expr), good.payload.to_bytes(), encoding, error=False)
+        attachment = _convert_attachment(good.attachment)
+        payload = good.payload.to_bytes()
+        return Reply(str(good.key_expr), payload, encoding, error=False, attachment=attachment)
     bad = raw.err
     if bad is None or str(bad.encoding) != _ERROR:
         return None

@@ -250,7 +250,7 @@ def test_sessions_meet_through_a_router(router, mode):
         b.query("add", b"1", timeout=WAIT_S, on_reply=answers.append, on_done=done.set)
         assert done.wait(WAIT_S)
         # Tokens overtake samples: the live "old" may still have been on its way.
-        assert [s[1:] for s in heard if s.payload != b"old"] == [(b"new", "enc", a.session_id)]
+        assert [s[1:4] for s in heard if s.payload != b"old"] == [(b"new", "enc", a.session_id)]
         assert [r.payload for r in answers] == [b"sum of 1"]
         for _ in range(40):  # each one: a router leaves some liveliness queries unanswered
             assert b.list_alive("@test/*", WAIT_S) == ["@test/a"]
@@ -547,3 +547,28 @@ def test_closed_publisher_is_not_entered():
         publisher.put(b"x")
     assert not publisher.matching()
     transport.close()
+
+
+def test_messages_carry_the_time_they_were_sent_at_if_the_session_says_so():
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    a = ZenohTransport(Config(listen=(endpoint,), discovery="off", timestamping=True))
+    b = ZenohTransport(Config(connect=(endpoint,), discovery="off"))
+    try:
+        stamps, came = [], CLOCK.event()
+
+        def note(sample):
+            stamps.append(sample.stamp_ns)
+            came.set()
+
+        b.subscribe("stamped", note, history=False)
+        for session in (a, b):
+            session.declare_alive(f"@test/{session.session_id}")
+        Watch(a).wait(lambda alive: len(alive) == 2)
+        publisher = a.publisher("stamped")
+        before = CLOCK.time_ns()
+        publisher.put(b"x", b"att")
+        assert came.wait(WAIT_S)
+        assert before - 1_000_000 <= stamps[0] <= CLOCK.time_ns() + 1_000_000
+    finally:
+        a.close()
+        b.close()
