@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
 
-from actionlib_core.config import Config
+from actionlib_core.config import Config, Ros2
 from actionlib_core.exceptions import ConfigError
 from actionlib_core.suggest import did_you_mean
 from actionlib_core.yaml_text import YamlTextError, load_yaml
@@ -78,7 +78,11 @@ class _Reader:
         if dataclasses.is_dataclass(hint) and isinstance(hint, type):
             return self.read_record(hint, value, path)
         if get_origin(hint) is tuple:
-            return self._read_sequence(get_args(hint)[0], value, path)
+            item = get_args(hint)[0]
+            if item is Ros2 and isinstance(value, Mapping):  # one network needs no list
+                only = self.read_record(item, value, path)
+                return None if only is None else (only,)
+            return self._read_sequence(item, value, path)
         if get_origin(hint) is Literal:
             choices = sorted(get_args(hint))
             return value if value in choices else self._report(path, "unknown", value, choices)

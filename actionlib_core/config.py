@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -28,7 +28,10 @@ LAST_DOMAIN = 9999
 MOST_DIGITS = 9  # of a number that is read
 ROUTER_ENDPOINT = "tcp/127.0.0.1:7447"
 
+PROBE_S = 5.0  # a ROS 2 server whose tokens are there is asked this often whether it is alive
+
 Mode = Literal["peer", "client", "router"]
+Distro = Literal["humble", "jazzy", "kilted", "rolling"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +71,60 @@ class AccessRule:
 
 
 @dataclass(frozen=True, slots=True)
+class Ros2:
+    """A network of ROS 2 nodes whose middleware is rmw_zenoh: a robot's, for example.
+
+    Attributes:
+        router: Endpoint of its Zenoh router, `tcp/robot.local:7447`; "" finds its nodes in the
+            network that this program has joined anyway.
+        domain: ROS_DOMAIN_ID of its nodes.
+        distro: Their release of ROS 2, which decides the definitions of messages.
+        namespace: What names live under there: `navigate_to_pose` here is
+            `<namespace>/navigate_to_pose` there; a name that begins so already stays.
+        robot: Name of the robot here, where several have the same names: `<robot>/odom` here is
+            `odom` there, under `namespace`.
+        names: Full names here that are on this network, `*` for a word, `**` for any number of
+            them; needed where there are several networks and no `robot`.
+        mode: "client" reaches nodes through the router only, as it has to be from another machine;
+            "peer" talks to them directly, faster, on the robot's own machine.
+        probe: How often a server with running goals is asked whether it is alive [s], as a link may
+            be silent for a minute before ROS 2 takes it for dead; 0 never asks.
+    """
+
+    router: str = ""
+    domain: int = 0
+    distro: Distro = "jazzy"
+    namespace: str = ""
+    robot: str = ""
+    names: tuple[str, ...] = ()
+    mode: Literal["peer", "client"] = "client"
+    probe: float = PROBE_S
+
+    def __post_init__(self) -> None:
+        """Check the fields.
+
+        Raises:
+            ConfigError: some are wrong; the text names all of them.
+        """
+        problems = [
+            *_check_endpoint("router", self.router),
+            *_check_domain(self.domain),
+            *_check_choice("distro", self.distro, get_args(Distro)),
+            *_check_choice("mode", self.mode, ("client", "peer")),
+            *_check_names("names", self.names),
+        ]
+        for name in ("namespace", "robot"):
+            try:
+                clean_namespace(getattr(self, name))
+            except NameSetupError as error:
+                problems.append(f"{name}: {error}")
+        if not 0 <= self.probe < math.inf:
+            problems.append(f"probe: got {self.probe!r}; expected 0 or more [s].")
+        if problems:
+            raise ConfigError("ros2", *problems)
+
+
+@dataclass(frozen=True, slots=True)
 class Config:
     """How to join the network.
 
@@ -89,6 +146,8 @@ class Config:
         password_file: File whose first line is the password, instead of `password`.
         users_file: File with `user:password` lines: whom this side lets in.
         access: Who may use which names; without rules everybody may everything.
+        ros2: Networks of ROS 2 nodes that this program uses as well. `tls`, `user` and the password
+            count for their routers, too.
     """
 
     mode: Mode = "peer"
@@ -107,6 +166,7 @@ class Config:
     password_file: str = ""
     users_file: str = ""
     access: tuple[AccessRule, ...] = ()
+    ros2: tuple[Ros2, ...] = ()
 
     def __post_init__(self) -> None:
         """Check what fits together.
@@ -135,6 +195,47 @@ class Config:
                 "file whose first line is the password.",
             ) from error
 
+    def for_ros2(self, network: Ros2) -> Config:
+        """Return how to join the network of `network.router`."""
+        return replace(
+            self,
+            mode=network.mode,
+            connect=(network.router,),
+            listen=(),
+            discovery="off",
+            domain=0,
+            namespace="",
+            timestamping=True,
+            users_file="",
+            access=(),
+            ros2=(),
+        )
+
+
+def _check_choice(name: str, value: object, choices: tuple[str, ...]) -> list[str]:
+    if value in choices:
+        return []
+    return [f"{name}: unknown: got {value!r}; expected one of {sorted(choices)}."]
+
+
+def _check_endpoint(name: str, endpoint: str) -> list[str]:
+    protocol, slash, address = endpoint.partition("/")
+    if not endpoint or (protocol and slash and address):
+        return []
+    expected = "protocol/address, tcp/192.168.1.2:7447 for example"
+    return [f"{name}: malformed endpoint: got {endpoint!r}; expected {expected}."]
+
+
+def _check_domain(domain: int) -> list[str]:
+    if isinstance(domain, int) and 0 <= domain <= LAST_DOMAIN:
+        return []
+    return [f"domain: out of range: got {domain!r}; expected 0 to {LAST_DOMAIN}."]
+
+
+def _check_names(where: str, names: tuple[str, ...]) -> list[str]:
+    bad = [n for n in names if not n or n.startswith("/") or n.endswith("/") or "//" in n]
+    return [f"{where}: got {name!r}; expected a full name without outer slashes." for name in bad]
+
 
 def _check_mode(config: Config) -> str:
     if config.mode not in get_args(Mode):
@@ -150,20 +251,19 @@ def _check_mode(config: Config) -> str:
 
 
 def _check_endpoints(config: Config) -> str:
-    for name, endpoints in (("connect", config.connect), ("listen", config.listen)):
-        for endpoint in endpoints:
-            protocol, slash, address = endpoint.partition("/")
-            if not (protocol and slash and address):
-                return (
-                    f"{name}: malformed endpoint: got {endpoint!r}; expected protocol/address, "
-                    "tcp/192.168.1.2:7447 for example."
-                )
-    return ""
+    lists = (("connect", config.connect), ("listen", config.listen))
+    problems = [
+        _check_endpoint(name, end) if end else [f"{name}: got ''; expected an endpoint."]
+        for name, ends in lists
+        for end in ends
+    ]
+    return "\n".join(line for lines in problems for line in lines)
 
 
 def _check_numbers(config: Config) -> str:
-    if not 0 <= config.domain <= LAST_DOMAIN:
-        return f"domain: out of range: got {config.domain!r}; expected 0 to {LAST_DOMAIN}."
+    wrong_domain = _check_domain(config.domain)
+    if wrong_domain:
+        return wrong_domain[0]
     for name, low in (("lease", 0.1), ("connect_timeout", 0.0), ("settle", 0.0)):
         value = getattr(config, name)
         if not low <= value < math.inf:
@@ -219,9 +319,23 @@ def _check_access(config: Config) -> str:
             return f"{where}.permission: got {rule.permission!r}; expected 'allow' or 'deny'."
         if rule.users and rule.certificates:
             return f"{where}: for users and for certificates; expected one. Try two rules."
-        bad = [n for n in rule.names if n.startswith("/") or n.endswith("/") or "//" in n]
+        bad = _check_names(f"{where}.names", rule.names)
         if bad:
-            return f"{where}.names: got {bad[0]!r}; expected a full name without outer slashes."
+            return bad[0]
+    return ""
+
+
+def _check_ros2(config: Config) -> str:
+    alike = [network for network in config.ros2 if not (network.robot or network.names)]
+    if len(config.ros2) > 1 and len(alike) > 1:
+        return (
+            f"ros2: got {len(alike)} networks that do not say which names are theirs; expected one "
+            "at most. Try 'robot: robot1' or 'names: [robot1/**]'."
+        )
+    if config.ros2 and not config.tls.ca:
+        encrypted = [n.router for n in config.ros2 if n.router.startswith(("tls/", "quic/"))]
+        if encrypted:
+            return f"tls.ca: missing: got ''; expected a file, as {encrypted[0]!r} is encrypted."
     return ""
 
 
@@ -234,6 +348,7 @@ _CHECKS: tuple[Callable[[Config], str], ...] = (
     _check_files,
     _check_login,
     _check_access,
+    _check_ros2,
 )
 
 

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from actionlib_core.clock import RealClock, current_clock
 from actionlib_core.clock._ending import ending
 from actionlib_core.clock._serial import report_thread_exception
-from actionlib_core.config import load_config
+from actionlib_core.config import Config, load_config
 from actionlib_core.exceptions import NodeError, TransportError
 from actionlib_core.names import check_base_name, clean_namespace, parse_arguments, resolve_name
 from actionlib_core.shutdown import current_shutdown
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from typing import Self
 
     from actionlib_core.clock import Clock
-    from actionlib_core.config import Config
     from actionlib_core.names import NameArguments
     from actionlib_core.transport import Closable, Transport
 
@@ -59,7 +58,8 @@ class Node:
         namespace: What the node's name and its relative names live under, "robot_1" for example.
         arguments: Renaming from a command line (`actionlib_core.names.parse_arguments`).
         config: How that session joins the network; None takes `SMACHPY_CONFIG`. Its `namespace`
-            is for the default node only.
+            is for the default node only. With a transport of the caller's, only its `ros2` counts,
+            and all of those networks are in that transport.
 
     Raises:
         InvalidNameError: the name or the namespace breaks the ROS rules.
@@ -90,8 +90,11 @@ class Node:
         )
         if transport is None and not isinstance(self.clock, RealClock):
             raise NodeError(_NO_ZENOH.format(what=f"node {self.full_name}"))
-        self._owns_transport = transport is None
-        self.transport: Transport = transport if transport is not None else _open_zenoh(config)
+        self.owns_transport = transport is None
+        if config is None:
+            config = load_config() if transport is None else Config()
+        self.config = config
+        self.transport: Transport = transport if transport is not None else open_zenoh(config)
         self._lock = threading.Lock()
         self._entities = itertools.count(1)
         self._shared_lock = threading.Lock()  # held while something is made
@@ -245,7 +248,7 @@ class Node:
                 call()
             except Exception:  # noqa: BLE001  a border: reported, the others are closed too
                 report_thread_exception()
-        if self._owns_transport:
+        if self.owns_transport:
             self.transport.close()
 
     def __enter__(self) -> Self:
@@ -255,7 +258,8 @@ class Node:
         self.close()
 
 
-def _open_zenoh(config: Config | None = None) -> Transport:
+def open_zenoh(config: Config) -> Transport:
+    """Open a session on zenoh, which is imported only now."""
     from actionlib_core.transport.zenoh import ZenohTransport
 
     return ZenohTransport(config)

@@ -60,7 +60,7 @@ def zenoh_settings(config: Config) -> dict[str, object]:
         "scouting/delay": round(config.settle * 1e3),
         "open/return_conditions/connect_scouted": config.settle > 0,
         "open/return_conditions/declares": config.settle > 0,
-        "timestamping/enabled": config.timestamping or config.mode == "router",
+        "timestamping/enabled": _stamps(config),
         "transport/link/tx/lease": round(config.lease * 1e3),
         # Shared memory saves nothing at our sizes, and a killed process leaves its segments behind.
         "transport/shared_memory/enabled": False,
@@ -86,6 +86,11 @@ def new_session_id(now_ns: int) -> str:
     # Zenoh compares from the last byte of the number to the first.
     raw = now_ns.to_bytes(8, "big") + secrets.token_bytes(8)
     return f"{int.from_bytes(raw, 'little'):x}"
+
+
+def _stamps(config: Config) -> bool:
+    in_one_session = any(not network.router for network in config.ros2)
+    return config.timestamping or config.mode == "router" or in_one_session
 
 
 def _listen(config: Config) -> list[str]:

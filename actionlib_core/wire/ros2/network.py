@@ -1,0 +1,143 @@
+"""The ROS 2 networks that a node of ours uses: which name is on which, and their sessions."""
+
+from __future__ import annotations
+
+import itertools
+import weakref
+from typing import TYPE_CHECKING
+
+from actionlib_core.config import Ros2
+from actionlib_core.exceptions import ConfigError, TransportError
+from actionlib_core.names import clean_namespace
+from actionlib_core.node import open_zenoh
+from actionlib_core.transport._keys import key_matches
+from actionlib_core.wire.ros2.graph import RosNode, RosType
+from actionlib_core.wire.ros2.names import HASH_NOT_SUPPORTED
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from actionlib_core.node import Node
+    from actionlib_core.transport import Transport
+
+_ids: weakref.WeakKeyDictionary[Transport, Iterator[int]] = weakref.WeakKeyDictionary()
+"""What numbers the nodes and ends of a session, which several nodes of ours may share."""
+
+
+def choose_network(networks: Sequence[Ros2], name: str) -> Ros2:
+    """Return the network that the full name `name` is on.
+
+    Without any network it is the one that this program has joined anyway, in ROS's domain 0. Of
+    several it is the first that has the robot or a pattern of the name, else the one that names
+    neither.
+
+    Raises:
+        ConfigError: there are several, and none of them has the name.
+    """
+    if len(networks) <= 1:
+        return networks[0] if networks else Ros2()
+    for network in networks:
+        if _has(network, name):
+            return network
+    for network in networks:
+        if not (network.robot or network.names):
+            return network
+    raise ConfigError(
+        "ros2",
+        f"names: got {name!r}, which is on none of the {len(networks)} networks; expected a name "
+        "of one of them. Try adding it to 'names', or a network without 'names' and 'robot'.",
+    )
+
+
+def _has(network: Ros2, name: str) -> bool:
+    robot = clean_namespace(network.robot)
+    patterns = (f"{robot}/**", *network.names) if robot else network.names
+    return any(key_matches(pattern, name) for pattern in patterns)
+
+
+def name_there(network: Ros2, name: str) -> str:
+    """Return what the full name `name` is called on a network, no slash in front."""
+    robot, namespace = clean_namespace(network.robot), clean_namespace(network.namespace)
+    if robot:
+        name = name.removeprefix(f"{robot}/")
+    if not namespace or name.startswith(f"{namespace}/"):
+        return name
+    return f"{namespace}/{name}"
+
+
+class RosNetwork:
+    """A network of ROS 2 as one node of ours uses it.
+
+    Attributes:
+        settings: Which network, as the configuration says.
+        ros: Our node there; shown since this was made.
+
+    Args:
+        node: Our node; the network is left as it closes.
+        settings: See above.
+
+    Raises:
+        TransportError: the network cannot be joined.
+
+    Blocks: making one opens the session, where the network has one of its own.
+    """
+
+    def __init__(self, node: Node, settings: Ros2) -> None:
+        self.settings = settings
+        owned = bool(settings.router) and node.owns_transport
+        transport = _join(node, settings) if owned else node.transport
+        self._owned = transport if owned else None
+        try:
+            ids = _ids.setdefault(transport, itertools.count())
+            name = node.full_name
+            self.ros = RosNode(
+                transport, node.clock, domain=settings.domain, full_name=name, ids=ids
+            )
+            self.ros.show()
+            node.on_close(self._close)
+        except BaseException:
+            self._close()
+            raise
+
+    @property
+    def transport(self) -> Transport:
+        """The session there."""
+        return self.ros.transport
+
+    def name(self, name: str) -> str:
+        """Return what our full name `name` is called there."""
+        return name_there(self.settings, name)
+
+    def type(self, type_name: str, type_hash: str) -> RosType:
+        """Return a type as it is named there: Humble knows no hashes."""
+        humble = self.settings.distro == "humble"
+        return RosType(type_name, HASH_NOT_SUPPORTED if humble else type_hash)
+
+    def _close(self) -> None:
+        if self._owned is not None:
+            self._owned.close()
+        elif hasattr(self, "ros"):
+            self.ros.close()
+
+
+def ros_network(node: Node, name: str) -> RosNetwork:
+    """Return the ROS 2 network that our full name `name` is on, joined when it is first needed.
+
+    Raises:
+        ConfigError: no network has the name.
+        TransportError: the network cannot be joined.
+
+    Blocks: the first time, until the network is joined: `Config.connect_timeout` at most.
+    """
+    settings = choose_network(node.config.ros2, name)
+    return node.shared(("ros2", settings), lambda: RosNetwork(node, settings))
+
+
+def _join(node: Node, settings: Ros2) -> Transport:
+    try:
+        return open_zenoh(node.config.for_ros2(settings))
+    except TransportError as error:
+        raise TransportError(
+            f"ros2: {error} The router of a ROS 2 robot is started there with 'ros2 run "
+            "rmw_zenoh_cpp rmw_zenohd'; its firewall has to let the port through."
+        ) from error
