@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from smachpy import log
 from smachpy.events.tape import LONGEST, Tape
 from smachpy.machines.problems import Problems
+from smachpy.run.callback import call_bounded
 from smachpy.run.frame import SUBSCRIPTIONS
 
 if TYPE_CHECKING:
@@ -72,11 +73,15 @@ class Callbacks:
         self._call(self._termination_cbs, terminal_states, outcome)
 
     def _call(self, callbacks: list[Callback], *arguments: object) -> None:
+        frame = self._smachpy.frame
         for callback, extra in tuple(callbacks):
+            given = (self.userdata, *arguments, *extra)
             try:
-                callback(self.userdata, *arguments, *extra)
+                if frame is None:  # called by hand
+                    callback(*given)
+                else:
+                    call_bounded(frame.container, frame, callback, given)
             except Exception as error:  # noqa: BLE001  a border: reported, the machine goes on
-                frame = self._smachpy.frame
                 if frame is not None:
                     frame.callback_failed(callback, error)
                 else:

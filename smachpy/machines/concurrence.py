@@ -22,6 +22,8 @@ from smachpy.machines.rules import Rule, all_of, any_of, as_rules, decide, n_of
 from smachpy.machines.spec import ChildSpec, ConcurrenceSpec
 from smachpy.machines.validate import concurrence_problems
 from smachpy.run.branches import Group
+from smachpy.run.callback import call_bounded
+from smachpy.run.interrupt import Interruption
 from smachpy.run.origin import asking
 from smachpy.run.visit import End
 
@@ -270,17 +272,19 @@ class Concurrence(Container):
         else:
             self._run_group(group)
             outcome = self._outcome(frame, group)
-        if self._termination_cbs:
-            self.call_termination_cbs(list(self._states), outcome)
         return outcome
 
+    def _terminal_labels(self, frame: Frame) -> list[str]:  # noqa: ARG002  that of any container
+        return list(self._states)
+
     def _run_group(self, group: Group) -> None:
-        """Start the branches and see them end."""
+        """Start the branches and see them end.
+
+        Raises:
+            Interruption: a callback did not listen; the branches have ended all the same.
+        """
         try:
             group.start()
-            if self._transition_cbs:
-                for _ in group.branches:
-                    self.call_transition_cbs()
             self._see_them_end(group)
         except BaseException as error:
             with asking("concurrence", group.frame.path, f"raised {type(error).__name__}"):
@@ -290,6 +294,12 @@ class Concurrence(Container):
     def _see_them_end(self, group: Group) -> None:
         failure: InvalidUserCodeError | None = None
         running = True
+        if self._transition_cbs:
+            try:
+                for _ in group.branches:
+                    self.call_transition_cbs()
+            except Interruption as error:
+                self._stop_calling(group, error)
         while running or group.reports:
             running = group.wait() if running else False
             while group.reports:
@@ -301,19 +311,32 @@ class Concurrence(Container):
                     group.failed = True
                     with asking("concurrence", group.frame.path, "child_termination_cb raised"):
                         group.ask(group.running())
+                except Interruption as error:
+                    self._stop_calling(group, error)
         group.raise_errors(failure)
+        if group.interruption is not None:
+            raise group.interruption
+
+    def _stop_calling(self, group: Group, interruption: Interruption) -> None:
+        """Call no callback more: one did not listen, so the others might not either."""
+        if group.frame.dead:
+            raise interruption
+        group.failed = True
+        group.interruption = interruption
 
     def _branch_ended(self, group: Group, branch: ChildBranch) -> None:
         if branch.error is not None:
             with asking("concurrence", branch.here(), f"raised {type(branch.error).__name__}"):
                 group.ask(group.running())
             return
-        if self._transition_cbs:
+        if self._transition_cbs and group.interruption is None:
             self.call_transition_cbs()
         if self._child_termination_cb is None or group.failed:
             return  # an outcome that a child did not live to give would pass for one that runs
         try:
-            answer = self._child_termination_cb(group.outcomes())
+            answer = call_bounded(
+                self, group.frame, self._child_termination_cb, (group.outcomes(),)
+            )
         except Exception as error:
             raise InvalidUserCodeError(
                 f"{group.frame.path}: child_termination_cb raised {type(error).__name__}: {error}",
@@ -366,7 +389,7 @@ class Concurrence(Container):
     def _ask_callback(self, frame: Frame, outcomes: dict[str, str | None]) -> str | None:
         assert self._outcome_cb is not None
         try:
-            answer = self._outcome_cb(dict(outcomes))
+            answer = call_bounded(self, frame, self._outcome_cb, (dict(outcomes),))
         except Exception as error:
             raise InvalidUserCodeError(
                 f"{frame.path}: outcome_cb raised {type(error).__name__}: {error}",

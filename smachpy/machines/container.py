@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
 from actionlib_core.clock import RealClock
 from smachpy import log
 from smachpy.context import THREAD
+from smachpy.events import Preempted
 from smachpy.exceptions import (
     InconsistentMachineError,
     InvalidStateError,
@@ -22,11 +23,11 @@ from smachpy.machines.problems import Problems, takes
 from smachpy.machines.state import DataOf, State, get_options, make_step
 from smachpy.run.child import EPOCH, ContainerData, on_preempt
 from smachpy.run.frame import Frame, clock_of_run
-from smachpy.run.grace import request, request_soon
+from smachpy.run.grace import forget_visit, request, request_soon
+from smachpy.run.interrupt import Interruption
 from smachpy.run.options import retry_problems
 from smachpy.run.origin import REQUESTING, asking, signal_being_handled
 from smachpy.run.root import execute_root
-from smachpy.run.runner import forget_visit
 from smachpy.run.visit import Origin
 from smachpy.userdata.typed import CheckedDict
 from smachpy.userdata.user_data import Remapper, UserData, reset, typed_userdata
@@ -236,7 +237,9 @@ class Container(Openable, Callbacks, State):
             run = partial(Container.execute, self)
             return execute_root(self, run, get_options(self), parent_ud)
         frame = Frame(self, parent)
-        step = parent.step
+        step, callback = parent.step, parent.container._smachpy.callback
+        if callback is not None and callback.parent is parent:
+            step = callback.step  # a callback of the parent runs this container
         if step is None or step.state is self:
             return self._run(frame, parent_ud)
         if self._smachpy.frame is not None:
@@ -271,7 +274,12 @@ class Container(Openable, Callbacks, State):
                 frame.run.watched = True
             if data.input_keys and parent_ud is not None:
                 self._copy_input_keys(parent_ud, self.userdata)
-            outcome = self._run_children(frame, plan)
+            try:
+                outcome = self._run_children(frame, plan)
+            except Interruption:  # a callback did not listen
+                outcome = self._interrupted(frame)
+            if self._termination_cbs:
+                outcome = self._call_at_end(frame, outcome)
             if data.output_keys and parent_ud is not None:
                 self._copy_output_keys(self.userdata, parent_ud)
             raised = False
@@ -285,6 +293,28 @@ class Container(Openable, Callbacks, State):
                 data.answered = frame.answered
             if raised or self._preempt_requested or frame.visit is not None or data.end_waiters:
                 self._leave(frame)
+
+    def _interrupted(self, frame: Frame) -> str:
+        """Return how the container ends when a callback of it outlasted the grace."""
+        if frame.dead:
+            raise Interruption
+        if not frame.answered:
+            frame.answered = True
+            frame.emit_own(Preempted, "")
+        return "preempted"
+
+    def _call_at_end(self, frame: Frame, outcome: str) -> str:
+        labels = self._terminal_labels(frame)
+        try:
+            self.call_termination_cbs(labels, outcome)
+        except Interruption:
+            return self._interrupted(frame)
+        return outcome
+
+    def _terminal_labels(self, frame: Frame) -> list[str]:
+        """Return the children that ended last."""
+        step, frame.step = frame.step, None
+        return [] if step is None else [step.label]
 
     def _already_runs(self, frame: Frame) -> InvalidStateError:
         return InvalidStateError(

@@ -18,6 +18,7 @@ from smachpy.machines.container import Container
 from smachpy.machines.problems import Problems
 from smachpy.machines.spec import ChildSpec, LoopSpec
 from smachpy.machines.validate import loop_problems
+from smachpy.run.callback import call_bounded
 from smachpy.run.interrupt import Interruption
 from smachpy.run.runner import end_visit, run_watched, unknown_outcome, user_error
 from smachpy.run.visit import End, Why
@@ -35,6 +36,9 @@ if TYPE_CHECKING:
     from smachpy.userdata.user_data import UserData
 
 __all__ = ["Iterator"]
+
+_PLAIN = frozenset({list, tuple, range, set, dict, str})  # iterating runs no code of the user
+_END = object()
 
 
 class _Plan:
@@ -274,8 +278,6 @@ class Iterator(Container):
         outcome = self._final_outcome_map.get(outcome, outcome)
         if outcome not in self._smachpy.outcomes and outcome != "preempted":
             raise unknown_outcome(frame.path, self._smachpy.outcomes, outcome)
-        if self._termination_cbs:
-            self.call_termination_cbs([plan.step.label], outcome)
         return outcome
 
     def _loop(self, frame: Frame, step: Step) -> str:
@@ -340,14 +342,17 @@ class Iterator(Container):
 
     def _iterate(self, frame: Frame) -> IteratorOf[Any]:
         """Return the items' iterator; what making or running it raises names the iterator."""
+
+        def call(function: Callable[..., Any], *arguments: Any) -> Any:
+            return call_bounded(self, frame, function, arguments)
+
         try:
-            items = self._items() if callable(self._items) else self._items
-            iterator = iter(items)
-            while True:
-                try:
-                    item = next(iterator)
-                except StopIteration:
-                    return
+            items = call(self._items) if callable(self._items) else self._items
+            if type(items) in _PLAIN:
+                yield from items
+                return
+            iterator = call(iter, items)
+            while (item := call(next, iterator, _END)) is not _END:
                 yield item
         except Exception as error:
             raise InvalidUserCodeError(

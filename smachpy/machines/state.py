@@ -24,7 +24,7 @@ from smachpy.machines.names import unique_names
 from smachpy.machines.problems import Problems, as_number, unknown_arguments
 from smachpy.run.child import StateData, mark_preempt, on_preempt
 from smachpy.run.frame import clock_of_run, current_scope
-from smachpy.run.grace import note_serviced
+from smachpy.run.grace import PreemptNotice, note_serviced
 from smachpy.run.options import NAMES, NO_OPTIONS, Options, Retry, changed
 from smachpy.run.origin import REQUESTING
 from smachpy.run.runner import runner_of
@@ -269,10 +269,24 @@ class State:
         Returns:
             A function that removes the callback.
 
-        Threads: the callback runs in the requester's thread, possibly in a signal handler: it must
-            not wait.
+        Raises:
+            InvalidStateError: `callback` cannot be called without arguments.
+
+        Threads: the callback has a thread of its own, so it may block, and never runs twice at
+            once: requests that come before it is called count as one. What it raises is reported
+            (`smachpy.events.CallbackFailed`).
         """
-        return on_preempt(self, callback)
+        problems = Problems(current_path() or type(self).__name__)
+        problems.function("on_preempt: callback", callback, "callback()", 0, optional=False)
+        problems.raise_all()
+        notice = PreemptNotice(callback)
+        forget = on_preempt(self, notice)
+
+        def forget_both() -> None:
+            notice.forget()
+            forget()
+
+        return forget_both
 
     def _smachpy_grace(self, inherited: Grace) -> Grace:
         """Return how long the state has after a preempt [s], given what its containers say."""

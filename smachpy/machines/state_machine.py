@@ -333,12 +333,9 @@ class StateMachine(Container):
             except Exception as error:
                 step = frame.step
                 raise user_error(step.path_in(frame), step.state, error) from error
-        last, outcome = frame.step.label, following.outcome
+        outcome = following.outcome
         if logged:
-            log.loginfo(f"{frame.path}: {last!r} ended it with {outcome!r}")
-        if self._termination_cbs:
-            frame.step = None
-            self.call_termination_cbs([last], outcome)
+            log.loginfo(f"{frame.path}: {frame.step.label!r} ended it with {outcome!r}")
         return outcome
 
     def _loop(self, frame: Frame, step: Step) -> End:
@@ -450,12 +447,21 @@ class StateMachine(Container):
             return self._preempted(frame, step)
         outcome = run_watched(frame, step) if run.watched else step.execute(step.userdata)
         following = self._follow(frame, step, outcome)
-        if not following.final and (self._transition_cbs or run.logged):
-            frame.step = following
-            if run.logged:
-                log.loginfo(f"{frame.path}: {step.label!r} -{outcome}-> {following.label!r}")
-            if self._transition_cbs:
-                self.call_transition_cbs()
+        if following.final or not (self._transition_cbs or run.logged):
+            return following
+        frame.step = following
+        if run.logged:
+            log.loginfo(f"{frame.path}: {step.label!r} -{outcome}-> {following.label!r}")
+        return self._call_between(frame, following)
+
+    def _call_between(self, frame: Frame, following: Step) -> Following:
+        """Call the transition callbacks; return what comes then."""
+        try:
+            self.call_transition_cbs()
+        except Interruption:
+            if frame.dead:
+                raise
+            return self._preempted(frame, following)
         return following
 
     def _follow(self, frame: Frame, step: Step, outcome: Any) -> Following:

@@ -17,7 +17,7 @@ from smachpy.run.runner import ChildErrors, end_visit, run_watched
 from smachpy.run.visit import Event, Phase, Why
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from actionlib_core.clock import Event as ClockEvent
     from smachpy.run.step import Step
@@ -167,14 +167,31 @@ class Group:
         reports: Ended branches that the container has not looked at yet.
         each: The container wants to be woken for every end, not only for the last.
         failed: A branch or a callback has raised; the container will raise too.
+        started: The branches have threads, or are about to.
+        interruption: Ended a callback that did not listen; the container will be preempted.
+        when_ended: Called once when the last branch has ended; None: nothing.
     """
 
-    __slots__ = ("_left", "_wake", "branches", "each", "failed", "frame", "reports")
+    __slots__ = (
+        "_left",
+        "_wake",
+        "branches",
+        "each",
+        "failed",
+        "frame",
+        "interruption",
+        "reports",
+        "started",
+        "when_ended",
+    )
 
     def __init__(self, frame: Frame, steps: list[Step], *, each: bool) -> None:
         self.frame = frame
         self.each = each
         self.failed = False
+        self.started = False
+        self.interruption: Interruption | None = None
+        self.when_ended: Callable[[], object] | None = None
         self.reports: deque[ChildBranch] = deque()
         self._wake: ClockEvent = frame.run.clock.event()
         self.branches = [ChildBranch(self, step) for step in steps]
@@ -182,6 +199,7 @@ class Group:
 
     def start(self) -> None:
         """Start every branch, in a thread named after its path."""
+        self.started = True
         clock = self.frame.run.clock
         if isinstance(clock, RealClock):
             _Threads(clock, self.branches).call()
@@ -215,6 +233,9 @@ class Group:
             self.reports.append(branch)  # before it is counted: who sees the last sees them all
             self._left -= 1
             last = self._left == 0
+            when_ended = self.when_ended if last else None
+        if when_ended is not None:
+            when_ended()
         if last or self.each or error is not None:
             self._wake.set()
 

@@ -93,6 +93,7 @@ class ContainerData(StateData):
         listeners: Called at each event of it and of all below it.
         tapes: Take these events down.
         control: The operator's control, once somebody asked for it.
+        callback: Runs its callback or hook, while there is one.
         answered: Its last run ended because a request to stop was taken up.
         origin: Who asked it to stop before it ran.
         is_passing_on: A request to stop is being passed on to what runs in it.
@@ -101,6 +102,7 @@ class ContainerData(StateData):
 
     __slots__ = (
         "answered",
+        "callback",
         "control",
         "end_waiters",
         "frame",
@@ -120,6 +122,7 @@ class ContainerData(StateData):
         self.listeners: tuple[Callable[[Event], object], ...] = ()
         self.tapes: tuple[Tape, ...] = ()
         self.control: Gate | None = None
+        self.callback: Frame | None = None
         self.answered = False
         self.origin: Origin | None = None
         self.is_passing_on = False
@@ -189,8 +192,8 @@ def on_preempt(state: Child, callback: Callable[[], object]) -> Callable[[], Non
     Returns:
         Forgets the callback.
 
-    Threads: the callback runs in the requester's thread, maybe in a signal handler: it must not
-        wait.
+    Threads: the callback runs in the requester's thread with the run's lock held, maybe in a signal
+        handler: it must not wait, and is none of the user's (`smachpy.run.grace.PreemptNotice`).
     """
     callbacks = state._smachpy.preempt_callbacks
     callbacks.append(callback)

@@ -47,6 +47,9 @@ class Gate(Protocol):
 class Group(Protocol):
     """The children of a concurrence while they run."""
 
+    started: bool
+    when_ended: Callable[[], object] | None
+
     def running(self) -> Sequence[Frame]:
         """Return the branches that have not ended."""
         ...
@@ -212,6 +215,21 @@ class Frame:
         """Return the path of the state that runs now."""
         step = self.step
         return self.path if step is None else f"{self.path}/{step.label}"
+
+    def described(self) -> str:
+        """Name what runs now, for the log."""
+        return self.here()
+
+    def is_in_child(self) -> bool:
+        """Tell whether a child runs, or a callback of the child, which is a container."""
+        step, callback = self.step, self.container._smachpy.callback
+        if step is None or callback is None or callback.parent is not self:
+            return step is not None
+        return step.state is self.container  # a hook of the root; else the child comes after it
+
+    def waits_for(self) -> Group | None:
+        """Return the branches that must end before what runs here is left behind; None: none."""
+        return None
 
     def is_asked(self) -> bool:
         """Tell whether the container itself was asked to stop, not only what runs in it."""

@@ -9,10 +9,11 @@ thread of its own. Graces end on the clock's thread, which waits for no listener
 from __future__ import annotations
 
 import sys
+import threading
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from smachpy.context import current_frame
+from smachpy.context import current_frame, current_path
 from smachpy.events import Abandoned, Finished, Left, PreemptRequested, PreemptServiced, TimedOut
 from smachpy.run.child import mark_preempt
 from smachpy.run.frame import clock_of_run
@@ -130,7 +131,7 @@ class Visit:
     # -- the effects of the table --------------------------------------------------------------
 
     def _path(self) -> str:
-        return f"{self._frame.path}/{self.step.label}"
+        return self._frame.here()
 
     def _publish_timed_out(self) -> None:
         self._frame.note(self._path(), TimedOut, self.timeout)
@@ -174,7 +175,8 @@ class Visit:
     def _publish_abandoned(self) -> None:
         frame, clock = self._frame, self._frame.run.clock
         grace = grace_of(frame, self.step.state)
-        path, now = self._path(), (clock.now(), clock.time_ns())
+        path, described = self._path(), frame.described()
+        now = clock.now(), clock.time_ns()
         lines = lines_of(frame.first.thread)
         subscribers = frame.find_subscribers() if frame.run.watched else None  # before it is dead
 
@@ -183,8 +185,8 @@ class Visit:
             if subscribers is not None:
                 frame.give(subscribers, Abandoned(path, *now, grace or 0.0, stack))
             frame.run.note_log(
-                f"{path}: still runs {grace or 0.0:g} s after its preempt; interrupted. It was "
-                f"at:\n{stack}"
+                f"{described}: still runs {grace or 0.0:g} s after its preempt; interrupted. It "
+                f"was at:\n{stack}"
             )
 
         frame.run.pending.append(tell)
@@ -209,11 +211,11 @@ class Visit:
         last = outcome_left(first)
         now = run.clock.now(), run.clock.time_ns()
         for each in _up_to(frame, first):
-            if run.watched and each.step is not None:
+            if run.watched and each.is_in_child():
                 kind = Finished if each.parent is None else Left
                 event = kind(each.here(), *now, last if each is first else "preempted")
                 run.pending.append(partial(each.give, each.find_subscribers(), event))
-        run.note_log(f"{self._path()}: did not react; its thread is left behind.")
+        run.note_log(f"{frame.described()}: did not react; its thread is left behind.")
 
     def _cut_off(self) -> None:
         """Cut off what is left behind from userdata, events and later runs; then go on without.
@@ -234,6 +236,8 @@ class Visit:
                     each.step.state._preempt_requested = False
                 data = each.container._smachpy
                 data.plan = None
+                if data.callback is each:
+                    data.callback = None
                 if data.frame is each:
                     data.frame = None
                     each.container._preempt_requested = False
@@ -266,8 +270,13 @@ class Visit:
 
     def _overdue(self, event: Event, number: int) -> None:
         with self._frame.run.lock:
-            if self._is_on() and number == self._timer_number:  # not one that was cancelled late
-                self.happen(event)
+            if not self._is_on() or number != self._timer_number:  # one that was cancelled late
+                return
+            group = self._frame.waits_for() if event is Event.LEAVE else None
+            if group is not None and group.running():
+                group.when_ended = partial(self._overdue, event, number)
+                return
+            self.happen(event)
         self._frame.run.flush_soon()
 
     _PERFORM: ClassVar[dict[Effect, Callable[[Visit], None]]] = {
@@ -347,9 +356,11 @@ def pass_on(container: Parent) -> None:
         try:
             mark_preempt(container)  # first the mark, then the look: see `Container._run`
         finally:
-            if data.frame is not None:
-                for each in data.frame.running():
+            if data.frame is not None and (data.callback is None or data.frame.group is not None):
+                for each in data.frame.running():  # a child that comes after a callback is not told
                     ask(each)
+            if data.callback is not None:
+                ask(data.callback)
     finally:
         data.is_passing_on = False
 
@@ -367,11 +378,11 @@ def request(container: Parent, only: Frame | None = None) -> Run | None:
     data = container._smachpy
     origin = current_origin()
     with asking(*origin):
-        frame = data.root or data.frame
+        frame = data.root or data.frame or data.callback
         if frame is None and only is None:
             data.origin = origin
             pass_on(container)
-            frame = data.root or data.frame  # it may have begun meanwhile
+            frame = data.root or data.frame or data.callback  # it may have begun meanwhile
             return None if frame is None else frame.run
         if frame is None:
             return None
@@ -380,7 +391,7 @@ def request(container: Parent, only: Frame | None = None) -> Run | None:
                 return None
             if frame is data.root:
                 ask(frame)
-            elif frame is data.frame:
+            elif frame is data.frame or frame is data.callback:
                 _pass_on_reported(container, frame)
             else:  # it has just ended
                 container._preempt_requested = True
@@ -421,6 +432,51 @@ def call_override(state: Child, frame: Frame | None, path: str) -> None:
         frame.run.flush()
 
 
+class PreemptNotice:
+    """Calls a function of the user for requests to a state, in a thread where it holds up nobody.
+
+    Threads: any, also in a signal handler.
+    """
+
+    def __init__(self, function: Callable[[], object]) -> None:
+        self._function: Callable[[], object] | None = function
+        self._frame: Frame | None = current_frame()
+        self._path = current_path()
+        self._clock = clock_of_run()
+        self._busy = threading.Lock()
+        self._asked = False  # no lock for it: a signal handler may interrupt whoever holds it
+
+    def __call__(self) -> None:
+        """Have the function called."""
+        self._asked = True
+        self._clock.spawn(self._work, name=f"on_preempt of {self._path or 'a state'}")
+
+    def forget(self) -> None:
+        """Call it no more."""
+        self._function = None
+
+    def _work(self) -> None:
+        while self._asked and self._busy.acquire(blocking=False):  # else another thread sees it
+            try:
+                self._asked = False
+                function = self._function
+                if function is not None:
+                    self._call(function)
+            finally:
+                self._busy.release()
+
+    def _call(self, function: Callable[[], object]) -> None:
+        frame = self._frame
+        if frame is None:  # outside of any machine; the thread's border reports what it raises
+            function()
+            return
+        try:
+            function()
+        except BaseException as error:  # noqa: BLE001  a border: reported, without effect on others
+            frame.note_failure(self._path, function, error)
+            frame.run.flush()
+
+
 def note_serviced(state: Child) -> None:
     """Publish that `state`, which runs in this context, takes its request up."""
     frame: Frame | None = current_frame()
@@ -429,6 +485,17 @@ def note_serviced(state: Child) -> None:
     visit = frame.visit
     if visit is not None and visit.step is frame.step and visit.step.state is state:
         visit.service()
+
+
+def forget_visit(frame: Frame) -> None:
+    """End a visit that nobody follows: it was asked just when it had ended, or its frame ends."""
+    with frame.run.lock:
+        visit = frame.visit
+        if visit is None or frame.dead:
+            return
+        frame.visit = None
+        visit.happen(Event.END)
+    visit.settle()
 
 
 # -- graces --------------------------------------------------------------------------------------

@@ -13,10 +13,10 @@ from smachpy.context import THREAD
 from smachpy.events import Finished, Started
 from smachpy.run.branches import Branch
 from smachpy.run.frame import Run
-from smachpy.run.grace import ask, request_soon
-from smachpy.run.interrupt import use_signals
+from smachpy.run.grace import ask, forget_visit, request_soon
+from smachpy.run.interrupt import Interruption, use_signals
 from smachpy.run.origin import REQUESTING, asking, current_origin, shutdown_asking
-from smachpy.run.runner import forget_visit, runner_of
+from smachpy.run.runner import runner_of
 from smachpy.run.step import Step
 
 if TYPE_CHECKING:
@@ -130,7 +130,12 @@ class Root(Branch):
         data.origin = None
         outcome: str | None = None
         try:
-            outcome = step.execute(step.userdata)
+            try:
+                outcome = step.execute(step.userdata)
+            except Interruption:  # one of its own hooks did not listen
+                if self.dead:
+                    raise
+                outcome = "preempted"
             visit = self.visit
             if visit is not None and visit.has_answered(outcome):
                 visit.service()

@@ -12,9 +12,10 @@ from smachpy.exceptions import (
     InvalidUserCodeError,
     did_you_mean,
 )
+from smachpy.run.callback import call_bounded
 from smachpy.run.child import on_preempt
 from smachpy.run.frame import SUBSCRIPTIONS, clock_of_run
-from smachpy.run.grace import ask
+from smachpy.run.grace import ask, forget_visit
 from smachpy.run.interrupt import Interruption
 from smachpy.run.origin import asking
 from smachpy.run.visit import Again, Decision, Event, Why, after, after_attempt
@@ -102,10 +103,10 @@ class _WithOptions:
         frame: Frame | None = current_frame()
         assert frame is not None  # a container runs it
         if options.on_enter is not None:
-            _call_hook(frame, options.on_enter, userdata)
+            _call_hook(frame, self._state, options.on_enter, userdata)
         outcome = self._attempts(frame, userdata)
         if options.on_exit is not None:
-            _call_hook(frame, options.on_exit, userdata, outcome)
+            _call_hook(frame, self._state, options.on_exit, userdata, outcome)
         return outcome
 
     def _attempts(self, frame: Frame, userdata: Any) -> Any:
@@ -142,9 +143,12 @@ class _WithOptions:
             return decision
 
 
-def _call_hook(frame: Frame, hook: Callable[..., object], *arguments: Any) -> None:
+def _call_hook(frame: Frame, state: Any, hook: Callable[..., object], *arguments: Any) -> None:
     try:
-        hook(*arguments)
+        if state._smachpy_is_container:  # a leaf's grace covers its hooks
+            call_bounded(state, frame, hook, arguments)
+        else:
+            hook(*arguments)
     except Exception as error:
         where = frame.here()
         name = getattr(hook, "__name__", repr(hook))
@@ -330,17 +334,6 @@ def end_visit(frame: Frame, outcome: Any) -> Decision:
     if decision.why is Why.FORCED and override is not None:
         frame.emit(OutcomeForced, override.outcome)
     return decision
-
-
-def forget_visit(frame: Frame) -> None:
-    """End a visit that nobody follows: it was asked just when it had ended, or its frame ends."""
-    with frame.run.lock:
-        visit = frame.visit
-        if visit is None or frame.dead:
-            return
-        frame.visit = None
-        visit.happen(Event.END)
-    visit.settle()
 
 
 # -- what goes wrong ---------------------------------------------------------------------------

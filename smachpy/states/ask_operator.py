@@ -22,6 +22,7 @@ from actionlib_core.pubsub.topic import Publisher, Subscriber
 from smachpy import State, UserData
 from smachpy.exceptions import did_you_mean
 from smachpy.log import logwarn
+from smachpy.run.child import on_preempt
 from smachpy.sim.exceptions import MissionError
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ class AskOperator(State):
         node = get_node()
         with contextlib.ExitStack() as open_ends:
             inbox = _Inbox(self, node)
-            open_ends.callback(self.on_preempt(inbox.wake.set))
+            open_ends.callback(on_preempt(self, inbox.wake.set))
             ask = open_ends.enter_context(
                 Publisher(f"{self.channel}/question", String, latch=True, node=node)
             )

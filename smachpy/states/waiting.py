@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.pubsub.topic import Subscriber
 from smachpy import State, UserData
+from smachpy.run.child import on_preempt
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -46,7 +47,7 @@ class AwaitMessage(State):
                 came.append(True)
                 wake.set()
 
-        forget = self.on_preempt(wake.set)
+        forget = on_preempt(self, wake.set)
         try:
             with Subscriber(self._topic, self._msg_type, on_message):
                 wake.wait(self._longest)

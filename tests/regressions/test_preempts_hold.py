@@ -783,3 +783,97 @@ def test_requests_that_begin_at_different_containers_do_not_wait_for_each_other(
         for thread in threads:
             thread.join(LONG_S)
     assert outcomes == ["preempted"]
+
+
+# -- callbacks of requests ----------------------------------------------------------------------
+
+
+class Hears(Work):
+    """Has `hear` called for each request."""
+
+    def __init__(self, hear, seconds=30.0):
+        super().__init__(seconds)
+        self.hear = hear
+
+    def execute(self, userdata):
+        forget = self.on_preempt(self.hear)
+        try:
+            return super().execute(userdata)
+        finally:
+            forget()
+
+
+def test_a_callback_of_a_request_that_blocks_holds_nobody():
+    go_on, called = threading.Event(), threading.Event()
+
+    def block():
+        called.set()
+        go_on.wait(LONG_S)
+
+    with use_clock(RealClock()):
+        state = Hears(block)
+        machine = both(state, Work(30.0))
+        entered = threading.Event()
+        machine.register_transition_cb(lambda *_: entered.set())
+        returned = threading.Event()
+
+        def ask():
+            entered.wait(LONG_S)
+            machine.request_preempt()
+            machine.request_preempt()
+            returned.set()
+
+        asker = threading.Thread(target=ask)
+        asker.start()
+        try:
+            assert machine.execute() == "preempted"
+            assert returned.wait(LONG_S)
+            assert not go_on.is_set()
+        finally:
+            go_on.set()
+            asker.join()
+
+
+def test_requests_while_their_callback_runs_count_as_one(clock):
+    times = []
+
+    def hear():
+        times.append(clock.now())
+        clock.sleep(1.0)
+
+    class Deaf(Hears):
+        def execute(self, userdata):
+            forget = self.on_preempt(self.hear)
+            self.clock().sleep(5.0)
+            forget()
+            return "done"
+
+    machine = chain(Deaf(hear))
+    for at in (1.0, 1.25, 1.5, 3.5):
+        clock.call_later(at, machine.request_preempt)
+    machine.execute()
+    assert times == [1.0, 2.0, 3.5]
+
+
+def test_a_callback_is_called_at_once_when_a_request_is_there(clock):
+    times = []
+
+    class Late(Work):
+        def execute(self, userdata):
+            self.clock().sleep(2.0)
+            forget = self.on_preempt(lambda: times.append(clock.now()))
+            self.clock().sleep(1.0)
+            forget()
+            return "done"
+
+    machine = chain(Late())
+    clock.call_later(1.0, machine.request_preempt)
+    machine.execute()
+    assert times == [2.0]
+
+
+@pytest.mark.parametrize("bad", [None, 5, lambda argument: None])
+def test_a_callback_that_cannot_be_called_is_refused(bad):
+    with pytest.raises(smachpy.InvalidStateError) as caught:
+        Work().on_preempt(bad)
+    assert len(caught.value.problems) == 1
