@@ -22,12 +22,11 @@ from smachpy.machines.problems import Problems
 from smachpy.machines.spec import ChildSpec, MachineSpec
 from smachpy.machines.validate import machine_problems
 from smachpy.run.frame import SUBSCRIPTIONS
-from smachpy.run.grace import request_soon
+from smachpy.run.grace import forget_visit, request_soon
 from smachpy.run.interrupt import Interruption
 from smachpy.run.origin import asking
 from smachpy.run.runner import (
     end_visit,
-    forget_visit,
     only_tape,
     publish_left,
     publish_raised,
