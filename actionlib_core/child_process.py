@@ -31,7 +31,7 @@ class ChildProcess:
     Args:
         module: What to run. It prints a line when it is ready, and ends with its standard input.
         arguments: Further arguments for it.
-        on_change: Called when it is ready, and when it has ended.
+        on_change: Called when it is ready, and when it has ended; an attribute too.
         environment: Added to that of this process.
 
     Threads: `on_change` is called from threads of the clock.
@@ -49,7 +49,7 @@ class ChildProcess:
         # -P: a user's module in the current folder must not take the place of one of ours.
         self._command = [sys.executable, "-P", "-m", module, *arguments]
         self._environment = dict(environment or {})
-        self._on_change = on_change
+        self.on_change = on_change
         self._clock = RealClock()  # processes know no other
         self._said: deque[str] = deque(maxlen=KEPT_LINES)
         self._changed = self._clock.event()
@@ -142,7 +142,7 @@ class ChildProcess:
                 if self._first_line is None:
                     self._first_line = line.strip()
                 self._changed.set()
-                self._on_change()
+                self.on_change()
 
     def _watch(self, stderr: IO[str], listened: Callable[[float], object]) -> None:
         """Read what it says until it ends."""
@@ -155,7 +155,7 @@ class ChildProcess:
         self._ended.set()
         self._changed.set()
         self.on_end()
-        self._on_change()
+        self.on_change()
 
 
 def end_with_stdin(ending: Shutdown) -> None:

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 if "SMACHPY_DOMAIN" not in os.environ or "PYTEST_XDIST_WORKER" in os.environ:
     os.environ["SMACHPY_DOMAIN"] = str(1 + os.getpid() % 9999)
 
+# Runs that are viewed are kept, but not those of tests; a folder that cannot be made keeps none.
+os.environ["SMACHPY_RUNS"] = os.devnull
+
 # A shell's background job ignores Ctrl-C, and so would all that it starts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import re
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -121,7 +122,16 @@ def register(subparsers: Any) -> None:
 
 def _add_watching(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("watching")
-    group.add_argument("--view", action="store_true", help="show it in a browser while it runs")
+    group.add_argument(
+        "--view", action="store_true", help="show it in a browser while it runs, and after"
+    )
+    group.add_argument(
+        "--view-for",
+        type=_span,
+        metavar="TIME",
+        help="how long the page stays when the run has ended: 30s, 10m, 2h, or 0 (default: until "
+        "Ctrl-C)",
+    )
     group.add_argument(
         "--port", type=int, default=8080, help="of that page; 0 takes any (default: %(default)s)"
     )
@@ -210,6 +220,7 @@ def _run_mission(
         watching=Watching(
             record=args.record,
             view=args.view,
+            view_for=args.view_for,
             port=args.port,
             control=args.control,
             alone=args.time.virtual,
@@ -252,6 +263,13 @@ class _Help(argparse.Action):
 
             print(f"\n{usage(load_target(name))}")
         parser.exit()
+
+
+def _span(text: str) -> float:
+    match = re.fullmatch(r"(\d{1,9}(?:\.\d{1,3})?)(s|m|h|)", text)
+    if match is None:
+        raise argparse.ArgumentTypeError(f"got {text!r}; expected a time such as 30s, 10m, 2h or 0")
+    return float(match[1]) * {"": 1, "s": 1, "m": 60, "h": 3600}[match[2]]
 
 
 def _seconds(text: str) -> float:

@@ -114,7 +114,7 @@ def run_mission(target: Target, options: RunOptions) -> int:
             return _signal_exit(ending)
         if out is not None:
             stack.enter_context(out.collecting())
-        stack.enter_context(watched(target.name, machine, record.path, options.watching))
+        watch = stack.enter_context(watched(target.name, machine, record.path, options.watching))
         show = _show(record, options)
         stack.enter_context(show)
         stack.callback(machine.subscribe(show.on_event))
@@ -132,6 +132,7 @@ def run_mission(target: Target, options: RunOptions) -> int:
                 "time": str(options.pace),
             }
             print(f"\nWritten: {', '.join(map(str, out.write(facts)))}")
+        watch.linger(outcome, ending)
     return code
 
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 import contextlib
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from actionlib_core.clock import RealClock
+from actionlib_core.output import printable
 from smachpy import IntrospectionServer
+from smachpy.command import runs_folder
 from smachpy.command.extras import load_view
 from smachpy.events.recording import Recorder
 
@@ -15,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
+    from actionlib_core.shutdown import Shutdown
     from smachpy.machines.container import Container
 
 
@@ -23,8 +27,10 @@ class Watching:
     """Who may see a run, and how.
 
     Attributes:
-        record: File to write the run to; None writes none.
-        view: Serve the page of the live viewer while it runs.
+        record: File to write the run to; None writes one only for those who view it, to the folder
+            of runs.
+        view: Serve the page of the live viewer while it runs, and after its end.
+        view_for: How long after its end [s]; None: until the program is to end.
         port: Of that page; 0 takes any.
         control: Obey pause, step, jump and the like from viewers.
         alone: Nobody can look in, as the mission is on no network that others are on.
@@ -32,13 +38,61 @@ class Watching:
 
     record: Path | None = None
     view: bool = False
+    view_for: float | None = None
     port: int = 8080
     control: bool = False
     alone: bool = False
 
 
+class Watch:
+    """The page and the file of one run, while they are there.
+
+    Args:
+        file: Where the run is written to.
+        viewer: What serves the page.
+        stay: How long the page stays after the end [s]; None: until the program is to end.
+    """
+
+    def __init__(self, file: Recorder | None, viewer: Any, stay: float | None) -> None:
+        self._file = file
+        self._viewer = viewer
+        self._stay = stay
+        self._clock = RealClock()  # people look in real time
+        self._over = self._clock.event("page of the run")
+
+    def viewer_ended(self) -> None:
+        """Take the end of the viewer; from any thread."""
+        if self._viewer is not None and self._viewer.exit_code is not None:
+            self._over.set()
+
+    def linger(self, outcome: str | None, ending: Shutdown) -> None:
+        """Complete the file, say where the run can be looked at, and leave it there for a while.
+
+        Args:
+            outcome: How the run has ended; None: its own code raised.
+            ending: What ends the program.
+
+        Blocks: until the time is over, `ending` is requested, or the viewer has ended.
+        """
+        if self._file is not None:
+            self._file.close()
+        if self._viewer is None:
+            return
+        if self._file is not None:
+            print(f"recorded: smachpy view {printable(str(self._file.path))}", flush=True)
+        if ending.requested() or self._stay == 0 or self._viewer.exit_code is not None:
+            return
+        how = "raised an exception" if outcome is None else f"ended: {printable(outcome)}"
+        left = "" if self._stay is None else f" for {self._stay:g} s"
+        print(f"{how}; still at {self._viewer.address}{left} (Ctrl-C ends it)", flush=True)
+        cancel = ending.on_shutdown(self._over.set)
+        self.viewer_ended()
+        self._over.wait(self._stay)
+        cancel()
+
+
 @contextlib.contextmanager
-def watched(name: str, machine: Container, path: str, watching: Watching) -> Iterator[None]:
+def watched(name: str, machine: Container, path: str, watching: Watching) -> Iterator[Watch]:
     """Let a machine be seen while the context lasts; nothing that watches can hold it up.
 
     Args:
@@ -46,6 +100,9 @@ def watched(name: str, machine: Container, path: str, watching: Watching) -> Ite
         machine: The machine.
         path: Its path in its record.
         watching: Who may see it.
+
+    Yields:
+        What keeps the page after the end.
 
     Raises:
         SmachError: the file exists, or the page cannot be served.
@@ -55,14 +112,22 @@ def watched(name: str, machine: Container, path: str, watching: Watching) -> Ite
         word if word[:1].isalpha() else f"m_{word}", machine, path, control=watching.control
     )
     with contextlib.ExitStack() as stack:
-        if watching.record is not None:
-            stack.enter_context(Recorder(watching.record, machine))
+        path_of_file = watching.record
+        if path_of_file is None and watching.view:
+            path_of_file = runs_folder.new_file(name, RealClock().time_ns())
+        file = (
+            None if path_of_file is None else stack.enter_context(Recorder(path_of_file, machine))
+        )
         if not watching.alone:
             server.start()
             stack.callback(server.stop)
+        viewer = None
         if watching.view:
             control = ("--control",) if watching.control else ()
             viewer = load_view("viewer")(("--auto-focus", "--port", str(watching.port), *control))
+        watch = Watch(file, viewer, watching.view_for)
+        if viewer is not None:
+            viewer.on_change = watch.viewer_ended
             stack.enter_context(viewer)
             print(f"watch it at {viewer.address}", flush=True)
-        yield
+        yield watch

@@ -109,6 +109,9 @@ class Recorder:
         path: The file; it must not exist yet.
         machine: The machine.
 
+    Attributes:
+        path: The file.
+
     Raises:
         RecordingError: the file exists or cannot be made.
 
@@ -116,14 +119,14 @@ class Recorder:
     """
 
     def __init__(self, path: str | Path, machine: Container) -> None:
-        self._path = Path(path)
+        self.path = Path(path)
         clock = current_clock()
-        self._executor = SerialExecutor(clock, f"recording {self._path.name}")
+        self._executor = SerialExecutor(clock, f"recording {self.path.name}")
         self._failed = False
         self._unwritten = 0
         try:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            self._file: TextIO = self._path.open("x", encoding="utf-8")
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._file: TextIO = self.path.open("x", encoding="utf-8")
             self._file.write(header_line(describe(machine), clock.time_ns()))
             self._file.flush()
         except FileExistsError as error:
@@ -152,7 +155,7 @@ class Recorder:
             return
         if not in_time:
             log.logwarn(
-                f"recording {str(self._path)!r}: still being written after {CLOSE_S:g} s; the end "
+                f"recording {str(self.path)!r}: still being written after {CLOSE_S:g} s; the end "
                 "of the run is lost if the program ends now."
             )
         else:
@@ -162,11 +165,11 @@ class Recorder:
                 self._fail(error)
         if self._tape.dropped:
             log.logwarn(
-                f"recording {str(self._path)!r}: {self._tape.dropped} events are missing; more "
+                f"recording {str(self.path)!r}: {self._tape.dropped} events are missing; more "
                 "came than could be written. Every state's last visit is there."
             )
         if self._unwritten:
-            log.logwarn(f"recording {str(self._path)!r}: {self._unwritten} events are not in it.")
+            log.logwarn(f"recording {str(self.path)!r}: {self._unwritten} events are not in it.")
 
     @property
     def dropped(self) -> int:
@@ -192,7 +195,7 @@ class Recorder:
     def _fail(self, error: OSError) -> None:
         if not self._failed:
             self._failed = True
-            log.logerr(f"recording {str(self._path)!r}: ends here: {error.strerror or error}.")
+            log.logerr(f"recording {str(self.path)!r}: ends here: {error.strerror or error}.")
 
 
 def header_line(record: StateRecord, stamp_ns: int, base: dict[str, Any] | None = None) -> str:

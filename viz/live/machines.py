@@ -8,6 +8,7 @@ import threading
 import uuid
 from collections import deque
 from dataclasses import asdict
+from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
 from smachpy.events import record_text
@@ -24,6 +25,9 @@ KEPT_EVENTS = 20_000
 KEPT_BYTES = 64_000_000
 """So much text of them at most."""
 
+KEPT_RUNS = 3
+"""So many earlier programs of one machine can be looked at after it was started again."""
+
 
 class Machine:
     """One machine: its structure, the newest events, and what happened before them.
@@ -31,6 +35,8 @@ class Machine:
     Args:
         name: What it is found under.
         on_change: Called after every change, with the machine.
+        keep: Called before it begins anew for another program, with the machine as it was; keeps it
+            under the name that is returned.
 
     Attributes:
         record: Its structure; None until it is known.
@@ -39,12 +45,22 @@ class Machine:
         control: Pause and breakpoints; None when it obeys no commands.
         node: Name of the node that it runs in.
         behind: How far its clock is behind this process's [ns]; None while nobody knows.
+        before: Name of the machine that keeps what the program before this one did.
+        after: The same the other way round, of one that is kept.
 
     Threads: every method may be called from any thread.
     """
 
-    def __init__(self, name: str, on_change: Callable[[Machine], object]) -> None:
+    def __init__(
+        self,
+        name: str,
+        on_change: Callable[[Machine], object],
+        keep: Callable[[Machine], str | None] = lambda _machine: None,
+    ) -> None:
         self.name = name
+        self._keep = keep
+        self.before: str | None = None
+        self.after: str | None = None
         self.record: StateRecord | None = None
         self.revision = 0
         self.problems: list[dict[str, str]] = []
@@ -71,6 +87,8 @@ class Machine:
     def reset(self, history: dict[str, Any], *, limit: int = KEPT_EVENTS) -> None:
         """Begin anew with what a server tells (`smachpy.network.feed`), or a file."""
         record = StateRecord.from_json(json.dumps(history["description"]))
+        if str(history["epoch"]) != self.epoch and self._now.data["started"] is not None:
+            self.before = self._keep(self._split_off()) or self.before
         with self._lock:
             self.epoch = str(history["epoch"])
             self.problems = list(history.get("problems") or ())
@@ -88,6 +106,18 @@ class Machine:
             for event in events:
                 self._append(event, limit)
         self._on_change(self)
+
+    def _split_off(self) -> Machine:
+        """Return another machine that has what this one has; this one is to begin anew."""
+        kept = Machine(self.name, self._on_change)
+        with self._lock:
+            kept.record, kept.revision, kept.problems = self.record, self.revision, self.problems
+            kept.recorded, kept.node, kept.epoch = True, self.node, f"kept {self.epoch}"
+            kept.before, kept.after = self.before, self.name
+            kept._base, kept._now, kept._bytes = self._base, self._now, self._bytes
+            kept._seq, kept._folded = self._seq, self._folded
+            kept._events, self._events = self._events, deque()
+        return kept
 
     def describe(self, record: StateRecord) -> None:
         """Take a new structure."""
@@ -191,6 +221,8 @@ class Machine:
             "recorded": self.recorded,
             "node": self.node,
             "behind": self.behind,
+            "before": self.before,
+            "after": self.after,
         }
 
     def _set_record(self, record: StateRecord) -> None:
@@ -254,8 +286,21 @@ class Machines:
         """Return the machine of that name, a new one if there is none."""
         with self._lock:
             if name not in self._machines:
-                self._machines[name] = Machine(name, self._changed)
+                self._machines[name] = Machine(name, self._changed, self._keep)
             return self._machines[name]
+
+    def _keep(self, machine: Machine) -> str:
+        """Keep a machine that has been started again, by its name and when it began."""
+        began = datetime.fromtimestamp(machine.summary()["started"] / 1e9).astimezone()
+        with self._lock:
+            earlier = [name for name, one in self._machines.items() if one.after == machine.name]
+            for name in earlier[: max(0, len(earlier) - KEPT_RUNS + 1)]:
+                del self._machines[name]
+            first = f"{machine.name}, run of {began:%H:%M:%S}"
+            names = (f"{first} ({n})" if n > 1 else first for n in itertools.count(1))
+            machine.name = next(name for name in names if name not in self._machines)
+            self._machines[machine.name] = machine
+        return machine.name
 
     def summaries(self) -> list[dict[str, Any]]:
         """Return what is known of every machine, by name."""

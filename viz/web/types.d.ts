@@ -165,6 +165,8 @@ interface MachineFacts {
   recorded: boolean;
   node: string;
   behind: number | null;
+  before?: string | null; // the machine that keeps what the program before this one did
+  after?: string | null; // of such a machine: the one that it was
 }
 interface MachineSummary extends MachineFacts {
   active: string[];

@@ -78,7 +78,7 @@ def test_a_users_package_called_missions_works(folder, arguments, on_path):
 
 @pytest.mark.zenoh
 def test_a_users_package_called_missions_works_with_the_robot_and_the_viewer(folder):
-    arguments = ("--start-robot", "--view", "--port", "0")
+    arguments = ("--start-robot", "--view", "--view-for", "0", "--port", "0")
     done = run(folder, "run", "missions.fetch:mission", *arguments)
     assert done.returncode == 0, done.stderr
 

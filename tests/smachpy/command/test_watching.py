@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
 import sys
+import time
 import urllib.request
 from pathlib import Path
 
 import pytest
 
+from smachpy.command import runs_folder
 from smachpy.events.recording import read_recording
 
 pytestmark = [pytest.mark.zenoh, pytest.mark.timeout(120)]
@@ -39,6 +42,7 @@ def run(tmp_path):
     path = tmp_path / "nap.py"
     path.write_text(MISSION)
     started = []
+    environment = {**os.environ, "SMACHPY_RUNS": str(tmp_path / "kept")}
 
     def run(*arguments):
         process = subprocess.Popen(
@@ -46,6 +50,7 @@ def run(tmp_path):
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
+            env=environment,
         )
         started.append(process)
         return process
@@ -67,7 +72,8 @@ def viewer_of(process):
 
 
 def test_a_page_and_a_file_of_a_run(run, tmp_path):
-    process = run("--view", "--port", "0", "--record", str(tmp_path / "runs" / "nap.jsonl"))
+    file = tmp_path / "runs" / "nap.jsonl"
+    process = run("--view", "--view-for", "0", "--port", "0", "--record", str(file))
     line = process.stdout.readline()
     assert line.startswith("watch it at http://127.0.0.1:")
     assert "token" not in line
@@ -81,11 +87,103 @@ def test_a_page_and_a_file_of_a_run(run, tmp_path):
 
 @pytest.mark.parametrize("what", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_viewer_that_is_killed_or_hangs_does_not_stop_the_mission(run, what):
-    process = run("--view", "--port", "0", "--control")
+    process = run("--view", "--view-for", "0", "--port", "0", "--control")
     assert "#token=" in process.stdout.readline()
     os.kill(viewer_of(process), what)
     process.stdout.read()
     assert process.wait(20) == 0
+
+
+def read_until(process, word):
+    """The lines up to the one with `word`, which is the last."""
+    lines = []
+    for line in process.stdout:
+        lines.append(line.rstrip())
+        if word in line:
+            return lines
+    raise AssertionError(f"no {word!r} in {lines}")
+
+
+def summary_at(address):
+    with urllib.request.urlopen(f"{address}api/machines", timeout=10) as answer:
+        (one,) = json.load(answer)
+    return one
+
+
+def test_the_page_stays_after_the_end_until_ctrl_c(run, tmp_path):
+    process = run("--view", "--port", "0")
+    address = process.stdout.readline().split()[-1]
+    recorded, still = read_until(process, "still at")[-2:]
+    assert address in still
+    assert "ended: succeeded" in still
+    deadline = time.monotonic() + 20
+    while (one := summary_at(address))["outcome"] is None:  # its last event is on the way
+        assert time.monotonic() < deadline
+    assert (one["outcome"], one["stale"]) == ("succeeded", None)
+    (kept,) = (tmp_path / "kept").iterdir()
+    assert recorded == f"recorded: smachpy view {kept}"
+    assert read_recording(kept).events[-1]["kind"] == "Finished"
+    process.send_signal(signal.SIGINT)
+    assert process.wait(20) == 0  # as the mission ended
+
+
+def test_the_page_stays_for_the_time_that_was_said(run):
+    process = run("--view", "--view-for", "0.3s", "--port", "0")
+    assert "for 0.3 s" in read_until(process, "still at")[-1]
+    assert process.wait(20) == 0
+
+
+def test_a_viewer_that_ends_ends_the_wait(run):
+    process = run("--view", "--port", "0")
+    read_until(process, "still at")
+    os.kill(viewer_of(process), signal.SIGKILL)
+    assert process.wait(20) == 0
+
+
+def test_ctrl_c_while_it_runs_ends_all(run):
+    process = run("--view", "--port", "0")
+    process.stdout.readline()
+    read_until(process, "WAIT")
+    process.send_signal(signal.SIGINT)
+    process.stdout.read()
+    assert process.wait(20) == 128 + signal.SIGINT
+
+
+@pytest.mark.parametrize("wrong", ["-1", "ten", "1d", "nan", "inf", "", "1e3", "5 m"])
+def test_a_time_for_the_page_that_is_none_is_refused(run, wrong):
+    process = run("--view", f"--view-for={wrong}")
+    assert f"got {wrong!r}; expected a time such as" in process.stdout.read()
+    assert process.wait(20) == 2
+
+
+def test_a_folder_of_runs_that_cannot_be_written_stops_nothing(run, tmp_path):
+    (tmp_path / "kept").write_text("a file")
+    process = run("--view", "--view-for", "0", "--port", "0")
+    assert "kept nowhere" in process.stdout.read()
+    assert process.wait(20) == 0
+
+
+def test_the_folder_of_runs_keeps_the_newest_and_what_is_not_its_own(tmp_path, monkeypatch):
+    monkeypatch.setenv(runs_folder.VARIABLE, str(tmp_path))
+    for number in range(runs_folder.KEPT + 3):
+        path = tmp_path / f"nap-20260101-000000-{number}.jsonl"
+        path.write_text("")
+        os.utime(path, (number, number))
+    (tmp_path / "mine.jsonl").write_text("")
+    new = runs_folder.new_file("../a b", 1_700_000_000_000_000_000)
+    assert new.parent == tmp_path
+    assert new.name.startswith(".._a_b-2023111")
+    left = {path.name for path in tmp_path.iterdir()}
+    assert len(left) == runs_folder.KEPT  # with mine, and room for the new one
+    assert "mine.jsonl" in left
+    assert "nap-20260101-000000-3.jsonl" not in left
+    assert f"nap-20260101-000000-{runs_folder.KEPT + 2}.jsonl" in left
+
+
+def test_the_folder_of_runs_goes_by_the_environment():
+    assert runs_folder.runs_folder({"XDG_STATE_HOME": "/s"}) == Path("/s/smachpy/runs")
+    assert runs_folder.runs_folder({"SMACHPY_RUNS": "/r", "XDG_STATE_HOME": "/s"}) == Path("/r")
+    assert runs_folder.runs_folder({}) == Path.home() / ".local/state/smachpy/runs"
 
 
 def test_a_run_is_not_overwritten_and_a_port_may_be_taken(run, tmp_path):

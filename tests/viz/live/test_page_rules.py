@@ -12,6 +12,7 @@ from dataclasses import asdict
 import pytest
 
 from viz.live import app
+from viz.live.machines import KEPT_RUNS
 
 pytestmark = pytest.mark.browser
 
@@ -63,6 +64,37 @@ def test_single_events_back_and_on_though_they_share_an_instant(served, look):
     assert on == seen[3::-1]
     page.keyboard.press(".")
     assert page.evaluate("() => smachpy.store.cursor.value") is None
+
+
+def test_a_restart_keeps_the_run_before_to_look_at(served, look):
+    machine = served.add("one", events=run()[:2])  # it is cut short in A
+    page = look(served.start())
+    history = {"problems": [], "base": None, "control": None, "description": asdict(machine.record)}
+    machine.reset({**history, "epoch": "another program", "events": served.events(run()[:1])})
+    page.click(".restarted button:text-is('Look at the one before')")
+    wait_for(page, "smachpy.store.facts.value?.after === 'one'")
+    assert lit(page) == ["/JOB", "/JOB/A"]
+    assert page.text_content("[data-testid=status]") == "recording ends here"
+    page.click("button:text-is('Show the newest')")
+    wait_for(page, "smachpy.store.facts.value?.name === 'one'")
+    wait_for(page, "!document.querySelector('.diagram g.active[data-path=\"/JOB/A\"]')")
+    page.click(".restarted [aria-label=dismiss]")
+    wait_for(page, "!document.querySelector('.restarted')")
+
+
+def test_so_many_runs_before_are_kept(served):
+    machine = served.add("one", events=run())
+    history = {"problems": [], "base": None, "control": None, "description": asdict(machine.record)}
+    for number in range(KEPT_RUNS + 2):
+        machine.reset({**history, "epoch": str(number), "events": served.events(run())})
+        machine.reset({**history, "epoch": str(number), "events": served.events(run())})
+    machine.reset({**history, "epoch": "not begun", "events": []})
+    machine.reset({**history, "epoch": "begun", "events": served.events(run())})
+    kept = [one for one in served.machines.summaries() if one["after"] == "one"]
+    assert len(kept) == KEPT_RUNS
+    assert all(one["outcome"] == "done" and one["recorded"] for one in kept)
+    assert machine.before in [one["name"] for one in kept]
+    assert machine.summary()["outcome"] == "done"
 
 
 GOAL = ("GoalSent", "/JOB/A", {"action": "drive", "goal_id": "1", "goal": {"x": 1}})

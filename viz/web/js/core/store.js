@@ -63,6 +63,8 @@ export const theme = signal(saved("theme", "system"));
 /** @type {Signal<Set<string>>} */
 export const opened = signal(new Set()); // paths of containers
 export const help = signal(false);
+/** @type {Signal<string | null>} */
+export const dismissed = signal(null); // the run before whose notice was closed
 export const actionsOpen = signal(false);
 /** @type {Signal<string | null>} */
 export const chosenAction = signal(null);

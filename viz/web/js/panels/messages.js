@@ -52,7 +52,21 @@ export function Overlay({ page }) {
     return html`<div class="banner preempted">You see an earlier instant.
       <button onClick=${() => page.timeline.live()}>Back to ${end}</button></div>`;
   }
+  const after = store.facts.value?.after;
+  if (after)
+    return html`<div class="banner other">You see an earlier run.
+      <button onClick=${() => choose(after)}>Show the newest</button></div>`;
   return html`<${PreemptBanner} page=${page} />`;
+}
+
+/** The program was started again; what it did before is kept. @param {{ before: string }} props */
+function RestartBanner({ before }) {
+  const dismiss = () => {
+    store.dismissed.value = before;
+  };
+  return html`<div class="banner other restarted" role="status">A new run began.
+    <button onClick=${() => choose(before)}>Look at the one before</button>
+    <button aria-label="dismiss" onClick=${dismiss}>\u2715</button></div>`;
 }
 
 /** A preempt under way: who asked, and what holds it up. @param {{ page: Page }} props */
@@ -60,7 +74,9 @@ function PreemptBanner({ page }) {
   store.tick.value;
   const now = store.nowMs();
   const found = store.run.now.ended == null ? store.run.preemptAt(now) : null;
-  if (!found || found.to !== null) return null;
+  const before = store.facts.value?.before;
+  if (!found || found.to !== null)
+    return before && store.dismissed.value !== before ? html`<${RestartBanner} before=${before} />` : null;
   const by = askerText(found.rows[0].asked);
   const more = found.holds.length - MOST_HOLDS;
   return html`<div class="banner preempted preempt-banner" role="status">

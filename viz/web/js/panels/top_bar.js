@@ -60,8 +60,8 @@ function Chooser() {
 
 /** @param {MachineSummary} machine */
 function statusOf({ recorded, stale, ended, outcome }) {
-  if (recorded) return "recording";
-  if (ended != null) return `ended: ${outcome}`;
+  if (ended != null) return `${recorded ? "recorded" : "ended"}: ${outcome}`;
+  if (recorded) return "recording, without an end";
   return stale != null ? "stale" : "running";
 }
 

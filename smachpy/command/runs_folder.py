@@ -1,0 +1,59 @@
+"""Where runs that somebody watches are kept: a folder of this user's, with the newest of them."""
+
+from __future__ import annotations
+
+import os
+import re
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from smachpy import log
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+VARIABLE: Final = "SMACHPY_RUNS"
+KEPT: Final = 100
+"""So many files of this folder are kept; only those with names of `new_file` are ever removed."""
+
+_NAME = re.compile(r".+-\d{8}-\d{6}-\d+\.jsonl")
+
+
+def runs_folder(environment: Mapping[str, str] = os.environ) -> Path:
+    """Return the folder: `SMACHPY_RUNS`, else `smachpy/runs` in the user's folder for state.
+
+    Sources: the XDG base directory specification names `XDG_STATE_HOME`, else `~/.local/state`.
+    """
+    if environment.get(VARIABLE):
+        return Path(environment[VARIABLE]).expanduser()
+    state = environment.get("XDG_STATE_HOME") or "~/.local/state"
+    return Path(state).expanduser() / "smachpy" / "runs"
+
+
+def new_file(mission: str, stamp_ns: int) -> Path | None:
+    """Return the name of a new file, and remove the oldest that are too many.
+
+    Args:
+        mission: Name of the mission.
+        stamp_ns: When it begins [ns since the epoch].
+
+    Returns:
+        None when nothing can be written there, which is logged.
+    """
+    folder = runs_folder()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        ours = [path for path in folder.iterdir() if _NAME.fullmatch(path.name)]
+        ours.sort(key=lambda path: path.stat().st_mtime)
+        for path in ours[: max(0, len(ours) - KEPT + 1)]:
+            path.unlink(missing_ok=True)
+        if not os.access(folder, os.W_OK):
+            raise PermissionError(13, "no permission to write")
+    except (OSError, RuntimeError) as error:  # RuntimeError: this user has no home
+        reason = getattr(error, "strerror", None) or error
+        log.logwarn(f"runs folder {str(folder)!r}: {reason}. This run is kept nowhere.")
+        return None
+    word = re.sub(r"[^A-Za-z0-9_.]", "_", mission)[:80]
+    began = datetime.fromtimestamp(stamp_ns / 1e9).astimezone()
+    return folder / f"{word}-{began:%Y%m%d-%H%M%S}-{os.getpid()}.jsonl"
