@@ -228,7 +228,7 @@ class DeserializationError(ActionlibError, ValueError):
     """Received bytes are not a message of the expected type.
 
     Attributes:
-        type_name: The type that was expected, "pkg/Type".
+        type_name: The type that was expected, "pkg/Type"; of ROS 2 "pkg/msg/Type".
         size: Number of bytes received.
         reason: What does not fit.
     """
@@ -237,9 +237,15 @@ class DeserializationError(ActionlibError, ValueError):
         self.type_name = type_name
         self.size = size
         self.reason = reason
+        ros2 = type_name.count("/") > 1
+        expected = (
+            "CDR. Try comparing type and type hash"
+            if ros2
+            else ("the ROS 1 serialisation. Try comparing type and md5")
+        )
         super().__init__(
             f"{type_name}: got {size} bytes that are no message of this type: {reason}; expected "
-            "the ROS 1 serialisation. Try comparing type and md5 at both ends."
+            f"{expected} at both ends."
         )
 
 

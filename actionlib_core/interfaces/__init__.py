@@ -4,9 +4,14 @@
     from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
     from actionlib_core.interfaces.std_srvs.srv import Trigger, TriggerResponse
 
+Classes of ROS 2 have CDR for bytes and a type hash for a checksum; `ros2` tells more of them:
+
+    from actionlib_core.interfaces.nav2_msgs.action import NavigateToPose
+    from actionlib_core.interfaces.ros2.geometry_msgs.msg import PoseStamped
+
 Your own definitions lie in folders in ROS layout (`my_pkg/action/Turn.action`), named in the
 environment variable `SMACHPY_INTERFACE_PATH` or given to `add_path`; `define_action` and its like
-take text. Bytes and checksums are those of ROS 1.
+take text. Bytes and checksums of the others are those of ROS 1.
 """
 
 from __future__ import annotations
@@ -14,10 +19,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, TypeVar, cast
 
 from actionlib_core.exceptions import DeserializationError, FieldError, InterfaceError
-from actionlib_core.interfaces._message import Message
+from actionlib_core.interfaces._message import Message, Ros2Message
 from actionlib_core.interfaces._modules import install as _install
 from actionlib_core.interfaces._modules import install_ros_names
 from actionlib_core.interfaces._registry import ServiceType, registry
+from actionlib_core.interfaces._ros2 import ActionParts, Ros2Action, Ros2Service, ros2_registry
 
 if TYPE_CHECKING:
     import os
@@ -27,6 +33,9 @@ __all__ = [
     "FieldError",
     "InterfaceError",
     "Message",
+    "Ros2Action",
+    "Ros2Message",
+    "Ros2Service",
     "ServiceType",
     "add_path",
     "define_action",
@@ -38,6 +47,7 @@ __all__ = [
     "get_service",
     "install_ros_names",
     "rihs01",
+    "ros2_action",
     "to_cdr",
 ]
 
@@ -117,6 +127,20 @@ def add_path(folder: str | os.PathLike[str]) -> None:
         InterfaceError: No such folder, or nothing of that kind in it.
     """
     registry.add_path(folder)
+
+
+def ros2_action(action: type[Ros2Action], distro: str | None = None) -> ActionParts:
+    """Return the services and topics of a ROS 2 action: type names, hashes and message classes.
+
+    Args:
+        action: Its class, `nav2_msgs.action.NavigateToPose` for example.
+        distro: Whose definitions to take instead of the class's own.
+
+    Raises:
+        InterfaceError: The distribution does not define it.
+    """
+    found = ros2_registry(distro or action._distro)
+    return found.parts(found.action(action._type))
 
 
 def rihs01(message: type[Message] | str) -> str:

@@ -11,6 +11,7 @@ STRUCT_CODES = {
     "byte": "b",
     "uint8": "B",
     "char": "B",
+    "octet": "B",
     "int16": "h",
     "uint16": "H",
     "int32": "i",

@@ -29,7 +29,7 @@ _TIMES: Final[dict[str, tuple[type[Time | Duration], str]]] = {
     "time": (Time, "II"),
     "duration": (Duration, "ii"),
 }
-_TEXT = "'utf-8', 'surrogateescape'"  # so that bytes which are not UTF-8 pass through unchanged
+TEXT = "'utf-8', 'surrogateescape'"  # so that bytes which are not UTF-8 pass through unchanged
 _ZERO_SIZE_LIMIT = 1_000_000  # elements without content, whose number no payload size bounds
 
 WRITE_ERRORS = (
@@ -44,11 +44,16 @@ WRITE_ERRORS = (
 """What the fast path raises on a value it does not take."""
 
 
-class _Source:
-    """Lines of a function and the names they use; `scope` becomes the function's globals."""
+class Source:
+    """Lines of a function and the names they use; `scope` becomes the function's globals.
 
-    def __init__(self, scope: dict[str, Any]) -> None:
+    Attributes:
+        order: Byte order of numbers, as `struct` spells it.
+    """
+
+    def __init__(self, scope: dict[str, Any], order: str = "<") -> None:
         self.scope = scope
+        self.order = order
         self.lines: list[str] = []
         self.indent = 1
         self._count = 0
@@ -73,7 +78,7 @@ class _Source:
         """Return the name of the `pack` or `unpack_from` of a struct."""
         name = f"{kind}_{codes.replace('?', 'o')}"
         if name not in self.scope:
-            self.scope[name] = getattr(struct.Struct(f"<{codes}"), kind)
+            self.scope[name] = getattr(struct.Struct(f"{self.order}{codes}"), kind)
         return name
 
     def function(self, signature: str) -> str:
@@ -88,7 +93,16 @@ def make_codecs(
     `write` raises one of `WRITE_ERRORS` on values that need converting or are wrong; `read` raises
     DeserializationError.
     """
-    scope: dict[str, Any] = {
+    scope = new_scope()
+    text = _write_source(definition, resolve, scope) + _read_source(cls, definition, resolve, scope)
+    # The text holds only names checked by the parser and numbers made here.
+    exec(compile(text, f"<codecs of {definition.name}>", "exec"), scope)  # noqa: S102
+    return scope["write"], scope["read"]
+
+
+def new_scope() -> dict[str, Any]:
+    """Return the names that generated functions use."""
+    return {
         "Mismatch": _arrays.MismatchError,
         "Bad": DeserializationError,
         "READ_ERRORS": (struct.error, _arrays.MismatchError, OverflowError, TypeError),
@@ -100,10 +114,6 @@ def make_codecs(
         "fixed": _arrays.fixed,
         "objects": _arrays.objects,
     }
-    text = _write_source(definition, resolve, scope) + _read_source(cls, definition, resolve, scope)
-    # The text holds only names checked by the parser and numbers made here.
-    exec(compile(text, f"<codecs of {definition.name}>", "exec"), scope)  # noqa: S102
-    return scope["write"], scope["read"]
 
 
 # --- writing -----------------------------------------------------------------------------------
@@ -112,7 +122,7 @@ def make_codecs(
 class _Items:
     """The parts of the payload in order: runs of packed scalars, and ready bytes."""
 
-    def __init__(self, source: _Source) -> None:
+    def __init__(self, source: Source) -> None:
         self._source = source
         self._parts: list[str] = []
         self._codes = ""
@@ -138,7 +148,7 @@ class _Items:
 
 
 def _write_source(definition: Definition, resolve: Resolve, scope: dict[str, Any]) -> str:
-    source = _Source(scope)
+    source = Source(scope)
     items = _Items(source)
     _write_fields(source, items, definition.fields, "m", resolve)
     parts = items.parts()
@@ -150,7 +160,7 @@ def _write_source(definition: Definition, resolve: Resolve, scope: dict[str, Any
 
 
 def _write_fields(
-    source: _Source, items: _Items, fields: tuple[Field, ...], owner: str, resolve: Resolve
+    source: Source, items: _Items, fields: tuple[Field, ...], owner: str, resolve: Resolve
 ) -> None:
     for field in fields:
         value = f"{owner}.{field.attribute}"
@@ -161,7 +171,7 @@ def _write_fields(
 
 
 def _write_one(
-    source: _Source, items: _Items, kind: FieldType, value: str, resolve: Resolve
+    source: Source, items: _Items, kind: FieldType, value: str, resolve: Resolve
 ) -> None:
     if kind.base == "bool":
         items.scalar("B", f"BOOLS[{value}]")
@@ -169,20 +179,20 @@ def _write_one(
         items.scalar(_arrays.STRUCT_CODES[kind.base], value)
     elif kind.base == "string":
         name = source.local("s")
-        source.add(f"{name} = {value}.encode({_TEXT})")
+        source.add(f"{name} = {value}.encode({TEXT})")
         items.scalar("I", f"len({name})")
         items.ready(name)
     elif kind.base in _TIMES:
         time_class, codes = _TIMES[kind.base]
-        name = _checked(source, value, time_class)
+        name = checked(source, value, time_class)
         items.scalar(codes, f"{name}.secs", f"{name}.nsecs")
     else:
         nested = resolve(kind.base)
-        name = _checked(source, value, nested)
+        name = checked(source, value, nested)
         _write_fields(source, items, nested._definition.fields, name, resolve)
 
 
-def _checked(source: _Source, value: str, cls: type) -> str:
+def checked(source: Source, value: str, cls: type) -> str:
     """Put `value` into a local, checked to be exactly of a class."""
     name = source.local()
     source.add(f"{name} = {value}")
@@ -191,7 +201,7 @@ def _checked(source: _Source, value: str, cls: type) -> str:
 
 
 def _write_array(
-    source: _Source, items: _Items, kind: FieldType, value: str, resolve: Resolve
+    source: Source, items: _Items, kind: FieldType, value: str, resolve: Resolve
 ) -> None:
     name = source.local("a")
     code = _arrays.STRUCT_CODES.get(kind.base)
@@ -215,7 +225,7 @@ def _write_array(
         items.ready(_write_loop(source, kind, name, resolve))
 
 
-def _write_loop(source: _Source, kind: FieldType, values: str, resolve: Resolve) -> str:
+def _write_loop(source: Source, kind: FieldType, values: str, resolve: Resolve) -> str:
     """Write the elements one by one; return the expression of their bytes."""
     element, parts = source.local("x"), source.local("p")
     source.add(f"{parts} = []")
@@ -223,7 +233,7 @@ def _write_loop(source: _Source, kind: FieldType, values: str, resolve: Resolve)
     source.indent += 1
     items = _Items(source)
     if kind.is_builtin:
-        _write_one(source, items, type(kind)(kind.base), element, resolve)
+        _write_one(source, items, kind.element, element, resolve)
     else:
         nested = resolve(kind.base)
         source.add(f"if {element}.__class__ is not {source.bind('C', nested)}: raise Mismatch")
@@ -237,10 +247,14 @@ def _write_loop(source: _Source, kind: FieldType, values: str, resolve: Resolve)
 # --- reading -----------------------------------------------------------------------------------
 
 
-class _Cursor:
-    """Emits reads in wire order and gathers runs of scalars into one `unpack_from`."""
+class Cursor:
+    """Emits reads in wire order and gathers runs of scalars into one `unpack_from`.
 
-    def __init__(self, source: _Source, offset: str) -> None:
+    A subclass for another format says how strings end, what an empty message holds, and where
+    values are aligned.
+    """
+
+    def __init__(self, source: Source, offset: str) -> None:
         self.source = source
         self._offset = offset  # "0" or a variable; then plus `_skip` bytes
         self._skip = 0
@@ -301,16 +315,31 @@ class _Cursor:
         self.moved()
         return f"d[{name}:p]"
 
+    def text(self, length: str) -> str:
+        """Move past a string of `length` bytes; return its expression."""
+        return f"str({self.take(length)}, {TEXT})"
+
+    def empty(self) -> None:
+        """Move past a message without fields."""
+
+    def align(self, size: int, *, unless_empty: str = "") -> None:
+        """Move to where a value of `size` bytes may stand.
+
+        Args:
+            size: A power of two.
+            unless_empty: The count of an array that, when empty, needs no alignment.
+        """
+
 
 def _read_source(
     cls: type[Message], definition: Definition, resolve: Resolve, scope: dict[str, Any]
 ) -> str:
-    source = _Source(scope)
+    source = Source(scope)
     source.add("if d.__class__ is not bytes: d = bytes(memoryview(d))")
     source.add("try:")
     source.indent += 1
-    cursor = _Cursor(source, "0")
-    result = _read_message(cursor, cls, definition.fields, resolve)
+    cursor = Cursor(source, "0")
+    result = read_message(cursor, cls, definition.fields, resolve)
     cursor.flush()
     end = cursor.position()
     source.add(f"if len(d) != {end}: raise Mismatch(f'it should end at byte {{{end}}}')")
@@ -323,12 +352,14 @@ def _read_source(
     return source.function("read(d)")
 
 
-def _read_message(
-    cursor: _Cursor, cls: type[Message], fields: tuple[Field, ...], resolve: Resolve
+def read_message(
+    cursor: Cursor, cls: type[Message], fields: tuple[Field, ...], resolve: Resolve
 ) -> str:
     """Read the fields; the object is put together in `cursor.builds`, when all is read."""
     name = cursor.source.local("o")
     cursor.builds.append(f"{name} = new({cursor.source.bind('C', cls)})")
+    if not fields:
+        cursor.empty()
     for field in fields:
         if field.type.is_array:
             value = _read_array(cursor, field.type, resolve)
@@ -338,13 +369,13 @@ def _read_message(
     return name
 
 
-def _read_one(cursor: _Cursor, kind: FieldType, resolve: Resolve) -> str:
+def _read_one(cursor: Cursor, kind: FieldType, resolve: Resolve) -> str:
     if kind.base in _arrays.STRUCT_CODES:
         return cursor.scalar(_arrays.STRUCT_CODES[kind.base])
     if kind.base == "string":
         length = cursor.scalar("I")
         name = cursor.source.local("s")
-        cursor.source.add(f"{name} = str({cursor.take(length)}, {_TEXT})")
+        cursor.source.add(f"{name} = {cursor.text(length)}")
         return name
     if kind.base in _TIMES:
         time_class, codes = _TIMES[kind.base]
@@ -358,26 +389,30 @@ def _read_one(cursor: _Cursor, kind: FieldType, resolve: Resolve) -> str:
         ]
         return name
     nested = resolve(kind.base)
-    return _read_message(cursor, nested, nested._definition.fields, resolve)
+    return read_message(cursor, nested, nested._definition.fields, resolve)
 
 
-def _read_array(cursor: _Cursor, kind: FieldType, resolve: Resolve) -> str:
+def _read_array(cursor: Cursor, kind: FieldType, resolve: Resolve) -> str:
     count = cursor.scalar("I") if kind.length is None else str(kind.length)
     name = cursor.source.local("a")
     code = _arrays.STRUCT_CODES.get(kind.base)
     if code == "B":
         cursor.source.add(f"{name} = {cursor.take(count)}")
     elif code and kind.length is not None:
+        cursor.align(struct.calcsize(code))
         cursor.flush()
         unpack = cursor.source.codec("unpack_from", f"{kind.length}{code}")
         cursor.source.add(f"{name} = list({unpack}(d, {cursor.position()}))")
         cursor.skip(kind.length * struct.calcsize(code))
     elif code:
-        cursor.flush()
         size = struct.calcsize(f"<{code}")
+        cursor.align(size, unless_empty=count)
+        cursor.flush()
         start = cursor.position()
         unpack = cursor.source.bind("unpack_from", struct.unpack_from)
-        cursor.source.add(f"{name} = list({unpack}(f'<{{{count}}}{code}', d, {start}))")
+        cursor.source.add(
+            f"{name} = list({unpack}(f'{cursor.source.order}{{{count}}}{code}', d, {start}))"
+        )
         cursor.source.add(f"p = {start} + {count} * {size}")
         cursor.moved()
     else:
@@ -385,7 +420,7 @@ def _read_array(cursor: _Cursor, kind: FieldType, resolve: Resolve) -> str:
     return name
 
 
-def _read_loop(cursor: _Cursor, kind: FieldType, name: str, count: str, resolve: Resolve) -> None:
+def _read_loop(cursor: Cursor, kind: FieldType, name: str, count: str, resolve: Resolve) -> None:
     """Read the elements one by one into the list `name`."""
     source = cursor.source
     cursor.settle()
@@ -393,8 +428,8 @@ def _read_loop(cursor: _Cursor, kind: FieldType, name: str, count: str, resolve:
     guard = len(source.lines)
     source.add(f"for _ in range({count}):")
     source.indent += 1
-    inner = _Cursor(source, "p")
-    element = _read_one(inner, type(kind)(kind.base), resolve)
+    inner = type(cursor)(source, "p")
+    element = _read_one(inner, kind.element, resolve)
     inner.settle()
     for line in inner.builds:
         source.add(line)

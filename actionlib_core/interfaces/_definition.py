@@ -11,7 +11,7 @@ import keyword
 import re
 import struct
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from actionlib_core.exceptions import InterfaceError
 from actionlib_core.interfaces._arrays import STRUCT_CODES
@@ -32,18 +32,26 @@ INTEGERS = {
     # Old names: in ROS 1 a byte is signed and a char is not.
     "byte": (-(2**7), 2**7 - 1),
     "char": (0, 2**8 - 1),
+    # ROS 2's `byte`, which has a type hash of its own.
+    "octet": (0, 2**8 - 1),
 }
 """Lowest and highest value of each integer type."""
 
 FLOATS = ("float32", "float64")
 TIMES = ("time", "duration")
-BUILTINS = (*INTEGERS, *FLOATS, "bool", "string", *TIMES)
+BUILTINS = tuple(n for n in (*INTEGERS, *FLOATS, "bool", "string", *TIMES) if n != "octet")
+"""ROS 1's built-in types."""
+OCTETS = ("uint8", "char", "octet")
+"""Types whose arrays are `bytes`."""
+_ROS2_SPELT = {"char": "uint8", "byte": "octet"}
+"""ROS 2's names of one byte: `char` is another name of `uint8`, `byte` is unsigned."""
+_ROS2_BUILTINS = (*(name for name in BUILTINS if name not in {*TIMES, "char"}), "octet")
 
 # Names a message class has for itself; a field of that name gets a trailing underscore.
 RESERVED = frozenset(
     {
         *("serialize", "deserialize", "to_bytes", "from_bytes"),
-        *("to_yaml", "from_yaml", "to_dict", "from_dict", "self"),
+        *("to_yaml", "from_yaml", "to_dict", "from_dict", "to_cdr", "from_cdr", "self"),
     }
 )
 
@@ -78,36 +86,54 @@ class FieldType:
         base: A built-in such as "float64", or a message type "pkg/Name".
         is_array: Whether it is an array.
         length: The length of a fixed array, None for a dynamic one.
+        most: The most elements a dynamic array may have (ROS 2's `type[<=N]`), None for any.
+        most_text: The most bytes a string may have (ROS 2's `string<=N`), None for any.
     """
 
     base: str
     is_array: bool = False
     length: int | None = None
+    most: int | None = None
+    most_text: int | None = None
+
+    @property
+    def element(self) -> FieldType:
+        """The type of an array's elements."""
+        return FieldType(self.base, most_text=self.most_text)
 
     @property
     def is_builtin(self) -> bool:
         """Whether the base is no message type."""
-        return self.base in BUILTINS
+        return self.base in BUILTINS or self.base == "octet"
 
     @property
     def suffix(self) -> str:
-        """The array part of the ROS spelling: "", "[]" or "[9]"."""
+        """The array part of the ROS spelling: "", "[]", "[9]" or "[<=9]"."""
         if not self.is_array:
             return ""
+        if self.most is not None:
+            return f"[<={self.most}]"
         return f"[{'' if self.length is None else self.length}]"
 
     def __str__(self) -> str:
-        return f"{self.base}{self.suffix}"
+        base = "byte" if self.base == "octet" else self.base
+        bound = "" if self.most_text is None else f"<={self.most_text}"
+        return f"{base}{bound}{self.suffix}"
 
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One field: its ROS name, the Python attribute (they differ for keywords), its type."""
+    """One field: its ROS name, the Python attribute (they differ for keywords), its type.
+
+    Attributes:
+        default: ROS 2's default value, None for that of the type.
+    """
 
     name: str
     type: FieldType
     position: Position = field(compare=False, repr=False)
     comment: str = ""
+    default: Any = None
 
     @property
     def attribute(self) -> str:
@@ -133,7 +159,10 @@ class Constant:
 
 @dataclass(frozen=True, slots=True)
 class Definition:
-    """A message type: name "pkg/Name", fields, constants and the text they were read from."""
+    """A message type: name, fields, constants and the text they were read from.
+
+    The name is "pkg/Name", for ROS 2's types "pkg/msg/Name" (or srv, action).
+    """
 
     name: str
     fields: tuple[Field, ...]
@@ -156,7 +185,7 @@ class Definition:
     @property
     def short_name(self) -> str:
         """The name without its package."""
-        return self.name.partition("/")[2]
+        return self.name.rpartition("/")[2]
 
 
 def attribute_of(name: str) -> str:
@@ -168,7 +197,8 @@ def parse(name: str, text: str, *, source: str = "", first_line: int = 1) -> Def
     """Read the text of one message.
 
     Args:
-        name: Its type, "pkg/Name"; bare types in the text belong to the same package.
+        name: Its type, "pkg/Name", or "pkg/msg/Name" for a text in ROS 2's dialect (bounded types,
+            default values, quoted strings); bare types in the text belong to the same package.
         text: The definition, lines of `type name` and `type NAME=value`.
         source: File name for error messages; the name when "".
         first_line: Number of the text's first line in that file.
@@ -176,7 +206,8 @@ def parse(name: str, text: str, *, source: str = "", first_line: int = 1) -> Def
     Raises:
         InterfaceError: Lines that cannot be read; all of them at once.
     """
-    return _Reader(name, source or name, first_line).read(text)
+    reader = _Ros2Reader if name.count("/") > 1 else _Reader
+    return reader(name, source or name, first_line).read(text)
 
 
 class _Reader:
@@ -196,7 +227,7 @@ class _Reader:
         head: list[str] = []
         block: list[str] = []
         for number, line in enumerate(text.splitlines(), self.first_line):
-            code, _, comment = line.partition("#")
+            code, comment = self._split(line)
             if not code.strip():
                 if "#" in line:
                     block.append(comment.strip())
@@ -214,6 +245,11 @@ class _Reader:
             head = head or block
         fields, constants = tuple(self.fields), tuple(self.constants)
         return Definition(self.name, fields, constants, text, self.source, " ".join(head))
+
+    def _split(self, line: str) -> tuple[str, str]:
+        """Return the part of a line before its comment, and the comment."""
+        code, _, comment = line.partition("#")
+        return code, comment
 
     def _line(self, at: Position, code: str, comment: str) -> None:
         words = code.split(None, 1)
@@ -305,6 +341,120 @@ class _Reader:
     def _problem(self, at: Position, column: int, what: str) -> None:
         where = Position(at.source, at.line, column, at.text)
         self.problems.append(where.problem(what))
+
+
+_ROS2_TYPE = re.compile(
+    r"(?:([a-z][a-z0-9_]*)/)?(?:(msg|srv|action)/)?([A-Za-z][A-Za-z0-9_]*)"
+    r"(?:<=(\d+))?(\[(<=)?(\d*)\])?\Z"
+)
+
+
+class _Ros2Reader(_Reader):
+    """Reads ROS 2's dialect.
+
+    Source: https://docs.ros.org/en/jazzy/Concepts/Basic/About-Interfaces.html
+    """
+
+    def _split(self, line: str) -> tuple[str, str]:
+        quote = ""
+        for index, character in enumerate(line):
+            if quote:
+                quote = "" if character == quote else quote
+            elif character == "#":
+                return line[:index], line[index + 1 :]
+            elif character in {'"', "'"}:
+                quote = character
+        return line, ""
+
+    def _type(self, at: Position, text: str) -> FieldType | None:
+        match = _ROS2_TYPE.match(text)
+        if match is None or (match[4] and match[3] != "string") or match[5] == "[<=]":
+            self._problem(at, at.column, self._malformed(text))
+            return None
+        if max(len(match[4] or ""), len(match[7] or "")) > _LENGTH_DIGITS:
+            self._problem(at, at.column, too_large("10^18 bytes"))
+            return None
+        package, kind, short = match[1], match[2], match[3]
+        count = int(match[7]) if match[7] else None
+        base = _ROS2_SPELT.get(short, short)
+        if package or base not in _ROS2_BUILTINS:
+            if short in {"time", "duration", "wstring"} and not package:
+                self._problem(at, at.column, self._unsupported(short))
+                return None
+            base = f"{package or self.package}/{kind or 'msg'}/{short}"
+        return FieldType(
+            base,
+            is_array=match[5] is not None,
+            length=None if match[6] else count,
+            most=count if match[6] else None,
+            most_text=int(match[4]) if match[4] else None,
+        )
+
+    @staticmethod
+    def _malformed(text: str) -> str:
+        hint = did_you_mean(text.strip("-:;,"), _ROS2_BUILTINS)
+        return (
+            f"malformed type {text!r}; expected a built-in type, `package/Name`, `string<=N`, or "
+            f"one of these with `[]`, `[N]` or `[<=N]` behind it.{hint}"
+        )
+
+    @staticmethod
+    def _unsupported(short: str) -> str:
+        if short == "wstring":
+            return "got type 'wstring', which cannot be used here; expected `string`"
+        return (
+            f"got ROS 1's type {short!r}; expected `builtin_interfaces/{short.title()}`, as ROS 2 "
+            "has it"
+        )
+
+    def _field(self, at: Position, column: int, kind: FieldType, name: str, comment: str) -> None:
+        name, _, value = name.partition(" ")
+        if not self._check_name(at, column, name, "field"):
+            return
+        default = None
+        if value.strip():
+            try:
+                default = _ros2_value(kind, value.strip())
+            except ValueError as error:
+                where = at.text.index(value.strip(), column)
+                self._problem(at, where, f"default value of {name}: {error}")
+                return
+        self.fields.append(Field(name, kind, at, comment, default))
+
+    def _constant(
+        self, at: Position, column: int, kind: FieldType, code: str, comment: str
+    ) -> None:
+        name, _, raw = (part.strip() for part in code.partition("="))
+        if kind.is_array or not kind.is_builtin:
+            what = f"a constant cannot be a {kind}; expected a number, bool or string type"
+            self._problem(at, at.column, what)
+            return
+        if not self._check_name(at, column, name, "constant"):
+            return
+        try:
+            value = _ros2_value(kind, raw)
+        except ValueError as error:
+            self._problem(at, at.text.index("=") + 1, f"constant {name}: {error}")
+            return
+        self.constants.append(Constant(name, kind.base, value, raw, comment))
+
+
+def _ros2_value(kind: FieldType, text: str) -> Any:
+    """Convert a default value or a constant; ValueError says what is wrong with it."""
+    if kind.is_array:
+        if not (kind.is_builtin and text.startswith("[") and text.endswith("]")):
+            raise ValueError(f"got {text!r}; expected `[value, ...]` for an array of built-in type")
+        # Commas within quotes do not separate.
+        parts = re.findall(r"\"[^\"]*\"|'[^']*'|[^,]+", text[1:-1])
+        values = [_ros2_value(kind.element, part.strip()) for part in parts if part.strip()]
+        if kind.length not in {None, len(values)} or len(values) > (kind.most or len(values)):
+            raise ValueError(f"got {len(values)} values; expected {kind}")
+        return bytes(values) if kind.base in OCTETS else values
+    if not kind.is_builtin:
+        raise ValueError(f"got {text!r}; expected none, the type is a message")
+    if kind.base == "string" and len(text) > 1 and text[0] == text[-1] and text[0] in "\"'":
+        text = text[1:-1]
+    return _constant_value(kind.base, text)
 
 
 def _constant_value(kind: str, text: str) -> bool | int | float | str:

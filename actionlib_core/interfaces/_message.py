@@ -9,11 +9,13 @@ from actionlib_core.interfaces import _arrays
 from actionlib_core.interfaces._codegen import WRITE_ERRORS, make_codecs
 from actionlib_core.interfaces._definition import attribute_of
 from actionlib_core.interfaces._values import (
+    ROS2_TIMES,
     coerced,
     default_source,
     filled,
     plain,
     short,
+    to_ros2_time,
     to_time,
 )
 from actionlib_core.interfaces._yaml import dump, load
@@ -50,8 +52,10 @@ class Message:
     __slots__: ClassVar[Any] = ()
     __hash__ = None  # type: ignore[assignment] # mutable
 
+    _wire: ClassVar[str] = "ros1"
+    """Whose bytes they are: "ros1", which smachpy's own wire speaks too, or "ros2"."""
     _type: ClassVar[str]
-    """ROS name, "pkg/Name"."""
+    """ROS name, "pkg/Name"; of ROS 2's classes "pkg/msg/Name" (or srv, action)."""
     _md5sum: ClassVar[str]
     """ROS 1 checksum of the definition, 32 hexadecimal digits."""
     _slot_types: ClassVar[list[str]]
@@ -161,13 +165,53 @@ class Message:
             setattr(self, name, value)
 
 
+class Ros2Message(Message):
+    """Base of the message classes of ROS 2: their bytes are CDR, their checksum is the type hash.
+
+    They differ from ROS 1's (`Message`) in this: a stamp is a `builtin_interfaces` message with
+    `sec` and `nanosec`, in whose place float seconds, `Time` and `Duration` may be given; fields
+    have the default values of their definition; arrays and strings may have bounds.
+    """
+
+    __slots__: ClassVar[Any] = ()
+    _wire: ClassVar[str] = "ros2"
+    _rihs01: ClassVar[str]
+    """Type hash, "RIHS01_" and 64 hexadecimal digits; computed when first asked for.
+
+    Source: ROS 2 REP 2016."""
+    _distro: ClassVar[str]
+    """The distribution whose definition this is, "jazzy" for example."""
+
+    def to_cdr(self) -> bytes:
+        """Return the CDR serialisation, little-endian, with its 4 bytes of encapsulation.
+
+        Padding is zero.
+
+        Raises:
+            FieldError: Values do not fit their fields; all of them are named.
+        """
+        return Message.to_bytes(self)
+
+    @classmethod
+    def from_cdr(cls, data: bytes) -> Self:
+        """Make a message from its CDR serialisation, of either byte order.
+
+        Bytes behind the end are ignored, as ROS 2's nodes do.
+
+        Raises:
+            DeserializationError: The bytes are no message of this type. It is a ValueError.
+        """
+        return cls._read(data)  # type: ignore[no-any-return] # generated code
+
+
 def make_class(
     definition: Definition,
     resolve: Callable[[str], type[Message]],
     *,
     module: str,
-    md5: str,
-    full_text: str,
+    base: type[Message] = Message,
+    make: Callable[..., tuple[Callable[[Any], bytes], Callable[[bytes], Any]]] = make_codecs,
+    **attributes: Any,
 ) -> type[Message]:
     """Make the class of a message.
 
@@ -175,8 +219,9 @@ def make_class(
         definition: What to make it of.
         resolve: Returns the class of a nested type.
         module: Value of `__module__`, under which the class can be imported (pickle needs it).
-        md5: Its ROS 1 checksum.
-        full_text: Value of `_full_text`.
+        base: What it derives from.
+        make: Makes its serialiser and deserialiser, with the arguments of `make_codecs`.
+        attributes: Further attributes of the class, such as its checksum.
     """
     slots = [field.attribute for field in definition.fields]
     names = [*slots, *(constant.attribute for constant in definition.constants)]
@@ -187,23 +232,22 @@ def make_class(
         "__module__": module,
         "__doc__": _documentation(definition),
         "_type": definition.name,
-        "_md5sum": md5,
         "_slot_types": [str(field.type) for field in definition.fields],
-        "_full_text": full_text,
         "_has_header": definition.has_header,
         "_definition": definition,
         "_nested": {
             f.type.base: resolve(f.type.base) for f in definition.fields if not f.type.is_builtin
         },
     }
+    namespace |= attributes
     namespace |= {constant.attribute: constant.value for constant in definition.constants}
     namespace["__init__"] = _make_init(definition, resolve)
-    cls: Any = type(definition.short_name, (Message,), namespace)
+    cls: Any = type(definition.short_name, (base,), namespace)
 
     def compile_codecs() -> None:
         # On first use: most classes are only ever parts of others, which have them unrolled. Two
         # threads here at once do the same work twice, nothing worse.
-        write, read = make_codecs(cls, definition, resolve)
+        write, read = make(cls, definition, resolve)
         cls._write = staticmethod(write)
         cls._read = staticmethod(read)
 
@@ -218,7 +262,7 @@ def make_class(
     cls._write = staticmethod(first_write)
     cls._read = staticmethod(first_read)
     for field in definition.fields:
-        if field.name != field.attribute and not hasattr(Message, field.name):
+        if field.name != field.attribute and not hasattr(base, field.name):
             # `getattr(message, "in")` works too, under the field's own name.
             setattr(cls, field.name, cls.__dict__[field.attribute])
     return cast("type[Message]", cls)
@@ -237,18 +281,22 @@ def _make_init(definition: Definition, resolve: Callable[[str], type[Message]]) 
         "_Time": Time,
         "_Duration": Duration,
         "_to_time": to_time,
+        "_to_ros2_time": to_ros2_time,
         "_take_extra": _take_extra,
     }
     names = [field.attribute for field in definition.fields]
     lines = [f"def __init__({', '.join(['self', *(f'{n}=None' for n in names), '**_extra'])}):"]
     for field in definition.fields:
         name = field.attribute
-        default = default_source(field.type, resolve, scope)
+        default = default_source(field, resolve, scope)
         given = name
         if not field.type.is_array and field.type.base in {"time", "duration"}:
             cls = "_Time" if field.type.base == "time" else "_Duration"
             given = f"{name} if {name}.__class__ is {cls} else _to_time({cls}, {name})"
             given = f"({given})"
+        elif not field.type.is_array and field.type.base in ROS2_TIMES:
+            cls = "_M_" + field.type.base.replace("/", "_")
+            given = f"({name} if {name}.__class__ is {cls} else _to_ros2_time({cls}, {name}))"
         lines.append(f"    self.{name} = {default} if {name} is None else {given}")
     lines.append("    if _extra: _take_extra(self, _extra)")
     # The text holds only names checked by the parser.
@@ -272,4 +320,4 @@ def _take_extra(message: Message, extra: dict[str, Any]) -> None:
         setattr(message, ours[name], value)
 
 
-__all__ = ["Buffer", "Message", "attribute_of", "make_class"]
+__all__ = ["Buffer", "Message", "Ros2Message", "attribute_of", "make_class"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import sys
 import types
 from importlib.abc import Loader, MetaPathFinder
@@ -11,18 +12,21 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.exceptions import InterfaceError
 from actionlib_core.interfaces._registry import ROOT, Registry, registry
+from actionlib_core.interfaces._ros2 import ros2_registry
 from actionlib_core.suggest import did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from actionlib_core.interfaces._sources import Kind
 
-_SECTIONS: dict[str, Kind] = {"msg": "msg", "srv": "srv"}
+    Choose = Callable[[str, str], Registry | None]
+
+_SECTIONS: dict[str, Kind] = {"msg": "msg", "srv": "srv", "action": "action"}
 
 
 class _Section(types.ModuleType):
-    """The module `pkg.msg` or `pkg.srv`; its classes are made when first named."""
+    """The module `pkg.msg`, `pkg.srv` or `pkg.action`; its classes are made when first named."""
 
     def __init__(self, name: str, package: str, kind: Kind, source: Registry) -> None:
         super().__init__(name, f"The {kind} classes of the ROS package {package}.")
@@ -50,14 +54,14 @@ class _Section(types.ModuleType):
 
 
 class _Package(types.ModuleType):
-    """The module `pkg`; it has `msg` and `srv`."""
+    """The module `pkg`; it has `msg`, `srv` and `action`."""
 
     def __init__(self, name: str, package: str) -> None:
         super().__init__(name, f"The ROS package {package}.")
         self.__path__: list[str] = []
 
     def __getattr__(self, name: str) -> Any:
-        if name in _SECTIONS:
+        if name in _SECTIONS and importlib.util.find_spec(f"{self.__name__}.{name}"):
             return importlib.import_module(f"{self.__name__}.{name}")
         if self.__name__ == "actionlib" and not name.startswith("_"):
             # Old programs say `import actionlib` for the clients and servers.
@@ -70,12 +74,13 @@ class _Finder(MetaPathFinder, Loader):
 
     Args:
         prefix: "actionlib_core.interfaces." or "" for plain ROS names.
-        source: Where the classes come from.
+        choose: Returns where the classes of a package and section ("" for the package itself) come
+            from, None when there are none.
     """
 
-    def __init__(self, prefix: str, source: Registry) -> None:
+    def __init__(self, prefix: str, choose: Choose) -> None:
         self.prefix = prefix
-        self._registry = source
+        self._choose = choose
 
     def find_spec(
         self,
@@ -88,9 +93,7 @@ class _Finder(MetaPathFinder, Loader):
         package, _, section = fullname.removeprefix(self.prefix).partition(".")
         if package.startswith("_") or section not in {"", *_SECTIONS}:
             return None
-        if not self._registry.sources.has_package(package) or self._is_found_elsewhere(
-            fullname, path
-        ):
+        if self._choose(package, section) is None or self._is_found_elsewhere(fullname, path):
             return None
         return ModuleSpec(fullname, self, is_package=not section)
 
@@ -106,7 +109,9 @@ class _Finder(MetaPathFinder, Loader):
         package, _, section = spec.name.removeprefix(self.prefix).partition(".")
         if not section:
             return _Package(spec.name, package)
-        return _Section(spec.name, package, _SECTIONS[section], self._registry)
+        source = self._choose(package, section)
+        assert source is not None
+        return _Section(spec.name, package, _SECTIONS[section], source)
 
     def exec_module(self, module: types.ModuleType) -> None:
         """Nothing to run: the module looks its classes up."""
@@ -114,7 +119,8 @@ class _Finder(MetaPathFinder, Loader):
 
 def install() -> None:
     """Make `actionlib_core.interfaces.<pkg>` importable; called by the package itself, once."""
-    _install(f"{ROOT}.")
+    _install(f"{ROOT}.", _either)
+    _install(f"{ROOT}.ros2.", _ros2)
 
 
 def install_ros_names() -> None:
@@ -132,10 +138,26 @@ def install_ros_names() -> None:
             f"install_ros_names: got geometry_msgs from {getattr(taken, '__file__', '?')} imported "
             "already; expected none. Try calling it first, or use the other installation"
         )
-    _install("")
+    _install("", _ros1)
 
 
-def _install(prefix: str) -> None:
+def _ros1(package: str, section: str) -> Registry | None:
+    return registry if section != "action" and registry.sources.has_package(package) else None
+
+
+def _ros2(package: str, section: str) -> Registry | None:
+    found = ros2_registry()
+    if section == "action" and not found.sources.names("action", package):
+        return None
+    return found if found.sources.has_package(package) else None
+
+
+def _either(package: str, section: str) -> Registry | None:
+    """Choose ROS 1 for what it has; only ROS 2 has `pkg.action`."""
+    return _ros1(package, section) or _ros2(package, section)
+
+
+def _install(prefix: str, choose: Choose) -> None:
     # First, so that no folder (of stubs, of definitions) is taken for a namespace package.
     if not any(isinstance(f, _Finder) and f.prefix == prefix for f in sys.meta_path):
-        sys.meta_path.insert(0, _Finder(prefix, registry))
+        sys.meta_path.insert(0, _Finder(prefix, choose))

@@ -45,7 +45,7 @@ class ServiceType:
     _response_class: ClassVar[type[Message]]
 
 
-class _UnknownTypeError(InterfaceError):
+class UnknownTypeError(InterfaceError):
     """No place defines the type `name`."""
 
     def __init__(self, text: str, name: str) -> None:
@@ -178,7 +178,7 @@ class Registry:
         if found is None:
             section, found = "srv", self.sources.service_part(package, short)
         if found is None:
-            raise _UnknownTypeError(self._unknown("message", full), full)
+            raise UnknownTypeError(self._unknown("message", full), full)
         source, first_line = found
         self._building.append(full)
         try:
@@ -189,8 +189,8 @@ class Registry:
                 definition,
                 self.message,
                 module=f"{ROOT}.{package}.{section}",
-                md5=self._md5(definition),
-                full_text=self._full_text(definition),
+                _md5sum=self._md5(definition),
+                _full_text=self._full_text(definition),
             )
         finally:
             self._building.pop()
@@ -210,7 +210,7 @@ class Registry:
                 continue
             try:
                 self.message(field.type.base)
-            except _UnknownTypeError as error:
+            except UnknownTypeError as error:
                 problems.append(field.position.problem(self._unknown("type", error.name)))
             except InterfaceError as error:
                 problems += error.problems

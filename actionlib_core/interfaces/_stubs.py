@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from actionlib_core.interfaces._definition import FLOATS, INTEGERS, FieldType
+from actionlib_core.interfaces._definition import FLOATS, INTEGERS, OCTETS, FieldType
 from actionlib_core.interfaces._registry import ROOT, Registry, ServiceType
 from actionlib_core.interfaces._sources import BUNDLED, Sources
 
@@ -152,7 +152,7 @@ class _Stub:
             return element, f"{element} | float" if kind.base in {"time", "duration"} else element
         self._needs.add("_Collection")
         taken = f"_Collection[{element}]"
-        if kind.base in {"uint8", "char"}:
+        if kind.base in OCTETS:
             return self._builtin("bytes", shadowed), taken
         return f"{self._builtin('list', shadowed)}[{element}]", taken
 

@@ -8,6 +8,7 @@ ones as their text here says. The only difference between the two worlds that CD
 from __future__ import annotations
 
 import functools
+import re
 import threading
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,8 @@ from actionlib_core.exceptions import DeserializationError, InterfaceError
 from actionlib_core.interfaces._registry import registry
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rosbags.typesys.store import Typestore
 
     from actionlib_core.interfaces._definition import Definition, Field
@@ -32,6 +35,47 @@ def rihs01(cls: type[Message]) -> str:
         store = _store()
         name = _added(store, cls)
         return store.hash_rihs01(name)
+
+
+def ros2_hash(name: str, fields_of: Callable[[str], list[tuple[str, str]]]) -> str:
+    """Return the type hash of a ROS 2 type, "pkg/kind/Name".
+
+    Args:
+        name: Its name.
+        fields_of: Returns (type, name) of each field of a type, message types as "pkg/kind/Name".
+
+    Source: ROS 2 REP 2016; the description and the digest are those of `rosbags`.
+    """
+    from rosbags.typesys.store import Typestore
+
+    # Nothing but the fields is asked of it, so that no classes need to be made.
+    store = Typestore()
+    waiting = [name]
+    while waiting:
+        current = waiting.pop()
+        if current in store.fielddefs:
+            continue
+        described = [(field, _described(kind)) for kind, field in fields_of(current)]
+        store.fielddefs[current] = ([], [(field, node) for field, (node, _) in described])
+        waiting += [used for _, (_, used) in described if used]
+    return store.hash_rihs01(name)
+
+
+_SPELT = re.compile(r"([\w/]+)(?:<=(\d+))?(?:\[(<=)?(\d*)\])?")
+
+
+def _described(kind: str) -> tuple[Any, str]:
+    """Return a field's type in the terms of rosbags, and the message type it uses ("" for none)."""
+    from rosbags.interfaces import Nodetype
+
+    match = _SPELT.fullmatch(kind)
+    assert match is not None
+    base, used = match[1], match[1] if "/" in match[1] else ""
+    inner: Any = (Nodetype.NAME, base) if used else (Nodetype.BASE, (base, int(match[2] or 0)))
+    if not kind.endswith("]"):
+        return inner, used
+    fixed = match[4] and not match[3]
+    return (Nodetype.ARRAY if fixed else Nodetype.SEQUENCE, (inner, int(match[4] or 0))), used
 
 
 def to_cdr(message: Message) -> bytes:

@@ -9,6 +9,8 @@ from actionlib_core.exceptions import FieldError
 from actionlib_core.interfaces._definition import (
     FLOATS,
     INTEGERS,
+    OCTETS,
+    Field,
     FieldType,
 )
 from actionlib_core.suggest import did_you_mean
@@ -22,6 +24,13 @@ if TYPE_CHECKING:
     AnyMessage = TypeVar("AnyMessage", bound=Message)
     AnyTime = TypeVar("AnyTime", bound=TimeValue)
 
+TEXT_CODEC = ("utf-8", "surrogateescape")
+ROS2_TIMES: dict[str, type[Time | Duration]] = {
+    "builtin_interfaces/msg/Time": Time,
+    "builtin_interfaces/msg/Duration": Duration,
+}
+"""ROS 2's messages that take what our `Time` and `Duration` fields take."""
+HEADERS = ("std_msgs/Header", "std_msgs/msg/Header")
 _LONGEST_SHOWN = 8  # array elements in a repr
 _LARGEST_FLOAT32 = 3.4028235677973366e38  # rounds to infinity from here on
 _DEFAULTS = {
@@ -32,19 +41,30 @@ _DEFAULTS = {
     "time": "_Time()",
     "duration": "_Duration()",
 }
-_OCTETS = ("uint8", "char")
 
 
 def default_source(
-    kind: FieldType, resolve: Callable[[str], type[Message]], scope: dict[str, Any]
+    field: Field, resolve: Callable[[str], type[Message]], scope: dict[str, Any]
 ) -> str:
     """Return the Python expression of a field's default value, its names put into `scope`."""
+    if isinstance(field.default, float):
+        return f"float({str(field.default)!r})"  # inf and nan have no literal
+    if field.default is not None:
+        return (
+            f"list({field.default!r})" if isinstance(field.default, list) else repr(field.default)
+        )
+    return _type_default(field.type, resolve, scope)
+
+
+def _type_default(
+    kind: FieldType, resolve: Callable[[str], type[Message]], scope: dict[str, Any]
+) -> str:
     if kind.is_array and kind.length is None:
-        return 'b""' if kind.base in _OCTETS else "[]"
+        return 'b""' if kind.base in OCTETS else "[]"
     if kind.is_array:
-        if kind.base in _OCTETS:
+        if kind.base in OCTETS:
             return f"bytes({kind.length})"
-        element = default_source(FieldType(kind.base), resolve, scope)
+        element = _type_default(kind.element, resolve, scope)
         if kind.is_builtin and kind.base not in {"time", "duration"}:
             return f"[{element}] * {kind.length}"
         return f"[{element} for _ in range({kind.length})]"
@@ -68,6 +88,13 @@ def to_time(cls: type[AnyTime], value: Any) -> AnyTime:
             raise TypeError(f"expected {cls.__name__.lower()}, got {value!r}")
         return cls(value.secs, value.nsecs)
     raise TypeError(f"expected {cls.__name__.lower()} (float seconds will do), got {_kind(value)}")
+
+
+def to_ros2_time(cls: type[AnyMessage], value: Any) -> AnyMessage:
+    """Convert what a `builtin_interfaces` Time or Duration takes besides itself; as `to_time`."""
+    plain_class = ROS2_TIMES[cls._type]
+    taken = to_time(plain_class, value)
+    return cls(sec=taken.secs, nanosec=taken.nsecs)  # type: ignore[call-arg] # its two fields
 
 
 # --- deep check --------------------------------------------------------------------------------
@@ -115,7 +142,7 @@ class _Check:
     def message(self, cls: type[Message], value: Any, path: str) -> Message | None:
         if isinstance(value, cls):
             return self._from_message(cls, value, path)
-        if self._from_plain and cls._type == "std_msgs/Header" and value == "auto":
+        if self._from_plain and cls._type in HEADERS and value == "auto":
             return cls(stamp=Time.now())  # type: ignore[call-arg] # Header has a stamp
         if self._from_plain and hasattr(value, "keys"):
             return self._from_mapping(cls, value, path)
@@ -153,7 +180,7 @@ class _Check:
     def _field(self, cls: type[Message], kind: FieldType, value: Any, path: str) -> Any:
         if kind.is_array:
             return self._array(cls, kind, value, path)
-        return self._one(cls, kind.base, value, path)
+        return self._one(cls, kind, value, path)
 
     def _array(self, cls: type[Message], kind: FieldType, value: Any, path: str) -> Any:
         if isinstance(value, (str, dict)) or not hasattr(value, "__len__"):
@@ -165,23 +192,38 @@ class _Check:
         if kind.length is not None and len(value) != kind.length:
             self._problem(path, f"expected {kind}, got {len(value)} elements")
             return None
+        if kind.most is not None and len(value) > kind.most:
+            self._problem(path, f"expected {kind}, got {len(value)} elements")
+            return None
         items: Iterable[Any] = value.tolist() if hasattr(value, "tolist") else value
         before = len(self._problems)
-        result = [self._one(cls, kind.base, x, f"{path}[{i}]") for i, x in enumerate(items)]
-        if kind.base in _OCTETS and len(self._problems) == before:
+        result = [self._one(cls, kind.element, x, f"{path}[{i}]") for i, x in enumerate(items)]
+        if kind.base in OCTETS and len(self._problems) == before:
             return bytes(result)
         return result
 
-    def _one(self, cls: type[Message], base: str, value: Any, path: str) -> Any:
-        if base not in _CONVERTERS:
-            return self.message(cls._nested[base], value, path)
+    def _one(self, cls: type[Message], kind: FieldType, value: Any, path: str) -> Any:
+        base = kind.base
         try:
+            if base in ROS2_TIMES and not isinstance(value, cls._nested[base]):
+                return self._ros2_time(cls._nested[base], value)
+            if base not in _CONVERTERS:
+                return self.message(cls._nested[base], value, path)
             if self._from_plain and base in {"time", "duration"}:
                 value = _plain_time(value)
-            return _CONVERTERS[base](value)
+            result = _CONVERTERS[base](value)
         except (TypeError, ValueError, OverflowError) as error:
             self._problem(path, str(error))
             return None
+        if kind.most_text is not None and len(result.encode(*TEXT_CODEC)) > kind.most_text:
+            self._problem(path, f"expected {kind}, got {len(result)} characters")
+            return None
+        return result
+
+    def _ros2_time(self, cls: type[AnyMessage], value: Any) -> AnyMessage:
+        if self._from_plain:
+            value = _plain_time(value)
+        return to_ros2_time(cls, value)
 
 
 def _kind(value: object) -> str:

@@ -11,13 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from actionlib_core.interfaces._definition import FLOATS, INTEGERS
+from actionlib_core.interfaces._definition import BUILTINS, FLOATS, INTEGERS
 from actionlib_core.interfaces._registry import Registry
 from actionlib_core.interfaces._sources import BUNDLED, Sources
 from actionlib_core.time import Duration, Time
 
 NESTED = ("geometry_msgs/Point", "std_msgs/Header", "geometry_msgs/Polygon", "std_msgs/Empty")
-BASES = (*INTEGERS, *FLOATS, "bool", "string", "time", "duration", *NESTED)
+BASES = (*BUILTINS, *NESTED)
 _serial = itertools.count()
 
 definitions = st.lists(

@@ -1,0 +1,94 @@
+"""ROS 2's message, service and action classes, by the definitions of a distribution.
+
+    from actionlib_core.interfaces.ros2.geometry_msgs.msg import PoseStamped
+    from actionlib_core.interfaces.ros2.std_srvs.srv import SetBool
+    from actionlib_core.interfaces.nav2_msgs.action import NavigateToPose
+
+    goal = NavigateToPose.Goal(pose=PoseStamped(header={"frame_id": "map"}))
+
+Packages that only ROS 2 has, and the module `action` of every package, need no `ros2` in between.
+Distributions define some types differently. The default is `SMACHPY_ROS2_DISTRO`, or "jazzy";
+`set_distro` changes it for classes that are asked for later.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from actionlib_core.interfaces._ros2 import (
+    DISTROS,
+    NO_HASH,
+    ActionParts,
+    Ros2Action,
+    Ros2Service,
+    ServiceParts,
+    TopicParts,
+    default_distro,
+    ros2_registry,
+    set_default_distro,
+)
+
+if TYPE_CHECKING:
+    from actionlib_core.interfaces._message import Ros2Message
+
+__all__ = [
+    "DISTROS",
+    "NO_HASH",
+    "ActionParts",
+    "Ros2Action",
+    "Ros2Service",
+    "ServiceParts",
+    "TopicParts",
+    "default_distro",
+    "distros_of",
+    "get_action",
+    "get_message",
+    "get_service",
+    "set_default_distro",
+]
+
+
+def get_message(name: str, distro: str | None = None) -> type[Ros2Message]:
+    """Return a message class by name, "geometry_msgs/msg/Pose" or "geometry_msgs/Pose".
+
+    Args:
+        name: Parts of services and actions have names too: "nav2_msgs/action/Spin_Goal",
+            "nav2_msgs/action/Spin_SendGoal_Request", "std_srvs/srv/SetBool_Request".
+        distro: Whose definition, None for the default.
+
+    Raises:
+        InterfaceError: Unknown there, or malformed.
+    """
+    return ros2_registry(distro).message(name)
+
+
+def get_service(name: str, distro: str | None = None) -> type[Ros2Service]:
+    """Return a service class, with its `Request` and `Response`; as `get_message`."""
+    found: type[Ros2Service] = ros2_registry(distro).service(name)
+    return found
+
+
+def get_action(name: str, distro: str | None = None) -> type[Ros2Action]:
+    """Return an action class, with its `Goal`, `Result` and `Feedback`; as `get_message`."""
+    found: type[Ros2Action] = ros2_registry(distro).action(name)
+    return found
+
+
+def distros_of(name: str, type_hash: str) -> list[str]:
+    """Return the distributions whose definition of a type has a hash.
+
+    Args:
+        name: As keys and tokens have it: "nav2_msgs/action/NavigateToPose_SendGoal",
+            "std_srvs/srv/SetBool", "nav_msgs/msg/Odometry".
+        type_hash: "RIHS01_...".
+    """
+    from actionlib_core.exceptions import InterfaceError
+
+    found = []
+    for distro in DISTROS:
+        try:
+            if ros2_registry(distro).hash(name) == type_hash:
+                found.append(distro)
+        except InterfaceError:
+            continue
+    return found
