@@ -35,7 +35,7 @@ from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus
 from actionlib_core.node import get_node
 from actionlib_core.time import Time
 from actionlib_core.wire.action_messages import ActionTypes
-from actionlib_core.wire.server_port import ActionServerPort
+from actionlib_core.wire.ports import make_server_port
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -356,6 +356,7 @@ class GoalKeeper:
         text = self._as_text(text, "set_accepted()")
         with self.lock:
             self.goals.step(handle.record, "accept", "set_accepted()", text)
+        self.port.send_accepted(_entry(handle.record))
         self.status.on_change()
 
     def request_cancel(self, handle: ServerGoalHandle) -> bool:
@@ -392,7 +393,7 @@ class GoalKeeper:
             FieldError: a field of `result` has a wrong type.
         """
         # Whatever can fail comes first: a goal that has ended must have a result.
-        body = self._pack(result, self.types.result, call)
+        body = self._pack_result(result, call)
         text = self._as_text(text, call)
         record = handle.record
         with self.lock:
@@ -425,23 +426,26 @@ class GoalKeeper:
 
     def send_result(self, entry: StatusEntry, result: Any) -> None:
         """Send a result under any status; errors as `finish`."""
-        self.port.send_result(entry, self._pack(result, self.types.result, "publish_result()"))
+        self.port.send_result(entry, self._pack_result(result, "publish_result()"))
 
     def send_feedback(self, entry: StatusEntry, feedback: Any) -> None:
         """Send feedback for a goal; errors as `finish`."""
-        body = self._pack(feedback, self.types.feedback, "publish_feedback()")
-        self.port.send_feedback(entry, body)
+        message = self._checked(feedback, self.types.feedback, "publish_feedback()")
+        self.port.send_feedback(entry, self.port.pack_feedback(message))
 
-    def _pack(self, message: Any, expected: Any, call: str) -> bytes:
+    def _pack_result(self, result: Any, call: str) -> bytes:
+        return self.port.pack_result(self._checked(result, self.types.result, call))
+
+    def _checked(self, message: Any, expected: Any, call: str) -> Any:
+        """Return a message of the type expected, one with default values for None."""
         if message is None:
-            message = expected()
-        elif not isinstance(message, expected):
+            return expected()
+        if not isinstance(message, expected):
             raise ActionException(
                 f"action '{self.name}': {call}: got {message!r}; expected a message of type "
                 f"{expected._type}."
             )
-        body: bytes = message.to_bytes()
-        return body
+        return message
 
     def _as_text(self, text: Any, call: str) -> str:
         """Return `text` as it can be sent; characters that UTF-8 does not have are escaped."""
@@ -520,8 +524,10 @@ class GoalKeeper:
 
     # -- what arrives (on the network's thread) ------------------------------------------------
 
-    def on_goal(self, goal_id: str, stamp_ns: int, content: Any, client: str) -> None:
+    def on_goal(self, goal_id: str, stamp_ns: int, content: Any, client: str) -> bool:
         """Handle a goal: a new one goes to the server's code, of a known one is said what is known.
+
+        Returns whether it is new and has been taken.
 
         Nothing here waits for a link that is full: a client that misses the answer asks again.
         """
@@ -530,28 +536,30 @@ class GoalKeeper:
         record = ServerGoal(goal_id, stamp_ns or self._clock.time_ns(), client=client)
         with self.lock:
             if self.stopped:
-                return
+                return False
             arrival, known = self.goals.on_goal(record, self._clock.now())
             if arrival is Arrival.LATE:
-                return
+                return False
             handle = record.tag = ServerGoalHandle(self, record, content)
             if arrival is Arrival.RECALLED:
-                record.result = self.types.result().to_bytes()
+                record.result = self._pack_result(None, "the cancel that came first")
             past = self.goals.past_status(goal_id) or Status.LOST
         if arrival is Arrival.NEW:
             self._deliver_goal(handle)
-            return
+            return True
         if known is None:
             self.port.send_status([_past_entry(goal_id, past)])
         elif isinstance(known.result, bytes):
             self.port.send_result(_entry(known), known.result, wait=False)
         self.status.on_change()
+        return False
 
-    def on_cancel(self, goal_id: str, stamp_ns: int) -> None:
-        """Handle a cancel."""
+    def on_cancel(self, goal_id: str, stamp_ns: int) -> list[StatusEntry]:
+        """Handle a cancel; return the goals that are now asked to stop."""
         now_ns = self._clock.time_ns()
         with self.lock:
             asked = self.goals.on_cancel(goal_id, stamp_ns, self._clock.now(), now_ns)
+            entries = [_entry(goal) for goal in asked]
         if stamp_ns > now_ns + FUTURE_NS:
             log.warning(
                 "action '%s': a cancel of goals up to %.1f s in the future counts as one up to "
@@ -560,6 +568,7 @@ class GoalKeeper:
                 (stamp_ns - now_ns) / 1e9,
             )
         self._cancel(asked)
+        return entries
 
     def on_client_lost(self, client: str) -> None:
         """Handle the death of a client."""
@@ -680,7 +689,7 @@ class ActionServer:
             self.node,
             self.ns,
             self.types,
-            ActionServerPort(self.node, self.ns, self.types),
+            make_server_port(self.node, self.ns, self.types),
             on_client_lost=on_client_lost,
             result_timeout=keep,
             deliver_goal=goal_cb if direct else self._deliver_goal,

@@ -161,6 +161,19 @@ class ServerPort(Protocol):
     def is_farewell_heard(self) -> bool:
         """Return whether all clients have answered the farewell."""
 
+    def pack_result(self, result: Any) -> bytes:
+        """Return the bytes of a result message.
+
+        Raises:
+            FieldError: a field of it has a wrong type.
+        """
+
+    def pack_feedback(self, feedback: Any) -> bytes:
+        """Return the bytes of a feedback message; errors as `pack_result`."""
+
+    def send_accepted(self, entry: StatusEntry) -> None:
+        """Say that a goal is accepted, where its client waits for that; a status follows."""
+
     def send_status(self, entries: Iterable[StatusEntry]) -> None:
         """Send the status list; dropped when the network is slow, as it is sent again."""
 
@@ -180,17 +193,21 @@ class ServerPort(Protocol):
 class ServerListener(Protocol):
     """What a server does about what arrives."""
 
-    def on_goal(self, goal_id: str, stamp_ns: int, content: Any, client: str) -> None:
-        """Handle a goal; `client` is the session that sent it."""
+    def on_goal(self, goal_id: str, stamp_ns: int, content: Any, client: str) -> bool:
+        """Handle a goal; `client` is who sent it, as in `on_client_lost`.
 
-    def on_cancel(self, goal_id: str, stamp_ns: int) -> None:
-        """Handle a cancel."""
+        Returns:
+            Whether it is new and has been taken.
+        """
+
+    def on_cancel(self, goal_id: str, stamp_ns: int) -> list[StatusEntry]:
+        """Handle a cancel; return the goals that are asked to stop and were not before."""
 
     def on_acknowledged(self, goal_ids: list[str]) -> None:
         """Handle acknowledged results; `is_farewell_heard` may have changed too."""
 
     def on_client_lost(self, client: str) -> None:
-        """Handle the death of a client's session."""
+        """Handle the death of a client, or of its session."""
 
     def on_conflict(self, error: Any) -> None:
         """Stop: an older server has the name."""

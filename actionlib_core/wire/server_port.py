@@ -142,6 +142,15 @@ class ActionServerPort:
         payload = pack_statuses(self._clock.time_ns(), taken, self._own_key)
         self._publisher(self._keys.status, GoalStatusArray, RESULT).put(payload)
 
+    def pack_result(self, result: Any) -> bytes:
+        return _bytes_of(result)
+
+    def pack_feedback(self, feedback: Any) -> bytes:
+        return _bytes_of(feedback)
+
+    def send_accepted(self, entry: StatusEntry) -> None:
+        """Send nothing: the status list says it."""
+
     def send_status(self, entries: Iterable[StatusEntry]) -> None:
         payload = pack_statuses(self._clock.time_ns(), entries)
         self._publisher(self._keys.status, GoalStatusArray, STATUS).put(payload)
@@ -289,3 +298,8 @@ class ActionServerPort:
                 self._listener.on_acknowledged([])
             if not any(end.session == client.session for end in self._clients.values()):
                 self._listener.on_client_lost(client.session)
+
+
+def _bytes_of(message: Any) -> bytes:
+    body: bytes = message.to_bytes()
+    return body
