@@ -50,10 +50,10 @@ class ActionTypes:
 
     Attributes:
         action: XAction, as the user gave it.
-        action_goal: XActionGoal, with header and goal id around the goal; None for ROS 2, which
-            has none.
-        action_result: XActionResult, with header and status around the result; the same.
-        action_feedback: XActionFeedback, with header and status around the feedback; the same.
+        action_goal: XActionGoal, with header and goal id around the goal; that of a ROS 2 action
+            never travels, nor do the next two.
+        action_result: XActionResult, with header and status around the result.
+        action_feedback: XActionFeedback, with header and status around the feedback.
         goal: XGoal.
         result: XResult.
         feedback: XFeedback.
@@ -74,8 +74,6 @@ class ActionTypes:
         Raises:
             ActionException: `spec` is not the class of an action.
         """
-        if getattr(spec, "_wire", "ros1") == "ros2":
-            return cls(spec, None, None, None, spec.Goal, spec.Result, spec.Feedback)
         try:
             example = spec()
             parts = example.action_goal, example.action_result, example.action_feedback

@@ -102,7 +102,8 @@ def test_a_goal_from_acceptance_to_result(world: World) -> None:
     pending = client.send(uuid, Fibonacci.Goal(order=5))
     world.clock.sleep(0.01)
     (goal,) = world.goals
-    assert goal.get_goal() == Fibonacci.Goal(order=5)
+    assert goal.get_goal() == goal.goal.goal == Fibonacci.Goal(order=5)
+    assert goal.goal.goal_id.id == uuid.hex()
     assert not pending.done.is_set()
     now_ns = world.clock.time_ns()
     goal.set_accepted()
