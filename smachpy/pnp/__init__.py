@@ -1,0 +1,29 @@
+"""Petri Net Plans: nets whose places run actions, beside state machines.
+
+from smachpy import pnp
+
+net, problems = pnp.read_pnml("fetch.pnml")
+plan = pnp.understand(net, problems=problems)
+for problem in pnp.check_plan(plan):
+    print(problem)
+"""
+
+from __future__ import annotations
+
+from smachpy.pnp.check import check_plan as check_plan
+from smachpy.pnp.conditions import Condition as Condition
+from smachpy.pnp.conditions import ConditionError as ConditionError
+from smachpy.pnp.net import Arc as Arc
+from smachpy.pnp.net import Net as Net
+from smachpy.pnp.net import Place as Place
+from smachpy.pnp.net import Transition as Transition
+from smachpy.pnp.plan import Plan as Plan
+from smachpy.pnp.plan import understand as understand
+from smachpy.pnp.pnml import parse_pnml as parse_pnml
+from smachpy.pnp.pnml import pnml_text as pnml_text
+from smachpy.pnp.pnml import read_pnml as read_pnml
+from smachpy.pnp.pnml import write_pnml as write_pnml
+from smachpy.pnp.problems import PlanError as PlanError
+from smachpy.pnp.problems import PlanProblem as PlanProblem
+from smachpy.pnp.reach import Reachable as Reachable
+from smachpy.pnp.reach import explore as explore

@@ -1,0 +1,189 @@
+"""What is wrong with a plan, found without running it; no threads, time or I/O."""
+
+from __future__ import annotations
+
+from collections import Counter
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+from smachpy.pnp.plan import problem_of
+from smachpy.pnp.reach import explore
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from smachpy.pnp.conditions import Condition
+    from smachpy.pnp.plan import Plan
+    from smachpy.pnp.problems import PlanProblem
+    from smachpy.pnp.reach import Reachable
+
+MOST_SHOWN = 20
+"""Dead transitions and places that are never marked, told one by one."""
+
+
+def check_plan(plan: Plan) -> tuple[PlanProblem, ...]:
+    """Return what is wrong with a plan: its labels, and what its net can do.
+
+    Guards count as what may be true or false at any time, so a run that is shown may be one that
+    they rule out.
+    """
+    reached = explore(plan.net)
+    return (*plan.problems, *_net_problems(plan, reached))
+
+
+def _net_problems(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
+    net = plan.net
+    if not net.initial:
+        text = "got no token in any place; expected an initial marking."
+        yield problem_of(net, "no-token", "error", text)
+        return
+    if reached.covering is not None:
+        yield _unbounded(plan, reached)
+        return
+    if not reached.complete:
+        text = f"has more than {len(reached.came) - 1} markings; looked at no more."
+        yield problem_of(net, "too-many", "note", text)
+    yield from _ends(plan, reached)
+    if reached.complete:
+        yield from _never(plan, reached)
+    yield from _shared(plan, reached)
+    yield from _races(plan, reached)
+
+
+def _unbounded(plan: Plan, reached: Reachable) -> PlanProblem:
+    assert reached.covering is not None
+    before, marking = reached.covering
+    place = next(iter(Counter(marking) - Counter(before)))
+    text = f"can hold any number of tokens: {plan.net.words(before)} leads to more of the same."
+    run = reached.run_to(marking)
+    return problem_of(
+        plan.net,
+        "unbounded",
+        "error",
+        text,
+        place=place,
+        hint="Expected a bound.",
+        run=run,
+        marking=marking,
+    )
+
+
+def _ends(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
+    """Yield what is wrong with the ends of the plan."""
+    net = plan.net
+    if not plan.goals:
+        text = "has no goal place: the plan ends with 'fail' where nothing can fire any more."
+        yield problem_of(net, "no-goal", "note", text, hint="Try the label 'goal'.")
+    elif reached.complete and not any(map(plan.is_goal, reached.came)):
+        names = [net.name_of(place) for place in plan.goals]
+        text = f"no firing sequence leads to the goal: expected tokens in all of {names} at once."
+        yield problem_of(net, "unreachable-goal", "error", text, place=next(iter(plan.goals)))
+    if plan.fails and reached.complete and not any(map(plan.is_fail, reached.came)):
+        names = [net.name_of(place) for place in plan.fails]
+        text = f"no firing sequence leads to the failed plan: expected tokens in all of {names}."
+        yield problem_of(net, "unreachable-fail", "warning", text, place=next(iter(plan.fails)))
+    stuck = [m for m in reached.dead if not (plan.is_goal(m) or plan.is_fail(m))]
+    if stuck and plan.goals:
+        more = f" So are {len(stuck) - 1} more markings." if len(stuck) > 1 else ""
+        words = net.words(stuck[0])
+        text = f"nothing can fire in {words}, which is no goal; expected a way on.{more}"
+        place = stuck[0][0] if stuck[0] else -1
+        yield problem_of(
+            net,
+            "deadlock",
+            "error",
+            text,
+            place=place,
+            run=reached.run_to(stuck[0]),
+            marking=stuck[0],
+        )
+
+
+def _never(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
+    net = plan.net
+    transitions = [
+        t for t in range(len(net.transitions)) if t not in reached.fired and net.inputs[t]
+    ]
+    for number in transitions[:MOST_SHOWN]:
+        text = "can never fire: no firing sequence fills its places."
+        yield problem_of(net, "dead-transition", "warning", text, transition=number)
+    places = [p for p in range(len(net.places)) if p not in reached.most]
+    for number in places[:MOST_SHOWN]:
+        text = "is never marked: no firing sequence puts a token there."
+        yield problem_of(net, "unmarked-place", "warning", text, place=number)
+    hidden = len(transitions[MOST_SHOWN:]) + len(places[MOST_SHOWN:])
+    if hidden:
+        text = f"has {hidden} more places and transitions that no firing sequence gets to."
+        yield problem_of(net, "dead-transition", "warning", text)
+
+
+def _shared(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
+    """Yield the actions that two tokens share."""
+    net = plan.net
+    for name, known in plan.executables.items():
+        places = known.places
+        if len(places) == 1 and reached.most.get(places[0], 0) <= 1:
+            continue
+        own = set(places)
+        for marking in reached.came:
+            marked = [place for place in marking if place in own]
+            if len(marked) > 1:
+                labels = sorted({net.places[place].id for place in marked})
+                text = (
+                    f"{name!r} runs once for {len(marked)} tokens, in {labels}: what ends it for "
+                    "one ends it for all. Expected one token, or names that differ."
+                )
+                yield problem_of(
+                    net,
+                    "shared-name",
+                    "warning",
+                    text,
+                    place=marked[-1],
+                    run=reached.run_to(marking),
+                    marking=marking,
+                )
+                break
+
+
+def _races(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
+    """Yield pairs of ends of one exec place of which nothing decides which one fires."""
+    net = plan.net
+    for name, known in plan.executables.items():
+        for place in known.places:
+            ends = [
+                t
+                for t in net.consumers[place]
+                if (name, "end") in plan.calls[t] and t in reached.fired
+            ]
+            for one, other in combinations(ends, 2):
+                if not _may_both_hold(plan.conditions[one], plan.conditions[other]):
+                    continue
+                marking = next(
+                    (
+                        m
+                        for m in reached.came
+                        if place in m and net.has_tokens(m, one) and net.has_tokens(m, other)
+                    ),
+                    None,
+                )
+                if marking is None:
+                    continue
+                text = (
+                    f"races with {net.transition_name(other)!r} (transition "
+                    f"{net.transitions[other].id!r}) for the token of {name!r}; the first in the "
+                    "file wins. Expected conditions that rule each other out."
+                )
+                yield problem_of(
+                    net,
+                    "race",
+                    "warning",
+                    text,
+                    transition=one,
+                    run=reached.run_to(marking),
+                    marking=marking,
+                )
+
+
+def _may_both_hold(one: Condition | None, other: Condition | None) -> bool:
+    """Tell whether two ends race: they have the same condition, or one has none."""
+    return one is None or other is None or one == other

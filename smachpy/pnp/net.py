@@ -1,0 +1,200 @@
+"""Petri nets: places, transitions, arcs, markings and what fires; no threads, time or I/O.
+
+A marking is the sorted tuple of the marked places' numbers, a place with two tokens twice. Plans
+have few tokens and up to thousands of places, so that firing costs as much as there are tokens.
+"""
+
+from __future__ import annotations
+
+from bisect import insort
+from collections import Counter
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, TypeAlias
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+Marking: TypeAlias = tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A place.
+
+    Attributes:
+        id: Its id, unique among all nodes of the net.
+        name: Its label; for a plan see `smachpy.pnp.labels`.
+        tokens: Its tokens in the initial marking.
+        line: Of its file; 0 when it is in none.
+    """
+
+    id: str
+    name: str = ""
+    tokens: int = 0
+    line: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """A transition; attributes as those of a place."""
+
+    id: str
+    name: str = ""
+    line: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Arc:
+    """An arc between nodes, by their ids: one is a place, one a transition."""
+
+    source: str
+    target: str
+    weight: int = 1
+
+
+@dataclass(frozen=True)
+class Net:
+    """A place/transition net with weights.
+
+    Attributes:
+        name: Its name.
+        places: In the order of the document, which is the order of all that follows.
+        transitions: Likewise.
+        arcs: Two between the same nodes count as one with both weights.
+        file: Where it was read; "" when it was built.
+
+    Raises:
+        ValueError: an id is used twice, or an arc does not join a place and a transition.
+    """
+
+    name: str
+    places: tuple[Place, ...]
+    transitions: tuple[Transition, ...]
+    arcs: tuple[Arc, ...]
+    file: str = ""
+
+    def __post_init__(self) -> None:
+        nodes: tuple[Place | Transition, ...] = (*self.places, *self.transitions)
+        count = Counter(node.id for node in nodes)
+        twice = sorted(name for name, number in count.items() if number > 1)
+        if twice:
+            raise ValueError(f"net {self.name!r}: ids: got {twice} twice; expected unique ids.")
+        for arc in self.arcs:
+            if (arc.source in self.place_numbers) == (arc.target in self.place_numbers) or not {
+                arc.source,
+                arc.target,
+            } <= set(count):
+                raise ValueError(
+                    f"net {self.name!r}: arc: got {arc.source!r} -> {arc.target!r}; expected a "
+                    "place and a transition of the net."
+                )
+            if arc.weight < 1:
+                raise ValueError(f"net {self.name!r}: arc: got weight {arc.weight}; expected >= 1.")
+
+    @cached_property
+    def place_numbers(self) -> dict[str, int]:
+        """Id of a place -> its number."""
+        return {place.id: number for number, place in enumerate(self.places)}
+
+    @cached_property
+    def transition_numbers(self) -> dict[str, int]:
+        """Id of a transition -> its number."""
+        return {transition.id: number for number, transition in enumerate(self.transitions)}
+
+    @cached_property
+    def inputs(self) -> tuple[tuple[tuple[int, int], ...], ...]:
+        """For each transition: pairs (place, weight) that it takes from."""
+        return self._weights(into_transition=True)
+
+    @cached_property
+    def outputs(self) -> tuple[tuple[tuple[int, int], ...], ...]:
+        """For each transition: pairs (place, weight) that it gives to."""
+        return self._weights(into_transition=False)
+
+    def _weights(self, *, into_transition: bool) -> tuple[tuple[tuple[int, int], ...], ...]:
+        found: list[Counter[int]] = [Counter() for _ in self.transitions]
+        for arc in self.arcs:
+            place, transition = arc.source, arc.target
+            if not into_transition:
+                place, transition = transition, place
+            if transition in self.transition_numbers:
+                number = self.transition_numbers[transition]
+                found[number][self.place_numbers[place]] += arc.weight
+        return tuple(tuple(sorted(counter.items())) for counter in found)
+
+    @cached_property
+    def consumers(self) -> tuple[tuple[int, ...], ...]:
+        """For each place: the transitions that take from it."""
+        found: list[list[int]] = [[] for _ in self.places]
+        for number, pairs in enumerate(self.inputs):
+            for place, _ in pairs:
+                found[place].append(number)
+        return tuple(map(tuple, found))
+
+    @cached_property
+    def producers(self) -> tuple[tuple[int, ...], ...]:
+        """For each place: the transitions that give to it."""
+        found: list[list[int]] = [[] for _ in self.places]
+        for number, pairs in enumerate(self.outputs):
+            for place, _ in pairs:
+                found[place].append(number)
+        return tuple(map(tuple, found))
+
+    @cached_property
+    def initial(self) -> Marking:
+        """The initial marking."""
+        return tuple(n for n, place in enumerate(self.places) for _ in range(place.tokens))
+
+    def enabled(self, marking: Marking) -> list[int]:
+        """Return the transitions that have their tokens, in the order of the document.
+
+        One that takes from no place is never among them, as in PNP.
+        """
+        candidates = {t for place in dict.fromkeys(marking) for t in self.consumers[place]}
+        return sorted(t for t in candidates if self.has_tokens(marking, t))
+
+    def has_tokens(self, marking: Marking, transition: int) -> bool:
+        """Tell whether the places that a transition takes from hold enough tokens."""
+        return all(
+            place in marking if weight == 1 else marking.count(place) >= weight
+            for place, weight in self.inputs[transition]
+        )
+
+    def fire(self, marking: Marking, transition: int) -> Marking:
+        """Return the marking after a transition that has its tokens."""
+        tokens = list(marking)
+        for place, weight in self.inputs[transition]:
+            for _ in range(weight):
+                tokens.remove(place)
+        for place, weight in self.outputs[transition]:
+            for _ in range(weight):
+                insort(tokens, place)
+        return tuple(tokens)
+
+    def marking_of(self, ids: Iterable[str]) -> Marking:
+        """Return the marking with one token for each id.
+
+        Raises:
+            KeyError: there is no such place.
+        """
+        return tuple(sorted(self.place_numbers[name] for name in ids))
+
+    def words(self, marking: Marking) -> str:
+        """Return a marking for people: "{ready, item(2)}"."""
+        return "{" + ", ".join(self._counted(marking)) + "}"
+
+    def _counted(self, marking: Marking) -> Iterator[str]:
+        for place, count in Counter(marking).items():
+            name = self.name_of(place)
+            yield name if count == 1 else f"{name} ({count} tokens)"
+
+    def name_of(self, place: int) -> str:
+        """Return the label of a place, its id when it has none or shares it."""
+        node = self.places[place]
+        return node.name.strip() or node.id
+
+    def transition_name(self, transition: int) -> str:
+        """Return the label of a transition, its id when it has none."""
+        node = self.transitions[transition]
+        return node.name.strip() or node.id

@@ -1,0 +1,356 @@
+"""PNML files, read and written: the dialect of PNP (JARP, PNPgenerator) and PNML 2009.
+
+Sources: the loader of PetriNetPlans 1.4; ISO/IEC 15909-2:2011, place/transition nets.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
+
+from smachpy.pnp.net import Arc, Net, Place, Transition
+from smachpy.pnp.problems import PlanProblem, raise_errors
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
+
+    from smachpy.pnp.labels import Severity
+
+Dialect: TypeAlias = Literal["pnp", "2009"]
+
+NAMESPACE: Final = "http://www.pnml.org/version-2009/grammar/pnml"
+PT_NET: Final = "http://www.pnml.org/version-2009/grammar/ptnet"
+MOST_TOKENS: Final = 1000
+"""Of one place or arc: more is a mistake, or somebody who wants to fill the memory."""
+
+_LINE: Final = "{smachpy}line"
+_PLAN_NAME: Final = "PLAN NAME:"
+
+
+@dataclass
+class _Found:
+    """What was read so far."""
+
+    file: str
+    dialect: Dialect = "pnp"
+    name: str = ""
+    places: dict[str, Place] = field(default_factory=dict)
+    transitions: dict[str, Transition] = field(default_factory=dict)
+    arcs: list[tuple[Arc, Element]] = field(default_factory=list)
+    references: dict[str, str] = field(default_factory=dict)
+    problems: list[PlanProblem] = field(default_factory=list)
+
+    def problem(
+        self,
+        severity: Severity,
+        rule: str,
+        element: Element | int,
+        message: str,
+        hint: str = "",
+    ) -> None:
+        line = element if isinstance(element, int) else int(element.get(_LINE, "0"))
+        what = "" if isinstance(element, int) else _name_of(element)
+        self.problems.append(PlanProblem(rule, severity, message, what, self.file, line, hint))
+
+
+def read_pnml(file: Path | str) -> tuple[Net, tuple[PlanProblem, ...]]:
+    """Read a net.
+
+    Returns:
+        The net, and what is doubtful about the file.
+
+    Raises:
+        PlanError: the file cannot be read, or is no net; all problems at once.
+    """
+    path = Path(file)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        why = error.strerror or type(error).__name__
+        raise_errors([PlanProblem("file", "error", f"{why}; expected a plan.", "", str(file))])
+        raise
+    return parse_pnml(data, name=path.name.partition(".")[0], file=str(file))
+
+
+def parse_pnml(
+    data: bytes | str, *, name: str = "plan", file: str = ""
+) -> tuple[Net, tuple[PlanProblem, ...]]:
+    """Read a net from the text of a file; arguments and errors as for `read_pnml`.
+
+    Args:
+        data: The text; bytes say their encoding themselves.
+        name: Of the plan, unless a comment "PLAN NAME:" says another.
+        file: For the problems.
+    """
+    found = _Found(file, name=name)
+    root = _parse(data, found)
+    if root is not None:
+        _read_root(root, found)
+    raise_errors(found.problems)
+    arcs = _checked_arcs(found)
+    raise_errors(found.problems)
+    net = Net(
+        found.name, tuple(found.places.values()), tuple(found.transitions.values()), arcs, file
+    )
+    return net, tuple(found.problems)
+
+
+def _parse(data: bytes | str, found: _Found) -> Element | None:
+    """Return the root of the XML, each element with its line; None when it is no XML."""
+    from xml.etree.ElementTree import ParseError, TreeBuilder
+
+    from defusedxml.common import DefusedXmlException
+    from defusedxml.ElementTree import DefusedXMLParser
+
+    class WithLines(TreeBuilder):
+        def start(self, tag: Any, attrs: Any) -> Any:
+            return super().start(tag, {**attrs, _LINE: str(parser.parser.CurrentLineNumber)})
+
+    parser = DefusedXMLParser(target=WithLines())
+    try:
+        parser.feed(data)
+        root: Element = parser.close()
+    except ParseError as error:
+        line = error.position[0] if hasattr(error, "position") else 0
+        found.problem("error", "xml", line, f"is no XML: {error}; expected PNML.")
+    except DefusedXmlException as error:
+        text = f"has entities, which are not read: {type(error).__name__}; expected plain PNML."
+        found.problem("error", "xml", parser.parser.CurrentLineNumber, text)
+    except (LookupError, ValueError) as error:
+        found.problem("error", "xml", 1, f"cannot be decoded: {error}; expected PNML.")
+    else:
+        return root
+    return None
+
+
+def _read_root(root: Element, found: _Found) -> None:
+    if _tag(root) != "pnml":
+        found.problem("error", "xml", root, f"got <{_tag(root)}>; expected <pnml>.")
+        return
+    nets = [child for child in root if _tag(child) == "net"]
+    if len(nets) != 1:
+        found.problem("error", "xml", root, f"got {len(nets)} nets; expected one.")
+        return
+    if _namespace(root) == NAMESPACE or any(_tag(child) == "page" for child in nets[0]):
+        found.dialect = "2009"
+    kind = nets[0].get("type", "")
+    if kind not in {"", "PTNet", PT_NET} and "ptnet" not in kind.lower():
+        text = f"type: got {kind!r}; expected a place/transition net, {PT_NET!r}."
+        found.problem("error", "xml", nets[0], text)
+    if found.dialect == "2009":
+        own = _text_below(nets[0], "name", found)
+        found.name = own.strip() or found.name
+    _read_nodes(nets[0], found, 0)
+    if not found.places:
+        found.problem("error", "xml", nets[0], "got no places; expected a plan.")
+
+
+_DEEPEST_PAGE: Final = 50
+
+
+def _read_nodes(parent: Element, found: _Found, depth: int) -> None:
+    if depth > _DEEPEST_PAGE:
+        found.problem("error", "xml", parent, f"got more than {_DEEPEST_PAGE} pages deep.")
+        return
+    for element in parent:
+        tag = _tag(element)
+        if tag in {"place", "transition", "arc", "referencePlace", "referenceTransition"}:
+            _read_node(element, tag, found)
+        elif tag == "page":
+            _read_nodes(element, found, depth + 1)
+        elif tag == "comment":
+            text = _text_below(element, None, found).strip()
+            if text.startswith(_PLAN_NAME):
+                found.name = text.removeprefix(_PLAN_NAME).strip() or found.name
+
+
+def _read_node(element: Element, tag: str, found: _Found) -> None:
+    identity = element.get("id")
+    line = int(element.get(_LINE, "0"))
+    if not identity and tag != "arc":
+        found.problem("error", "id", element, f"got a <{tag}> without id; expected one.")
+        return
+    identity = identity or ""
+    if tag == "arc":
+        _read_arc(element, found)
+        return
+    if identity in found.places or identity in found.transitions or identity in found.references:
+        found.problem("error", "id", element, "got its id a second time; expected unique ids.")
+        return
+    if tag.startswith("reference"):
+        found.references[identity] = element.get("ref", "")
+    elif tag == "place":
+        tokens = _number(element, "initialMarking", 0, found)
+        found.places[identity] = Place(identity, _text_below(element, "name", found), tokens, line)
+    else:
+        found.transitions[identity] = Transition(
+            identity, _text_below(element, "name", found), line
+        )
+
+
+def _read_arc(element: Element, found: _Found) -> None:
+    source, target = element.get("source", ""), element.get("target", "")
+    if not (source and target):
+        text = f"got source {source!r}, target {target!r}; expected the ids of two nodes."
+        found.problem("error", "arc", element, text)
+        return
+    kinds = [child for child in element if _tag(child) in {"type", "arctype"}]
+    kind = "" if not kinds else (kinds[0].get("value") or "".join(kinds[0].itertext())).strip()
+    if kind not in {"", "normal"}:
+        found.problem("error", "arc", element, f"got type {kind!r}; expected an ordinary arc.")
+    late = source not in found.places and source not in found.transitions
+    late = late or (target not in found.places and target not in found.transitions)
+    if late and found.dialect == "pnp":
+        element.set("late", "1")
+    weight = max(1, _number(element, "inscription", 1, found))
+    found.arcs.append((Arc(source, target, weight), element))
+
+
+def _checked_arcs(found: _Found) -> tuple[Arc, ...]:
+    """Return the arcs whose ends are there; with what is wrong noted.
+
+    PNP drops an arc that stands above one of its ends, so it is dropped here too, with a warning.
+    """
+    arcs = []
+    for arc, element in found.arcs:
+        source = _resolved(arc.source, found)
+        target = _resolved(arc.target, found)
+        missing = [
+            name
+            for name in (source, target)
+            if name not in found.places and name not in found.transitions
+        ]
+        if missing:
+            text = f"got {missing[0]!r}; expected the id of a place or a transition of the net."
+            found.problem("error", "arc", element, text)
+        elif (source in found.places) == (target in found.places):
+            kind = "places" if source in found.places else "transitions"
+            text = f"got an arc between two {kind}; expected a place and a transition."
+            found.problem("error", "arc", element, text)
+        elif element.get("late"):
+            text = "stands above one of its ends; PNP drops it, and so it is left out here."
+            hint = "Try to put it behind both."
+            found.problem("warning", "arc", element, text, hint)
+        else:
+            arcs.append(Arc(source, target, arc.weight))
+    return tuple(arcs)
+
+
+def _resolved(name: str, found: _Found) -> str:
+    seen: set[str] = set()
+    while name in found.references and name not in seen:
+        seen.add(name)
+        name = found.references[name]
+    return name
+
+
+def _number(element: Element, tag: str, default: int, found: _Found) -> int:
+    """Return the number below `tag`, of "Colour,N" the last part; `default` when there is none."""
+    if not any(_tag(child) == tag for child in element):
+        return default
+    text = _text_below(element, tag, found).strip().rpartition(",")[2].strip()
+    if re.fullmatch(r"[0-9]{1,9}", text) and int(text) <= MOST_TOKENS:
+        number = int(text)
+        if number == 0 and tag == "inscription":
+            found.problem("error", "number", element, f"{tag}: got 0; expected at least 1.")
+        return number
+    least = 1 if tag == "inscription" else 0
+    expected = f"a whole number from {least} to {MOST_TOKENS}"
+    found.problem("error", "number", element, f"{tag}: got {text!r}; expected {expected}.")
+    return default
+
+
+def _text_below(element: Element, tag: str | None, found: _Found) -> str:
+    """Return the text of `element`'s child `tag`, which is in its `value` or `text`."""
+    holder = element
+    if tag is not None:
+        holders = [child for child in element if _tag(child) == tag]
+        if not holders:
+            return ""
+        holder = holders[0]
+    for child in holder:
+        if _tag(child) in {"value", "text"}:
+            text = "".join(child.itertext())
+            if not text and tag == "name":
+                found.problem(
+                    "note", "xml", element, "has an empty name, which ends PNP's own loader."
+                )
+            return text
+    return ""
+
+
+def _tag(element: Element) -> str:
+    return str(element.tag).rpartition("}")[2]
+
+
+def _namespace(element: Element) -> str:
+    return str(element.tag).partition("}")[0].lstrip("{")
+
+
+def _name_of(element: Element) -> str:
+    tag = _tag(element)
+    identity = element.get("id")
+    if tag == "arc":
+        ends = f"{element.get('source', '?')} -> {element.get('target', '?')}"
+        return f"arc {identity!r} ({ends})" if identity else f"arc {ends}"
+    return f"{tag} {identity!r}" if identity else f"<{tag}>"
+
+
+# -- writing ---------------------------------------------------------------------------------------
+
+
+def pnml_text(net: Net, *, dialect: Dialect = "pnp") -> str:
+    """Return a net as the text of a file; reading that gives the same net."""
+    from xml.etree import ElementTree as ET
+
+    is_pnp = dialect == "pnp"
+    holds = "value" if is_pnp else "text"
+    root = ET.Element("pnml", {} if is_pnp else {"xmlns": NAMESPACE})
+    kind = "PTNet" if is_pnp else PT_NET
+    outer = ET.SubElement(root, "net", {"id": "plan", "type": kind})
+    if is_pnp:
+        comment = ET.SubElement(ET.SubElement(outer, "comment"), "text")
+        ET.SubElement(comment, "value").text = f"{_PLAN_NAME} {net.name}"
+        page = outer
+    else:
+        ET.SubElement(ET.SubElement(outer, "name"), "text").text = net.name
+        page = ET.SubElement(outer, "page", {"id": _free_id(net, "page")})
+
+    def add(parent: Element, tag: str, text: str) -> None:
+        ET.SubElement(ET.SubElement(parent, tag), holds).text = text
+
+    for place in net.places:
+        element = ET.SubElement(page, "place", {"id": place.id})
+        add(element, "name", place.name or " ")
+        if place.tokens:
+            add(element, "initialMarking", str(place.tokens))
+    for transition in net.transitions:
+        element = ET.SubElement(page, "transition", {"id": transition.id})
+        add(element, "name", transition.name or " ")
+    for number, arc in enumerate(net.arcs, 1):
+        ends = {"source": arc.source, "target": arc.target}
+        element = ET.SubElement(page, "arc", {"id": _free_id(net, f"a{number}"), **ends})
+        if arc.weight > 1:
+            add(element, "inscription", str(arc.weight))
+    ET.indent(root)
+    text = ET.tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
+
+
+def write_pnml(net: Net, file: Path | str, *, dialect: Dialect = "pnp") -> Path:
+    """Write a net to a file.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    path = Path(file)
+    path.write_text(pnml_text(net, dialect=dialect), encoding="utf-8")
+    return path
+
+
+def _free_id(net: Net, wanted: str) -> str:
+    while wanted in net.place_numbers or wanted in net.transition_numbers:
+        wanted += "_"
+    return wanted

@@ -1,0 +1,73 @@
+"""What is wrong with plans: problems with file, line and element."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from smachpy.exceptions import InvalidStateError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from smachpy.pnp.labels import Severity
+
+
+@dataclass(frozen=True, slots=True)
+class PlanProblem:
+    """One thing wrong with a plan.
+
+    Attributes:
+        rule: Id of the rule; `smachpy.checks.RULES` has "net-" and it.
+        severity: "error": the plan is not run. "warning": it runs, as in PNP, which is silent
+            about it. "note": worth knowing.
+        message: What was found, what was expected.
+        element: What it is about: "place 'p1' (A.exec)"; "" for the whole plan.
+        file: The file, "" when the plan was built.
+        line: Of it, from 1; 0 when not known.
+        hint: What to try, or "".
+        run: Labels of the transitions whose firing leads there, first to last.
+        marking: The marking that they lead to, in words.
+    """
+
+    rule: str
+    severity: Severity
+    message: str
+    element: str = ""
+    file: str = ""
+    line: int = 0
+    hint: str = ""
+    run: tuple[str, ...] = ()
+    marking: str = ""
+
+    @property
+    def where(self) -> str:
+        """File and line, as far as they are known."""
+        return f"{self.file}:{self.line}" if self.file and self.line else self.file
+
+    def __str__(self) -> str:
+        where = ": ".join(part for part in (self.where, self.element) if part)
+        text = f"{where}: {self.message}" if where else self.message
+        return f"{text} {self.hint}" if self.hint else text
+
+
+class PlanError(InvalidStateError):
+    """A plan cannot be loaded or run.
+
+    Attributes:
+        found: All its problems, the errors first.
+        problems: Their texts.
+    """
+
+    def __init__(self, found: Iterable[PlanProblem]) -> None:
+        order = ("error", "warning", "note")
+        self.found = tuple(sorted(found, key=lambda problem: order.index(problem.severity)))
+        errors = [str(problem) for problem in self.found if problem.severity == "error"]
+        super().__init__("\n".join(errors), errors)
+
+
+def raise_errors(found: Iterable[PlanProblem]) -> None:
+    """Raise `PlanError` if there are errors among these problems."""
+    found = tuple(found)
+    if any(problem.severity == "error" for problem in found):
+        raise PlanError(found)

@@ -1,0 +1,103 @@
+"""What a net can do when its guards may be true or false at any time; no threads, time or I/O."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from smachpy.pnp.net import Marking, Net
+
+MOST_MARKINGS: Final = 20_000
+"""So many are looked at: the largest public plan has 3,555."""
+
+
+@dataclass(frozen=True)
+class Reachable:
+    """The reachable markings of a net.
+
+    Attributes:
+        net: The net.
+        came: Marking -> the marking and the transition it was first reached by; None for the
+            initial one. In the order of a breadth-first search: nearest first.
+        fired: Transitions that can fire.
+        dead: Markings in which nothing can fire, nearest first.
+        most: Place -> most tokens that it held; places that are never marked are not in it.
+        covering: A marking, and one with the same tokens and more that it leads to: the net is
+            unbounded. None when no such pair was found.
+        complete: All were looked at.
+    """
+
+    net: Net
+    came: dict[Marking, tuple[Marking, int] | None]
+    fired: frozenset[int]
+    dead: tuple[Marking, ...]
+    most: dict[int, int]
+    covering: tuple[Marking, Marking] | None
+    complete: bool
+
+    def run_to(self, marking: Marking) -> tuple[int, ...]:
+        """Return a shortest firing sequence that leads to a reachable marking."""
+        run: list[int] = []
+        step = self.came[marking]
+        while step is not None:
+            run.append(step[1])
+            step = self.came[step[0]]
+        return tuple(reversed(run))
+
+    def run_to_place(self, place: int, tokens: int = 1) -> Marking | None:
+        """Return the nearest marking in which a place holds so many tokens."""
+        return next((m for m in self.came if m.count(place) >= tokens), None)
+
+
+def explore(net: Net, *, limit: int = MOST_MARKINGS) -> Reachable:
+    """Find the reachable markings of `net`, breadth first.
+
+    Args:
+        net: The net.
+        limit: How many are looked at; the search also ends at the first proof that there are
+            infinitely many.
+    """
+    came: dict[Marking, tuple[Marking, int] | None] = {net.initial: None}
+    fired: set[int] = set()
+    dead: list[Marking] = []
+    most: dict[int, int] = dict(Counter(net.initial))
+    covering = None
+    queue = deque([net.initial])
+    while queue and covering is None and len(came) <= limit:
+        marking = queue.popleft()
+        enabled = net.enabled(marking)
+        if not enabled:
+            dead.append(marking)
+        for transition in enabled:
+            after = net.fire(marking, transition)
+            fired.add(transition)
+            if after in came:
+                continue
+            came[after] = (marking, transition)
+            queue.append(after)
+            counts = Counter(after)
+            for place, count in counts.items():
+                if count > most.get(place, 0):
+                    most[place] = count
+            # A net that grows without end comes to a place with two tokens.
+            before = _covered(after, counts, came) if len(counts) < len(after) else None
+            if before is not None:
+                covering = before, after
+                break
+    complete = not queue and covering is None
+    return Reachable(net, came, frozenset(fired), tuple(dead), most, covering, complete)
+
+
+def _covered(
+    marking: Marking, counts: Counter[int], came: dict[Marking, tuple[Marking, int] | None]
+) -> Marking | None:
+    """Return a marking on the way to `marking` that has fewer tokens, all of them in it."""
+    step = came[marking]
+    while step is not None:
+        before = step[0]
+        if len(before) < len(marking) and Counter(before) <= counts:
+            return before
+        step = came[before]
+    return None

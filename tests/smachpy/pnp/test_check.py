@@ -1,0 +1,129 @@
+"""What is found in a plan without running it, with the run that shows it."""
+
+import itertools
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from smachpy.pnp import Arc, Net, Place, Transition, check_plan, explore, understand
+
+
+def net_of(text):
+    """Return the net of lines "a b -> c : label"; a name with * has a token."""
+    places, transitions, arcs = {}, [], []
+    for number, line in enumerate(filter(None, map(str.strip, text.splitlines()))):
+        ends, _, label = line.partition(" : ")
+        sources, _, targets = ends.partition("->")
+        transitions.append(Transition(f"t{number}", label))
+        for side, names in enumerate((sources, targets)):
+            for word in names.split():
+                name = word.strip("*").replace("~", " ")
+                known = places.setdefault(name, Place(f"p{len(places)}", name))
+                if word.endswith("*"):
+                    places[name] = Place(known.id, name, 1)
+                ends = (known.id, f"t{number}")
+                arcs.append(Arc(*(reversed(ends) if side else ends)))
+    return Net("plan", tuple(places.values()), tuple(transitions), tuple(arcs))
+
+
+def rules(text, **options):
+    return [p.rule for p in check_plan(understand(net_of(text), **options))]
+
+
+GOOD = """
+init* -> A.exec : A.start
+A.exec -> goal : A.end
+"""
+
+
+def test_nothing_wrong():
+    assert rules(GOOD) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("init* -> A.exec : B.start\nA.exec -> goal : A.end", ["unmatched", "unmatched"]),
+        ("init* -> A.exec : start\nA.exec -> goal : end", []),
+        ("init* -> x : start\nx -> goal : t", ["unmatched"]),
+        (GOOD + "\nelse -> goal : t", ["dead-transition", "unmarked-place"]),
+        ("init* -> A.exec : A.start\nA.exec -> x : A.end", ["no-goal"]),
+        ("init* -> A.exec : A.start\nA.exec -> x : A.end\nx y -> goal : t", ["unreachable-goal", "deadlock", "dead-transition", "unmarked-place", "unmarked-place"]),
+        ("init* -> init x : t\ninit -> goal : u", ["unbounded"]),
+        ("init* -> A.exec : A.start\nA.exec -> goal : A.end\nA.exec -> goal : A.end [c]", ["race"]),
+        ("init* -> A.exec : A.start\nA.exec -> goal : A.end [c]\nA.exec -> goal : A.end [not c]", []),
+        ("init* -> A.exec : A.start\nA.exec -> goal : A.end\nA.exec -> init : A.interrupt [c]", []),
+        ("init* -> a b : t\na -> A.exec : A.start\nb -> A.exec~ : A.start\nA.exec -> c : A.end\nA.exec~ -> d : A.end\nc d -> goal : u", ["shared-name"]),
+        ("init* -> A.exec B.exec : A.start B.start\nA.exec B.exec -> goal : A.end B.end", ["two-ends"]),
+        ("init -> goal : t", ["no-token"]),
+        ("-> goal : t\ninit* -> goal : u", ["no-input"]),
+        ("init* -> A.exec : A.start\nA.exec -> Goal : A.end", ["comment", "no-goal"]),
+    ],
+)  # fmt: skip
+def test_rules(text, expected):
+    assert rules(text) == expected
+
+
+def test_strict_waits_for_both_ends():
+    text = "init* -> A.exec B.exec : A.start B.start\nA.exec B.exec -> goal : A.end B.end"
+    assert rules(text, strict=True) == []
+
+
+def test_a_deadlock_comes_with_the_run_to_it():
+    text = "init* -> a : left\ninit -> b : right\nb -> goal : on"
+    (problem,) = check_plan(understand(net_of(text)))
+    assert problem.rule == "deadlock"
+    assert problem.run == ("left",)
+    assert problem.marking == "{a}"
+
+
+def test_an_unbounded_net_names_the_place_that_grows():
+    (problem,) = check_plan(understand(net_of("init* -> init heap : t\nheap x -> goal : u")))
+    assert problem.element == "place 'p1' (heap)"
+    assert set(problem.run) == {"t"}
+
+
+def test_a_guess_for_a_name_that_does_not_match():
+    text = "init* -> goto_kitchen.exec : goto_kitchn.start\ngoto_kitchen.exec -> goal : end"
+    problems = check_plan(understand(net_of(text)))
+    assert any("Did you mean" in str(p) for p in problems)
+
+
+@given(st.integers(0, 2**20))
+def test_markings_are_those_of_a_plain_search(seed):
+    import random
+
+    dice = random.Random(seed)
+    places = tuple(Place(f"p{n}", "", dice.choice([0, 0, 1])) for n in range(4))
+    transitions = tuple(Transition(f"t{n}") for n in range(4))
+    arcs = [
+        Arc(*pair, dice.choice([1, 1, 2]))
+        for t in transitions
+        for pair in ((dice.choice(places).id, t.id), (t.id, dice.choice(places).id))
+    ]
+    net = Net("drawn", places, transitions, tuple(dict.fromkeys(arcs)))
+    found = explore(net, limit=300)
+    if not found.complete:
+        return
+    start = tuple(p.tokens for p in places)
+    seen, queue = {start}, [start]
+    for marking in queue:
+        for number in range(4):
+            after = list(marking)
+            for p, weight in net.inputs[number]:
+                after[p] -= weight
+            if min(after) < 0:
+                continue
+            for p, weight in net.outputs[number]:
+                after[p] += weight
+            if tuple(after) not in seen:
+                seen.add(tuple(after))
+                queue.append(tuple(after))
+    assert {tuple(m.count(p) for p in range(4)) for m in found.came} == seen
+    for marking in itertools.islice(found.came, 20):
+        at = net.initial
+        for step in found.run_to(marking):
+            assert net.has_tokens(at, step)
+            at = net.fire(at, step)
+        assert at == marking
