@@ -84,14 +84,24 @@ def check_limit(where: str, argument: str, value: object) -> float | None:
         DurationTypeError: it is no time.
         InvalidDurationError: it is negative or NaN.
     """
-    seconds = check_delay(where, argument, value)
+    seconds = _check_number(where, argument, value)
     if seconds is not None and seconds < 0:
         raise InvalidDurationError(where, argument, value, SECONDS)
     return seconds
 
 
 def check_delay(where: str, argument: str, value: object) -> float | None:
-    """As `check_limit`, for what is often the rest of a time: a negative one is allowed."""
+    """As `check_limit`, for a wait, often the rest of a time: a negative one is over, as 0 is.
+
+    Raises:
+        DurationTypeError: it is no time.
+        InvalidDurationError: it is NaN.
+    """
+    seconds = _check_number(where, argument, value)
+    return None if seconds is None else max(seconds, 0.0)
+
+
+def _check_number(where: str, argument: str, value: object) -> float | None:
     if value is None:
         return None
     try:
@@ -104,5 +114,6 @@ def check_delay(where: str, argument: str, value: object) -> float | None:
 
 
 def check_wait(where: str, argument: str, value: object) -> float | None:
-    """As `check_limit`, by actionlib's rule: 0 sets no limit, too."""
-    return check_limit(where, argument, value) or None
+    """As `check_delay`, by actionlib's rule: 0 sets no limit, too."""
+    seconds = _check_number(where, argument, value)
+    return max(seconds, 0.0) if seconds else None

@@ -14,7 +14,13 @@ import weakref
 from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from actionlib_core._arguments import check_function, check_limit, check_seconds, check_wait
+from actionlib_core._arguments import (
+    check_delay,
+    check_function,
+    check_limit,
+    check_seconds,
+    check_wait,
+)
 from actionlib_core.action._callbacks import CallbackQueue
 from actionlib_core.action.goal_id_generator import GoalIDGenerator
 from actionlib_core.action.sent_goal import SentGoal
@@ -210,7 +216,7 @@ class ClientGoalHandle:
 
         Blocks: until then.
         """
-        return self.manager.wait(self, check_limit(f"goal {self.goal.id}", "timeout", timeout))
+        return self.manager.wait(self, check_delay(f"goal {self.goal.id}", "timeout", timeout))
 
     @property
     def comm_state_machine(self) -> ClientGoalHandle:
@@ -987,7 +993,7 @@ class ActionClient(Generic[A_co]):
 
         Raises:
             TypeMismatchError: there is one, but of another type.
-            InvalidDurationError: `timeout` is no time, or negative.
+            InvalidDurationError: `timeout` is no time.
 
         Blocks: until then.
         """

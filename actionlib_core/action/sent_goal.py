@@ -14,7 +14,7 @@ import contextlib
 import threading
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from actionlib_core._arguments import check_limit
+from actionlib_core._arguments import check_delay
 from actionlib_core.exceptions import GoalFailedError, GoalTimeoutError
 from actionlib_core.goal.states import CommState, Status
 
@@ -109,7 +109,7 @@ class SentGoal(Generic[R, F]):
 
         Blocks: until then, `timeout` [s] at most; None: no limit.
         """
-        return self._handle.settled.wait(check_limit(f"goal {self.id}", "timeout", timeout))
+        return self._handle.settled.wait(check_delay(f"goal {self.id}", "timeout", timeout))
 
     def cancel(self) -> None:
         """Ask for the goal's end; it ends when the server says so."""
@@ -133,12 +133,12 @@ class SentGoal(Generic[R, F]):
 
         Raises:
             GoalTimeoutError: the time was over.
-            InvalidDurationError: `timeout` is no time, or negative.
+            InvalidDurationError: `timeout` is no time.
             GoalFailedError: the goal ended otherwise than SUCCEEDED.
 
         Blocks: until the goal is over; after a timeout 5 s more for the answer to the cancel.
         """
-        timeout = check_limit(f"goal {self.id}", "timeout", timeout)
+        timeout = check_delay(f"goal {self.id}", "timeout", timeout)
         if not self._wait(timeout):
             self.cancel()
             self._handle.settled.wait(CANCEL_GRACE_S)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["SimpleActionClient", "SimpleGoalState"]
 
 A = TypeVar("A")
+log = logging.getLogger(__name__)
 
 _RUNNING = frozenset({CommState.ACTIVE, CommState.PREEMPTING})
 _OVER = frozenset({CommState.DONE, CommState.LOST})
@@ -241,21 +243,20 @@ class SimpleActionClient(Generic[A]):
 
         Args:
             goal: The goal message (XGoal).
-            execute_timeout: Longest run [s]; 0 sets no limit.
-            preempt_timeout: Longest wait for the end after the cancel [s]; 0 sets no limit.
+            execute_timeout: Longest run [s]; 0 sets no limit, nor does a negative time.
+            preempt_timeout: Longest wait for the end after the cancel [s]; likewise.
 
         Returns:
             The status (`GoalStatus`), not yet a final one when `preempt_timeout` was too short.
 
         Blocks: until the goal is over or both times have passed.
         """
-        where = f"action '{self.action_client.ns}'"
-        check_wait(where, "execute_timeout", execute_timeout)  # before the robot moves
-        check_wait(where, "preempt_timeout", preempt_timeout)
+        execute = self._check_wait("execute_timeout", execute_timeout)  # before the robot moves
+        preempt = self._check_wait("preempt_timeout", preempt_timeout)
         self.send_goal(goal)
-        if not self.wait_for_result(execute_timeout):
+        if not self.wait_for_result(execute):
             self.cancel_goal()
-            self.wait_for_result(preempt_timeout)
+            self.wait_for_result(preempt)
         return self.get_state()
 
     def wait_for_result(self, timeout: float | Duration | None = 0.0) -> bool:
@@ -268,20 +269,36 @@ class SimpleActionClient(Generic[A]):
             timeout: Longest wait [s]; 0 and None wait as long as it takes, as in actionlib: until
                 the goal is over, or its server dies, or the client is stopped. That the program is
                 to end does not end it, as the goal runs on: `shutdown.on_shutdown(cancel_goal)`.
+                A negative time sets no limit either, as in actionlib, with a warning: the rest of a
+                time that is over is better not waited for.
 
         Returns:
             Whether the goal is over; False also when no goal was sent.
 
         Raises:
-            InvalidDurationError: `timeout` is no time, or negative.
+            InvalidDurationError: `timeout` is no time.
 
         Blocks: until then.
         """
-        limit = check_wait(f"action '{self.action_client.ns}'", "timeout", timeout)
+        limit = self._check_wait("timeout", timeout)
         handle = self.gh
         if handle is None:
             return False
         return handle.manager.wait(handle, limit)
+
+    def _check_wait(self, argument: str, timeout: float | Duration | None) -> float | None:
+        """Return the limit of a wait for a goal's end; warn of one that is no limit by mistake."""
+        where = f"action '{self.action_client.ns}'"
+        limit = check_wait(where, argument, timeout)
+        if limit != 0.0:
+            return limit
+        log.warning(
+            "%s: %s: got %s, which is negative; the goal's end is waited for without a limit.",
+            where,
+            argument,
+            timeout,
+        )
+        return None
 
     def get_result(self) -> Any:
         """Return the result message, None while there is none."""

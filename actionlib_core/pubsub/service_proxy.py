@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core._arguments import check_class, check_limit
+from actionlib_core._arguments import check_class, check_delay, check_limit
 from actionlib_core.exceptions import (
     ActionlibError,
     NodeError,
@@ -159,14 +159,14 @@ class ServiceProxy(ServiceEnd):
             timeout: Longest wait [s]; None waits until the node closes or the program is to end.
 
         Raises:
-            InvalidDurationError: `timeout` is no time, or negative.
+            InvalidDurationError: `timeout` is no time.
             WaitTimeoutError: there is none in time.
             TypeMismatchError: there is one, but of another type.
             NodeError: the node was closed, or the program is to end.
 
         Blocks: see `timeout`.
         """
-        seconds = check_limit(f"service /{self.resolved_name}", "timeout", timeout)
+        seconds = check_delay(f"service /{self.resolved_name}", "timeout", timeout)
         if not self._wait_for_server(seconds):
             raise WaitTimeoutError(
                 f"/{self.resolved_name}: no server: got none in {_show(seconds)}; expected one of "
@@ -315,7 +315,7 @@ def wait_for_service(
         node: Where to look; the node in force when None.
 
     Raises:
-        InvalidDurationError: `timeout` is no time, or negative.
+        InvalidDurationError: `timeout` is no time.
         WaitTimeoutError: there is none in time.
         NodeError: the node was closed, or the program is to end.
 
@@ -323,7 +323,7 @@ def wait_for_service(
     """
     node = get_node() if node is None else node
     name = node.resolve(service, "service name")
-    seconds = check_limit(f"service {service!r}", "timeout", timeout)
+    seconds = check_delay(f"service {service!r}", "timeout", timeout)
     anybody = node.endpoint(Kind.SERVICE, name, "", "")
     watch = NameWatch(node, anybody, {Kind.SERVICE}, any_type=True)
     try:

@@ -16,7 +16,7 @@ import weakref
 from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from actionlib_core._arguments import check_class, check_function, check_limit, check_queue_size
+from actionlib_core._arguments import check_class, check_delay, check_function, check_queue_size
 from actionlib_core.action._callbacks import CallbackQueue
 from actionlib_core.exceptions import NodeError, TypeMismatchError, WaitTimeoutError
 from actionlib_core.goal.backlog import MESSAGES, Backlog
@@ -77,11 +77,11 @@ class _TopicEnd(End):
             Whether they are.
 
         Raises:
-            InvalidDurationError: `timeout` is no time, or negative.
+            InvalidDurationError: `timeout` is no time.
 
         Blocks: see `timeout`.
         """
-        limit = check_limit(f"topic {self.name}", "timeout", timeout)
+        limit = check_delay(f"topic {self.name}", "timeout", timeout)
         return self._ends.wait(lambda: self.get_num_connections() >= count, limit)
 
     def unregister(self) -> None:
@@ -310,14 +310,14 @@ def wait_for_message(
         node: Where to listen; the node in force when None.
 
     Raises:
-        InvalidDurationError: `timeout` is no time, or negative.
+        InvalidDurationError: `timeout` is no time.
         WaitTimeoutError: no message came in time.
         TypeMismatchError: somebody publishes another type there, and nobody ours.
         NodeError: the node was closed, or the program is to end.
 
     Blocks: see `timeout`.
     """
-    limit = check_limit(f"topic {topic!r}", "timeout", timeout)
+    limit = check_delay(f"topic {topic!r}", "timeout", timeout)
     with _OneMessage(topic, topic_type, node) as subscriber:
         return subscriber.take(limit)
 

@@ -9,7 +9,7 @@ import pytest
 from actionlib_core.action.client import ActionClient
 from actionlib_core.action.simple_client import SimpleActionClient
 from actionlib_core.action.simple_server import SimpleActionServer
-from actionlib_core.exceptions import DurationTypeError, InvalidDurationError
+from actionlib_core.exceptions import DurationTypeError, InvalidDurationError, WaitTimeoutError
 from actionlib_core.interfaces.actionlib.msg import TestAction as Action
 from actionlib_core.interfaces.actionlib.msg import TestGoal as Goal
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
@@ -61,8 +61,16 @@ WAITS = {
 }
 
 
-@pytest.mark.parametrize("wait", WAITS)
-@pytest.mark.parametrize("value", [math.nan, -1.0, -math.inf, Duration(-1)])
+SETTINGS = ("ack_timeout", "send", "attach", "proxy")  # the others wait themselves
+
+
+@pytest.mark.parametrize(
+    ("wait", "value"),
+    [
+        *((wait, math.nan) for wait in WAITS),
+        *((wait, value) for wait in SETTINGS for value in (-1.0, -math.inf, Duration(-1))),
+    ],
+)
 def test_duration_that_cannot_be_waited_is_a_value_error(world, wait, value):
     with pytest.raises(ValueError, match="timeout") as caught:
         WAITS[wait](world, value)
@@ -81,6 +89,31 @@ def test_duration_that_is_no_number_is_a_type_error(world, wait, value):
     assert isinstance(caught.value, DurationTypeError)
     world.clock.sleep(1.0)
     assert not world.taken
+
+
+@pytest.mark.parametrize("past", [-1.0, -math.inf, Duration(-1)])
+def test_a_wait_whose_time_is_over_looks_once(world, past):
+    started = world.clock.now()
+    assert world.simple.wait_for_server(past)
+    assert not SimpleActionClient("nobody", Action, node=world.mission).wait_for_server(past)
+    assert not world.publisher.wait_for_connections(1, past)
+    for wait in ("message", "wait_for_service", "proxy.wait_for_service"):
+        with pytest.raises(WaitTimeoutError):
+            WAITS[wait](world, past)
+    assert not world.client.send_goal(Goal(1)).wait(past)
+    assert world.clock.now() == started
+
+
+@pytest.mark.parametrize("past", [-1.0, -math.inf, Duration(-1)])
+def test_a_goal_is_waited_for_without_a_limit_by_a_negative_one_as_in_actionlib(
+    world, caplog, past
+):
+    world.simple.send_goal(Goal(1))
+    assert world.simple.wait_for_result(past)
+    assert world.simple.send_goal_and_wait(Goal(1), past, past) == GoalStatus.SUCCEEDED
+    assert len(world.taken) == 2
+    warned = [r.args[1] for r in caplog.records if r.name.endswith("simple_client")]
+    assert warned == ["timeout", "execute_timeout", "preempt_timeout"]
 
 
 def test_goal_handles_check_their_timeouts(world):
