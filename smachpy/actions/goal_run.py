@@ -11,10 +11,12 @@ watches it and carries the decisions out, so that no goal is left behind by acci
 from __future__ import annotations
 
 import enum
+import math
 import threading
 from typing import TYPE_CHECKING, Any
 
 from smachpy.events import GoalDone, GoalFeedback, GoalSent
+from smachpy.run.interrupt import Interruption
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,6 +32,7 @@ ABORTED = "aborted"
 PREEMPTED = "preempted"
 OUTCOMES = (SUCCEEDED, ABORTED, PREEMPTED)
 
+INTERRUPTED = "a callback of the state did not return; nobody waits for the goal any more"
 STOPPED_S = 0.2  # a goal that this state has cancelled is over: so much longer for its feedback
 _STOPPED = frozenset({"PREEMPTED", "RECALLED", "LOST"})
 
@@ -52,6 +55,7 @@ class GoalRun:
             no limit.
 
     Attributes:
+        taken_at: When a server took it [s]; None: none has.
         preempted: A preempt was asked for while the goal ran.
         timed_out: `exec_timeout` passed while the goal ran.
         status: Name of the goal status it ended with; "" while it runs, "LOST" when abandoned.
@@ -65,12 +69,12 @@ class GoalRun:
         "_deadline",
         "_failed",
         "_preempt_timeout",
-        "_taken",
         "abandoned",
         "cancelling",
         "exec_timeout",
         "preempted",
         "status",
+        "taken_at",
         "text",
         "timed_out",
     )
@@ -79,7 +83,7 @@ class GoalRun:
         self.exec_timeout = exec_timeout
         self._preempt_timeout = preempt_timeout
         self._deadline: float | None = None
-        self._taken = False
+        self.taken_at: float | None = None
         self._failed = False
         self.preempted = False
         self.timed_out = False
@@ -93,10 +97,16 @@ class GoalRun:
         """When `step` has something to do though nothing happens [s]; None: never."""
         return self._deadline
 
+    def left(self, now: float) -> float:
+        """Return what is left of `exec_timeout` [s]; infinity without one or before it begins."""
+        if self.exec_timeout is None or self.taken_at is None:
+            return math.inf
+        return max(0.0, self.taken_at + self.exec_timeout - now)
+
     def on_taken(self, now: float) -> None:
         """Note that a server has the goal; from then on `exec_timeout` counts."""
-        if not self._taken:
-            self._taken = True
+        if self.taken_at is None:
+            self.taken_at = now
             if self.exec_timeout is not None and not self.cancelling:
                 self._deadline = now + self.exec_timeout
 
@@ -174,6 +184,8 @@ class GoalExchange:
         scope: Where the events go; None outside any machine.
         run: The decisions.
         preempt_requested: Whether the state is to stop; any thread may ask.
+        on_late: Called when `exec_timeout` is over while the state's thread is in foreign code,
+            maybe more than once, in any thread.
         wants_feedback: Somebody besides the listeners wants the feedback: without either, feedback
             does not wake the state's thread.
 
@@ -195,6 +207,7 @@ class GoalExchange:
         run: GoalRun,
         preempt_requested: Callable[[], bool],
         *,
+        on_late: Callable[[], object] | None = None,
         wants_feedback: bool = True,
     ) -> None:
         self.run = run
@@ -203,6 +216,7 @@ class GoalExchange:
         self._wake = wake
         self._scope = scope
         self._preempt_requested = preempt_requested
+        self._on_late = on_late
         self._wants_feedback = wants_feedback
         self._handle: ClientGoalHandle | None = None
         self._lock = threading.Lock()  # guards `run` and the timer
@@ -272,6 +286,9 @@ class GoalExchange:
                     self._emit(GoalFeedback, self.goal_id, feedback)
                     if failure is None:
                         on_feedback(feedback)
+                except Interruption:
+                    self._emit(GoalDone, self.goal_id, self.run.status or "LOST", INTERRUPTED, None)
+                    raise
                 except Exception as error:  # noqa: BLE001  raised again when the goal has ended
                     failure = error
                     self.run.on_failure()
@@ -324,20 +341,24 @@ class GoalExchange:
             if handle.goal.acknowledged:
                 self.run.on_taken(clock.now())
             if handle.goal.over and not self.run.status:
-                return Step.WAIT  # for the feedback that came before the end
-            step = self.run.step(clock.now())
+                step = Step.WAIT  # for the feedback that came before the end
+            else:
+                step = self.run.step(clock.now())
             if step is Step.CANCEL:
                 handle.cancel()
                 step = self.run.step(clock.now())
             if step is Step.ABANDON:
                 handle.manager.forget(handle)
+            late = self._inside and not self.run.left(clock.now())
             due = self.run.deadline
             if self._inside and due is not None and due != self._timer_due:
                 if self._timer is not None:
                     self._timer.cancel()
                 self._timer = clock.call_later(due - clock.now(), self.hurry)
                 self._timer_due = due
-            return step
+        if late and self._on_late is not None:
+            self._on_late()
+        return step
 
     def _note_state(self, _state: CommState) -> None:
         self._wake.set()

@@ -20,6 +20,8 @@ from smachpy.machines.state import State
 from smachpy.run.child import on_preempt
 from smachpy.run.frame import current_scope
 from smachpy.run.grace import inherited_grace
+from smachpy.run.interrupt import Interruption
+from smachpy.run.runner import Timeout
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
     from actionlib_core.time import Duration
     from smachpy.introspection import Kind
     from smachpy.machines.state import Grace, RetrySpec
+    from smachpy.run.frame import Frame
 
 __all__ = ["ActionStateOptions", "SimpleActionState"]
 
@@ -91,7 +94,8 @@ class SimpleActionState(State):
         output_keys: More keys to write, for the callbacks.
         outcomes: More outcomes, for `result_cb`.
         exec_timeout: A goal that has not ended so long [s] after a server took it is cancelled, and
-            the outcome is 'aborted'; None: no limit.
+            the outcome is 'aborted'; None: no limit. A callback that still runs `preempt_timeout`
+            and a few seconds later is interrupted (docs/preemption.md), with that outcome too.
         preempt_timeout: A cancelled goal that has not ended after so long [s] is abandoned and
             reported; it may still run on the server. None: no limit. Left out, a container's
             `preempt_timeout` holds if it is shorter.
@@ -207,6 +211,25 @@ class SimpleActionState(State):
         Blocks: until the goal has ended: all three timeouts together at most; a preempt
             cancels the goal at once.
         """
+        frame: Frame | None = current_frame()
+        if frame is None or self._exec_s is None:
+            return self._execute(ud, None)
+        limit = Timeout(frame, self._exec_s)
+        try:
+            outcome = self._execute(ud, limit)
+        except Interruption:
+            if not limit.end(PREEMPTED):
+                raise
+            log.logwarn(f"{frame.here()}: a callback did not return; 'aborted' by exec_timeout.")
+            return ABORTED
+        except BaseException:
+            limit.end(None)
+            raise
+        limit.end(outcome)
+        return outcome
+
+    def _execute(self, ud: Any, limit: Timeout | None) -> str:
+        """Do it; when `exec_timeout` is over while foreign code runs, `limit` is told."""
         with Wakeup(self) as wake:
             if self._is_preempted():
                 return PREEMPTED
@@ -218,8 +241,18 @@ class SimpleActionState(State):
             grace = _shorter(inherited_grace(current_frame())) if own == "inherit" else own
             run = GoalRun(exec_timeout=self._exec_s, preempt_timeout=grace)
             wanted = self._feedback_cb is not None or self._feedback_key is not None
+
+            def is_asked() -> bool:
+                return self._preempt_requested and (limit is None or not limit.is_alone())
+
             exchange = GoalExchange(
-                client, wake, current_scope(), run, self.preempt_requested, wants_feedback=wanted
+                client,
+                wake,
+                current_scope(),
+                run,
+                is_asked,
+                on_late=None if limit is None else limit.over,
+                wants_feedback=wanted,
             )
             self._exchange = exchange
             forget = on_preempt(self, exchange.hurry)
@@ -234,6 +267,8 @@ class SimpleActionState(State):
             finally:
                 forget()
                 exchange.close()
+            if limit is not None and not run.preempted:  # for `result_cb`
+                limit.start(run.left(wake.clock.now()))
         return self._finish(ud, exchange)
 
     def _smachpy_grace(self, inherited: Grace) -> Grace:

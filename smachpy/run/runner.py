@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import asyncio
     from collections.abc import Callable, Coroutine, Iterable
 
+    from actionlib_core.clock import Timer
     from smachpy.events.tape import Tape
     from smachpy.run.child import Child
     from smachpy.run.frame import Frame
@@ -113,7 +114,10 @@ class _WithOptions:
         """Run until an attempt is good, or the last one was made, or somebody asks it to stop."""
         state, options, attempt = self._state, self._options, 1
         while True:
-            timer = None if options.timeout is None else Timeout(frame, options.timeout)
+            timer = None
+            if options.timeout is not None:
+                timer = Timeout(frame, options.timeout)
+                timer.start(options.timeout)
             result: Any = None
             timed_out = False
             try:
@@ -169,7 +173,7 @@ def _waits_in_vain(state: Child, seconds: float) -> bool:
 
 
 class Timeout:
-    """Asks what `frame` runs to stop when its time is over."""
+    """Asks what `frame` runs to stop when its time, `seconds`, is over."""
 
     def __init__(self, frame: Frame, seconds: float) -> None:
         self._frame = frame
@@ -177,7 +181,16 @@ class Timeout:
         self._seconds = seconds
         self._passed = False
         self._ended = False  # both are changed with the run's lock held
-        self._timer = frame.run.clock.call_later(seconds, self._over)
+        self._timer: Timer | None = None
+
+    def start(self, left: float) -> None:
+        """Let the time be over in `left` seconds."""
+        self._timer = self._frame.run.clock.call_later(left, self.over)
+
+    def is_alone(self) -> bool:
+        """Tell whether the time is over and nobody else wants the child to stop."""
+        visit = self._frame.visit
+        return self._passed and visit is not None and visit.step is self._step and visit.by_timeout
 
     def end(self, result: object) -> bool:
         """The attempt has ended with `result`; tell whether nothing but the timeout had asked.
@@ -185,7 +198,8 @@ class Timeout:
         Then the request ends with the attempt, and the next one begins anew. A request of somebody
         else stays.
         """
-        self._timer.cancel()
+        if self._timer is not None:
+            self._timer.cancel()
         frame = self._frame
         with frame.run.lock:
             self._ended = True
@@ -203,10 +217,11 @@ class Timeout:
         visit.settle()
         return alone
 
-    def _over(self) -> None:
+    def over(self) -> None:
+        """The time is over; only the first call counts."""
         frame = self._frame
         with asking("timeout", frame.here(), f"{self._seconds:g} s"), frame.run.lock:
-            if self._ended or frame.dead:
+            if self._passed or self._ended or frame.dead:
                 return
             self._passed = ask(frame, self._step, timeout=self._seconds)
         frame.run.flush_soon()

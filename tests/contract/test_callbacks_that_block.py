@@ -23,6 +23,7 @@ from actionlib_core.pubsub.topic import Publisher, Subscriber
 from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import SimpleActionState, StateMachine, events
 from smachpy.actions.goal_run import STOPPED_S
+from smachpy.actions.simple_action_state import MARGIN_S
 from tests.two_nodes import TwoNodes
 
 LONG_S = 20.0
@@ -126,6 +127,61 @@ def test_goal_that_ended_while_feedback_cb_was_busy_keeps_its_end(world):
     outcome, _ = world.run(state, preempt_after=2.5)
     assert outcome == "succeeded"
     assert not world.heard
+
+
+CALLBACKS = {
+    "feedback_cb": lambda block: {"feedback_cb": block},
+    "result_cb": lambda block: {"result_cb": block},
+    "feedback_cb after the end": lambda block: {"feedback_cb": block},
+}
+
+
+@pytest.mark.parametrize("callback", CALLBACKS)
+def test_a_callback_that_never_returns_ends_by_exec_timeout(world, callback):
+    """The goal is cancelled at once; the state ends when the grace of its preempts is over."""
+    seconds = 1 if "end" in callback or callback == "result_cb" else 60
+    block = CALLBACKS[callback](lambda *_: world.clock.sleep(1e6))
+    state = world.state(seconds, exec_timeout=2.0, preempt_timeout=3.0, **block)
+    heard = []
+    outcome, took_s = world.run(state, listener=heard.append)
+    assert outcome == "aborted"
+    assert took_s == pytest.approx(2.0 + 3.0 + MARGIN_S, abs=0.3)
+    assert world.heard == ([pytest.approx(2.0, abs=HEARD_S)] if seconds == 60 else [])
+    assert not state.preempt_requested()
+    done = [e for e in heard if isinstance(e, events.GoalDone)]
+    assert len(done) == 1
+    assert sum(isinstance(e, events.Abandoned) for e in heard) == 1
+    world.heard.clear()
+    again, _ = world.run(world.state(1))
+    assert again == "succeeded"
+
+
+@pytest.mark.parametrize("callback", ["feedback_cb", "result_cb"])
+def test_a_callback_that_takes_longer_than_exec_timeout_but_returns_is_not_cut(world, callback):
+    called = []
+
+    def slow(*_):
+        if not called:
+            world.clock.sleep(3.0)
+        called.append(1)
+
+    state = world.state(1, exec_timeout=2.0, preempt_timeout=3.0, **{callback: slow})
+    heard = []
+    outcome, _ = world.run(state, listener=heard.append)
+    assert outcome == "succeeded"
+    assert called
+    assert not any(isinstance(e, events.Abandoned) for e in heard)
+    assert not state.preempt_requested()
+
+
+def test_a_preempt_after_exec_timeout_is_one_of_the_machine(world):
+    """A callback that does not return neither hides the preempt nor turns it into 'aborted'."""
+    state = world.state(
+        60, exec_timeout=2.0, preempt_timeout=3.0, feedback_cb=lambda *_: world.clock.sleep(1e6)
+    )
+    outcome, took_s = world.run(state, preempt_after=4.0)
+    assert outcome == "preempted"
+    assert took_s == pytest.approx(2.0 + 3.0 + MARGIN_S, abs=0.3)
 
 
 # -- clients -----------------------------------------------------------------------------------
