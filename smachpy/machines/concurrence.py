@@ -262,17 +262,18 @@ class Concurrence(Container):
     def _run_children(self, frame: Frame, plan: _Plan) -> str:
         each = bool(self._child_termination_cb or self._transition_cbs)
         group = frame.group = Group(frame, plan.steps, each=each)
-        if self._start_cbs:
-            self.call_start_cbs()
-        if self._preempt_requested:
-            frame.answered = True
-            frame.emit_own(Preempted, "")
-            frame.group = None
-            outcome = "preempted"
-        else:
+        try:
+            if self._start_cbs:
+                self.call_start_cbs()
+            if self._preempt_requested:
+                frame.answered = True
+                frame.emit_own(Preempted, "")
+                return "preempted"
             self._run_group(group)
-            outcome = self._outcome(frame, group)
-        return outcome
+            return self._outcome(frame, group)
+        finally:
+            frame.group = None  # else run and branches would wait for the garbage collector
+            group.end_run()
 
     def _terminal_labels(self, frame: Frame) -> list[str]:  # noqa: ARG002  that of any container
         return list(self._states)

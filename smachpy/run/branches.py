@@ -109,6 +109,17 @@ class ChildBranch(Branch):
         """Report how the child ended."""
         self._group.end(self, outcome, error)
 
+    def end_thread(self) -> None:
+        """Refer to itself no more, so that no run waits for the garbage collector."""
+        super().end_thread()
+        self.let_go()
+
+    def let_go(self) -> None:
+        """Refer to nothing that refers to it."""
+        del self._group
+        self.visit = None
+        self.step.forget_frame()
+
 
 class _Threads:
     """Starts branches in as many threads as they need: one each when they all block.
@@ -255,6 +266,12 @@ class Group:
     def running(self) -> list[ChildBranch]:
         """Return the branches that have not ended."""
         return [branch for branch in self.branches if not branch.ended]
+
+    def end_run(self) -> None:
+        """Let go of the branches, when nobody waits for them any more."""
+        if not self.started:
+            for branch in self.branches:
+                branch.let_go()
 
     def outcomes(self) -> dict[str, str | None]:
         """Return label -> outcome, None for those that run."""

@@ -71,6 +71,10 @@ class Step:
             if isinstance(window, Remapper):
                 revoke(window)
 
+    def forget_frame(self) -> None:
+        """Keep nothing of the run that has ended."""
+        self._window = None
+
     def path_in(self, frame: Frame) -> str:
         """Return the child's path."""
         base = frame.path
