@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
 
-from actionlib_core.config import Config, Ros2
+from actionlib_core.config import Config, Mapped, Ros2
 from actionlib_core.exceptions import ConfigError
 from actionlib_core.suggest import did_you_mean
 from actionlib_core.yaml_text import YamlTextError, load_yaml
@@ -50,13 +50,14 @@ class _Reader:
         self._folder = folder
         self._line = 1
 
-    def read_record(self, kind: type, data: object, where: str) -> object:
-        """Return a `kind` made from `data`, None when a problem was found."""
+    def read_record(self, kind: type, data: object, where: str, **given: str) -> object:
+        """Return a `kind` made from `data`, and `given`, None when a problem was found."""
         if not isinstance(data, Mapping):
             return self._report(where, "not a mapping", data, "lines of 'field: value'")
         before = len(self.problems)
-        hints = get_type_hints(kind)
-        values: dict[str, Any] = {}
+        line = self._line
+        hints = {name: hint for name, hint in get_type_hints(kind).items() if name not in given}
+        values: dict[str, Any] = {**given}
         for key, value in data.items():
             self._go_to(data, key)
             path = f"{where}.{key}" if where else str(key)
@@ -64,29 +65,48 @@ class _Reader:
                 values[key] = self._read(hints[key], value, path)
             else:
                 self._report_unknown(path, str(key), sorted(hints))
-        for name in _required(kind) - set(data):
+        for name in _required(kind) - {*data, *given}:
             self._report(f"{where}.{name}", "missing", None, "a value")
         if len(self.problems) > before:
             return None
         try:
             return kind(**values)
         except ConfigError as error:
-            self.problems += [self._place(data, text) for text in error.problems]
+            self._line = line
+            self.problems += [self._place(data, where, text) for text in error.problems]
             return None
 
     def _read(self, hint: Any, value: object, path: str) -> object:
         if dataclasses.is_dataclass(hint) and isinstance(hint, type):
             return self.read_record(hint, value, path)
         if get_origin(hint) is tuple:
-            item = get_args(hint)[0]
-            if item is Ros2 and isinstance(value, Mapping):  # one network needs no list
-                only = self.read_record(item, value, path)
-                return None if only is None else (only,)
-            return self._read_sequence(item, value, path)
+            return self._read_tuple(get_args(hint)[0], value, path)
         if get_origin(hint) is Literal:
             choices = sorted(get_args(hint))
             return value if value in choices else self._report(path, "unknown", value, choices)
         return self._read_scalar(hint, value, path)
+
+    def _read_tuple(self, item: Any, value: object, path: str) -> object:
+        if not isinstance(value, Mapping):
+            return self._read_sequence(item, value, path)
+        if item is Ros2:  # one network needs no list
+            only = self.read_record(item, value, path)
+            return None if only is None else (only,)
+        if item is Mapped:
+            return self._read_mapped(value, path)
+        if get_origin(item) is tuple:  # pairs
+            return tuple(
+                (str(key), self._read(str, text, f"{path}.{key}")) for key, text in value.items()
+            )
+        return self._read_sequence(item, value, path)
+
+    def _read_mapped(self, data: Mapping[str, Any], path: str) -> object:
+        """Read entries by the names that they are for."""
+        result = []
+        for name, entry in data.items():
+            self._go_to(data, name)
+            result.append(self.read_record(Mapped, entry, f"{path}.{name}", name=str(name)))
+        return tuple(result)
 
     def _read_sequence(self, hint: Any, value: object, path: str) -> object:
         if isinstance(value, str) or not isinstance(value, Sequence):
@@ -129,12 +149,13 @@ class _Reader:
         if position is not None:
             self._line = position.data[key][0] + 1
 
-    def _place(self, data: Mapping[str, Any], problem: str) -> str:
+    def _place(self, data: Mapping[str, Any], where: str, problem: str) -> str:
         """Put the line in front of a problem that the dataclass itself found."""
         key = problem.partition(":")[0].partition(".")[0].partition("[")[0]
-        if key not in data:
+        if key in data:
+            self._go_to(data, key)
+        elif not where:
             return problem
-        self._go_to(data, key)
         return f"line {self._line}: {problem}"
 
 

@@ -71,6 +71,55 @@ class AccessRule:
 
 
 @dataclass(frozen=True, slots=True)
+class Mapped:
+    """A name here that is on a ROS 2 network under another name or with another type.
+
+    Attributes:
+        name: Full name here, no slash in front.
+        action: Its name there, when it is an action; "" is the same name, as for the next two.
+        topic: The same for a topic.
+        service: The same for a service.
+        type: Its type there, "nav2_msgs/NavigateToPose"; "" is the one that corresponds.
+        fields: Pairs of fields that correspond, the one here and the one there ("" for none), where
+            names and types do not tell; of an action with its part in front, "goal.target_pose".
+    """
+
+    name: str
+    action: str = ""
+    topic: str = ""
+    service: str = ""
+    type: str = ""
+    fields: tuple[tuple[str, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check the fields.
+
+        Raises:
+            ConfigError: some are wrong; the text names all of them.
+        """
+        given = {word: getattr(self, word) for word in ("action", "topic", "service")}
+        named = [word for word, name in given.items() if name]
+        problems = [
+            f"{word}: got {given[word]!r} beside {named[0]!r}; expected one of the two."
+            for word in named[1:]
+        ]
+        for word in ("name", *named):
+            try:
+                clean_namespace(getattr(self, word))
+            except NameSetupError as error:
+                problems.append(f"{word}: {error}")
+        if not (named or self.type or self.fields):
+            problems.append("action: missing: got nothing; expected a name or a type.")
+        if problems:
+            raise ConfigError("map", *problems)
+
+    @property
+    def name_there(self) -> str:
+        """Its full name there, before the network's namespace."""
+        return (self.action or self.topic or self.service or self.name).strip("/")
+
+
+@dataclass(frozen=True, slots=True)
 class Ros2:
     """A network of ROS 2 nodes whose middleware is rmw_zenoh: a robot's, for example.
 
@@ -84,7 +133,9 @@ class Ros2:
         robot: Name of the robot here, where several have the same names: `<robot>/odom` here is
             `odom` there, under `namespace`.
         names: Full names here that are on this network, `*` for a word, `**` for any number of
-            them; needed where there are several networks and no `robot`.
+            them; needed where there are several networks and no `robot`, and for ends whose types
+            are those of ROS 1, which use the corresponding ones of ROS 2 then.
+        map: Names here that have another name or type there; they need not be in `names`.
         mode: "client" reaches nodes through the router only, as it has to be from another machine;
             "peer" talks to them directly, faster, on the robot's own machine.
         probe: How often a server with running goals is asked whether it is alive [s], as a link may
@@ -97,6 +148,7 @@ class Ros2:
     namespace: str = ""
     robot: str = ""
     names: tuple[str, ...] = ()
+    map: tuple[Mapped, ...] = ()
     mode: Literal["peer", "client"] = "client"
     probe: float = PROBE_S
 

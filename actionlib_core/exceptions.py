@@ -224,6 +224,14 @@ class FieldError(InterfaceError, TypeError):
     """
 
 
+class CorrespondenceError(InterfaceError):
+    """Fields of a message have no counterpart in the message that it is to become.
+
+    Attributes:
+        problems: One text per field, "pkg/Type -> pkg/msg/Type: field: ...".
+    """
+
+
 class DeserializationError(ActionlibError, ValueError):
     """Received bytes are not a message of the expected type.
 

@@ -37,7 +37,7 @@ def choose_network(networks: Sequence[Ros2], name: str) -> Ros2:
     if len(networks) <= 1:
         return networks[0] if networks else Ros2()
     for network in networks:
-        if _has(network, name):
+        if is_named(network, name):
             return network
     for network in networks:
         if not (network.robot or network.names):
@@ -49,7 +49,10 @@ def choose_network(networks: Sequence[Ros2], name: str) -> Ros2:
     )
 
 
-def _has(network: Ros2, name: str) -> bool:
+def is_named(network: Ros2, name: str) -> bool:
+    """Tell whether a network's settings say that it has the full name `name`."""
+    if any(entry.name == name for entry in network.map):
+        return True
     robot = clean_namespace(network.robot)
     patterns = (f"{robot}/**", *network.names) if robot else network.names
     return any(key_matches(pattern, name) for pattern in patterns)

@@ -1,0 +1,201 @@
+"""Which field of one message is which of another: ROS 1 and ROS 2, or two distributions of ROS 2.
+
+Fields correspond by name (capital letters do not count), else by being the only ones of their type
+on either side. The message of the user's side has to be covered: each of its fields needs a
+counterpart. What the other side has more keeps its default value, or is left out on the way back.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal
+
+from actionlib_core.exceptions import CorrespondenceError
+from actionlib_core.interfaces._definition import FLOATS, INTEGERS, OCTETS
+from actionlib_core.suggest import did_you_mean
+from actionlib_core.time import Duration, Time
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from actionlib_core.interfaces._definition import Field, FieldType
+    from actionlib_core.interfaces._message import Message
+
+    Convert = Callable[[Any], Any]
+
+_TIMES = {
+    "time": (Time, "builtin_interfaces/msg/Time"),
+    "duration": (Duration, "builtin_interfaces/msg/Duration"),
+}
+_ONLY_ROS1 = {"std_msgs/Header": {"seq"}}
+"""Fields that ROS 2 does without: they are 0 on the way back."""
+
+
+def converter(
+    source: type[Message],
+    target: type[Message],
+    fields: Mapping[str, str] | None = None,
+    *,
+    whole: Literal["source", "target"] = "source",
+) -> Convert:
+    """Return a function that makes a `target` of a `source`; the same one when they are one class.
+
+    It raises FieldError, ValueError or TypeError for values that the target cannot hold.
+
+    Args:
+        source: Class of what it takes.
+        target: Class of what it returns.
+        fields: Counterparts that names and types do not tell: fields of the side that `whole`
+            names, to those of the other; "" for one that is to be without.
+        whole: The side of which every field needs a counterpart.
+
+    Raises:
+        CorrespondenceError: Fields have none; all of them.
+    """
+    if source is target:
+        return lambda message: message
+    pairs = _Pairs(whole)
+    convert = pairs.message(source, target, "", dict(fields or {}))
+    if pairs.problems:
+        raise CorrespondenceError(*pairs.problems)
+    return convert
+
+
+class _Pairs:
+    """Pairs the fields of two classes, all the way down, and collects what has no counterpart."""
+
+    def __init__(self, whole: Literal["source", "target"]) -> None:
+        self.problems: list[str] = []
+        self._whole = whole
+        self._made: dict[tuple[type, type], Convert] = {}
+
+    def message(
+        self, source: type[Message], target: type[Message], path: str, fields: dict[str, str]
+    ) -> Convert:
+        if not fields and (source, target) in self._made:
+            return self._made[source, target]
+        at = f"{source._type} -> {target._type}: {path}"
+        pairs = self._pairs(source, target, at, fields)
+        plan = [
+            (theirs.attribute, mine.attribute, self._field(source, mine, target, theirs, path))
+            for mine, theirs in pairs
+        ]
+
+        def convert(message: Any) -> Any:
+            made = target()
+            for to, origin, change in plan:
+                value = getattr(message, origin)
+                setattr(made, to, value if change is None else change(value))
+            return made
+
+        self._made[source, target] = convert
+        return convert
+
+    def _pairs(
+        self, source: type[Message], target: type[Message], at: str, fields: dict[str, str]
+    ) -> list[tuple[Field, Field]]:
+        """Return the pairs (of the source, of the target)."""
+        forward = self._whole == "source"
+        whole, other = (source, target) if forward else (target, source)
+        mine = {field.name: field for field in whole._definition.fields}
+        others = {field.name: field for field in other._definition.fields}
+        found: dict[str, Field] = {}
+        for name, counterpart in fields.items():
+            if name not in mine or counterpart not in {"", *others}:
+                wrong, known = (name, mine) if name not in mine else (counterpart, others)
+                self.problems.append(
+                    f"{at}fields: got {wrong!r}; expected one of {', '.join(known) or 'none'}."
+                    + did_you_mean(wrong, list(known))
+                )
+            elif counterpart:
+                found[name] = others[counterpart]
+        without = {*fields, *_ONLY_ROS1.get(whole._type, ())}
+        by_name = {name.lower(): field for name, field in others.items()}
+        for name in mine:
+            if name not in without and name.lower() in by_name:
+                found[name] = by_name[name.lower()]
+        taken = {field.name for field in found.values()}
+        alone = [name for name in mine if name not in {*without, *found}]
+        for name in alone:
+            alike = [f for n, f in others.items() if n not in taken and _alike(mine[name], f)]
+            rivals = [n for n in alone if _alike(mine[n], mine[name])]
+            if len(alike) == len(rivals) == 1:
+                found[name] = alike[0]
+            else:
+                self.problems.append(
+                    f"{at}{name}: got a field without counterpart; expected one of "
+                    f"{', '.join(others) or 'none'}. Try 'fields: {{{name}: ...}}' in the "
+                    "configuration of the name, with '' for a field to do without."
+                )
+        ordered = [(mine[name], found[name]) for name in mine if name in found]
+        return ordered if forward else [(theirs, field) for field, theirs in ordered]
+
+    def _field(
+        self, source: type[Message], mine: Field, target: type[Message], theirs: Field, path: str
+    ) -> Convert | None:
+        """Return what converts a value of a field, None when it is taken as it is."""
+        here = f"{path}{mine.name}"
+        if mine.type.is_array != theirs.type.is_array or (
+            {mine.type.length, theirs.type.length} - {None} != set()
+            and mine.type.length != theirs.type.length
+        ):
+            self._differ(source, mine, target, theirs, here)
+            return None
+        one = self._one(source, mine, target, theirs, here)
+        if not mine.type.is_array:
+            return one
+        if theirs.type.base in OCTETS:
+            return bytes
+        if one is None:
+            return list
+        element = one
+        return lambda values: [element(value) for value in values]
+
+    def _one(
+        self, source: type[Message], mine: Field, target: type[Message], theirs: Field, here: str
+    ) -> Convert | None:
+        kind, other = mine.type, theirs.type
+        for ours, (cls, ros2) in _TIMES.items():
+            if (kind.base, other.base) == (ours, ros2):
+                made = target._nested[ros2]
+                return lambda value: made(sec=value.secs, nanosec=value.nsecs)  # type: ignore[call-arg]
+            if (kind.base, other.base) == (ros2, ours):
+                time_class = cls
+                return lambda value: time_class(value.sec, value.nanosec)
+        if kind.is_builtin or other.is_builtin:
+            if _family(kind) != _family(other):
+                self._differ(source, mine, target, theirs, here)
+            return None
+        nested = source._nested[kind.base], target._nested[other.base]
+        return None if nested[0] is nested[1] else self.message(*nested, f"{here}.", {})
+
+    def _differ(
+        self, source: type[Message], mine: Field, target: type[Message], theirs: Field, here: str
+    ) -> None:
+        self.problems.append(
+            f"{source._type} -> {target._type}: {here}: got {mine.type}; expected {theirs.type}, "
+            f"the type of {theirs.name!r}."
+        )
+
+
+def _family(kind: FieldType) -> str:
+    if kind.base in INTEGERS:
+        return "integer"
+    return "float" if kind.base in FLOATS else kind.base
+
+
+def _alike(one: Field, other: Field) -> bool:
+    """Tell whether two fields hold the same kind of value, so that one may be the other."""
+    if one.type.is_array != other.type.is_array:
+        return False
+    return _plain_type(one.type) == _plain_type(other.type)
+
+
+def _plain_type(kind: FieldType) -> str:
+    """Return the type as both worlds would call it."""
+    if kind.base in _TIMES:
+        return _TIMES[kind.base][1]
+    return (
+        _family(kind)
+        if kind.is_builtin
+        else "/msg/".join((kind.base.partition("/")[0], kind.base.rpartition("/")[2]))
+    )

@@ -1,0 +1,195 @@
+"""What a name of ours is on a network of ROS 2: its name and type there, and the way of messages.
+
+A ROS 2 class goes to ROS 2 as it is. A ROS 1 class does where the configuration says so: the names
+in `ros2.names`, those of a `ros2.robot`, and those in `ros2.map`. Its counterpart is the ROS 2 type
+that `map` gives, else one that is known here (move_base is navigate_to_pose), else the one of the
+same name.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.exceptions import ConfigError, CorrespondenceError, InterfaceError
+from actionlib_core.interfaces import ros2
+from actionlib_core.interfaces._correspondence import converter
+from actionlib_core.wire.ros2.network import choose_network, is_named
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.config import Mapped, Ros2
+    from actionlib_core.node import Node
+    from actionlib_core.wire.action_messages import ActionTypes
+
+    Convert = Callable[[Any], Any]
+
+KNOWN_ACTIONS = {
+    "move_base_msgs/MoveBase": ("move_base", "navigate_to_pose", "nav2_msgs/NavigateToPose"),
+}
+"""ROS 1 actions whose successors have other names: their usual name, that of ROS 2, its type."""
+
+
+@dataclass(frozen=True, slots=True)
+class ActionOnRos2:
+    """An action of ours as it is on ROS 2.
+
+    Attributes:
+        name: Full name, as we would call it; the network's namespace is put before it there.
+        action: Its ROS 2 class.
+        to_goal: Makes the goal there of one of ours.
+        from_goal: The other way round, for servers.
+        to_result: As `to_goal`.
+        from_result: As `from_goal`, for clients.
+        to_feedback: As `to_goal`.
+        from_feedback: As `from_goal`, for clients.
+    """
+
+    name: str
+    action: type[ros2.Ros2Action]
+    to_goal: Convert
+    from_goal: Convert
+    to_result: Convert
+    from_result: Convert
+    to_feedback: Convert
+    from_feedback: Convert
+
+
+@dataclass(frozen=True, slots=True)
+class MessageOnRos2:
+    """A topic of ours, or one direction of a service, as it is on ROS 2.
+
+    Attributes:
+        name: As for `ActionOnRos2`.
+        message: Its ROS 2 class.
+        to_ros2: Makes a message of that class of one of ours.
+        from_ros2: The other way round.
+    """
+
+    name: str
+    message: Any
+    to_ros2: Convert
+    from_ros2: Convert
+
+
+def find_network(node: Node, name: str, wire: str) -> Ros2 | None:
+    """Return the network of ROS 2 that a full name is on, None when it is on our own wire.
+
+    Args:
+        node: Whose configuration counts.
+        name: Of an action, topic or service.
+        wire: `_wire` of its class.
+
+    Raises:
+        ConfigError: The class is one of ROS 2, and no network has the name.
+    """
+    networks = node.config.ros2
+    if wire == "ros2" or any(is_named(network, name) for network in networks):
+        return choose_network(networks, name)
+    return None
+
+
+def action_on_ros2(network: Ros2, name: str, types: ActionTypes) -> ActionOnRos2:
+    """Return what an action is on a network.
+
+    Raises:
+        ConfigError: The action has no counterpart, or fields of its goal, result or feedback have
+            none; all of them.
+    """
+    mapped = _mapped(network, name)
+    there, wanted = name, mapped.type if mapped else ""
+    type_name = types.action._type
+    if types.action._wire == "ros1":
+        type_name = type_name.removesuffix("Action")
+        if not mapped and type_name in KNOWN_ACTIONS:
+            usual, successor, wanted = KNOWN_ACTIONS[type_name]
+            front, _, last = name.rpartition("/")
+            if last == usual:
+                there = f"{front}/{successor}" if front else successor
+    action = _looked_up(network, name, "action", wanted or type_name)
+    fields = dict(mapped.fields) if mapped else {}
+    problems: list[str] = []
+
+    def ways(part: str) -> tuple[Convert, Convert]:
+        ours, theirs = getattr(types, part), getattr(action, part.title())
+        own = {
+            name.partition(".")[2]: counterpart.rpartition(".")[2]
+            for name, counterpart in fields.items()
+            if name.partition(".")[0] == part
+        }
+        return _ways(ours, theirs, own, problems)
+
+    goal, result, feedback = ways("goal"), ways("result"), ways("feedback")
+    if problems:
+        raise ConfigError(f"ros2: {name}", *problems)
+    return ActionOnRos2(mapped.name_there if mapped else there, action, *goal, *result, *feedback)
+
+
+def message_on_ros2(network: Ros2, name: str, cls: Any) -> MessageOnRos2:
+    """Return what a topic with a message class is on a network; raises as `action_on_ros2`."""
+    mapped = _mapped(network, name)
+    theirs = _looked_up(network, name, "message", (mapped and mapped.type) or cls._type)
+    problems: list[str] = []
+    ways = _ways(cls, theirs, dict(mapped.fields) if mapped else {}, problems)
+    if problems:
+        raise ConfigError(f"ros2: {name}", *problems)
+    return MessageOnRos2(mapped.name_there if mapped else name, theirs, *ways)
+
+
+def service_on_ros2(
+    network: Ros2, name: str, cls: Any
+) -> tuple[type[ros2.Ros2Service], MessageOnRos2, MessageOnRos2]:
+    """Return what a service is on a network: its class there, the request and the response.
+
+    Raises:
+        ConfigError: As `action_on_ros2`.
+    """
+    mapped = _mapped(network, name)
+    theirs = _looked_up(network, name, "service", (mapped and mapped.type) or cls._type)
+    problems: list[str] = []
+    there = mapped.name_there if mapped else name
+    request, response = (
+        MessageOnRos2(there, part, *_ways(ours, part, {}, problems))
+        for ours, part in (
+            (cls._request_class, theirs.Request),
+            (cls._response_class, theirs.Response),
+        )
+    )
+    if problems:
+        raise ConfigError(f"ros2: {name}", *problems)
+    return theirs, request, response
+
+
+def _mapped(network: Ros2, name: str) -> Mapped | None:
+    return next((entry for entry in network.map if entry.name == name), None)
+
+
+def _looked_up(network: Ros2, name: str, kind: str, type_name: str) -> Any:
+    look_up = {
+        "action": ros2.get_action,
+        "message": ros2.get_message,
+        "service": ros2.get_service,
+    }[kind]
+    try:
+        return look_up(type_name, network.distro)
+    except InterfaceError as error:
+        raise ConfigError(
+            f"ros2: {name}",
+            f"{kind}: got {type_name!r}, which ROS 2 does not have under this name; expected a "
+            f"type of ROS 2. Try 'map: {{{name}: {{type: pkg/Name}}}}'. {error}",
+        ) from error
+
+
+def _ways(
+    ours: Any, theirs: Any, fields: dict[str, str], problems: list[str]
+) -> tuple[Convert, Convert]:
+    """Return what makes a message of theirs of one of ours, and the other way round."""
+    try:
+        return (
+            converter(ours, theirs, fields, whole="source"),
+            converter(theirs, ours, fields, whole="target"),
+        )
+    except CorrespondenceError as error:
+        problems += error.problems
+        return (lambda message: message), (lambda message: message)

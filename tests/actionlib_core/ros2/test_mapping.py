@@ -1,0 +1,143 @@
+"""Names of ours on a network of ROS 2: the configuration, and what becomes of types and messages."""
+
+from __future__ import annotations
+
+import pytest
+
+from actionlib_core import interfaces
+from actionlib_core.clock import RealClock
+from actionlib_core.config import Config, Mapped, Ros2, load_config
+from actionlib_core.exceptions import ConfigError
+from actionlib_core.interfaces.control_msgs.msg import GripperCommandAction
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
+from actionlib_core.interfaces.nav2_msgs.action import NavigateToPose
+from actionlib_core.interfaces.std_srvs.srv import SetBool
+from actionlib_core.node import Node
+from actionlib_core.transport.memory import MemoryNetwork
+from actionlib_core.wire.action_messages import ActionTypes
+from actionlib_core.wire.ros2.mapping import (
+    action_on_ros2,
+    find_network,
+    message_on_ros2,
+    service_on_ros2,
+)
+
+MOVE_BASE = ActionTypes.of(MoveBaseAction)
+
+
+def test_a_file_says_what_is_where(tmp_path) -> None:
+    path = tmp_path / "robot.yaml"
+    path.write_text(
+        "ros2:\n"
+        "  router: tcp/127.0.0.1:7447\n"
+        "  names: [odom]\n"
+        "  map:\n"
+        "    move_base: {action: navigate_to_pose, type: nav2_msgs/NavigateToPose}\n"
+        "    arm/go: {type: a_msgs/Go, fields: {goal.target: pose}}\n"
+    )
+    (network,) = load_config(path).ros2
+    assert network.map == (
+        Mapped("move_base", action="navigate_to_pose", type="nav2_msgs/NavigateToPose"),
+        Mapped("arm/go", type="a_msgs/Go", fields=(("goal.target", "pose"),)),
+    )
+    assert [entry.name_there for entry in network.map] == ["navigate_to_pose", "arm/go"]
+
+
+def test_a_wrong_file_names_everything_at_once(tmp_path) -> None:
+    path = tmp_path / "robot.yaml"
+    path.write_text(
+        "ros2:\n  map:\n    a: {acton: x}\n    b: {action: a, topic: b}\n    c: 3\n"
+        "    d: {fields: {a: 1}}\n    e: {}\n    f: {action: 'x y'}\n"
+    )
+    with pytest.raises(ConfigError) as caught:
+        load_config(path)
+    assert [problem.partition(":")[0] for problem in caught.value.problems] == [
+        f"line {line}" for line in range(3, 9)
+    ]
+
+
+def test_which_names_are_on_ros2() -> None:
+    clock = RealClock()
+    networks = (
+        Ros2(names=("odom", "robot1/**"), map=(Mapped("move_base", action="go"),)),
+        Ros2(robot="robot2"),
+    )
+    node = Node(
+        "mission",
+        clock=clock,
+        transport=MemoryNetwork(clock).session(),
+        config=Config(ros2=networks),
+    )
+    for name in ("odom", "robot1/scan", "move_base"):
+        assert find_network(node, name, "ros1") is networks[0]
+    assert find_network(node, "robot2/move_base", "ros1") is networks[1]
+    assert find_network(node, "scan", "ros1") is None
+    assert find_network(node, "robot2/spin", "ros2") is networks[1]
+    with pytest.raises(ConfigError):
+        find_network(node, "spin", "ros2")
+
+
+def test_move_base_is_navigate_to_pose_without_being_told() -> None:
+    found = action_on_ros2(Ros2(), "robot1/move_base", MOVE_BASE)
+    assert (found.name, found.action) == ("robot1/navigate_to_pose", NavigateToPose)
+    goal = MoveBaseGoal()
+    goal.target_pose.header.frame_id = "map"
+    assert found.to_goal(goal).pose.header.frame_id == "map"
+    assert found.from_goal(found.to_goal(goal)) == goal
+    assert found.from_result(NavigateToPose.Result(error_code=3)) == MOVE_BASE.result()
+    assert found.from_feedback(NavigateToPose.Feedback()).base_position.header.frame_id == ""
+    assert action_on_ros2(Ros2(), "drive", MOVE_BASE).name == "drive"
+
+
+def test_the_configuration_has_the_last_word() -> None:
+    settings = Ros2(
+        distro="kilted",
+        map=(
+            Mapped(
+                "move_base",
+                action="/dock",
+                type="nav2_msgs/DockRobot",
+                fields=(
+                    ("goal.target_pose", "goal.dock_pose"),
+                    ("feedback.base_position", ""),
+                ),
+            ),
+        ),
+    )
+    found = action_on_ros2(settings, "move_base", MOVE_BASE)
+    assert (found.name, found.action._type) == ("dock", "nav2_msgs/action/DockRobot")
+    assert found.to_goal(MoveBaseGoal()).use_dock_id is True
+    wrong = Ros2(map=(Mapped("move_base", type="nav2_msgs/Spin"),))
+    with pytest.raises(ConfigError) as caught:
+        action_on_ros2(wrong, "move_base", MOVE_BASE)
+    assert len(caught.value.problems) == 2
+    with pytest.raises(ConfigError, match="nav2_msgs/Spinn"):
+        action_on_ros2(Ros2(map=(Mapped("a", type="nav2_msgs/Spinn"),)), "a", MOVE_BASE)
+
+
+def test_another_distribution_takes_the_goals_of_a_class() -> None:
+    found = action_on_ros2(Ros2(distro="rolling"), "go", ActionTypes.of(NavigateToPose))
+    assert found.action._distro == "rolling"
+    assert type(found.to_goal(NavigateToPose.Goal())) is found.action.Goal
+    assert type(found.from_feedback(found.action.Feedback())) is NavigateToPose.Feedback
+    with pytest.raises(ConfigError, match="error_code"):
+        action_on_ros2(Ros2(distro="humble"), "go", ActionTypes.of(NavigateToPose))
+
+
+def test_actions_of_one_name_in_both_worlds() -> None:
+    found = action_on_ros2(Ros2(), "gripper", ActionTypes.of(GripperCommandAction))
+    assert found.action._type == "control_msgs/action/GripperCommand"
+
+
+def test_topics_and_services() -> None:
+    odometry = interfaces.get_message("nav_msgs/Odometry")
+    topic = message_on_ros2(Ros2(map=(Mapped("odom", topic="wheels/odom"),)), "odom", odometry)
+    assert (topic.name, topic.message._type) == ("wheels/odom", "nav_msgs/msg/Odometry")
+    assert topic.from_ros2(topic.to_ros2(odometry())) == odometry()
+    service, request, response = service_on_ros2(Ros2(), "flag", SetBool)
+    assert service._type == "std_srvs/srv/SetBool"
+    assert request.to_ros2(SetBool._request_class(data=True)).data is True
+    assert response.from_ros2(response.message(message="x")).message == "x"
+    own = interfaces.define_message("mapping_pkg/Old", "time at\n")
+    with pytest.raises(ConfigError, match="mapping_pkg"):
+        message_on_ros2(Ros2(), "old", own)
