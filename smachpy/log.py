@@ -43,7 +43,13 @@ def set_loggers(
     for name, function in (("info", info), ("warn", warn), ("debug", debug), ("error", error)):
         problems.function(name, function, f"{name}(text)", 1, optional=False)
     problems.raise_all()
-    _current[0] = _Loggers(info, warn, debug, error)
+    given = _Loggers(info, warn, debug, error)
+    _current[0] = _STANDARD if given == _STANDARD else given
+
+
+def current_loggers() -> tuple[Callable[[str], object], ...]:
+    """Return the functions in force, in the order in which `set_loggers` takes them."""
+    return _current[0]
 
 
 def loginfo(msg: str) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from smachpy.command import UsageError
+from smachpy.command.ros1_options import add_options as add_ros1_options
 
 if TYPE_CHECKING:
     from smachpy.introspection import StateRecord
@@ -71,6 +72,7 @@ def register_render(
         default="time",
         help="what colours the states of --runs (default: %(default)s)",
     )
+    add_ros1_options(parser, loads=True)
     parser.set_defaults(run=_run)
 
 
@@ -89,7 +91,7 @@ def _run(args: argparse.Namespace) -> int:
             "smachpy render: got neither -o nor --atlas; expected where to draw. "
             f"Try -o {Path(args.target).stem or 'machine'}.svg"
         )
-    record = read_record(args.target)
+    record = read_record(args.target, args)
     looks: dict[str, Any] = {"theme": args.theme, "show_implicit": args.show_implicit}
     if args.runs:
         from viz.runs.statistics import marks_of
@@ -135,18 +137,23 @@ def _legend(statistics: Statistics, heat: str) -> tuple[tuple[str, str], ...]:
     )
 
 
-def read_record(text: str) -> StateRecord:
+def read_record(text: str, args: argparse.Namespace | None = None) -> StateRecord:
     """Return the record of a machine that can be loaded, or one that was written down.
+
+    Args:
+        text: What the user named.
+        args: The command line, which may say that it is a script for ROS 1.
 
     Raises:
         UsageError: there is no such file, or it is no record.
         SmachError: the target cannot be loaded.
     """
+    from smachpy.command.ros1_options import load_any
     from smachpy.command.targets import load_target
     from smachpy.introspection import StateRecord, describe
 
     if not text.endswith(".json"):
-        target = load_target(text)
+        target = load_target(text) if args is None else load_any(text, args)
         return describe(target.build())
     try:
         return StateRecord.from_json(Path(text).read_text(encoding="utf-8"))

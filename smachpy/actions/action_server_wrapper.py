@@ -13,6 +13,7 @@ from smachpy.exceptions import did_you_mean
 from smachpy.machines.problems import Problems
 from smachpy.run.grace import request_soon
 from smachpy.run.origin import asking
+from smachpy.slips import accepts
 from smachpy.userdata.user_data import Remapper, UserData
 
 if TYPE_CHECKING:
@@ -132,6 +133,11 @@ class ActionServerWrapper:
         wrapped_container.register_termination_cb(self.termination_cb)
 
     def _outcome_problems(self) -> Iterator[str]:
+        for problem in self._outcome_slips():
+            if not accepts(problem):
+                yield problem
+
+    def _outcome_slips(self) -> Iterator[str]:
         known = self.wrapped_container.get_registered_outcomes()
         listed: dict[str, str] = {}
         for name, outcomes in self._outcomes.items():

@@ -10,7 +10,8 @@ from actionlib_core.output import printable
 from smachpy.checks import check
 from smachpy.checks.report import FORMATS
 from smachpy.checks.suppression import read_settings
-from smachpy.command.targets import load_target
+from smachpy.command.ros1_options import add_options as add_ros1_options
+from smachpy.command.ros1_options import load_any
 from smachpy.exceptions import did_you_mean
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         help="look for what is off by itself: no-timeout; may be repeated",
     )
     parser.add_argument("--pictures", metavar="FOLDER", help="draw the runs that show problems")
+    add_ros1_options(parser, loads=True)
     parser.set_defaults(run=run)
 
 
@@ -70,7 +72,7 @@ def _tell_unused(settings: Settings, checked: list[str]) -> None:
 
 
 def _check(text: str, args: argparse.Namespace, settings: Settings) -> Report:
-    target = load_target(text)
+    target = load_any(text, args)
     machine = target.build()
     name = machine.name or target.name
     own = [p for machine_name, texts in settings.properties if machine_name == name for p in texts]

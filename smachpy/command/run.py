@@ -13,6 +13,8 @@ from actionlib_core.names import check_name
 from actionlib_core.output import printable
 from smachpy.command.arguments import Text, parameters_of, read_words, usage, wants_help
 from smachpy.command.robot import add_robot_options
+from smachpy.command.ros1_options import add_options as add_ros1_options
+from smachpy.command.ros1_options import options_of
 from smachpy.mission_info import mission_info
 from smachpy.sim.exceptions import MissionError
 from smachpy.sim.geometry import finite
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from typing import TextIO
 
+    from smachpy.command.runner import RunOptions
     from smachpy.command.surroundings import Pace, RobotOptions
     from smachpy.command.targets import Target
 
@@ -91,6 +94,7 @@ def register(subparsers: Any) -> None:
         help="how long to wait for the mission's action servers [s] (default: %(default)g)",
     )
     _add_watching(parser)
+    add_ros1_options(parser, loads=False)
     robot = parser.add_argument_group("the simulated robot")
     robot.add_argument(
         "--start-robot",
@@ -193,10 +197,15 @@ def _brings_robots(target: Target, words: Sequence[str], inputs: Mapping[str, Te
 def _run_mission(
     args: argparse.Namespace, events: TextIO | None, stack: contextlib.ExitStack
 ) -> int:
-    from smachpy.command.runner import RunOptions, run_mission
+    from smachpy.command.ros1 import run_ros1
+    from smachpy.command.runner import run_mission
     from smachpy.command.targets import load_target
-    from smachpy.command.watching import Watching
 
+    ros1 = options_of(args)
+    if ros1 is not None:
+        if args.input:
+            raise MissionError("--input: got it beside --ros1; expected --params FILE.")
+        return run_ros1(args.target, ros1, _options(args, {}, None, events))
     target = load_target(args.target)
     if wants_help(args.words):
         print(usage(target))
@@ -204,11 +213,23 @@ def _run_mission(
     inputs = _inputs(args.input)
     if _brings_robots(target, args.words, inputs):
         _use_own_network(args, stack)
-    options = RunOptions(
+    return run_mission(target, _options(args, inputs, mission_info(target.thing).world, events))
+
+
+def _options(
+    args: argparse.Namespace,
+    inputs: Mapping[str, Text],
+    world: Path | None,
+    events: TextIO | None,
+) -> RunOptions:
+    from smachpy.command.runner import RunOptions
+    from smachpy.command.watching import Watching
+
+    return RunOptions(
         inputs=inputs,
         words=args.words,
         pace=args.time,
-        robot=_robot(args, mission_info(target.thing).world),
+        robot=_robot(args, world),
         names=args.names,
         namespace=check_name(args.robot, "robot name") if args.robot else "",
         out=args.out,
@@ -226,7 +247,6 @@ def _run_mission(
             alone=args.time.virtual,
         ),
     )
-    return run_mission(target, options)
 
 
 def _robot(args: argparse.Namespace, world: Path | None) -> RobotOptions:

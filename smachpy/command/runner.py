@@ -111,11 +111,11 @@ def run_mission(target: Target, options: RunOptions) -> int:
             out = OutFolder(options.out, target.name, machine, options.robot)
         surroundings.start(machine, needed_servers(record) - set(needs.serves))
         if not surroundings.wait(options.server_timeout):
-            return _signal_exit(ending)
+            return signal_exit(ending)
         if out is not None:
             stack.enter_context(out.collecting())
         watch = stack.enter_context(watched(target.name, machine, record.path, options.watching))
-        show = _show(record, options)
+        show = show_run(record, options)
         stack.enter_context(show)
         stack.callback(machine.subscribe(show.on_event))
         outcome = _execute(machine, show, options)
@@ -123,7 +123,7 @@ def run_mission(target: Target, options: RunOptions) -> int:
         good = outcome in good_outcomes(record, options)
         code = EXIT_SUCCESS if good else EXIT_OTHER_OUTCOME
         if ending.requested():
-            code = _signal_exit(ending)
+            code = signal_exit(ending)
         if out is not None:
             facts = {
                 "mission": target.name,
@@ -136,7 +136,7 @@ def run_mission(target: Target, options: RunOptions) -> int:
     return code
 
 
-def _show(record: StateRecord, options: RunOptions) -> Any:
+def show_run(record: StateRecord, options: RunOptions) -> Any:
     """Return what shows the run: a terminal view, or an event stream."""
     clock = current_clock()
     if options.events is not None:
@@ -265,6 +265,7 @@ def _stuck(error: BaseException | None) -> str | None:
     return None if error is None else str(error)
 
 
-def _signal_exit(ending: shutdown.Shutdown) -> int:
+def signal_exit(ending: shutdown.Shutdown) -> int:
+    """Return the exit code of a program that a signal has ended."""
     members = signal.Signals.__members__
     return _SIGNAL_EXIT + members.get(ending.reason or "", signal.SIGINT)

@@ -148,6 +148,19 @@ class Surroundings(Protocol):
             MissionError: it cannot be had here.
         """
 
+    def put_robot(self, prefix: str, timeout: float) -> None:
+        """Bring up the simulated robot, or the world, before it is known who needs it.
+
+        Args:
+            prefix: What the robot's names live under, below the node's name space.
+            timeout: How long to wait for it [s].
+
+        Raises:
+            MissionError: it could not start.
+
+        Blocks: until it is there, `timeout` at most.
+        """
+
     def wait(self, timeout: float) -> bool:
         """Wait until all is there; False when the program is to end.
 
@@ -245,6 +258,17 @@ class _Network:
         self._robot = RobotProcess(arguments, on_change=self._wait.wake)
         self._robot.on_refusal(machine.request_preempt)
         self._robot.__enter__()
+
+    def put_robot(self, prefix: str, timeout: float) -> None:
+        self._wait = ServerWait(set())
+        self._forget = shutdown.on_shutdown(self._wait.wake)
+        arguments = self._options.arguments()
+        if self._options.world is None:
+            arguments += ("--namespace", prefix or "/")
+        self._robot = RobotProcess(arguments, on_change=self._wait.wake)
+        self._robot.on_refusal(lambda: shutdown.request("the robot refused"))
+        self._robot.__enter__()
+        self._wait.wait(timeout, self._robot)
 
     def wait(self, timeout: float) -> bool:
         assert self._wait is not None
@@ -435,6 +459,13 @@ class _VirtualNetwork:
             self._put_world(self._options.world)
         elif needed or self._options.start:
             self._put_robot(_prefix_of(needed))
+
+    def put_robot(self, prefix: str, timeout: float) -> None:
+        del timeout
+        if self._options.world is not None:
+            self._put_world(self._options.world)
+        else:
+            self._put_robot(prefix)
 
     def _put_world(self, world: Path) -> None:
         from smachpy.sim.simulation import simulation

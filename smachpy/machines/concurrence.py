@@ -17,6 +17,7 @@ from smachpy.exceptions import (
 from smachpy.introspection import RuleRecord, Structure
 from smachpy.machines.construction import construction_method
 from smachpy.machines.container import Container, below
+from smachpy.machines.old_states import as_state
 from smachpy.machines.problems import Problems
 from smachpy.machines.rules import Rule, all_of, any_of, as_rules, decide, n_of
 from smachpy.machines.spec import ChildSpec, ConcurrenceSpec
@@ -26,6 +27,7 @@ from smachpy.run.callback import call_bounded
 from smachpy.run.interrupt import Interruption
 from smachpy.run.origin import asking
 from smachpy.run.visit import End
+from smachpy.slips import accepting, accepts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -86,6 +88,7 @@ class Concurrence(Container):
     """
 
     _smachpy_kind: ClassVar[Kind] = "concurrence"
+    _smachpy_replaces: ClassVar[bool] = True
 
     def __init__(
         self,
@@ -158,11 +161,13 @@ class Concurrence(Container):
             raise InvalidConstructionError(f"{label}: add: got a new state while it runs.")
         for other, child in self._states.items():
             if child is state:
-                raise InvalidStateError(
+                problem = (
                     f"{label}: state: got the instance that runs as {other!r} at the same time; "
                     "expected one of its own."
                 )
-        self._store_child(label, state, remapping)
+                if not accepts(problem):
+                    raise InvalidStateError(problem)
+        self._store_child(label, as_state(state, label) if accepting() else state, remapping)
         return state
 
     # -- structure -----------------------------------------------------------------------------
@@ -214,7 +219,8 @@ class Concurrence(Container):
         spec = ConcurrenceSpec(
             where, self._smachpy.outcomes, children, self._default_outcome, self._rules
         )
-        return (*concurrence_problems(spec), *self._shared_states(where))
+        shared = (problem for problem in self._shared_states(where) if not accepts(problem))
+        return (*concurrence_problems(spec), *shared)
 
     def _shared_states(self, where: str) -> Iterator[str]:
         """Yield the states that two branches would run at the same time."""

@@ -11,7 +11,8 @@ import types
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, Concatenate, Generic, NoReturn, ParamSpec, TypeVar
 
-from smachpy.exceptions import InvalidConstructionError
+from smachpy.exceptions import InconsistentMachineError, InvalidConstructionError
+from smachpy.slips import accepts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -89,7 +90,11 @@ class Openable:
         """Close it; at the outermost container everything is checked."""
         OPEN.reset(self._open_tokens.pop())
         if error is None and not OPEN.get() and self._context_kwargs.get("check", True):
-            self.check_consistency()
+            try:
+                self.check_consistency()
+            except InconsistentMachineError as problems:
+                if not accepts(str(problems)):  # SMACH only logged it here
+                    raise
 
     @contextlib.contextmanager
     def opened(self, **kwargs: Any) -> Iterator[Self]:

@@ -29,6 +29,7 @@ from smachpy.run.options import retry_problems
 from smachpy.run.origin import REQUESTING, asking, signal_being_handled
 from smachpy.run.root import execute_root
 from smachpy.run.visit import Origin
+from smachpy.slips import accepts
 from smachpy.userdata.typed import CheckedDict
 from smachpy.userdata.user_data import Remapper, UserData, reset, typed_userdata
 
@@ -61,6 +62,8 @@ class Container(Openable, Callbacks, State):
 
     _smachpy_is_container: ClassVar[bool] = True
     _smachpy: DataOf[ContainerData] = DataOf(ContainerData)
+    _smachpy_replaces: ClassVar[bool] = False
+    """Whether SMACH's container of this kind replaced a child by another one of its label."""
     name: str | None = None
 
     def __init__(
@@ -181,13 +184,17 @@ class Container(Openable, Callbacks, State):
     ) -> None:
         """Add a child, unless something is wrong: with its arguments, or already in `problems`."""
         if not isinstance(label, str) or not label:
-            raise InvalidStateError(f"label: got {label!r}; expected a string, not empty.")
+            problem = f"label: got {label!r}; expected a string, not empty."
+            if not isinstance(label, str) or not accepts(problem):
+                raise InvalidStateError(problem)
         problems = problems or Problems(label)
         if label in self._states:
-            problems.add(
+            problem = (
                 "label is taken: got a second state with it; expected a label not in "
                 f"{sorted(self._states)}."
             )
+            if not (self._smachpy_replaces and accepts(f"{label}: {problem}")):
+                problems.add(problem)
         if isinstance(state, State):
             with problems:
                 problems.add(*state_problems(state))
@@ -448,10 +455,12 @@ def state_problems(state: State) -> Iterator[str]:
         yield f"execute: got {execute!r}; expected a method execute(self, userdata)."
     elif not takes(execute, 1):
         name = type(state).__name__
-        yield (
+        problem = (
             f"execute: got {name}.execute{inspect.signature(execute, follow_wrapped=False)}, which "
             "cannot be called with the userdata; expected `def execute(self, userdata):`."
         )
+        if not accepts(problem):
+            yield problem
 
 
 def below(state: State) -> Iterator[State]:

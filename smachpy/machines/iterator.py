@@ -15,6 +15,7 @@ from smachpy.exceptions import (
 from smachpy.introspection import RuleRecord, Structure, TransitionRecord
 from smachpy.machines.construction import construction_method
 from smachpy.machines.container import Container
+from smachpy.machines.old_states import as_state
 from smachpy.machines.problems import Problems
 from smachpy.machines.spec import ChildSpec, LoopSpec
 from smachpy.machines.validate import loop_problems
@@ -22,6 +23,7 @@ from smachpy.run.callback import call_bounded
 from smachpy.run.interrupt import Interruption
 from smachpy.run.runner import end_visit, run_watched, unknown_outcome, user_error
 from smachpy.run.visit import End, Why
+from smachpy.slips import accepting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -150,7 +152,8 @@ class Iterator(Container):
         before = self._states, self._remappings
         self._states, self._remappings = {}, {}
         try:
-            self._store_child(label, state, remapping, problems)
+            stored = as_state(state, label) if accepting() else state
+            self._store_child(label, stored, remapping, problems)
         except InvalidStateError:
             self._states, self._remappings = before
             raise

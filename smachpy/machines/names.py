@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from smachpy.exceptions import InvalidStateError
+from smachpy.slips import accepts
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -17,9 +18,10 @@ def unique_names(names: Iterable[str], what: str = "names") -> tuple[str, ...]:
         InvalidStateError: `names` is one string or no list, or holds something that is no string.
     """
     if isinstance(names, str):
-        raise InvalidStateError(
-            f"{what}: got the string {names!r}; expected a list of strings. Try [{names!r}]."
-        )
+        problem = f"{what}: got the string {names!r}; expected a list of strings. Try [{names!r}]."
+        if not accepts(problem):
+            raise InvalidStateError(problem)
+        names = [names]
     try:
         found = list(names)
     except TypeError as error:

@@ -29,6 +29,7 @@ from smachpy.run.options import NAMES, NO_OPTIONS, Options, Retry, changed
 from smachpy.run.origin import REQUESTING
 from smachpy.run.runner import runner_of
 from smachpy.run.step import Step
+from smachpy.slips import accepts
 from smachpy.util import has_smach_interface
 
 if TYPE_CHECKING:
@@ -94,6 +95,8 @@ class DataOf(Generic[Data_co]):
             f"State.__init__. Try `super().__init__(outcomes=[...])` as the first line of "
             f"{name}.__init__ (in __post_init__ for a dataclass)."
         )
+        if self.kind is StateData and accepts(problem):
+            return vars(state).setdefault("_smachpy", self.kind())  # type: ignore[no-any-return]
         raise InvalidStateError(f"{name}: {problem}", [problem])
 
 

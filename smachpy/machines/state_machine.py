@@ -18,6 +18,7 @@ from smachpy.introspection import Structure, TransitionRecord
 from smachpy.machines.construction import construction_method
 from smachpy.machines.container import Container
 from smachpy.machines.names import unique_names
+from smachpy.machines.old_states import adopt_slips, as_state
 from smachpy.machines.problems import Problems
 from smachpy.machines.spec import ChildSpec, MachineSpec
 from smachpy.machines.validate import machine_problems
@@ -35,6 +36,7 @@ from smachpy.run.runner import (
     user_error,
 )
 from smachpy.run.visit import PREEMPTED, End, Why
+from smachpy.slips import accepting, accepts
 from smachpy.util import is_shutdown
 
 if TYPE_CHECKING:
@@ -183,14 +185,18 @@ class StateMachine(Container):
         problems = Problems(str(label))
         holds = "outcome -> label of the next state, outcome of this machine, or None"
         given = problems.names_of("transitions", transitions, holds, optional=True)
+        stored = state
+        if accepting():
+            stored = as_state(state, label)
+            given = adopt_slips(label, stored, given)
         fixed = problems.mapping("constants", constants, "key of the state -> value")
-        self._store_child(label, state, remapping, problems)
+        self._store_child(label, stored, remapping, problems)
         self._transitions[label] = given
         for key, value in fixed.items():
             name = f"{label}.{key}"
             self.userdata[name] = value
             self._remappings[label][key] = name
-            state.register_input_keys([key])
+            stored.register_input_keys([key])
         if self._follow_connectors is not None:
             before, outcomes = self._follow_connectors
             self._transitions[before].update(dict.fromkeys(outcomes, label))
@@ -214,10 +220,13 @@ class StateMachine(Container):
         labels = list(initial_states)
         unknown = [label for label in labels if label not in self._states]
         if len(labels) > 1 or unknown:
-            raise InvalidStateError(
-                f"initial state: got {labels!r}; expected one of {sorted(self._states)}."
-                f"{did_you_mean(unknown[0], self._states) if unknown else ''}"
-            )
+            problem = f"initial state: got {labels!r}; expected one of {sorted(self._states)}."
+            if unknown and self.is_opened():
+                problem += " It is not added yet. Try set_initial_state after the last add()."
+            elif unknown:
+                problem += did_you_mean(unknown[0], self._states)
+            if not accepts(problem):
+                raise InvalidStateError(problem)
         if labels:
             if not self.is_opened() and self._initial_state_label is not None:
                 self._next_initial = labels[0]

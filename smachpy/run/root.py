@@ -34,7 +34,29 @@ _DEFAULTS = (
 )
 
 
+OBSERVERS: list[Callable[[Any], Callable[[str | None], object] | None]] = []
+"""Called with each root before it runs; what one returns is called with the outcome, None if the
+root raised. For programs whose roots are not known before: `smachpy.ros1`."""
+
+
 def execute_root(
+    root: Parent, execute: Callable[[Any], Any], options: Options, parent_ud: Any
+) -> str:
+    """Run `root` as the top of a machine, and tell the observers; see `_execute_root`."""
+    if not OBSERVERS:
+        return _execute_root(root, execute, options, parent_ud)
+    ends = [observe(root) for observe in OBSERVERS]
+    outcome: str | None = None
+    try:
+        outcome = _execute_root(root, execute, options, parent_ud)
+        return outcome
+    finally:
+        for end in ends:
+            if end is not None:
+                end(outcome)
+
+
+def _execute_root(
     root: Parent, execute: Callable[[Any], Any], options: Options, parent_ud: Any
 ) -> str:
     """Run `root`, by `execute`, as the top of a machine.

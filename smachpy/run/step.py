@@ -121,7 +121,7 @@ class _WatchedRemapper(Remapper):
     def __setitem__(self, key: str, item: Any) -> None:
         super().__setitem__(key, item)
         frame, path = self._scope_of
-        if frame.run.watched:
+        if frame.run.watched and key in self._output:  # else it was dropped
             clock = frame.run.clock
             fields = (path, clock.now(), clock.time_ns(), self._output[key], item)
             frame.publish(_new(UserdataWritten, fields))

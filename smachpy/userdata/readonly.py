@@ -13,10 +13,11 @@ import enum
 import functools
 import types
 from collections import OrderedDict, deque
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 from smachpy.context import current_path
 from smachpy.exceptions import ReadOnlyError
+from smachpy.slips import accepts
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -79,16 +80,30 @@ class _View:
     _smach_key: str
 
 
-def _refuse(self: Any, *_args: Any, **_kwargs: Any) -> NoReturn:
-    name, key = type(self).__name__, self._smach_key
-    path = current_path()
-    raise ReadOnlyError(
-        f"{path or 'userdata'}: read-only value{f' of {key!r}' if key else ''}: got a change of a "
-        f"{name}; expected reading only, because its userdata key is declared as input. Try "
-        f"declaring it with io_keys{f'=[{key!r}]' if key else ''}.",
-        key=key,
-        path=path,
-    )
+def _refuser(base: type, method: str) -> Callable[..., Any]:
+    """Return what stands in a view for a method of `base` that changes the object.
+
+    SMACH let a state change lists and dicts: where its slips are accepted, the original and the
+    view are changed.
+    """
+
+    def refuse(self: Any, *args: Any, **kwargs: Any) -> Any:
+        name, key = type(self).__name__, self._smach_key
+        path = current_path()
+        problem = (
+            f"{path or 'userdata'}: read-only value{f' of {key!r}' if key else ''}: got a change "
+            f"of a {name}; expected reading only, because its userdata key is declared as input. "
+            f"Try declaring it with io_keys{f'=[{key!r}]' if key else ''}."
+        )
+        if not accepts(problem):
+            raise ReadOnlyError(problem, key=key, path=path)
+        if base is not object:
+            getattr(base, method)(self, *args, **kwargs)
+        result = getattr(self._smach_original, method)(*args, **kwargs)
+        return self if method[:3] == "__i" else result
+
+    refuse.__name__ = method
+    return refuse
 
 
 _SEQUENCE = (
@@ -184,7 +199,8 @@ def _view_class(kind: type, base: type | None) -> Any:
             return value
         return read_only(value, self._smach_key)
 
-    body: dict[str, Any] = dict.fromkeys(() if base is None else _CHANGES[base], _refuse)
+    changes = () if base is None else _CHANGES[base]
+    body: dict[str, Any] = {name: _refuser(base or object, name) for name in changes}
     body |= {
         "__slots__": ("_smach_key", "_smach_original"),
         "__class__": property(lambda _self: kind),  # dataclasses compare `__class__`
@@ -197,8 +213,8 @@ def _view_class(kind: type, base: type | None) -> Any:
     if kind is not base:
         body |= {
             "__getattribute__": __getattribute__,
-            "__setattr__": _refuse,
-            "__delattr__": _refuse,
+            "__setattr__": _refuser(object, "__setattr__"),
+            "__delattr__": _refuser(object, "__delattr__"),
         }
     try:
         return types.new_class(kind.__name__, (kind, _View), exec_body=lambda ns: ns.update(body))

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from smachpy.context import current_path
 from smachpy.exceptions import UserDataKeyError
+from smachpy.slips import accepts
 from smachpy.userdata.readonly import ATOMS, read_only, writable
 from smachpy.userdata.typed import CheckedDict, Fields
 
@@ -220,7 +221,8 @@ class Remapper:
         try:
             name = self._output[key]
         except KeyError:
-            self._unwritable(key)
+            self._refuse_write(key)
+            return
         self._data[name] = item if type(item) in ATOMS else writable(item)
 
     __getattr__ = __getitem__  # the same rules, and no second call on the way
@@ -229,7 +231,8 @@ class Remapper:
         try:
             key = self._output[name]
         except KeyError:
-            self._unwritable(name)
+            self._refuse_write(name)
+            return
         self._data[key] = value if type(value) in ATOMS else writable(value)
 
     def __dir__(self) -> list[str]:
@@ -256,13 +259,15 @@ class Remapper:
         )
         raise UserDataKeyError(key, problem, declared, path=current_path()) from None
 
-    def _unwritable(self, key: str) -> NoReturn:
+    def _refuse_write(self, key: str) -> None:
+        """Raise; where SMACH's slips are accepted, drop the write as SMACH did."""
         declared = sorted(self._output)
         problem = (
             f"userdata key written but not declared: got {key!r}; declared output keys: "
             f"{declared}. Try adding it to output_keys."
         )
-        raise UserDataKeyError(key, problem, declared, path=current_path()) from None
+        if not accepts(f"{current_path() or 'userdata'}: {problem}"):
+            raise UserDataKeyError(key, problem, declared, path=current_path()) from None
 
 
 def revoke(window: Remapper) -> None:

@@ -1,0 +1,149 @@
+"""`--ros1`: what the command line says of scripts for ROS 1, and how one is loaded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.output import tell
+from smachpy.command.targets import Target, TargetError, load_target
+from smachpy.sim.exceptions import MissionError
+
+if TYPE_CHECKING:
+    import argparse
+
+
+@dataclass(frozen=True, slots=True)
+class Ros1Options:
+    """How a script for ROS 1 is taken.
+
+    Attributes:
+        params: Files of parameters, each with the name space that it is for.
+        stub_missing: Stand-ins for what nobody has.
+        timeout: Longest time that a script may take to build its machine [s].
+        words: The script's own arguments.
+    """
+
+    params: tuple[tuple[str, Path], ...] = ()
+    stub_missing: bool = False
+    timeout: float = 10.0
+    words: tuple[str, ...] = ()
+
+    def parameters(self) -> dict[str, Any]:
+        """Return the parameters of all files.
+
+        Raises:
+            ParameterFileError: a file cannot be read.
+        """
+        from smachpy.ros1.parameters import Parameters
+
+        made = Parameters()
+        for namespace, path in self.params:
+            made.load(path, namespace)
+        return dict(made.get("/"))
+
+
+def add_options(parser: Any, *, loads: bool) -> None:
+    """Add `--ros1` and what belongs to it.
+
+    Args:
+        parser: The command's.
+        loads: It loads machines without running them.
+    """
+    group = parser.add_argument_group("scripts for ROS 1")
+    group.add_argument(
+        "--ros1", action="store_true", help="TARGET is a script for ROS 1; it stays as it is"
+    )
+    group.add_argument(
+        "--params",
+        action="append",
+        default=[],
+        metavar="[NS=]FILE",
+        help="its parameters, a YAML file; may be repeated",
+    )
+    group.add_argument(
+        "--stub-missing",
+        action="store_true",
+        help="stand-ins for modules, messages and parameters that nobody has",
+    )
+    if loads:
+        group.add_argument(
+            "--timeout",
+            type=float,
+            default=10.0,
+            metavar="S",
+            help="longest time in which it builds its machine [s] (default: %(default)g)",
+        )
+
+
+def options_of(args: argparse.Namespace) -> Ros1Options | None:
+    """Return what the command line says of scripts for ROS 1; None without `--ros1`.
+
+    Raises:
+        MissionError: an option needs `--ros1`.
+    """
+    if not args.ros1:
+        for name in ("params", "stub_missing"):
+            if getattr(args, name):
+                flag = name.replace("_", "-")
+                raise MissionError(f"--{flag}: got it without --ros1; expected both.")
+        return None
+    return Ros1Options(
+        tuple(_params(text) for text in args.params),
+        args.stub_missing,
+        getattr(args, "timeout", 10.0),
+        tuple(getattr(args, "words", ())),
+    )
+
+
+def _params(text: str) -> tuple[str, Path]:
+    namespace, equals, file = text.partition("=")
+    return (namespace, Path(file)) if equals else ("/", Path(text))
+
+
+def load_script(text: str, options: Ros1Options) -> Target:
+    """Return the machine of a script, which ends where it would run it.
+
+    Raises:
+        LoadError: there is none.
+        TargetError: no such file.
+    """
+    from smachpy.ros1 import load
+
+    place = script_of(text)
+    stubbed: list[str] = []
+    machine = load(
+        place,
+        options.words,
+        params=options.parameters(),
+        stub_missing=options.stub_missing,
+        timeout=options.timeout,
+        stubbed=stubbed,
+    )
+    tell_stubs(stubbed)
+    return Target(place.stem, f"{place}", "", machine)
+
+
+def script_of(text: str) -> Path:
+    """Return the path of a script.
+
+    Raises:
+        TargetError: it is no file.
+    """
+    path = Path(text)
+    if not path.is_file():
+        raise TargetError(text, "no such file; expected a script for ROS 1, path/to/script.py.")
+    return path
+
+
+def tell_stubs(stubbed: list[str]) -> None:
+    """Say what got a stand-in."""
+    if stubbed:
+        tell("smachpy", f"--stub-missing: stand-ins for {', '.join(stubbed)}")
+
+
+def load_any(text: str, args: argparse.Namespace) -> Target:
+    """Load what a user named: a script for ROS 1 with `--ros1`, else as `load_target`."""
+    options = options_of(args)
+    return load_target(text) if options is None else load_script(text, options)

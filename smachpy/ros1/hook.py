@@ -1,0 +1,289 @@
+"""The import hook that finds what programs for ROS 1 import, while it is installed.
+
+In this order: ROS's own names (`rospy`, `smach`, `tf`, ...), which lie in `smachpy.ros1.names`;
+messages of the bundled packages, of the project and of SMACHPY_INTERFACE_PATH; modules of the
+project, converted from Python 2 if need be. What is left is found as ever, or, if a stand-in is
+wanted and a file of the project asks for it, gets one.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec, SourceFileLoader
+from importlib.util import find_spec, spec_from_file_location
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from actionlib_core.interfaces import (
+    InterfaceError,
+    add_path,
+    define_action,
+    define_message,
+    define_service,
+)
+from actionlib_core.suggest import did_you_mean
+from smachpy.compat import MODULES as SMACH_MODULES
+from smachpy.ros1 import python2
+from smachpy.ros1.session import session
+from smachpy.ros1.stubs import StubModule, StubSection
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from types import CodeType, FrameType, ModuleType
+
+    from smachpy.ros1.project import Project
+
+NAMES: Final = "smachpy.ros1.names"
+INTERFACES: Final = "actionlib_core.interfaces"
+OLD_NAMES: Final = frozenset(
+    {
+        *("PyKDL", "actionlib", "dynamic_reconfigure", "rospkg", "rosparam", "rospy", "rostest"),
+        *("roslib", "rosunit", "smach", "smach_ros", "tf", "tf2_geometry_msgs", "tf2_ros"),
+        "tf_conversions",
+    }
+)
+"""The packages of ROS 1 whose modules are here."""
+
+ALIASES: Final = {
+    name.replace("smachpy.", f"{old}.", 1): home
+    for old in ("smach", "smach_ros")
+    for name, home in SMACH_MODULES.items()
+} | {
+    "actionlib.goal_id_generator": "actionlib_core.action.goal_id_generator",
+    "actionlib.handle_tracker_deleter": "actionlib_core.action.compat",
+    "actionlib.server_goal_handle": "actionlib_core.action.server",
+    "actionlib.status_tracker": "actionlib_core.action.compat",
+    "smach.exceptions": "smachpy.exceptions",
+    "smach.log": "smachpy.log",
+    "smach.util": "smachpy.util",
+    "smach_ros.introspection": "smachpy.network.server",
+    "smach_ros.util": "smachpy.util",
+}
+"""Other module names -> module here."""
+
+_SECTIONS: Final = ("msg", "srv")
+_NEVER_STUBBED: Final = frozenset({"__main__", "sitecustomize", "usercustomize"})
+
+
+class MissingPackageError(ModuleNotFoundError):
+    """A program imports what neither this package nor its surroundings have.
+
+    Attributes:
+        name: What it imports.
+        file: Where it does.
+        line: In which line of it.
+    """
+
+    def __init__(self, name: str, file: str, line: int, near: str) -> None:
+        self.file, self.line = file, line
+        package = name.partition(".")[0]
+        what = "message package" if name.endswith((".msg", ".srv")) else "module"
+        super().__init__(
+            f"{file}:{line}: {what} {package!r} is missing: got no definition or module of it; "
+            "expected one in the script's folder, in a package beside it (msg, srv, action, src), "
+            f"in a folder of SMACHPY_INTERFACE_PATH, or installed.{near} Try setting "
+            f"SMACHPY_INTERFACE_PATH=FOLDER, where FOLDER/{package}/msg is, or --stub-missing for "
+            "a stand-in.",
+            name=name,
+        )
+
+
+class _Alias(Loader):
+    """Puts a module that has another name in place."""
+
+    def __init__(self, home: str) -> None:
+        self._home = home
+
+    def create_module(self, spec: ModuleSpec) -> None:
+        """Leave it to Python."""
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Put the module itself in place of the empty one."""
+        sys.modules[module.__name__] = import_module(self._home)
+
+
+class _Stub(Loader):
+    """Makes a stand-in."""
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        """Make a section of interfaces or a module."""
+        _, _, section = spec.name.partition(".")
+        return StubSection(spec.name) if section in _SECTIONS else StubModule(spec.name)
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Nothing to run."""
+
+
+class OldSourceLoader(SourceFileLoader):
+    """Loads a module of the project, converted from Python 2 if need be; leaves no files behind."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        """Compile the source."""
+        path = self.get_filename(fullname)
+        return python2.to_code(self.get_data(path), path)
+
+
+class OldNames(MetaPathFinder):
+    """The finder.
+
+    Args:
+        project: What lies around the program.
+        stub_missing: Whether what is missing gets a stand-in.
+    """
+
+    def __init__(self, project: Project, *, stub_missing: bool = False) -> None:
+        self.project = project
+        self._stub_missing = stub_missing
+        self._known: set[str] = set()  # packages of the project whose interfaces were made known
+        self._busy: set[str] = set()
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Find a module; None leaves it to the finders after this one."""
+        del target
+        top, _, below = fullname.partition(".")
+        if top in {"smachpy", "actionlib_core", "viz", "missions"} or fullname in self._busy:
+            return None
+        if top in OLD_NAMES:
+            home = self._home_of(fullname)
+            if home is not None:
+                return _alias(fullname, home)
+        if below and isinstance(sys.modules.get(top), StubModule):
+            return self._missing(fullname, path)
+        self._know_interfaces(top)
+        has_interfaces = find_spec(f"{INTERFACES}.{top}") is not None
+        found = None
+        if not (has_interfaces and below in _SECTIONS):
+            found = self._in_project(fullname, path)
+        if found is None and has_interfaces and below in {"", *_SECTIONS}:
+            found = _alias(fullname, f"{INTERFACES}.{fullname}")
+        return found or self._missing(fullname, path)
+
+    def claims(self, name: str) -> bool:
+        """Tell whether a module name is one of ROS's, so that another module must not have it."""
+        top = name.partition(".")[0]
+        return top in OLD_NAMES or find_spec(f"{INTERFACES}.{top}") is not None
+
+    def made(self, name: str, module: ModuleType) -> bool:
+        """Tell whether a module was found by this finder."""
+        if self.claims(name) or isinstance(module, (StubModule, StubSection)):
+            return True
+        return isinstance(getattr(module, "__loader__", None), OldSourceLoader)
+
+    def _home_of(self, fullname: str) -> str | None:
+        if fullname in ALIASES:
+            return ALIASES[fullname]
+        home = f"{NAMES}.{fullname}"
+        try:
+            return home if find_spec(home) is not None else None
+        except ModuleNotFoundError:
+            return None
+
+    def _know_interfaces(self, package: str) -> None:
+        """Make the definitions of a package of the project known, and of those that it uses."""
+        if package in self._known:
+            return
+        self._known.add(package)
+        found = self.project.interfaces_of(package)
+        if not found:
+            return
+        folder = self.project.packages()[package]
+        if folder.name == package:
+            add_path(folder)
+            return
+        for kind, define in (
+            ("msg", define_message),
+            ("srv", define_service),
+            ("action", define_action),
+        ):
+            _define_all(package, found.get(kind, []), define)
+
+    def _in_project(self, fullname: str, path: Sequence[str] | None) -> ModuleSpec | None:
+        name = fullname.rpartition(".")[2]
+        if path is not None:
+            places = [Path(place) for place in path if self.project.holds(place)]
+        elif name in sys.stdlib_module_names and not _lies_in(self.project.folder, name):
+            return None
+        else:
+            places = [*self.project.source_roots(), *_folder_of_importer(self.project)]
+        for place in places:
+            for file in (place / name / "__init__.py", place / f"{name}.py"):
+                if file.is_file():
+                    return spec_from_file_location(
+                        fullname,
+                        file,
+                        loader=OldSourceLoader(fullname, str(file)),
+                        submodule_search_locations=(
+                            [str(file.parent)] if file.name == "__init__.py" else None
+                        ),
+                    )
+        return None
+
+    def _missing(self, fullname: str, path: Sequence[str] | None) -> ModuleSpec | None:
+        """Look whether nobody else has it; a stand-in then, or an error that says what to do."""
+        importer = _importer()
+        if importer is None or not self.project.holds(importer[0]) or fullname in _NEVER_STUBBED:
+            return None
+        if path is not None:
+            parent = sys.modules.get(fullname.rpartition(".")[0])
+            if not isinstance(parent, StubModule):
+                return None  # its package was found, and says itself what it lacks
+        elif self._is_elsewhere(fullname):
+            return None
+        if self._stub_missing:
+            session().stand_in(f"module {fullname}")
+            return ModuleSpec(fullname, _Stub(), is_package=True)
+        file, line = importer
+        known = [*OLD_NAMES, *self.project.packages()]
+        raise MissingPackageError(
+            fullname, file, line, did_you_mean(fullname.partition(".")[0], known)
+        )
+
+    def _is_elsewhere(self, fullname: str) -> bool:
+        """Tell whether the finders after this one have a module."""
+        self._busy.add(fullname)
+        try:
+            return find_spec(fullname) is not None
+        except (ImportError, ValueError):
+            return False
+        finally:
+            self._busy.discard(fullname)
+
+
+def _alias(fullname: str, home: str) -> ModuleSpec:
+    return ModuleSpec(fullname, _Alias(home), is_package=True)
+
+
+def _define_all(package: str, files: list[Path], define: Any) -> None:
+    for file in files:
+        try:
+            define(f"{package}/{file.stem}", file.read_text(encoding="utf-8-sig"))
+        except InterfaceError as error:
+            text = str(error).replace(f"{package}/", f"{file.parent}/", 1)
+            raise InterfaceError(text) from error
+
+
+def _lies_in(folder: Path, name: str) -> bool:
+    return (folder / f"{name}.py").is_file() or (folder / name / "__init__.py").is_file()
+
+
+def _importer() -> tuple[str, int] | None:
+    """Return file and line of the code that imports."""
+    frame: FrameType | None = sys._getframe(1)  # noqa: SLF001  who imports
+    while frame is not None:
+        file = frame.f_code.co_filename
+        if file != __file__ and "importlib" not in file:
+            return file, frame.f_lineno
+        frame = frame.f_back
+    return None
+
+
+def _folder_of_importer(project: Project) -> list[Path]:
+    """Return the folder of the importing module: Python 2 looked there for neighbours first."""
+    importer = _importer()
+    if importer is None or not project.holds(importer[0]):
+        return []
+    return [Path(importer[0]).resolve().parent]

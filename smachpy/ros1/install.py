@@ -1,0 +1,91 @@
+"""Put the old names in place, and take them away again."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import threading
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from smachpy import log, slips
+from smachpy.ros1 import session
+from smachpy.ros1.hook import OldNames
+from smachpy.ros1.project import Project
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from types import ModuleType
+
+_lock = threading.Lock()
+
+
+class _Installed:
+    """What `install` changed."""
+
+    def __init__(self, finder: OldNames) -> None:
+        self.finder = finder
+        self.before = dict(sys.modules)
+        self.hidden: dict[str, ModuleType] = {}
+        self.loggers = log.current_loggers()
+
+
+_installed: list[_Installed] = []
+
+
+def install(script: str | Path | None = None, *, stub_missing: bool = False) -> None:
+    """Make ROS 1's names importable in this process, and accept the slips that SMACH accepted.
+
+    Modules of these names that were imported before, of an installed SMACH for example, are put
+    aside. Calling it again changes what lies around the program, no more.
+
+    Args:
+        script: The program; its folder and package are searched for modules and messages. None
+            takes the main module's file, or the working folder.
+        stub_missing: Modules, messages and, in `load`, parameters that nobody has get stand-ins.
+
+    Threads: any, one at a time.
+    """
+    if script is None:
+        main = getattr(sys.modules.get("__main__"), "__file__", None)
+        script = main if main and Path(main).is_file() else None
+    finder = OldNames(Project(None if script is None else Path(script)), stub_missing=stub_missing)
+    with _lock:
+        if _installed:
+            made = _installed[0]
+            sys.meta_path[sys.meta_path.index(made.finder)] = finder
+            made.finder = finder
+            return
+        made = _Installed(finder)
+        for name in list(sys.modules):
+            if finder.claims(name):
+                made.hidden[name] = sys.modules.pop(name)
+        _installed.append(made)
+        sys.meta_path.insert(0, finder)
+        slips.set_accepting(True)
+
+
+def uninstall() -> None:
+    """Undo `install`: the names, and the modules of the program, are as before."""
+    with _lock:
+        if not _installed:
+            return
+        made = _installed.pop()
+        sys.meta_path.remove(made.finder)
+        for name, module in list(sys.modules.items()):
+            if name not in made.before and made.finder.made(name, module):
+                del sys.modules[name]
+        sys.modules.update(made.hidden)
+        log.set_loggers(*made.loggers)
+        session.forget_loaded()
+        slips.set_accepting(False)
+
+
+@contextlib.contextmanager
+def installed(script: str | Path | None = None, *, stub_missing: bool = False) -> Iterator[None]:
+    """Have the names in a `with` block; arguments as `install`."""
+    install(script, stub_missing=stub_missing)
+    try:
+        yield
+    finally:
+        uninstall()

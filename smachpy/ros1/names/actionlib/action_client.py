@@ -1,0 +1,29 @@
+"""actionlib's client that follows each goal by a handle."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from actionlib_core.action.client import ActionClient as _ActionClient
+from actionlib_core.action.client import ClientGoalHandle as ClientGoalHandle
+from actionlib_core.action.client import CommState as CommState
+from actionlib_core.action.client import CommStateMachine as CommStateMachine
+from actionlib_core.action.client import GoalManager as GoalManager
+from actionlib_core.action.client import TerminalState as TerminalState
+from actionlib_core.action.client import get_name_of_constant as get_name_of_constant
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus as GoalStatus
+from smachpy.ros1.session import session
+
+
+class ActionClient(_ActionClient[Any]):
+    """Sends goals and follows each by a handle."""
+
+    def __init__(self, ns: str, ActionSpec: Any) -> None:
+        session().on_action(ns)
+        super().__init__(ns, ActionSpec)
+
+    def wait_for_server(self, timeout: Any = 0.0) -> bool:
+        """Wait for a server; a dry program is told that there is one."""
+        return session().dry or super().wait_for_server(timeout)
+
+    wait_for_action_server_to_start = wait_for_server

@@ -1,0 +1,8 @@
+"""actionlib's server that decides on each goal itself."""
+
+from __future__ import annotations
+
+from actionlib_core.action.server import ActionServer as ActionServer
+from actionlib_core.action.server import ServerGoalHandle as ServerGoalHandle
+from actionlib_core.action.server import nop_cb as nop_cb
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus as GoalStatus

@@ -1,0 +1,60 @@
+"""actionlib's client with one goal at a time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.action.simple_client import SimpleActionClient as _SimpleActionClient
+from actionlib_core.action.simple_client import SimpleGoalState as SimpleGoalState
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus as GoalStatus
+from smachpy.ros1.session import session
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+class SimpleActionClient(_SimpleActionClient[Any]):
+    """Sends one goal at a time; in a dry program all of them succeed at once, unsent."""
+
+    def __init__(self, ns: str, ActionSpec: Any) -> None:
+        session().on_action(ns)
+        super().__init__(ns, ActionSpec)
+        self._result_class = type(ActionSpec().action_result.result)
+
+    def wait_for_server(self, timeout: Any = 0.0) -> bool:
+        """Wait for a server; 0 waits for ever."""
+        session().check_time()
+        return session().dry or super().wait_for_server(timeout)
+
+    def send_goal(
+        self,
+        goal: Any,
+        done_cb: Callable[..., object] | None = None,
+        active_cb: Callable[..., object] | None = None,
+        feedback_cb: Callable[..., object] | None = None,
+        **more: Any,
+    ) -> None:
+        """Send a goal and forget the one before."""
+        if not session().dry:
+            super().send_goal(goal, done_cb, active_cb, feedback_cb, **more)
+
+    def send_goal_and_wait(
+        self, goal: Any, execute_timeout: Any = 0.0, preempt_timeout: Any = 0.0
+    ) -> int:
+        """Send a goal and wait for its end; returns its status."""
+        if session().dry:
+            return int(GoalStatus.SUCCEEDED)
+        return super().send_goal_and_wait(goal, execute_timeout, preempt_timeout)
+
+    def wait_for_result(self, timeout: Any = 0.0) -> bool:
+        """Wait for the end of the goal; 0 waits for ever."""
+        session().check_time()
+        return session().dry or super().wait_for_result(timeout)
+
+    def get_result(self) -> Any:
+        """Return the result of the goal."""
+        return self._result_class() if session().dry else super().get_result()
+
+    def get_state(self) -> int:
+        """Return the status of the goal."""
+        return int(GoalStatus.SUCCEEDED) if session().dry else super().get_state()

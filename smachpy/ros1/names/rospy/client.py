@@ -1,0 +1,199 @@
+"""Parameters and waiting, as rospy has them.
+
+Source:
+    rospy.client for names, arguments and exceptions.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from actionlib_core.node import get_node
+from actionlib_core.pubsub.service_proxy import wait_for_service as _wait_for_service
+from actionlib_core.pubsub.topic import wait_for_message as _wait_for_message
+from actionlib_core.wire.presence import Kind, list_endpoints
+from smachpy.ros1.names.rospy.core import init_node as init_node
+from smachpy.ros1.names.rospy.core import myargv as myargv
+from smachpy.ros1.names.rospy.core import on_shutdown as on_shutdown
+from smachpy.ros1.names.rospy.core import spin as spin
+from smachpy.ros1.names.rospy.exceptions import ROSException, as_rospy
+from smachpy.ros1.names.rospy.names import get_name, get_namespace, resolve_name
+from smachpy.ros1.session import session
+
+_NO_DEFAULT: Final = object()
+
+
+def get_param(param_name: str, default: Any = _NO_DEFAULT) -> Any:
+    """Return a parameter's value.
+
+    Raises:
+        KeyError: it has none, and there is no default.
+    """
+    name = resolve_name(param_name)
+    now = session()
+    try:
+        return now.parameters.get(name)
+    except KeyError as error:
+        if default is not _NO_DEFAULT:
+            return default
+        if now.dry and now.stub_missing:
+            from smachpy.ros1.stubs import Anything
+
+            now.stand_in(f"parameter {name}")
+            return Anything(name)
+        ways = "Try --params FILE.yaml, or _NAME:=VALUE for a private one."
+        raise KeyError(f"{error.args[0]} {ways}") from None
+
+
+def get_param_cached(param_name: str, default: Any = _NO_DEFAULT) -> Any:
+    """Return a parameter's value, as `get_param`."""
+    return get_param(param_name, default)
+
+
+def set_param(param_name: str, param_value: Any) -> None:
+    """Give a parameter a value; a dict becomes a name space."""
+    session().parameters.set(resolve_name(param_name), param_value)
+
+
+def has_param(param_name: str) -> bool:
+    """Tell whether a parameter has a value."""
+    return session().parameters.has(resolve_name(param_name))
+
+
+def delete_param(param_name: str) -> None:
+    """Forget a parameter.
+
+    Raises:
+        KeyError: it has no value.
+    """
+    session().parameters.delete(resolve_name(param_name))
+
+
+def search_param(param_name: str) -> str | None:
+    """Return the full name of a parameter, from the node's name space upwards; None for none."""
+    return session().parameters.search(get_name(), param_name)
+
+
+def get_param_names() -> list[str]:
+    """Return the full names of all parameters."""
+    return session().parameters.names()
+
+
+def wait_for_message(topic: str, topic_type: Any, timeout: Any = None) -> Any:
+    """Return the next message of a topic.
+
+    Args:
+        topic: Its name.
+        topic_type: Class of the messages.
+        timeout: Longest wait, seconds or `Duration`; None waits until the program is to end.
+
+    Raises:
+        ROSException: none came in time.
+        ROSInterruptException: the program is to end.
+
+    Blocks: see `timeout`.
+    """
+    now = session()
+    now.check_time()
+    if now.dry:
+        return topic_type()
+    if topic_type.__name__ == "AnyMsg":
+        from smachpy.ros1.names.rospy.topics import wait_for_any
+
+        return wait_for_any(topic, _limit(timeout))
+    with as_rospy():
+        return _wait_for_message(topic, topic_type, _limit(timeout))
+
+
+def wait_for_service(service: str, timeout: Any = None) -> None:
+    """Wait until a service has a server.
+
+    Args:
+        service: Its name.
+        timeout: Longest wait, seconds or `Duration`; None waits until the program is to end.
+
+    Raises:
+        ROSException: there is none in time.
+        ROSInterruptException: the program is to end.
+
+    Blocks: see `timeout`.
+    """
+    now = session()
+    now.check_time()
+    if not now.dry:
+        with as_rospy():
+            _wait_for_service(service, _limit(timeout))
+
+
+def _limit(timeout: Any) -> float | None:
+    """Return a limit in seconds; rospy takes 0 for no wait, and so a moment."""
+    return None if timeout is None else max(float(timeout), 1e-3)
+
+
+def get_published_topics(namespace: str = "/") -> list[list[str]]:
+    """Return [topic, type] of all topics below `namespace` that somebody publishes."""
+    prefix = namespace if namespace.endswith("/") else f"{namespace}/"
+    ends = list_endpoints(get_node().transport, kind=Kind.PUBLISHER)
+    found = {(f"/{end.name}", end.type) for end in ends}
+    return [list(pair) for pair in sorted(found) if pair[0].startswith(prefix)]
+
+
+class MasterProxy:
+    """The calls to a ROS master that make sense without one."""
+
+    target = "http://localhost:11311"
+
+    def getSystemState(self) -> tuple[int, str, list[list[list[Any]]]]:
+        """Return publishers, subscribers and services as ROS's master does."""
+        found: dict[Kind, dict[str, list[str]]] = {
+            kind: {} for kind in (Kind.PUBLISHER, Kind.SUBSCRIBER, Kind.SERVICE)
+        }
+        for end in list_endpoints(get_node().transport):
+            if end.kind in found:
+                found[end.kind].setdefault(f"/{end.name}", []).append(f"/{end.node}")
+        state = [
+            [[n, sorted(nodes)] for n, nodes in sorted(ends.items())] for ends in found.values()
+        ]
+        return 1, "current system state", state
+
+    def getPublishedTopics(self, subgraph: str = "") -> tuple[int, str, list[list[str]]]:
+        """Return [topic, type] of all published topics."""
+        return 1, "current topics", get_published_topics(subgraph or "/")
+
+    getTopicTypes = getPublishedTopics  # noqa: N815
+
+    def getPid(self) -> tuple[int, str, int]:
+        """Return this process's id."""
+        import os
+
+        return 1, "", os.getpid()
+
+    def __getattr__(self, name: str) -> Any:
+        raise ROSException(
+            f"master: got a call of {name!r}; expected getSystemState, getPublishedTopics, "
+            "getTopicTypes or getPid: there is no ROS master here."
+        )
+
+
+def get_master(env: Any = None) -> MasterProxy:
+    """Return what stands in for the ROS master."""
+    del env
+    return MasterProxy()
+
+
+__all__ = [
+    "MasterProxy",
+    "delete_param",
+    "get_master",
+    "get_name",
+    "get_namespace",
+    "get_param",
+    "get_param_cached",
+    "get_param_names",
+    "get_published_topics",
+    "has_param",
+    "search_param",
+    "set_param",
+    "wait_for_message",
+    "wait_for_service",
+]

@@ -1,0 +1,319 @@
+"""The program's beginning and end, its names and its log, as rospy has them.
+
+Source:
+    rospy.core, rospy.client and rospy.names for names, arguments and meaning.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import os
+import re
+import sys
+from typing import TYPE_CHECKING, Any, Final
+
+from actionlib_core import shutdown
+from actionlib_core.clock import Deadlock, current_clock
+from actionlib_core.node import get_node
+from smachpy.ros1.names.rospy.exceptions import ROSException, ROSInitException
+from smachpy.ros1.parameters import read_yaml
+from smachpy.ros1.session import session
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+DEBUG: Final = 1
+INFO: Final = 2
+WARN: Final = 4
+ERROR: Final = 8
+FATAL: Final = 16
+
+_LEVELS: Final = {
+    DEBUG: logging.DEBUG,
+    INFO: logging.INFO,
+    WARN: logging.WARNING,
+    ERROR: logging.ERROR,
+    FATAL: logging.CRITICAL,
+}
+_WORDS: Final = {
+    logging.DEBUG: "DEBUG",
+    logging.INFO: "INFO",
+    logging.WARNING: "WARN",
+    logging.ERROR: "ERROR",
+    logging.CRITICAL: "FATAL",
+}
+
+# -- beginning and end -----------------------------------------------------------------------------
+
+
+def init_node(
+    name: str,
+    argv: Sequence[str] | None = None,
+    anonymous: bool = False,
+    log_level: int | None = None,
+    disable_rostime: bool = False,
+    disable_rosout: bool = False,
+    disable_signals: bool = False,
+    xmlrpc_port: int = 0,
+    tcpros_port: int = 0,
+) -> None:
+    """Name the program on the network.
+
+    Args:
+        name: One word.
+        argv: Its arguments; None: those of the program.
+        anonymous: Add a number that no other program has.
+        log_level: The lowest level that is logged, `rospy.DEBUG` for example.
+        disable_rostime: As rospy takes it.
+        disable_rosout: As rospy takes it.
+        disable_signals: Leave Ctrl-C and SIGTERM to the program.
+        xmlrpc_port: As rospy takes it.
+        tcpros_port: As rospy takes it.
+
+    Raises:
+        ROSInitException: the name is none, or the network cannot be joined.
+        ROSException: called again with another name.
+    """
+    del disable_rostime, disable_rosout, xmlrpc_port, tcpros_port
+    from actionlib_core.exceptions import ActionlibError
+
+    if not name or not isinstance(name, str):
+        raise ValueError(f"init_node: name: got {name!r}; expected a word.")
+    if log_level is not None:
+        logger.setLevel(_LEVELS.get(log_level, log_level))
+    now = session()
+    if now.name:
+        if not anonymous and _base(now.name) != name:
+            raise ROSException(
+                f"init_node: got {name!r}; expected {now.name!r}, as it was called before."
+            )
+        return
+    full = f"{name}_{os.getpid()}_{_count()}" if anonymous else name
+    try:
+        now.begin_node(full)
+    except ActionlibError as error:
+        raise ROSInitException(str(error)) from error
+    _set_private_parameters(now.argv if argv is None else argv)
+    shutdown.on_shutdown(lambda: now.run_hooks("shutdown"))
+    if not disable_signals:
+        now.handle_signals()
+
+
+def _base(name: str) -> str:
+    return re.sub(r"_\d+_\d+$", "", name)
+
+
+_numbers = itertools.count(1000 * 1000)
+
+
+def _count() -> int:
+    return next(_numbers)
+
+
+def _set_private_parameters(argv: Sequence[str]) -> None:
+    """Take `_name:=value` of the command line; the value is YAML, as for roslaunch."""
+    from smachpy.ros1.names.rospy.names import resolve_name
+
+    for word in argv:
+        key, sign, value = word.partition(":=")
+        if sign and re.fullmatch(r"_[A-Za-z]\w*", key):
+            try:
+                parsed = read_yaml(value)
+            except ValueError:
+                parsed = value
+            session().parameters.set(resolve_name(f"~{key[1:]}"), parsed)
+
+
+def is_initialized() -> bool:
+    """Tell whether `init_node` was called."""
+    return bool(session().name)
+
+
+def is_shutdown() -> bool:
+    """Tell whether the program is to end."""
+    now = session()
+    if now.dry and now.stopped is None:
+        now.check_time()
+    return now.is_shutdown()
+
+
+is_shutdown_requested = is_shutdown
+
+
+def signal_shutdown(reason: Any = "") -> None:
+    """Ask the program to end: machines are preempted, what waits in rospy ends.
+
+    What `on_shutdown` was given is called here, before this returns.
+    """
+    now = session()
+    if now.dry:
+        now.stop()
+    logger.debug("signal_shutdown [%s]", reason)
+    now.run_hooks(str(reason))
+    shutdown.request(str(reason) or "signal_shutdown")
+
+
+def on_shutdown(h: Callable[..., object]) -> None:
+    """Call `h` once when the program is to end or has ended.
+
+    Raises:
+        TypeError: it cannot be called.
+    """
+    if not callable(h):
+        raise TypeError(f"on_shutdown: got {h!r}; expected a function without arguments.")
+    add_shutdown_hook(lambda _reason: h())
+
+
+def add_shutdown_hook(h: Callable[[str], object]) -> None:
+    """Call `h(reason)` once when the program is to end or has ended."""
+
+    def call(reason: str) -> None:
+        try:
+            h(reason)
+        except Exception:
+            logger.exception("on_shutdown: %r raised", h)
+
+    session().add_hook(call)
+
+
+add_preshutdown_hook = add_shutdown_hook
+add_client_shutdown_hook = on_shutdown
+
+
+def spin() -> None:
+    """Wait until the program is to end.
+
+    Raises:
+        ROSInitException: `init_node` was not called.
+
+    Blocks: until then. In virtual time also until nothing can happen any more.
+    """
+    now = session()
+    now.stop()
+    if not now.name:
+        raise ROSInitException("client code must call rospy.init_node() first")
+    try:
+        shutdown.event().wait()
+    except KeyboardInterrupt:
+        signal_shutdown("keyboard interrupt")
+    except Deadlock:
+        signal_shutdown("nothing can happen any more")
+
+
+def myargv(argv: list[str] | None = None) -> list[str]:
+    """Return the arguments without renaming (`a:=b`)."""
+    return [word for word in (sys.argv if argv is None else argv) if ":=" not in word]
+
+
+def get_node_uri() -> str:
+    """Return an address for messages; there is no XML-RPC server behind it."""
+    return f"zenoh://{get_node().full_name}"
+
+
+def get_ros_root(required: bool = False, env: Any = None) -> None:
+    """Return None: there is no ROS installation."""
+    del required, env
+
+
+def configure_logging(node_name: str, level: int = INFO) -> None:
+    """Do nothing: logging needs no configuration."""
+    del node_name, level
+
+
+# -- log -------------------------------------------------------------------------------------------
+
+
+class _Handler(logging.Handler):
+    """Writes as rospy does: DEBUG and INFO to the standard output, the rest to the error output."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        try:
+            seconds = current_clock().time_ns() / 1e9
+            word = _WORDS.get(record.levelno, record.levelname)
+            text = f"[{word}] [{seconds:.6f}]: {self.format(record)}\n"
+            stream = sys.stdout if record.levelno <= logging.INFO else sys.stderr
+            stream.write(text)
+            stream.flush()
+        except Exception:  # noqa: BLE001  as every handler of `logging` does
+            self.handleError(record)
+
+
+logger = logging.getLogger("rosout")
+if not logger.handlers:
+    logger.addHandler(_Handler())
+    logger.propagate = False
+    logger.setLevel(logging.INFO)
+"""Where everything goes; programs that log with `logging` may use it by name."""
+
+_said: dict[tuple[Any, ...], Any] = {}
+
+
+def _text(msg: Any, args: tuple[Any, ...]) -> str:
+    if not args:
+        return str(msg)
+    try:
+        return str(msg) % args
+    except (TypeError, ValueError):  # a log line must not end a mission
+        return f"{msg} {args}"
+
+
+def _place() -> tuple[str, int]:
+    """Return the line of the program that logs."""
+    frame = sys._getframe(1)  # noqa: SLF001  as `logging` does
+    while frame.f_code.co_filename == __file__ and frame.f_back is not None:
+        frame = frame.f_back
+    return frame.f_code.co_filename, frame.f_lineno
+
+
+def _log(level: int, msg: Any, args: tuple[Any, ...], logger_name: str | None) -> None:
+    where = logger if not logger_name else logging.getLogger(f"rosout.{logger_name}")
+    if not session().dry and where.isEnabledFor(level):
+        where.log(level, "%s", _text(msg, args))
+
+
+def _functions(level: int) -> tuple[Callable[..., None], ...]:
+    """Return the four functions of a level: plain, throttled, identical ones throttled, once."""
+
+    def log(msg: Any, *args: Any, logger_name: str | None = None, **_kwargs: Any) -> None:
+        """Log a message, with `%` and the other arguments; other keywords are rospy's."""
+        _log(level, msg, args, logger_name)
+
+    def throttle(period: float, msg: Any, *args: Any, logger_name: str | None = None) -> None:
+        """Log a message from this line of the program at most every `period` [s]."""
+        key = (level, *_place())
+        now = current_clock().now()
+        if key not in _said or now - _said[key] >= float(period) or now < _said[key]:
+            _said[key] = now
+            _log(level, msg, args, logger_name)
+
+    def throttle_identical(
+        period: float, msg: Any, *args: Any, logger_name: str | None = None
+    ) -> None:
+        """Log as `throttle`, but another text at once."""
+        key = (level, "identical", *_place())
+        now, text = current_clock().now(), _text(msg, args)
+        before = _said.get(key)
+        if before is None or before[1] != text or now - before[0] >= float(period):
+            _said[key] = now, text
+            _log(level, text, (), logger_name)
+
+    def once(msg: Any, *args: Any, logger_name: str | None = None) -> None:
+        """Log a message from this line of the program the first time only."""
+        key = (level, "once", *_place())
+        if key not in _said:
+            _said[key] = True
+            _log(level, msg, args, logger_name)
+
+    return log, throttle, throttle_identical, once
+
+
+logdebug, logdebug_throttle, logdebug_throttle_identical, logdebug_once = _functions(logging.DEBUG)
+loginfo, loginfo_throttle, loginfo_throttle_identical, loginfo_once = _functions(logging.INFO)
+logwarn, logwarn_throttle, logwarn_throttle_identical, logwarn_once = _functions(logging.WARNING)
+logerr, logerr_throttle, logerr_throttle_identical, logerr_once = _functions(logging.ERROR)
+logfatal, logfatal_throttle, logfatal_throttle_identical, logfatal_once = _functions(
+    logging.CRITICAL
+)
+logout = loginfo
+logerror = logerr

@@ -1,0 +1,102 @@
+"""rospy's exceptions, and how errors of this package become theirs."""
+
+from __future__ import annotations
+
+import contextlib
+from typing import TYPE_CHECKING
+
+from actionlib_core.exceptions import (
+    ActionlibError,
+    FieldError,
+    NodeError,
+    WaitTimeoutError,
+)
+from actionlib_core.exceptions import (
+    ServiceException as _ServiceError,
+)
+from smachpy.ros1.session import session
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+__all__ = [
+    "ROSException",
+    "ROSInitException",
+    "ROSInternalException",
+    "ROSInterruptException",
+    "ROSSerializationException",
+    "ROSTimeMovedBackwardsException",
+    "ServiceException",
+    "TransportException",
+    "TransportInitError",
+    "TransportTerminated",
+]
+
+
+class ROSException(Exception):  # noqa: N818  rospy's names, all of them
+    """Base of rospy's exceptions."""
+
+
+class ROSInterruptException(ROSException, KeyboardInterrupt):
+    """The program is to end while it sleeps or waits.
+
+    It is a `KeyboardInterrupt`, as in rospy, so that `except Exception` of a program that does not
+    want to end catches it (as a `ROSException`), and `except KeyboardInterrupt` of one that does.
+    """
+
+
+class ROSInitException(ROSException):
+    """`init_node` was not called, or failed."""
+
+
+class ROSSerializationException(ROSException):
+    """A message holds a value that does not fit its field."""
+
+
+class ROSTimeMovedBackwardsException(ROSInterruptException):
+    """Simulated time jumped back; never raised here.
+
+    Attributes:
+        time: By how much [s].
+    """
+
+    def __init__(self, time: float = 0.0) -> None:
+        self.time = time
+        super().__init__(f"ROS time moved backwards: {time} s")
+
+
+class ROSInternalException(Exception):  # noqa: N818
+    """Base of rospy's inner exceptions."""
+
+
+class TransportException(ROSInternalException):
+    """The network failed."""
+
+
+class TransportTerminated(TransportException):
+    """The connection was closed."""
+
+
+class TransportInitError(TransportException):
+    """The connection could not be made."""
+
+
+class ServiceException(Exception):  # noqa: N818
+    """A service call failed; what exactly is its `__cause__`."""
+
+
+@contextlib.contextmanager
+def as_rospy() -> Iterator[None]:
+    """Raise rospy's exceptions in place of this package's."""
+    try:
+        yield
+    except _ServiceError as error:
+        raise ServiceException(str(error)) from error
+    except FieldError as error:
+        raise ROSSerializationException(str(error)) from error
+    except (NodeError, WaitTimeoutError) as error:
+        if session().is_shutdown():
+            raise ROSInterruptException("rospy shutdown") from error
+        raise ROSException(str(error)) from error
+    except ActionlibError as error:
+        raise ROSException(str(error)) from error

@@ -1,0 +1,61 @@
+"""Names as rospy has them, with a slash in front."""
+
+from __future__ import annotations
+
+from actionlib_core.names import resolve_name as _resolve
+from actionlib_core.node import get_node
+from smachpy.ros1.session import session
+
+__all__ = [
+    "get_caller_id",
+    "get_name",
+    "get_namespace",
+    "get_resolved_mappings",
+    "remap_name",
+    "resolve_name",
+]
+
+
+def get_name() -> str:
+    """Return the full name of the program's node, "/unnamed" before `init_node`."""
+    return f"/{get_node().full_name}" if session().name else "/unnamed"
+
+
+get_caller_id = get_name
+
+
+def get_namespace() -> str:
+    """Return the name space of relative names, with slashes around it."""
+    space = get_node().namespace if session().name else ""
+    return f"/{space}/" if space else "/"
+
+
+def resolve_name(name: str, caller_id: str | None = None) -> str:
+    """Return the full name, remapped.
+
+    Args:
+        name: Relative, absolute or private name; "" is the name space.
+        caller_id: Full name of the node that it is private to; None: this one.
+    """
+    if not name:
+        return get_namespace()
+    name = name.rstrip("/") if len(name) > 1 else name
+    if name in {"/", "~"}:
+        return "/" if name == "/" else get_name()
+    if caller_id is None:
+        return f"/{get_node().resolve(name)}"
+    node = caller_id.strip("/")
+    return f"/{_resolve(name, namespace=node.rpartition('/')[0], node=node)}"
+
+
+def remap_name(name: str, caller_id: str | None = None, resolved: bool = True) -> str:
+    """Return `name` as the command line renames it."""
+    del resolved
+    return resolve_name(name, caller_id)
+
+
+def get_resolved_mappings() -> dict[str, str]:
+    """Return the renaming of the command line, full names."""
+    node = get_node()
+    rules = node.arguments.remappings(node.name, namespace=node.namespace, node=node.full_name)
+    return {f"/{old}": f"/{new}" for old, new in rules.items()}

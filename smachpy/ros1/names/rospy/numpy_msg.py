@@ -1,0 +1,12 @@
+"""`numpy_msg`: arrays of messages as NumPy arrays. Here messages take and give them anyway."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+T = TypeVar("T")
+
+
+def numpy_msg(msg_type: T) -> T:
+    """Return the message class itself; NumPy arrays fit its array fields."""
+    return msg_type

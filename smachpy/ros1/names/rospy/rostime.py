@@ -1,0 +1,234 @@
+"""Time as rospy has it: `Time`, `Duration`, `sleep`, `Rate`, on the clock in force.
+
+Source:
+    rospy.rostime and rospy.timer for names, arguments and exceptions.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core import shutdown
+from actionlib_core._arguments import check_seconds
+from actionlib_core.clock import current_clock
+from actionlib_core.time import Duration, Time
+from actionlib_core.time import TimeValue as TVal
+from smachpy.ros1.names.rospy.exceptions import ROSInterruptException
+from smachpy.ros1.session import session
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.clock import Task
+
+__all__ = [
+    "Duration",
+    "Rate",
+    "TVal",
+    "Time",
+    "Timer",
+    "TimerEvent",
+    "get_rostime",
+    "get_time",
+    "is_rostime_initialized",
+    "is_wallclock",
+    "set_rostime_initialized",
+    "sleep",
+    "wallsleep",
+]
+
+
+def get_time() -> float:
+    """Return seconds since the epoch, on the clock in force."""
+    session().check_time()
+    return Time.now().to_sec()
+
+
+def get_rostime() -> Time:
+    """Return `Time.now()`."""
+    session().check_time()
+    return Time.now()
+
+
+def is_rostime_initialized() -> bool:
+    """Tell whether time is known: it always is."""
+    return True
+
+
+def set_rostime_initialized(val: bool) -> None:
+    """Do nothing: there is no simulated time to wait for."""
+    del val
+
+
+def is_wallclock() -> bool:
+    """Tell whether time is wall time."""
+    from actionlib_core.clock import RealClock
+
+    return isinstance(current_clock(), RealClock)
+
+
+def wallsleep(duration: float) -> None:
+    """Let time pass, whoever wants the program to end.
+
+    Blocks: for `duration` [s].
+    """
+    current_clock().sleep(float(duration))
+
+
+def sleep(duration: Any) -> None:
+    """Let time pass; nothing happens for a negative duration.
+
+    Args:
+        duration: Seconds, or a `Duration`.
+
+    Raises:
+        ROSInterruptException: the program is to end, at once or meanwhile.
+
+    Blocks: for `duration`.
+    """
+    now = session()
+    now.check_time()
+    seconds = float(duration)
+    if seconds > 0:
+        seconds = check_seconds("rospy.sleep", "duration", seconds)
+        if now.dry:
+            current_clock().sleep(seconds)
+        else:
+            shutdown.event().wait(seconds)
+    if now.is_shutdown():
+        raise ROSInterruptException("ROS shutdown request")
+
+
+class Rate:
+    """Keeps a loop at a frequency.
+
+    Args:
+        hz: Rounds in a second; above 0.
+        reset: As rospy takes it; time does not jump here.
+
+    Raises:
+        ValueError: `hz` is not above 0.
+    """
+
+    def __init__(self, hz: float, reset: bool = False) -> None:
+        del reset
+        if not float(hz) > 0:
+            raise ValueError(f"Rate: hz: got {hz!r}; expected a number above 0.")
+        self.last_time = Time.now()
+        self.sleep_dur = Duration.from_sec(1.0 / float(hz))
+
+    def remaining(self) -> Duration:
+        """Return what is left of this round."""
+        return self.sleep_dur - (Time.now() - self.last_time)
+
+    def sleep(self) -> None:
+        """Wait for the end of this round; after a round that took too long, begin anew.
+
+        Raises:
+            ROSInterruptException: the program is to end.
+
+        Blocks: until then.
+        """
+        sleep(self.remaining())
+        self.last_time = self.last_time + self.sleep_dur
+        if Time.now() - self.last_time > self.sleep_dur * 2:
+            self.last_time = Time.now()
+
+
+class TimerEvent:
+    """What a timer's callback gets.
+
+    Attributes:
+        last_expected: When the round before should have come; None in the first.
+        last_real: When it came.
+        current_expected: When this one should have come.
+        current_real: When it came.
+        last_duration: How long the callback took in the round before [s].
+    """
+
+    def __init__(
+        self,
+        last_expected: Time | None,
+        last_real: Time | None,
+        current_expected: Time,
+        current_real: Time,
+        last_duration: float | None,
+    ) -> None:
+        self.last_expected = last_expected
+        self.last_real = last_real
+        self.current_expected = current_expected
+        self.current_real = current_real
+        self.last_duration = last_duration
+
+
+class Timer:
+    """Calls a function again and again, or once.
+
+    Args:
+        period: Time between two calls, `Duration` or seconds; above 0.
+        callback: Called with a `TimerEvent`.
+        oneshot: Only once.
+        reset: As rospy takes it; time does not jump here.
+
+    Raises:
+        ValueError: `period` is not above 0.
+
+    Threads: calls back in a thread of its own, until the program is to end; an exception ends it
+        and is given to `threading.excepthook`.
+    """
+
+    daemon = True
+
+    def __init__(
+        self,
+        period: Any,
+        callback: Callable[[TimerEvent], object],
+        oneshot: bool = False,
+        reset: bool = False,
+    ) -> None:
+        del reset
+        self._period_s = check_seconds("rospy.Timer", "period", period)
+        if not self._period_s > 0:
+            raise ValueError(f"Timer: period: got {period!r}; expected more than 0 s.")
+        self._callback = callback
+        self._oneshot = oneshot
+        self._clock = current_clock()
+        self._shutdown = self._clock.event("the timer's end")
+        self._forget = shutdown.on_shutdown(self._shutdown.set)
+        self._task: Task | None = None
+        if not session().dry:
+            self._task = self._clock.spawn(self._run, name="rospy timer")
+
+    def shutdown(self) -> None:
+        """Stop calling; a call that is under way ends by itself."""
+        self._shutdown.set()
+        self._forget()
+
+    def is_alive(self) -> bool:
+        """Tell whether it still calls."""
+        return self._task is not None and self._task.is_alive()
+
+    def join(self, timeout: float | None = None) -> None:
+        """Wait until it has ended.
+
+        Blocks: until then, or `timeout` [s].
+        """
+        if self._task is not None:
+            self._task.join(timeout)
+
+    def _run(self) -> None:
+        last_expected: Time | None = None
+        last_real: Time | None = None
+        took: float | None = None
+        due = self._clock.now() + self._period_s
+        expected = Time.now() + self._period_s
+        while not self._shutdown.wait(max(due - self._clock.now(), 0.0)):
+            real, begun = Time.now(), self._clock.now()
+            self._callback(TimerEvent(last_expected, last_real, expected, real, took))
+            if self._oneshot:
+                break
+            last_expected, last_real, took = expected, real, self._clock.now() - begun
+            missed = max(int((self._clock.now() - due) / self._period_s), 0)
+            due += self._period_s * (missed + 1)
+            expected = expected + self._period_s * (missed + 1)
+        self._forget()

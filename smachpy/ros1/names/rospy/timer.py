@@ -1,0 +1,5 @@
+"""rospy's module of `Rate`, `Timer` and `sleep`."""
+
+from smachpy.ros1.names.rospy.rostime import Rate, Timer, TimerEvent, sleep
+
+__all__ = ["Rate", "Timer", "TimerEvent", "sleep"]

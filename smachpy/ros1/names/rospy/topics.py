@@ -1,0 +1,180 @@
+"""Publishers and subscribers with rospy's arguments and exceptions.
+
+Source:
+    rospy.topics for names, arguments and exceptions.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.action._callbacks import CallbackQueue
+from actionlib_core.exceptions import TransportError, TypeMismatchError
+from actionlib_core.node import get_node
+from actionlib_core.pubsub.topic import Publisher as _Publisher
+from actionlib_core.pubsub.topic import Subscriber as _Subscriber
+from actionlib_core.wire.encoding import parse_encoding
+from smachpy.ros1.names.rospy.core import is_initialized, logerr_once
+from smachpy.ros1.names.rospy.exceptions import ROSException, as_rospy
+from smachpy.ros1.names.rospy.msg import AnyMsg
+from smachpy.ros1.session import session
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.transport import Sample
+
+__all__ = ["Publisher", "SubscribeListener", "Subscriber", "Topic"]
+
+
+class SubscribeListener:
+    """Told of the subscribers of a publisher; here for programs that name it as a base class."""
+
+    def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Any) -> None:
+        """Take notice of a subscriber."""
+
+    def peer_unsubscribe(self, topic_name: str, num_peers: int) -> None:
+        """Take notice that one left."""
+
+
+class Publisher(_Publisher):
+    """Sends messages to a topic; as `actionlib_core.Publisher`, with rospy's arguments."""
+
+    def __init__(
+        self,
+        name: str,
+        data_class: Any,
+        subscriber_listener: SubscribeListener | None = None,
+        tcp_nodelay: bool = False,
+        latch: bool = False,
+        headers: dict[str, str] | None = None,
+        queue_size: int | None = None,
+    ) -> None:
+        del subscriber_listener, tcp_nodelay, headers
+        if data_class is AnyMsg or not name:
+            raise ValueError(f"Publisher {name!r}: got {data_class!r}; expected a message class.")
+        with as_rospy():
+            super().__init__(name, data_class, latch, queue_size)
+        self.impl = self
+
+    def publish(self, *args: Any, **kwds: Any) -> None:
+        """Send a message, or one made from the arguments.
+
+        Raises:
+            ROSException: `init_node` was not called, or the topic is closed.
+            ROSSerializationException: a value does not fit its field.
+        """
+        if not is_initialized():
+            raise ROSException(
+                "ROS node has not been initialized yet. Please call init_node() first"
+            )
+        if session().dry:
+            return
+        try:
+            with as_rospy():
+                super().publish(*args, **kwds)
+        except ROSException as error:
+            if isinstance(error.__cause__, TypeMismatchError):  # in rospy nothing is said
+                logerr_once("%s", error)
+            elif isinstance(error.__cause__, TransportError):
+                raise ROSException("publish() to a closed topic") from error
+            else:
+                raise
+
+    def get_num_connections(self) -> int:
+        """Return how many subscribers there are; a dry program is told one."""
+        return 1 if session().dry else super().get_num_connections()
+
+
+class Subscriber(_Subscriber[Any]):
+    """Calls back with every message of a topic, with rospy's arguments; `AnyMsg` takes any type."""
+
+    def __new__(cls, name: str, data_class: Any, *_args: Any, **_kwargs: Any) -> Any:
+        """Make one, of another kind for `AnyMsg`."""
+        del name
+        return object.__new__(_AnySubscriber if data_class is AnyMsg else cls)
+
+    def __init__(
+        self,
+        name: str,
+        data_class: Any,
+        callback: Callable[..., object] | None = None,
+        callback_args: Any = None,
+        queue_size: int | None = None,
+        buff_size: int = 65536,
+        tcp_nodelay: bool = False,
+    ) -> None:
+        del buff_size, tcp_nodelay
+        with as_rospy():
+            super().__init__(name, data_class, callback, callback_args, queue_size)
+        self.impl = self
+
+
+class _AnySubscriber(Subscriber):
+    """Gets messages of any type as bytes."""
+
+    def __init__(
+        self,
+        name: str,
+        data_class: Any,
+        callback: Callable[..., object] | None = None,
+        callback_args: Any = None,
+        *_args: Any,
+        **_kwargs: Any,
+    ) -> None:
+        node = get_node()
+        self.node = node
+        self.resolved_name = node.resolve(name, "topic name")
+        self.type = "*"
+        self.data_class = data_class
+        self.callback = callback
+        self.callback_args = callback_args
+        self._closed = False
+        self._calls = CallbackQueue(node, f"topic /{self.resolved_name}")
+        self._parts = [node.transport.subscribe(self.resolved_name, self._on_sample)]
+        self._forget = node.on_close(self.unregister)
+
+    def get_num_connections(self) -> int:
+        """Return 0: publishers of any type are not counted."""
+        return 0
+
+    def _on_sample(self, sample: Sample) -> None:
+        self._calls.call(lambda: self._take(sample))
+
+    def _take(self, sample: Sample) -> None:
+        encoding = parse_encoding(sample.encoding)
+        message = AnyMsg().deserialize(bytes(sample.payload))
+        message._connection_header = {  # noqa: SLF001  its own package
+            "type": encoding.type,
+            "md5sum": encoding.md5,
+            "topic": f"/{self.resolved_name}",
+            "callerid": str(sample.source),
+        }
+        self._call_back(message)
+
+
+def wait_for_any(topic: str, timeout: float | None) -> AnyMsg:
+    """Return the next message of a topic, whatever its type.
+
+    Raises:
+        ROSException: none came in time, or the program is to end.
+    """
+    node = get_node()
+    found: list[AnyMsg] = []
+    came = node.clock.event(f"a message of {topic}")
+
+    def keep(message: AnyMsg) -> None:
+        found.append(message)
+        came.set()
+
+    subscriber = Subscriber(topic, AnyMsg, keep)
+    try:
+        came.wait(timeout)
+    finally:
+        subscriber.unregister()
+    if not found:
+        raise ROSException(f"timeout exceeded while waiting for message on topic {topic}")
+    return found[0]
+
+
+Topic = Publisher

@@ -1,0 +1,27 @@
+"""SMACH's public names, and what `from smach import *` brings along."""
+
+from smachpy import exceptions, log, util
+from smachpy.exceptions import (
+    InvalidConstructionError,
+    InvalidStateError,
+    InvalidTransitionError,
+    InvalidUserCodeError,
+    SmachError,
+)
+from smachpy.log import logdebug, logerr, loginfo, logwarn, set_loggers
+from smachpy.machines import concurrence, container, iterator, sequence, state, state_machine
+from smachpy.machines.concurrence import Concurrence
+from smachpy.machines.container import Container
+from smachpy.machines.iterator import Iterator
+from smachpy.machines.sequence import Sequence
+from smachpy.machines.state import CBState, State
+from smachpy.machines.state_machine import StateMachine
+from smachpy.userdata import user_data
+from smachpy.userdata.user_data import Const, Remapper, UserData, get_const
+from smachpy.util import (
+    CBInterface,
+    cb_interface,
+    has_smach_interface,
+    is_shutdown,
+    set_shutdown_check,
+)

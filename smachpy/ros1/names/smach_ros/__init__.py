@@ -1,0 +1,51 @@
+"""smach_ros's public names. Importing it sends SMACH's log to rospy's, as the original does."""
+
+from typing import Any
+
+import smachpy
+from smachpy.actions.action_server_wrapper import ActionServerWrapper as _ActionServerWrapper
+from smachpy.actions.condition_state import ConditionState
+from smachpy.actions.monitor_state import MonitorState
+from smachpy.actions.service_state import ServiceState
+from smachpy.actions.simple_action_state import SimpleActionState
+from smachpy.network.client import IntrospectionClient
+from smachpy.network.server import IntrospectionServer
+from smachpy.ros1.names.rospy import core as _core
+from smachpy.ros1.session import session
+from smachpy.run.preempt_handler import set_preempt_handler
+
+__all__ = [
+    "ActionServerWrapper",
+    "ConditionState",
+    "IntrospectionClient",
+    "IntrospectionServer",
+    "MonitorState",
+    "ServiceState",
+    "SimpleActionState",
+    "set_preempt_handler",
+]
+
+
+class ActionServerWrapper(_ActionServerWrapper):
+    """Runs a container for each goal of an action."""
+
+    def run_server(self) -> None:
+        """Serve from now on; a dry program ends here."""
+        session().stop(self.wrapped_container)
+        super().run_server()
+
+
+def _send_log_to_rospy() -> None:
+    if not session().shows_transitions:
+        smachpy.set_loggers(_core.loginfo, _core.logwarn, _core.logdebug, _core.logerr)
+
+
+_send_log_to_rospy()
+
+
+def __getattr__(name: str) -> Any:
+    if name == "introspection":
+        from importlib import import_module
+
+        return import_module("smachpy.network.server")
+    raise AttributeError(f"module 'smach_ros' has no attribute {name!r}")

@@ -1,0 +1,197 @@
+"""Parameters: a tree of values by ROS names, as the parameter server of ROS 1 keeps it.
+
+Source:
+    https://wiki.ros.org/Parameter%20Server, for types, names spaces and `search_param`.
+"""
+
+from __future__ import annotations
+
+import copy
+import io
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.exceptions import ActionlibError
+from actionlib_core.suggest import did_you_mean
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+
+class ParameterFileError(ActionlibError):
+    """A file of parameters cannot be read.
+
+    Attributes:
+        path: The file.
+    """
+
+    def __init__(self, path: Path, problem: str) -> None:
+        self.path = path
+        super().__init__(f"parameters {str(path)!r}: {problem}")
+
+
+class Parameters:
+    """A tree of values. Names are full, with or without the slash in front.
+
+    Threads: one call at a time is atomic enough for CPython's dicts; a read gets a copy.
+    """
+
+    def __init__(self) -> None:
+        self._tree: dict[str, Any] = {}
+
+    def get(self, name: str) -> Any:
+        """Return a copy of a value; a name space is a dict of what is in it.
+
+        Raises:
+            KeyError: there is none; the text says so.
+        """
+        try:
+            return copy.deepcopy(self._find(name))
+        except KeyError:
+            known = self.names()
+            raise KeyError(
+                f"parameter '/{_clean(name)}': got no value; expected one."
+                + did_you_mean(f"/{_clean(name)}", known)
+            ) from None
+
+    def set(self, name: str, value: Any) -> None:
+        """Give a name a value; a dict becomes a name space."""
+        words = _words(name)
+        value = _plain(value)
+        if not words:
+            if not isinstance(value, dict):
+                raise TypeError(f"parameter '/': got {value!r}; expected a dict.")
+            self._tree = value
+            return
+        tree = self._tree
+        for word in words[:-1]:
+            below = tree.get(word)
+            if not isinstance(below, dict):
+                below = tree[word] = {}
+            tree = below
+        tree[words[-1]] = value
+
+    def merge(self, name: str, values: dict[Any, Any]) -> None:
+        """Set every value of a tree below `name`, and leave its neighbours as they are."""
+        for key, value in values.items():
+            full = f"{_clean(name)}/{key}"
+            if isinstance(value, dict) and value:
+                self.merge(full, value)
+            else:
+                self.set(full, value)
+
+    def has(self, name: str) -> bool:
+        """Tell whether a name has a value."""
+        try:
+            self._find(name)
+        except KeyError:
+            return False
+        return True
+
+    def delete(self, name: str) -> None:
+        """Forget a value, or a whole name space.
+
+        Raises:
+            KeyError: there is none.
+        """
+        words = _words(name)
+        if not words:
+            self._tree = {}
+            return
+        tree = self._find("/".join(words[:-1]))
+        if not isinstance(tree, dict) or words[-1] not in tree:
+            raise KeyError(f"parameter '/{_clean(name)}': got no value; expected one to delete.")
+        del tree[words[-1]]
+
+    def search(self, namespace: str, key: str) -> str | None:
+        """Return the full name of `key` in the nearest name space from `namespace` upwards.
+
+        Only the first word of `key` has to be there, as on ROS 1's server.
+        """
+        words = _words(namespace)
+        wanted = _clean(key)
+        first = wanted.partition("/")[0]
+        while True:
+            if self.has("/".join([*words, first])):
+                return "/" + "/".join([*words, wanted])
+            if not words:
+                return None
+            words.pop()
+
+    def names(self) -> list[str]:
+        """Return the full names of all values."""
+        return [f"/{name}" for name in _leaves(self._tree)]
+
+    def load(self, path: Path, namespace: str = "/") -> None:
+        """Set what a YAML file says, below `namespace`.
+
+        Raises:
+            ParameterFileError: it cannot be read, or is no dict.
+        """
+        values = read_file(path)
+        self.merge(namespace, values)
+
+    def _find(self, name: str) -> Any:
+        found: Any = self._tree
+        for word in _words(name):
+            if not isinstance(found, dict):
+                raise KeyError(name)
+            found = found[word]
+        return found
+
+
+def read_file(path: Path) -> dict[Any, Any]:
+    """Return what a YAML file of parameters says.
+
+    Raises:
+        ParameterFileError: it cannot be read, or is no dict.
+    """
+    try:
+        values = read_yaml(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise ParameterFileError(path, f"{error}") from error
+    if values is None:
+        return {}
+    if not isinstance(values, dict):
+        raise ParameterFileError(path, f"got {values!r:.60}; expected a dict of parameters.")
+    return values
+
+
+def read_yaml(text: str) -> Any:
+    """Return the value of a YAML text, as `_name:=value` has it on a command line.
+
+    Raises:
+        ValueError: it is no YAML.
+    """
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    try:
+        return YAML(typ="safe", pure=True).load(io.StringIO(text))
+    except YAMLError as error:
+        raise ValueError(f"got no YAML: {error}") from error
+
+
+def _clean(name: str) -> str:
+    return "/".join(_words(name))
+
+
+def _words(name: str) -> list[str]:
+    return [word for word in name.split("/") if word]
+
+
+def _leaves(tree: dict[str, Any]) -> Iterator[str]:
+    for name, value in tree.items():
+        if isinstance(value, dict) and value:
+            yield from (f"{name}/{below}" for below in _leaves(value))
+        else:
+            yield name
+
+
+def _plain(value: Any) -> Any:
+    """Return a copy with lists and dicts as the server keeps them: keys are words."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    return value

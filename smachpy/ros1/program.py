@@ -1,0 +1,243 @@
+"""Run an old script, or only build its machine."""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import linecache
+import signal
+import sys
+import threading
+import traceback
+import types
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.clock import Deadlock, RealClock, VirtualClock, current_clock, use_clock
+from actionlib_core.node import Node, use_node
+from actionlib_core.shutdown import Shutdown, use_shutdown
+from actionlib_core.transport.memory import MemoryNetwork
+from smachpy.exceptions import SmachError
+from smachpy.machines.container import Container, below
+from smachpy.ros1 import python2, session
+from smachpy.ros1.dry import nothing_done
+from smachpy.ros1.install import install
+from smachpy.ros1.session import Session, Stop
+from smachpy.run.root import OBSERVERS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+    from types import FrameType
+
+LOAD_S = 10.0
+"""Longest time that a script may take to build its machine [s]."""
+
+
+class LoadError(SmachError):
+    """No machine could be had from a script.
+
+    Attributes:
+        script: The script.
+        problem: Why, and what to try.
+    """
+
+    def __init__(self, script: Path, problem: str) -> None:
+        self.script = script
+        self.problem = problem
+        super().__init__(f"script {str(script)!r}: {problem}")
+
+
+def run_script(script: Path, argv: Sequence[str] = ()) -> None:
+    """Run a script as `python script` would, with ROS 1's names, in the session in force.
+
+    Args:
+        script: The file.
+        argv: Its arguments.
+
+    Raises:
+        LoadError: the file cannot be read, or is no Python.
+        BaseException: what the script raises, `SystemExit` too.
+
+    Blocks: as long as the script does.
+    """
+    path = script.resolve()
+    try:
+        code = python2.to_code(path.read_bytes(), str(path))
+    except OSError as error:
+        raise LoadError(script, f"got {error}; expected a file of Python.") from error
+    except SyntaxError as error:
+        raise LoadError(
+            script,
+            f"line {error.lineno}: got {error.msg}; expected Python, 2 or 3.",
+        ) from error
+    main = types.ModuleType("__main__")
+    main.__file__ = str(path)
+    main.__dict__["__builtins__"] = __builtins__
+    before = sys.modules.get("__main__"), sys.argv, list(sys.path)
+    sys.modules["__main__"] = main
+    sys.argv = [str(path), *argv]
+    sys.path.insert(0, str(path.parent))
+    try:
+        exec(code, main.__dict__)  # noqa: S102  that is what running it means
+    finally:
+        sys.argv, sys.path[:] = before[1], before[2]
+        if before[0] is not None:
+            sys.modules["__main__"] = before[0]
+
+
+def load(
+    script: str | Path,
+    argv: Sequence[str] = (),
+    *,
+    params: Mapping[str, Any] | None = None,
+    stub_missing: bool = False,
+    timeout: float = LOAD_S,
+    stubbed: list[str] | None = None,
+) -> Container:
+    """Return the machine of a script for ROS 1; the script runs up to its first `execute`.
+
+    Where it calls `execute`, `run_server` or `spin`, it ends. Until then it waits for nothing,
+    sends nothing, writes nothing and starts no process: servers are there, goals succeed at once,
+    messages, results and responses are empty. ROS 1's names stay installed, as the states of the
+    machine may need them; `uninstall` takes them away.
+
+    Args:
+        script: The file.
+        argv: Its arguments; `_name:=value` gives it private parameters.
+        params: Parameters by name, also as a tree.
+        stub_missing: Modules, messages and parameters that nobody has get stand-ins.
+        timeout: Longest time that the script may take [s].
+        stubbed: Gets what got a stand-in.
+
+    Returns:
+        The machine that it would run first; where it would serve or wait, the outermost one.
+
+    Raises:
+        LoadError: it built none in time, or raised.
+
+    Blocks: as long as the script builds, `timeout` at most.
+    """
+    path = Path(script)
+    install(path, stub_missing=stub_missing)
+    made = Session([str(path), *argv], dry=True, stub_missing=stub_missing)
+    made.parameters.merge("/", dict(params or {}))
+    known = {id(thing) for thing in gc.get_objects() if isinstance(thing, Container)}
+    with contextlib.ExitStack() as stack:
+        _go_virtual(stack)
+        stack.enter_context(nothing_done())
+        session.forget_loaded()
+        session.begin(made)
+        stack.callback(made.be_live)
+        OBSERVERS.append(made.stop)
+        stack.callback(OBSERVERS.remove, made.stop)
+        stack.enter_context(_deadline(made, timeout))
+        problem = _build(path, argv, made)
+        stopped = made.stopped
+    if stubbed is not None:
+        stubbed += made.stubbed
+    machine = stopped.machine if stopped is not None else None
+    if machine is None:
+        machine = _outermost(known)
+    if machine is None or (problem and stopped is None):
+        raise LoadError(path, problem or _NOTHING)
+    assert isinstance(machine, Container)
+    return machine
+
+
+_NOTHING = (
+    "it ended without a machine: got no call of execute(), run_server() or spin(); expected one. "
+    "Try `path.py:function` if a function of the file returns its machine."
+)
+
+
+def _build(path: Path, argv: Sequence[str], made: Session) -> str:
+    """Run a dry script; return what went wrong, "" for nothing."""
+    try:
+        run_script(path, argv)
+    except LoadError as error:
+        return error.problem
+    except Stop:
+        return ""
+    except SystemExit as error:
+        return f"it ended by sys.exit({error.code!r}) before its machine ran."
+    except Deadlock:
+        made.stopped = made.stopped or Stop()
+        return ""
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt) and made.stopped is None:
+            raise
+        return where_raised(error, path)
+    return ""
+
+
+def where_raised(error: BaseException, script: Path) -> str:
+    """Return an error with the line of the script's project that it comes from."""
+    frames = traceback.extract_tb(error.__traceback__)
+    root = str(script.resolve().parent)
+    own = [frame for frame in frames if frame.filename.startswith(root)]
+    text = f"{type(error).__name__}: {error}"
+    if not own:
+        return text
+    last = own[-1]
+    source = linecache.getline(last.filename, last.lineno or 0).strip()
+    return f"{last.filename}:{last.lineno}: {text}" + (f"\n    {source}" if source else "")
+
+
+def _go_virtual(stack: contextlib.ExitStack) -> None:
+    """Enter a clock and a network in memory, unless the caller has such a clock in force."""
+    clock = current_clock()
+    if isinstance(clock, VirtualClock):
+        stack.enter_context(clock.patched())
+        return
+    made = stack.enter_context(VirtualClock())
+    stack.enter_context(use_clock(made))
+    stack.enter_context(use_shutdown(Shutdown()))
+    stack.enter_context(made.patched())
+    node = stack.enter_context(Node("script", transport=MemoryNetwork(made).session(), clock=made))
+    stack.enter_context(use_node(node))
+
+
+@contextlib.contextmanager
+def _deadline(made: Session, seconds: float) -> Iterator[None]:
+    """End the script after so many real seconds, wherever it is; in the main thread only."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    over: list[bool] = []
+
+    def end(_number: int, _frame: FrameType | None) -> None:
+        if not over:
+            made.stopped = made.stopped or Stop()
+            raise made.stopped
+
+    main = threading.main_thread().ident
+    assert main is not None
+    before = signal.signal(signal.SIGURG, end)
+    timer = RealClock().call_later(seconds, lambda: signal.pthread_kill(main, signal.SIGURG))
+    try:
+        yield
+    finally:
+        over.append(True)
+        timer.cancel()
+        signal.signal(signal.SIGURG, before)
+
+
+def _outermost(known: set[int]) -> Container | None:
+    """Return the largest of the containers that were made and are in no other one."""
+    made = [
+        thing
+        for thing in gc.get_objects()
+        if isinstance(thing, Container) and id(thing) not in known and "_smachpy" in vars(thing)
+    ]
+    inner = {
+        id(child)
+        for container in made
+        for each in container.get_children().values()
+        for child in below(each)
+    }
+    outer = [container for container in made if id(container) not in inner]
+    sizes = [(sum(1 for _ in below(container)), -index) for index, container in enumerate(outer)]
+    return outer[-max(sizes)[1]] if sizes else None
+
+
+__all__ = ["LOAD_S", "LoadError", "load", "run_script", "where_raised"]

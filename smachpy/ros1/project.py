@@ -1,0 +1,125 @@
+"""What lies around an old script: its package, the packages beside it, their modules and messages.
+
+ROS 1 found them through catkin's workspace; here the folders say it: a package is a folder with
+package.xml or manifest.xml, or one with definitions in msg, srv or action.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+MOST_FOLDERS: Final = 5000
+"""Folders that are looked at around a script; a larger tree is not searched further."""
+
+KINDS: Final = ("msg", "srv", "action")
+_MANIFESTS: Final = ("package.xml", "manifest.xml")
+_SKIPPED: Final = frozenset({"__pycache__", "node_modules", "build", "devel", "install", "logs"})
+_NAME: Final = re.compile(r"<name>\s*([A-Za-z]\w*)\s*</name>")
+
+
+class Project:
+    """The folders around a script.
+
+    Args:
+        script: The script; None looks around the working folder.
+
+    Attributes:
+        folder: Where the script lies.
+        root: The top of its repository or workspace, or its package, or its folder.
+    """
+
+    def __init__(self, script: Path | None = None) -> None:
+        self.folder = Path.cwd() if script is None else script.resolve().parent
+        self.root = _find_root(self.folder)
+        self._packages: dict[str, Path] | None = None
+
+    def packages(self) -> dict[str, Path]:
+        """Return name -> folder of the packages of the project."""
+        if self._packages is None:
+            self._packages = {}
+            for folder in _walk(self.root):
+                if _is_package(folder):
+                    self._packages.setdefault(_name_of(folder), folder)
+        return self._packages
+
+    def interfaces_of(self, package: str) -> dict[str, list[Path]]:
+        """Return kind -> files of the definitions of a package of the project; empty for none."""
+        folder = self.packages().get(package)
+        if folder is None:
+            return {}
+        found = {kind: sorted((folder / kind).glob(f"*.{kind}")) for kind in KINDS}
+        return {kind: files for kind, files in found.items() if files}
+
+    def source_roots(self) -> Iterator[Path]:
+        """Yield the folders whose modules the script may import: its own, then `src` of packages.
+
+        The script's own package comes before its neighbours.
+        """
+        yield self.folder
+        own = [folder for folder in self.packages().values() if self.folder.is_relative_to(folder)]
+        others = [folder for folder in self.packages().values() if folder not in own]
+        for folder in (*own, *others):
+            for below in ("src", "scripts", "nodes"):
+                if (folder / below).is_dir():
+                    yield folder / below
+        for folder in own:
+            yield folder
+            yield folder.parent
+        yield self.root
+
+    def holds(self, file: str) -> bool:
+        """Tell whether a file belongs to the project."""
+        try:
+            path = Path(file).resolve()
+        except OSError:
+            return False
+        if "site-packages" in path.parts or "dist-packages" in path.parts:
+            return False
+        return path.is_relative_to(self.root)
+
+
+def _find_root(folder: Path) -> Path:
+    """Return the repository's top, the outermost package's workspace, or the folder itself."""
+    package: Path | None = None
+    for above in (folder, *folder.parents):
+        if any((above / mark).exists() for mark in (".git", ".hg", ".catkin_workspace")):
+            return above
+        if _is_package(above) or (above / "stack.xml").is_file():
+            package = above
+        if above == above.parent or above == Path.home():
+            break
+    if package is None:
+        return folder
+    beside = package.parent
+    return beside if beside.name == "src" else package
+
+
+def _walk(root: Path) -> Iterator[Path]:
+    for seen, (folder, below, _files) in enumerate(os.walk(root), 1):
+        below[:] = sorted(
+            name for name in below if not name.startswith(".") and name not in _SKIPPED
+        )
+        yield Path(folder)
+        if seen >= MOST_FOLDERS:
+            return
+
+
+def _is_package(folder: Path) -> bool:
+    if any((folder / name).is_file() for name in _MANIFESTS):
+        return True
+    return any(next((folder / kind).glob(f"*.{kind}"), None) is not None for kind in KINDS)
+
+
+def _name_of(folder: Path) -> str:
+    """Return the name in package.xml, else the folder's."""
+    try:
+        match = _NAME.search((folder / "package.xml").read_text(encoding="utf-8", errors="replace"))
+    except OSError:
+        match = None
+    return match[1] if match else folder.name

@@ -1,0 +1,164 @@
+"""Python 2 source as Python 3 code, in memory: the file stays as it is, lines keep their numbers.
+
+fissix, a maintained fork of lib2to3, does the rewriting. What it cannot know stays Python 3's
+meaning: `/` between whole numbers gives a fraction, strings are text.
+"""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import re
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, Final
+
+from actionlib_core.exceptions import ActionlibError
+
+if TYPE_CHECKING:
+    from types import CodeType
+
+# Rewriting for looks, and implicit relative imports, which the import hook finds (`hook`).
+_NOT_WANTED: Final = frozenset({"buffer", "idioms", "import", "set_literal", "ws_comma", "apply"})
+# For source that is Python 3 by its grammar: names that are gone.
+_NAMES: Final = (
+    *("basestring", "dict", "execfile", "getcwdu", "has_key", "imports", "itertools", "long"),
+    *("next", "raw_input", "reduce", "reload", "standarderror", "types", "unicode", "urllib"),
+    *("xrange",),
+)
+_GONE: Final = re.compile(
+    r"\b(basestring|execfile|getcwdu|has_key|iteritems|iterkeys|itervalues|raw_input|unicode"
+    r"|xrange|unichr|viewitems|viewkeys|viewvalues|StandardError|izip|imap|ifilter"
+    r"|Queue|ConfigParser|cPickle|StringIO|urllib2|Tkinter|tkMessageBox|thread|commands)\b"
+    r"|(?<!\.)\b(long|reduce|reload)\s*\(|\.next\(\)"
+)
+_INDENT: Final = re.compile(r"^[ ]*\t[ \t]*", re.MULTILINE)
+_CODING: Final = re.compile(rb"^[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+)")
+
+
+class Python2Error(ActionlibError, SyntaxError):
+    """A source is neither Python 3 nor Python 2.
+
+    Attributes:
+        filename: The file.
+        lineno: The line that Python 2's grammar does not allow.
+    """
+
+    def __init__(self, filename: str, lineno: int, problem: str) -> None:
+        super().__init__(f"{filename}:{lineno}: {problem}")
+        self.filename, self.lineno, self.msg = filename, lineno, problem
+
+
+def to_code(source: bytes, filename: str) -> CodeType:
+    """Compile a source, converted from Python 2 if need be; lines are those of the file.
+
+    Raises:
+        SyntaxError: it is Python in neither version; of the version that it looks like.
+        MissingExtraError: it is Python 2, and what converts it is not installed.
+    """
+    text = read(source)
+    try:
+        tree = ast.parse(text, filename)
+    except SyntaxError as error:
+        tree = _convert(_straight(text), filename, error)
+    else:
+        if _GONE.search(text):
+            converted = convert(text, _NAMES)
+            if converted != text:
+                tree = _parse_as(text, converted, filename)
+    code: CodeType = compile(tree, filename, "exec", dont_inherit=True)
+    return code
+
+
+def read(source: bytes) -> str:
+    """Return the text of a source in the encoding that it declares, with plain line ends."""
+    encoding = "utf-8-sig"
+    for line in source.splitlines()[:2]:
+        match = _CODING.match(line)
+        if match:
+            encoding = match[1].decode()
+            encoding = "utf-8-sig" if encoding.lower().replace("_", "-") == "utf-8" else encoding
+    try:
+        text = source.decode(encoding)
+    except (UnicodeDecodeError, LookupError):
+        text = source.decode("latin-1")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _straight(text: str) -> str:
+    """Indent with spaces only: Python 2 took a tab for the way to the next multiple of eight."""
+    return _INDENT.sub(lambda match: match[0].expandtabs(8), text)
+
+
+def _convert(text: str, filename: str, error: SyntaxError) -> ast.Module:
+    """Parse what is no Python 3 as it stands: with spaces for tabs, or as Python 2."""
+    try:
+        return ast.parse(text, filename)
+    except SyntaxError:
+        pass
+    try:
+        converted = convert(text)
+    except SyntaxError:
+        raise error from None
+    return _parse_as(text, converted, filename)
+
+
+def convert(text: str, names: tuple[str, ...] | None = None) -> str:
+    """Return Python 2 source as Python 3 source.
+
+    Args:
+        text: The source, without tabs in its indents.
+        names: Only these fixers, for source that parses as Python 3.
+
+    Raises:
+        Python2Error: it is no Python 2.
+        MissingExtraError: fissix is not installed.
+    """
+    ended = text if text.endswith("\n") else f"{text}\n"
+    tool, parse_error = _tool(names)
+    try:
+        return str(tool.refactor_string(ended, "<old source>"))
+    except parse_error as error:
+        context: Any = getattr(error, "context", None)
+        line = context[1][0] if context else 0
+        raise Python2Error("<old source>", line, f"no Python 2 either: {error}") from error
+
+
+@lru_cache(maxsize=2)
+def _tool(names: tuple[str, ...] | None) -> tuple[Any, type[Exception]]:
+    from smachpy.ros1.extra import import_extra
+
+    refactor = import_extra("fissix.refactor", "Python 2 source")
+    parse = import_extra("fissix.pgen2.parse", "Python 2 source")
+    tokenize = import_extra("fissix.pgen2.tokenize", "Python 2 source")
+    wanted = names or sorted(set(refactor.get_all_fix_names("fissix.fixes")) - _NOT_WANTED)
+    options = {"print_function": True, "exec_function": True} if names else {}
+    fixers = [f"fissix.fixes.fix_{name}" for name in wanted]
+    tool = refactor.RefactoringTool(fixers, options)
+    tool.log_message = tool.log_debug = tool.log_error = lambda *_args, **_kwargs: None
+    return tool, (parse.ParseError, tokenize.TokenError)  # type: ignore[return-value]
+
+
+def _parse_as(text: str, converted: str, filename: str) -> ast.Module:
+    """Parse the converted source, with the lines of the original in every node."""
+    tree = ast.parse(converted, filename)
+    before, after = text.splitlines(), converted.splitlines()
+    if len(before) != len(after):
+        lines = _line_map(before, after)
+        for node in ast.walk(tree):
+            place: Any = node
+            if hasattr(place, "lineno"):
+                place.lineno = lines[place.lineno]
+                if getattr(place, "end_lineno", None):
+                    place.end_lineno = max(lines[place.end_lineno], place.lineno)
+    return tree
+
+
+def _line_map(before: list[str], after: list[str]) -> dict[int, int]:
+    """Return converted line -> original line, both from 1."""
+    lines: dict[int, int] = {}
+    matcher = difflib.SequenceMatcher(None, before, after, autojunk=False)
+    for _tag, old, old_end, new, new_end in matcher.get_opcodes():
+        last = max(old_end - 1, old - 1, 0)
+        for offset in range(new_end - new):
+            lines[new + offset + 1] = min(old + offset, last) + 1
+    return lines

@@ -1,0 +1,224 @@
+"""Stand-ins for what an old program needs and nobody has: modules, messages, values.
+
+They take every call, attribute and item, so that a machine can be built, drawn, checked and
+explored; they do nothing.
+"""
+
+from __future__ import annotations
+
+import types
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.interfaces import define_action, define_message, define_service
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+_ACTION_ENDS = ("ActionGoal", "ActionResult", "ActionFeedback", "Action")
+
+
+class Anything:
+    """A value that allows everything; in sums it is 0, as a list empty, as a condition true.
+
+    As a base class it takes any arguments.
+    """
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        name = args[0] if len(args) == 1 and isinstance(args[0], str) and not kwargs else "stub"
+        self.__dict__["_stub_name"] = name
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__") and name.endswith("__"):
+            raise AttributeError(name)
+        return Anything(f"{self.__dict__.get('_stub_name', 'stub')}.{name}")
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:  # noqa: D102  what it means is said above
+        del kwargs
+        if len(args) == 1 and isinstance(args[0], (types.FunctionType, type)):
+            return args[0]  # it was used as a decorator
+        return Anything(f"{self._stub_name}()")
+
+    def __getitem__(self, key: Any) -> Any:
+        if isinstance(key, int) and key > 0:
+            raise IndexError(key)  # a loop over it ends
+        return Anything(f"{self._stub_name}[...]")
+
+    def __setitem__(self, key: Any, value: Any) -> None:
+        pass
+
+    def __delitem__(self, key: Any) -> None:
+        pass
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter(())
+
+    def __len__(self) -> int:
+        return 0
+
+    def __bool__(self) -> bool:
+        return True
+
+    def __contains__(self, item: Any) -> bool:
+        return False
+
+    def __enter__(self) -> Any:
+        return self
+
+    def __exit__(self, *args: object) -> None:
+        pass
+
+    def __hash__(self) -> int:
+        return id(self)
+
+    def __eq__(self, other: object) -> bool:
+        return self is other
+
+    def __repr__(self) -> str:
+        return f"<stand-in {self._stub_name}>"
+
+    def __float__(self) -> float:
+        return 0.0
+
+    def __int__(self) -> int:
+        return 0
+
+    def __index__(self) -> int:
+        return 0
+
+    def to_sec(self) -> float:
+        """Return 0: as a duration it is none."""
+        return 0.0
+
+    def keys(self) -> list[Any]:
+        """Return no keys: as a dict it is empty."""
+        return []
+
+    def __mro_entries__(self, bases: tuple[type, ...]) -> tuple[type, ...]:
+        """Let a program derive a class from it."""
+        del bases
+        return (Anything,)
+
+
+def _number(name: str) -> Callable[..., Any]:
+    def operate(self: Anything, *_others: Any) -> Any:
+        del self
+        return 0.0
+
+    operate.__name__ = name
+    return operate
+
+
+for _name in (
+    *("add", "sub", "mul", "truediv", "floordiv", "mod", "pow"),
+    *("radd", "rsub", "rmul", "rtruediv", "rfloordiv", "rmod", "rpow"),
+    *("neg", "pos", "abs", "round"),
+):
+    setattr(Anything, f"__{_name}__", _number(_name))
+for _name in ("lt", "le", "gt", "ge"):
+    setattr(Anything, f"__{_name}__", lambda _self, _other: False)
+
+
+class StubModule(types.ModuleType):
+    """A module that has every name."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name, "A stand-in for a module that is missing.")
+        self.__path__: list[str] = []
+        self.__file__ = None
+        self.__all__: list[str] = []
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__") and name.endswith("__"):
+            raise AttributeError(name)
+        value = stand_in_class(name) if name[:1].isupper() else Anything(name)
+        setattr(self, name, value)
+        return value
+
+
+def stand_in_class(name: str) -> type:
+    """Return a class of stand-ins."""
+    return type(
+        name,
+        (Anything,),
+        {"__init__": lambda self, *_args, **_kwargs: Anything.__init__(self, name)},
+    )
+
+
+class StubSection(types.ModuleType):
+    """`pkg.msg` or `pkg.srv` of a package that is missing: its classes are made when named."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name, "Stand-ins for the interfaces of a package that is missing.")
+        self.__all__: list[str] = []
+        self.__file__ = None
+        self._package, _, self._kind = name.partition(".")
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        make = _service if self._kind == "srv" else _message
+        value = make(self._package, name)
+        setattr(self, name, value)
+        return value
+
+
+def _message(package: str, name: str) -> type:
+    """Return a message class; of an action, when its name says that it is part of one."""
+    for end in _ACTION_ENDS:
+        if name.endswith(end) and name != end:
+            return _action_part(package, name.removesuffix(end), end)
+    for end in ("Goal", "Result", "Feedback"):
+        if name.endswith(end) and name != end:
+            return _action_part(package, name.removesuffix(end), end)
+    return permissive(define_message(f"{package}/{name}", ""))
+
+
+def _action_part(package: str, base: str, end: str) -> type:
+    from actionlib_core.interfaces import get_message
+
+    action = define_action(f"{package}/{base}", "---\n---\n")
+    for part in ("Goal", "Result", "Feedback"):
+        permissive(get_message(f"{package}/{base}{part}"))
+    return (
+        action
+        if end == "Action"
+        else _loose.get(f"{package}/{base}{end}") or get_message(f"{package}/{base}{end}")
+    )
+
+
+def _service(package: str, name: str) -> type:
+    base = name.removesuffix("Request").removesuffix("Response")
+    service = define_service(f"{package}/{base}", "---\n")
+    if name == base:
+        return service
+    kind = service._request_class if name.endswith("Request") else service._response_class
+    return permissive(kind)
+
+
+_loose: dict[str, type] = {}
+
+
+def permissive(kind: type) -> type:
+    """Return a subclass of a message class without fields that takes and gives every field."""
+    name = kind._type  # type: ignore[attr-defined]
+    if name not in _loose:
+        _loose[name] = type(kind.__name__, (_Loose, kind), {})
+    return _loose[name]
+
+
+class _Loose:
+    """Takes every field; one that was not set is a stand-in."""
+
+    def __init__(self, *_args: Any, **fields: Any) -> None:
+        super().__init__()
+        self.__dict__.update(fields)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        value = Anything(name)
+        self.__dict__[name] = value
+        return value
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        self.__dict__[name] = value

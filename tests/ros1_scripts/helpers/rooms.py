@@ -1,0 +1,1 @@
+ROOMS = {'lab': 1L, 'kitchen': 2L}

@@ -1,0 +1,106 @@
+"""The old names come and go with the hook, whatever else is installed."""
+
+import importlib
+import subprocess
+import sys
+
+import pytest
+
+from smachpy import ros1, slips
+
+
+@pytest.fixture
+def names(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text("")
+    with ros1.installed(script):
+        yield tmp_path
+
+
+def test_the_names_are_this_packages(names):
+    import smach
+    import smach_ros
+
+    import smachpy
+
+    assert smach.StateMachine is smachpy.StateMachine
+    assert smach_ros.SimpleActionState is smachpy.SimpleActionState
+    assert importlib.import_module("smach.state_machine").StateMachine is smachpy.StateMachine
+    assert importlib.import_module("geometry_msgs.msg").PoseStamped().header.seq == 0
+
+
+def test_star_imports_leak_what_the_originals_leak(names):
+    scope = {}
+    exec("from actionlib import *\nfrom smach import *\nfrom smach_ros import *", scope)
+    leaked = {
+        "GoalStatus",
+        "rospy",
+        "threading",
+        "SimpleActionClient",
+        "State",
+        "IntrospectionServer",
+    }
+    assert leaked <= set(scope)
+
+
+def test_uninstall_gives_an_installed_smach_back(tmp_path):
+    import smach as before
+
+    with ros1.installed(tmp_path / "script.py"):
+        assert importlib.import_module("smach") is not before
+        assert slips.accepting()
+    assert importlib.import_module("smach") is before
+    assert not slips.accepting()
+    assert "rospy" not in sys.modules
+    with pytest.raises(ModuleNotFoundError):
+        importlib.import_module("rospy")
+
+
+def test_importing_smachpy_leaves_the_names_alone():
+    code = (
+        "import smachpy, sys; assert not [m for m in sys.modules if m.startswith('smachpy.ros1')]\n"
+        "import smachpy.ros1\n"
+        "try: import rospy\n"
+        "except ImportError: print('none')"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "none\n"
+
+
+def test_a_missing_package_is_named_with_its_place(names):
+    (names / "uses.py").write_text("import rospy\nfrom nobody_msgs.msg import Thing\n")
+    with pytest.raises(ModuleNotFoundError) as caught:
+        importlib.import_module("uses")
+    assert caught.value.name == "nobody_msgs"
+    assert caught.value.file == str(names / "uses.py")
+    assert caught.value.line == 2
+
+
+def test_messages_of_the_packages_around(tmp_path):
+    scripts = tmp_path / "my_stack" / "my_robot" / "scripts"
+    scripts.mkdir(parents=True)
+    (tmp_path / "my_stack" / "my_robot" / "package.xml").write_text("<name>my_robot</name>")
+    other = tmp_path / "my_stack" / "folder" / "msg"
+    other.mkdir(parents=True)
+    (tmp_path / "my_stack" / ".git").mkdir()
+    (other.parent / "package.xml").write_text("<package><name>around_msgs</name></package>")
+    (other / "Level.msg").write_text("float64 percent\n")
+    library = tmp_path / "my_stack" / "my_robot" / "src" / "my_robot_lib"
+    library.mkdir(parents=True)
+    (library / "__init__.py").write_text("import parts\nprint 'made', parts.WHAT\n")
+    (library / "parts.py").write_text("WHAT = 'x'\n")
+    with ros1.installed(scripts / "script.py"):
+        assert importlib.import_module("around_msgs.msg").Level(3.5).percent == 3.5
+        assert importlib.import_module("my_robot_lib").parts.WHAT == "x"
+    assert "my_robot_lib" not in sys.modules
+
+
+def test_the_python2_file_stays_and_errors_show_its_lines(tmp_path):
+    script = tmp_path / "old.py"
+    text = "import rospy\ndef f((a, b)):\n\tprint a\n\n\nraise ValueError, 'here'\n"
+    script.write_text(text)
+    with pytest.raises(ros1.LoadError) as caught:
+        ros1.load(script)
+    ros1.uninstall()
+    assert f"{script}:6: ValueError: here" in caught.value.problem
+    assert script.read_text() == text
