@@ -20,6 +20,7 @@ Exception
       +-- TypeMismatchError     two ends of a name disagree on the type
       +-- InterfaceError        a .msg/.srv/.action file or an interface name cannot be used
       |    +-- FieldError       a value does not fit the field of a message
+      +-- Ros1Error             a ROS 1 master or node does not answer, or not as it should
       +-- DeserializationError  received bytes are not a message of the expected type
 """
 
@@ -255,6 +256,20 @@ class DeserializationError(ActionlibError, ValueError):
             f"{type_name}: got {size} bytes that are no message of this type: {reason}; expected "
             f"{expected} at both ends."
         )
+
+
+class Ros1Error(ActionlibError):
+    """A ROS 1 master or node does not answer, refuses, or answers otherwise than it should.
+
+    Attributes:
+        peer: Whom it is about: the address of a master or node, or a node's name.
+        reason: What is wrong.
+    """
+
+    def __init__(self, peer: str, reason: str) -> None:
+        self.peer = peer
+        self.reason = reason
+        super().__init__(f"{peer}: {reason}")
 
 
 class ActionException(ActionlibError):  # noqa: N818  actionlib's name

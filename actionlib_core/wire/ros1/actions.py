@@ -1,0 +1,667 @@
+"""One bridged action, with its server on either side."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import threading
+from functools import partial
+from typing import TYPE_CHECKING
+
+from actionlib_core.exceptions import ActionlibError, Ros1Error
+from actionlib_core.goal.ports import StatusEntry
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
+from actionlib_core.wire.action_messages import (
+    action_keys,
+    pack_goal_id,
+    pack_status,
+    pack_statuses,
+    unpack_frame,
+    unpack_goal,
+    unpack_goal_id,
+    unpack_report,
+    unpack_statuses,
+)
+from actionlib_core.wire.client_port import ACK, AGAIN, ASK_TIMEOUT_S, GOAL
+from actionlib_core.wire.encoding import encoding_of
+from actionlib_core.wire.presence import Kind, parse_token, token_key, with_age
+from actionlib_core.wire.ros1.answers import ACTION_WORDS
+from actionlib_core.wire.ros1.goals import GoalsOfClients, GoalsOfServer, Verdict
+from actionlib_core.wire.ros1.sides import Typed, type_of
+from actionlib_core.wire.server_port import FEEDBACK, RESULT, STATUS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection
+
+    from actionlib_core.clock import Timer
+    from actionlib_core.transport import Closable, PublisherPort, Quality, Query, Reply, Sample
+    from actionlib_core.wire.presence import Endpoint
+    from actionlib_core.wire.ros1.answers import SystemState
+    from actionlib_core.wire.ros1.definitions import Definitions
+    from actionlib_core.wire.ros1.frames import Header
+    from actionlib_core.wire.ros1.node import Publication
+    from actionlib_core.wire.ros1.sides import Sides
+
+log = logging.getLogger("actionlib_core")
+
+OVERTAKEN_S = 0.05
+ACKNOWLEDGE_S = 5.0  # results: clients in ROS 1 take a goal that is no longer listed for lost
+GOAL_ID = Typed(GoalID._type, GoalID._md5sum)
+STATUS_ARRAY = Typed(GoalStatusArray._type, GoalStatusArray._md5sum)
+_PARTS = {"action_goal": "goal", "action_result": "result", "action_feedback": "feedback"}
+
+
+def action_type(parts: dict[str, Typed]) -> Typed:
+    """Return the type of an action from those of its topics, by their last word.
+
+    Source: ROS 1's checksum of a message whose three fields are messages.
+
+    Raises:
+        Ros1Error: the goal's type is not "pkg/XActionGoal".
+    """
+    goal = parts["goal"]
+    if not goal.type.endswith("ActionGoal"):
+        raise Ros1Error("goal", f"type: got {goal.type!r}; expected 'pkg/XActionGoal'.")
+    text = "\n".join(f"{parts[word].md5} {field}" for field, word in _PARTS.items())
+    md5 = hashlib.md5(text.encode(), usedforsecurity=False).hexdigest()
+    return Typed(goal.type.removesuffix("Goal"), md5)
+
+
+class ActionBridge:
+    """An action on both sides. Its server is looked for in ROS 1 unless it shows a token here.
+
+    Args:
+        sides: The two networks.
+        name: Its name in ROS 1.
+        type_name: "pkg/XAction" if it is known; "" if not.
+        definitions: Texts of types.
+        status_timeout: A server in ROS 1 that says nothing for so long is not there [s].
+
+    Threads: `look` and `close` from one thread.
+    """
+
+    def __init__(
+        self,
+        sides: Sides,
+        name: str,
+        type_name: str,
+        definitions: Definitions,
+        status_timeout: float,
+    ) -> None:
+        self._sides = sides
+        self._name = name
+        self._definitions = definitions
+        self._type = type_name
+        self._status_timeout = status_timeout
+        self._side: ServerInRos | ServerHere | None = None
+
+    def look(self, ends: Collection[Endpoint], state: SystemState) -> None:
+        """Bridge what is there now.
+
+        Args:
+            ends: The clients and servers of the action here that belong to no bridge.
+            state: Who is there in ROS 1.
+        """
+        servers = [end for end in ends if end.kind is Kind.ACTION_SERVER]
+        rivals = set(state.publishers.get(f"{self._name}/status", ())) - {self._sides.ros.name}
+        side = self._side
+        if servers and rivals:
+            text = f"got {sorted(rivals)} in ROS 1 and one of node '{servers[0].node}' here"
+            error = Ros1Error(f"action {self._name}", f"two servers: {text}; expected one.")
+            self._sides.ros.report(f"two servers of {self._name}", error)
+        here = bool(servers) and not (rivals and isinstance(side, ServerInRos))
+        if (isinstance(side, ServerHere) and (not here or side.server not in servers)) or (
+            isinstance(side, ServerInRos) and here
+        ):
+            side.close()
+            side = None
+        if side is None and here:
+            server = min(servers, key=lambda end: end.age)
+            side = ServerHere(self._sides, self._name, server, self._definitions)
+        elif side is None:
+            type_name = self._type or next((end.type for end in ends), "")
+            side = ServerInRos(
+                self._sides, self._name, self._definitions, self._status_timeout, type_name
+            )
+        self._side = side
+        if isinstance(side, ServerInRos):
+            side.check_silence()
+
+    def close(self) -> None:
+        """Bridge no more; does not wait."""
+        if self._side is not None:
+            self._side.close()
+
+
+class ServerInRos:
+    """An action whose server is in ROS 1: shown here while all five connections to it last.
+
+    Args:
+        sides: The two networks.
+        name: The action's name in ROS 1.
+        definitions: Learns the texts of its types.
+        status_timeout: See `ActionBridge`.
+        type_name: "pkg/XAction"; "" if it is not known.
+    """
+
+    def __init__(
+        self,
+        sides: Sides,
+        name: str,
+        definitions: Definitions,
+        status_timeout: float,
+        type_name: str,
+    ) -> None:
+        self._sides = sides
+        self._clock = sides.node.clock
+        self._name = name
+        self._definitions = definitions
+        self._status_timeout = status_timeout
+        self._lock = threading.Lock()
+        self._parts: dict[str, dict[str, Typed]] = {}  # node in ROS 1 -> what it is connected with
+        self._shown: _Shown | None = None
+        self._silent = ""  # node that was there but says nothing any more
+        self._heard = 0.0
+        self._closed = False
+        goal_type = f"{type_name}Goal" if type_name else ""
+        self._goals = self._advertise("goal", goal_type, "")
+        self._cancels = self._advertise("cancel", *GOAL_ID)
+        self._subscriptions = {
+            word: sides.ros.subscribe(f"{name}/{word}", partial(_Part, self, word))
+            for word in ("status", "feedback", "result")
+        }
+
+    def _advertise(self, word: str, type_name: str, md5: str) -> Publication:
+        accept: Callable[[Header], Callable[[], object]] = partial(self._accept, word)
+        definition = ""
+        if type_name and md5:
+            definition = self._definitions.text(Typed(type_name, md5))
+        return self._sides.ros.advertise(
+            f"{self._name}/{word}", type_name, md5, definition, latching=False, accept=accept
+        )
+
+    def close(self) -> None:
+        """Bridge no more; does not wait."""
+        with self._lock:
+            self._closed = True
+            self._hide()
+        self._goals.close()
+        self._cancels.close()
+        for subscription in self._subscriptions.values():
+            subscription.close()
+
+    # -- who is there in ROS 1 -----------------------------------------------------------------
+
+    def _accept(self, word: str, header: Header) -> Callable[[], object]:
+        """Take a subscriber of goals or cancels."""
+        node = header.get("callerid", "")
+        self.connect(node, word, type_of(header, f"{self._name}/{word}"))
+        return partial(self.disconnect, node, word)
+
+    def connect(self, node: str, word: str, typed: Typed) -> None:
+        """Note that a node is connected with one of the five; with all, it is the server."""
+        with self._lock:
+            parts = self._parts.setdefault(node, {})
+            parts[word] = typed
+            if len(parts) < len(ACTION_WORDS) or self._closed:
+                return
+            if self._shown is None:
+                self._show(node)
+            elif self._shown.ros_node != node:
+                text = f"two servers in ROS 1: got {node} beside {self._shown.ros_node}"
+                error = Ros1Error(f"action {self._name}", f"{text}; expected one.")
+                self._sides.ros.report(f"servers of {self._name}", error)
+
+    def disconnect(self, node: str, word: str) -> None:
+        """Note that one of the five has ended: the server is not there any more."""
+        with self._lock:
+            parts = self._parts.get(node, {})
+            parts.pop(word, None)
+            if not parts:
+                self._parts.pop(node, None)
+            if self._shown is not None and self._shown.ros_node == node:
+                self._hide()
+                others = (n for n, p in self._parts.items() if len(p) == len(ACTION_WORDS))
+                other = next(others, None)
+                if other is not None and not self._closed:
+                    self._show(other)
+
+    def _show(self, node: str) -> None:
+        """Show the server; with the lock held."""
+        try:
+            typed = action_type(self._parts[node])
+        except Ros1Error as error:
+            self._sides.ros.report(f"type of {self._name}", error)
+            return
+        self._heard, self._silent = self._clock.now(), ""
+        self._shown = _Shown(
+            self._sides, self._name, typed, self._parts[node], node, self._goals, self._cancels
+        )
+
+    def _hide(self) -> None:
+        shown, self._shown = self._shown, None
+        if shown is not None:
+            shown.close()
+
+    def check_silence(self) -> None:
+        """Hide a server whose status lists have stopped: it hangs, and so would its clients."""
+        with self._lock:
+            shown, now = self._shown, self._clock.now()
+            if shown is None or now < self._heard + self._status_timeout:
+                return
+            self._silent = shown.ros_node
+            self._hide()
+        log.error(
+            "ROS 1 bridge: action %s: no status of %s for %g s: it counts as gone until it speaks",
+            *(self._name, self._silent, self._status_timeout),
+        )
+
+    # -- what it says --------------------------------------------------------------------------
+
+    def take(self, node: str, word: str, payload: bytes) -> None:
+        """Pass on what a node says on `status`, `feedback` or `result`."""
+        with self._lock:
+            if word == "status":
+                self._heard = self._clock.now()
+                if self._silent == node and len(self._parts.get(node, ())) == len(ACTION_WORDS):
+                    self._show(node)
+            shown = self._shown
+        if word == "result":  # what was sent before on another connection comes before, here too
+            self._subscriptions["feedback"].wait_idle(OVERTAKEN_S)
+        if shown is not None and shown.ros_node == node:
+            try:
+                getattr(shown, f"on_{word}")(payload)
+            except ValueError as error:
+                about = f"{self._name}/{word} of {node}"
+                self._sides.ros.report(about, Ros1Error(about, str(error)))
+
+    def learn(self, header: Header, typed: Typed) -> None:
+        """Learn the text of a type from a publisher."""
+        self._definitions.learn(typed, header.get("message_definition", ""))
+
+
+class _Part:
+    """One of the three topics that a server in ROS 1 publishes on."""
+
+    def __init__(self, server: ServerInRos, word: str, header: Header) -> None:
+        typed = type_of(header, word)
+        self._server = server
+        self._word = word
+        self._node = header.get("callerid", "")
+        server.learn(header, typed)
+        server.connect(self._node, word, typed)
+
+    def take(self, payload: bytes) -> None:
+        self._server.take(self._node, self._word, payload)
+
+    def gone(self) -> None:
+        self._server.disconnect(self._node, self._word)
+
+
+class _Shown:
+    """A server in ROS 1 as it is here: token, topics, and answers about its goals."""
+
+    def __init__(
+        self,
+        sides: Sides,
+        name: str,
+        typed: Typed,
+        parts: dict[str, Typed],
+        ros_node: str,
+        goals: Publication,
+        cancels: Publication,
+    ) -> None:
+        self.ros_node = ros_node
+        self._sides = sides
+        self._clock = sides.node.clock
+        self._name = sides.key(name)
+        self._types = parts
+        self._to_server = goals, cancels
+        self._lock = threading.Lock()
+        self._goals = GoalsOfServer()
+        keys = action_keys(self._name)
+        transport = sides.node.transport
+        end = sides.node.endpoint(Kind.ACTION_SERVER, self._name, *typed)
+        end = end._replace(node=sides.key(ros_node))
+        self._own_key = token_key(with_age(end, self._clock.time_ns()))
+        self._status = transport.publisher(keys.status, STATUS_ARRAY.encoding, STATUS)
+        self._feedback = transport.publisher(keys.feedback, parts["feedback"].encoding, FEEDBACK)
+        self._result = transport.publisher(keys.result, parts["result"].encoding, RESULT)
+        self._declared: list[Closable] = [
+            *(self._status, self._feedback, self._result),
+            transport.subscribe(keys.goal, self._on_goal, history=False),
+            transport.subscribe(keys.cancel, self._on_cancel, history=False),
+            transport.subscribe(keys.ack, self._on_ack, history=False),
+            transport.queryable(keys.result, self._on_query),
+            transport.declare_alive(self._own_key),
+        ]
+
+    def close(self) -> None:
+        """Show it no more: its clients' goals are LOST at once."""
+        for each in reversed(self._declared):
+            each.close()
+
+    # -- from ROS 1 ----------------------------------------------------------------------------
+
+    def on_status(self, payload: bytes) -> None:
+        """Take a status list; an idle server's is not passed on, again and again."""
+        entries = unpack_statuses(payload)
+        with self._lock:
+            news = self._goals.on_statuses(entries)
+        if news:
+            self._status.put(payload)
+
+    def on_feedback(self, payload: bytes) -> None:
+        """Take feedback."""
+        self._feedback.put(payload)
+
+    def on_result(self, payload: bytes) -> None:
+        """Take a result."""
+        entry, _ = unpack_report(payload)
+        with self._lock:
+            self._goals.on_result(entry, payload, self._clock.now())
+        self._result.put(payload)
+
+    # -- from clients here ---------------------------------------------------------------------
+
+    def _on_goal(self, sample: Sample) -> None:
+        if self._sides.is_own(sample) or not self._sides.fits(sample, self._types["goal"]):
+            return
+        try:
+            frame, goal_id = unpack_frame(sample.payload), unpack_goal(sample.payload)[0]
+        except ValueError as error:
+            self._report("a goal", sample, error)
+            return
+        other = parse_token(frame) if frame and frame != self._own_key else None
+        if other is not None and other.kind is Kind.ACTION_SERVER and other.name == self._name:
+            return  # a late copy of a goal for a server that was here before
+        with self._lock:
+            verdict = self._goals.on_goal(goal_id)
+            result = self._goals.result(goal_id)
+        if verdict is Verdict.PASS:
+            self._to_server[0].put(sample.payload)
+        elif result is not None:
+            self._result.put(result)
+
+    def _on_cancel(self, sample: Sample) -> None:
+        if not self._sides.is_own(sample) and self._sides.fits(sample, GOAL_ID):
+            self._to_server[1].put(sample.payload)
+
+    def _on_ack(self, sample: Sample) -> None:
+        try:
+            entries = unpack_statuses(sample.payload)
+        except ValueError as error:
+            self._report("an acknowledgement", sample, error)
+            return
+        with self._lock:
+            self._goals.on_acknowledged(entry.id for entry in entries)
+
+    def _on_query(self, query: Query) -> None:
+        """Answer what became of a goal; without an id, the status list."""
+        try:
+            goal_id = unpack_goal_id(query.payload)[0]
+        except ValueError as error:
+            query.reply_error(f"action '{self._name}': {error}; expected an actionlib_msgs/GoalID")
+            query.finish()
+            return
+        with self._lock:
+            result, entry = self._goals.result(goal_id), self._goals.status(goal_id)
+            listed = self._goals.list()
+        if not goal_id:
+            statuses = pack_statuses(self._clock.time_ns(), listed)
+            query.reply(statuses, STATUS_ARRAY.encoding)
+        elif result is not None:
+            query.reply(result, self._types["result"].encoding)
+        else:
+            query.reply(pack_status(entry), encoding_of(GoalStatus))
+        query.finish()
+
+    def _report(self, what: str, sample: Sample, error: ValueError) -> None:
+        about = f"action '{self._name}': {what} of session {sample.source}"
+        self._sides.ros.report(about, ActionlibError(f"{about} cannot be read: {error}"))
+
+
+class ServerHere:
+    """An action whose server is on our network, for clients in ROS 1.
+
+    Args:
+        sides: The two networks.
+        name: The action's name in ROS 1.
+        server: What its token says.
+        definitions: Texts of types.
+    """
+
+    def __init__(self, sides: Sides, name: str, server: Endpoint, definitions: Definitions) -> None:
+        self.server = server
+        self._sides = sides
+        self._clock = sides.node.clock
+        self._name = name
+        self._keys = action_keys(sides.key(name))
+        self._lock = threading.Lock()
+        self._goals = GoalsOfClients()
+        self._clients: dict[str, Closable] = {}  # token's key -> token
+        self._publishers: dict[tuple[str, Quality], PublisherPort] = {}
+        self._goal_encoding = ""
+        self._timer: Timer | None = None
+        self._acks: list[str] = []
+        self._closed = False
+        self._publications: dict[str, Publication] = {}
+        parts = _types_of(server)
+        for word in ("status", "feedback", "result"):
+            typed = parts[word]
+            self._publications[word] = sides.ros.advertise(
+                f"{name}/{word}",
+                *typed,
+                definitions.text(typed) if all(typed) else "",
+                latching=word == "status",
+                accept=lambda _header: lambda: None,
+            )
+        # Clients in ROS 1 wait for a status list, and an idle server here sends none.
+        self._say_nothing_runs()
+        transport, keys = sides.node.transport, self._keys
+        self._subscribed: list[Closable] = [
+            transport.subscribe(keys.status, self._on_status, history=False),
+            transport.subscribe(keys.feedback, self._on_feedback, history=False),
+            transport.subscribe(keys.result, self._on_result, history=False),
+        ]
+        self._subscriptions = [
+            sides.ros.subscribe(f"{name}/{word}", partial(_Client, self, word))
+            for word in ("goal", "cancel")
+        ]
+
+    def close(self) -> None:
+        """Bridge no more: clients in ROS 1 hear that no goal is left; does not wait."""
+        with self._lock:
+            self._closed = True
+            if self._timer is not None:
+                self._timer.cancel()
+            publishers = list(self._publishers.values())
+        self._say_nothing_runs()
+        for part in (*self._subscribed, *publishers):
+            part.close()
+        for subscription in self._subscriptions:
+            subscription.close()
+        for publication in self._publications.values():
+            publication.close()
+
+    def _say_nothing_runs(self) -> None:
+        empty = pack_statuses(self._clock.time_ns(), ())
+        self._publications["status"].put(empty, keep="")
+
+    # -- from clients in ROS 1 -----------------------------------------------------------------
+
+    def join(self, ros_node: str) -> tuple[str, Closable]:
+        """Show a client in ROS 1 here; returns its token's key, and the token."""
+        node = self._sides.node
+        typed = self.server.type, self.server.md5
+        end = node.endpoint(Kind.ACTION_CLIENT, self.server.name, *typed)
+        key = token_key(end._replace(node=self._sides.key(ros_node)))
+        token = node.transport.declare_alive(key)
+        with self._lock:
+            self._clients[key] = token
+        return key, token
+
+    def leave(self, key: str) -> None:
+        """Show a client no more."""
+        with self._lock:
+            token = self._clients.pop(key, None)
+        if token is not None:
+            token.close()
+
+    def on_goal(self, typed: Typed, payload: bytes) -> None:
+        """Pass on a goal; blocks while our network has no room."""
+        goal_id, _, _ = unpack_goal(payload)
+        with self._lock:
+            self._goal_encoding = typed.encoding
+            self._goals.on_goal(goal_id, payload, self._clock.now())
+            self._arm()
+        self._publisher(self._keys.goal, typed.encoding, GOAL).put(payload)
+
+    def on_cancel(self, typed: Typed, payload: bytes) -> None:
+        """Pass on a cancel; blocks as `on_goal`."""
+        self._publisher(self._keys.cancel, typed.encoding, GOAL).put(payload)
+
+    def report(self, about: str, error: ValueError) -> None:
+        """Report what cannot be read."""
+        self._sides.ros.report(about, Ros1Error(about, str(error)))
+
+    def _publisher(self, key: str, encoding: str, quality: Quality) -> PublisherPort:
+        with self._lock:
+            which = f"{key} {encoding}", quality
+            made = self._publishers.get(which)
+            if made is None:
+                made = self._sides.node.transport.publisher(key, encoding, quality)
+                self._publishers[which] = made
+        return made
+
+    # -- from the server -----------------------------------------------------------------------
+
+    def _is_of_server(self, sample: Sample) -> bool:
+        return sample.source in {"", self.server.session}
+
+    def _on_status(self, sample: Sample) -> None:
+        if not self._is_of_server(sample) or not self._sides.fits(sample, STATUS_ARRAY):
+            return
+        try:
+            entries, frame = unpack_statuses(sample.payload), unpack_frame(sample.payload)
+        except ValueError as error:
+            self.report(f"{self._name}/status", error)
+            return
+        with self._lock:
+            for entry in entries:
+                self._goals.on_status(entry, self._clock.now())
+            self._arm()
+            clients = list(self._clients) if parse_token(frame) is not None else []
+        self._publications["status"].put(sample.payload, keep="")
+        for client in clients:  # a farewell, which each client answers
+            self._acknowledge([], client)
+
+    def _on_feedback(self, sample: Sample) -> None:
+        if self._is_of_server(sample):
+            self._publications["feedback"].put(sample.payload)
+
+    def _on_result(self, sample: Sample) -> None:
+        if self._is_of_server(sample):
+            self._take_result(sample.payload)
+
+    def _take_result(self, payload: bytes) -> None:
+        try:
+            entry, _ = unpack_report(payload)
+        except ValueError as error:
+            self.report(f"{self._name}/result", error)
+            return
+        with self._lock:
+            first = self._goals.on_result(entry.id)
+            if self._goals.is_ours(entry.id):
+                self._acks.append(entry.id)
+                if len(self._acks) == 1:
+                    self._clock.call_later(ACKNOWLEDGE_S, self._send_acks)
+        if first:
+            self._publications["result"].put(payload)
+
+    # -- what is sent again --------------------------------------------------------------------
+
+    def _send_acks(self) -> None:
+        with self._lock:
+            acks, self._acks = self._acks, []
+            closed = self._closed
+        if not closed:
+            self._acknowledge(acks, "")
+
+    def _acknowledge(self, goal_ids: list[str], frame: str) -> None:
+        entries = [StatusEntry(goal_id, 0, 0, "") for goal_id in goal_ids]
+        message = pack_statuses(self._clock.time_ns(), entries, frame)
+        self._publisher(self._keys.ack, STATUS_ARRAY.encoding, ACK).put(message)
+
+    def _arm(self) -> None:
+        """Have `_send_due` called when something is due; with the lock held."""
+        due = self._goals.next_due()
+        if due is None or self._timer is not None or self._closed:
+            return
+        self._timer = self._clock.call_later(max(0.0, due - self._clock.now()), self._send_due)
+
+    def _send_due(self) -> None:
+        with self._lock:
+            self._timer = None
+            if self._closed:
+                return
+            due = self._goals.take_due(self._clock.now())
+            encoding = self._goal_encoding
+            self._arm()
+        for message in due.again:
+            self._publisher(self._keys.goal, encoding, AGAIN).put(message)
+        for goal_id in due.ask:
+            self._sides.node.transport.query(
+                self._keys.result,
+                pack_goal_id(goal_id, 0),
+                encoding=GOAL_ID.encoding,
+                timeout=ASK_TIMEOUT_S,
+                on_reply=self._on_reply,
+                on_done=lambda: None,
+            )
+
+    def _on_reply(self, reply: Reply) -> None:
+        if not reply.error and reply.encoding != encoding_of(GoalStatus):
+            self._take_result(reply.payload)
+
+
+class _Client:
+    """A publisher of goals or cancels in ROS 1."""
+
+    def __init__(self, server: ServerHere, word: str, header: Header) -> None:
+        self._typed = type_of(header, word)
+        self._server = server
+        self._word = word
+        self._about = f"{word} of {header.get('callerid', '')}"
+        self._token = server.join(header.get("callerid", ""))[0] if word == "goal" else ""
+
+    def take(self, payload: bytes) -> None:
+        """Pass on a goal or cancel."""
+        try:
+            if self._word == "goal":
+                self._server.on_goal(self._typed, payload)
+            else:
+                self._server.on_cancel(self._typed, payload)
+        except ValueError as error:
+            self._server.report(self._about, error)
+
+    def gone(self) -> None:
+        """Show the client no more."""
+        if self._token:
+            self._server.leave(self._token)
+
+
+def _types_of(server: Endpoint) -> dict[str, Typed]:
+    """Return the types of the topics of an action of ours; checksums "" where it is not known."""
+    from actionlib_core.exceptions import InterfaceError
+    from actionlib_core.interfaces import get_message
+
+    types = {"status": STATUS_ARRAY}
+    for word in ("feedback", "result"):
+        name = f"{server.type}{word.title()}"
+        try:
+            known = get_message(server.type)._md5sum == server.md5
+            types[word] = Typed(name, get_message(name)._md5sum if known else "")
+        except InterfaceError:
+            types[word] = Typed(name, "")
+    return types

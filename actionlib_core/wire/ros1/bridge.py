@@ -1,0 +1,287 @@
+"""The bridge: looks at both networks, decides which names are bridged, and keeps them so."""
+
+from __future__ import annotations
+
+import logging
+import os
+import threading
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from actionlib_core.exceptions import ActionlibError, Ros1Error
+from actionlib_core.shutdown import current_shutdown
+from actionlib_core.wire.presence import parse_token, token_pattern
+from actionlib_core.wire.ros1.actions import ActionBridge
+from actionlib_core.wire.ros1.answers import SystemState
+from actionlib_core.wire.ros1.definitions import Definitions
+from actionlib_core.wire.ros1.node import Ros1Node
+from actionlib_core.wire.ros1.plan import Plan, Wanted, make_plan, without
+from actionlib_core.wire.ros1.services import ServiceBridge
+from actionlib_core.wire.ros1.sides import BRIDGE, Sides
+from actionlib_core.wire.ros1.topics import TopicBridge
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+    from typing import Self
+
+    from actionlib_core.node import Node
+    from actionlib_core.transport import Presence
+    from actionlib_core.wire.presence import Endpoint
+
+B = TypeVar("B", ActionBridge, TopicBridge, ServiceBridge)
+
+log = logging.getLogger("actionlib_core")
+
+LOOK_S = 1.0  # a ROS 1 master tells nobody of new services, subscribers, or that it was restarted
+BRIDGES = "@smachpy_ros1"
+CLOSE_S = 5.0
+
+
+class Ros1Bridge:
+    """Carries actions, topics and services between a ROS 1 robot and our network.
+
+    Args:
+        node: On our network, the bridge's alone: what its session sends is not bridged. It is
+            closed with the bridge.
+        master: Address of the robot's master, "http://robot:11311".
+        wanted: What is bridged.
+        namespace: What the robot's names live under here, "robot_1"; "" is nothing.
+        host: Name or address under which the robot finds this computer; see `Ros1Node`.
+        status_timeout: An action server in ROS 1 that says nothing for so long is gone [s].
+        service_timeout: Longest time of a service call through the bridge [s].
+
+    Attributes:
+        name: The bridge's node in ROS 1.
+        plan: What is bridged now.
+
+    Raises:
+        Ros1Error: the master's address cannot be used.
+        TransportError: the node is closed.
+
+    Threads: its own. Every method may be called from any thread.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        master: str,
+        wanted: Wanted,
+        *,
+        namespace: str = "",
+        host: str = "",
+        status_timeout: float = 5.0,
+        service_timeout: float = 600.0,
+    ) -> None:
+        self.name = f"{BRIDGE}{os.getpid()}_{node.transport.session_id[:12]}"
+        self.plan = Plan({}, {}, {})
+        self._wanted = wanted
+        self._node = node
+        self._clock = node.clock
+        self._status_timeout = status_timeout
+        self._service_timeout = service_timeout
+        self._ros = Ros1Node(self.name, master, clock=node.clock, host=host)
+        self._ros.on_ended = self._wake
+        self._sides = Sides(node, self._ros, namespace)
+        self._definitions = Definitions(node)
+        self._actions: dict[str, ActionBridge] = {}
+        self._topics: dict[str, TopicBridge] = {}
+        self._services: dict[str, ServiceBridge] = {}
+        self._lock = threading.Lock()
+        self._ends: dict[str, Endpoint] = {}
+        self._bridges: set[str] = set()  # sessions of bridges, ours among them
+        self._changed = node.clock.event("a change on the bridge's networks")
+        self._looked = node.clock.event("the bridge's first look at the master")
+        self._over = node.clock.event("the end of the bridge")
+        self._is_there = True
+        self._closing = False
+        self._forget = current_shutdown().at_exit(self.close)
+        transport = node.transport
+        self._parts = [
+            transport.declare_alive(f"{BRIDGES}/{transport.session_id}"),
+            transport.watch_alive(f"{BRIDGES}/*", self._on_bridge),
+            transport.watch_alive(token_pattern(), self._on_end),
+        ]
+        self._task = node.clock.spawn(self._run, name="ros1-bridge")
+
+    @property
+    def master(self) -> str:
+        """Address of the robot's master."""
+        return self._ros.master
+
+    @property
+    def ended(self) -> str:
+        """Why the bridge has ended by itself; "" while it has not."""
+        return self._ros.ended
+
+    def wait_for_master(self, timeout: float) -> bool:
+        """Wait until the master has answered once; return whether it has.
+
+        Blocks: `timeout` [s] at most.
+        """
+        return self._looked.wait(timeout)
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait until the bridge has ended, by itself or closed; return whether it has.
+
+        Blocks: `timeout` [s] at most; None: until then.
+        """
+        return self._over.wait(timeout)
+
+    def get_param(self, name: str) -> Any:
+        """Return a parameter of the robot's parameter server, or a tree of them as a dict.
+
+        Raises:
+            KeyError: there is none of that name.
+            Ros1Error: the master does not answer.
+
+        Blocks: some seconds at most.
+        """
+        full = name if name.startswith("/") else f"/{name}"
+        if not self._ros.ask("hasParam", full):
+            raise KeyError(name)
+        return self._ros.ask("getParam", full)
+
+    def param_names(self) -> list[str]:
+        """Return the names of all parameters; raises and blocks as `get_param`."""
+        return sorted(map(str, self._ros.ask("getParamNames")))
+
+    def close(self) -> None:
+        """Bridge no more; everything is unregistered in ROS 1. A second call does nothing.
+
+        Blocks: under a second with a master that answers, `CLOSE_S` at most.
+        """
+        with self._lock:
+            if self._closing:
+                return
+            self._closing = True
+        self._forget()
+        self._changed.set()
+        self._task.join(CLOSE_S)
+        for part in self._parts:
+            part.close()
+        every: list[ActionBridge | TopicBridge | ServiceBridge] = [
+            *self._actions.values(),
+            *self._topics.values(),
+            *self._services.values(),
+        ]
+        for bridge in every:
+            bridge.close()
+        self._ros.close()
+        self._definitions.close()
+        self._node.close()
+        self._over.set()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    # -- who is there here ---------------------------------------------------------------------
+
+    def _wake(self) -> None:
+        self._changed.set()
+
+    def _on_end(self, presence: Presence) -> None:
+        end = parse_token(presence.key)
+        if end is None:
+            return
+        with self._lock:
+            if presence.alive:
+                self._ends[presence.key] = end
+            else:
+                self._ends.pop(presence.key, None)
+        if end.session != self._node.transport.session_id:
+            self._changed.set()
+
+    def _on_bridge(self, presence: Presence) -> None:
+        session = presence.key.rpartition("/")[2]
+        with self._lock:
+            (self._bridges.add if presence.alive else self._bridges.discard)(session)
+        self._changed.set()
+
+    def _ends_by_name(self) -> tuple[dict[str, list[Endpoint]], set[str]]:
+        """Return the ends here by name in ROS 1, and the names that another bridge shows."""
+        own = self._node.transport.session_id
+        with self._lock:
+            ends, bridges = list(self._ends.values()), set(self._bridges)
+        found: dict[str, list[Endpoint]] = {}
+        elsewhere = set()
+        for end in sorted(ends):
+            name = self._sides.ros_name(end.name)
+            if name is None or end.session == own:
+                continue
+            if end.session not in bridges:
+                found.setdefault(name, []).append(end)
+            elif end.session < own:  # of two bridges one has to give way, and both say the same
+                elsewhere.add(name)
+        return found, elsewhere
+
+    # -- the loop ------------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        state, types = SystemState(), {}
+        while not self._closing and not self.ended:
+            self._changed.clear()
+            try:
+                state = self._ros.state()
+                types = self._ros.types()
+                self._look(state, types)
+                self._ros.register(state)
+                self._note_master(None)
+            except Ros1Error as error:
+                self._note_master(error)
+                self._look(state, types)
+            except ActionlibError as error:  # our own network has been left
+                self._ros.report("bridge", error)
+            self._changed.wait(LOOK_S)
+        if self.ended:
+            log.error("ROS 1 bridge %s: %s", self.name, self.ended)
+            self._over.set()
+
+    def _note_master(self, error: Ros1Error | None) -> None:
+        """Log once that the master does not answer, and that it does again."""
+        if error is not None:
+            self._ros.report("master", error)
+        else:
+            if not self._is_there:
+                log.warning("ROS 1 bridge %s: the master answers again", self.name)
+            self._ros.forget_report("master")
+            self._looked.set()
+        self._is_there = error is None
+
+    def _look(self, state: SystemState, types: Mapping[str, str]) -> None:
+        """Bridge what is to be bridged now."""
+        state = without(state, BRIDGE)
+        ends, elsewhere = self._ends_by_name()
+        plan = make_plan(self._wanted, ends, state, types)
+        for name in elsewhere & {*plan.actions, *plan.topics, *plan.services}:
+            error = Ros1Error(name, "it is bridged by another bridge already; expected one.")
+            self._ros.report(f"bridge of {name}", error)
+        sides, definitions = self._sides, self._definitions
+        actions = {n: t for n, t in plan.actions.items() if n not in elsewhere}
+        topics = {n: t for n, t in plan.topics.items() if n not in elsewhere}
+        services = {n: t for n, t in plan.services.items() if n not in elsewhere}
+
+        def make_action(name: str) -> ActionBridge:
+            timeout = self._status_timeout
+            return ActionBridge(sides, name, actions[name], definitions, timeout)
+
+        _keep(self._actions, actions, make_action)
+        _keep(self._topics, topics, lambda name: TopicBridge(sides, name, definitions))
+        _keep(self._services, services, lambda n: ServiceBridge(sides, n, self._service_timeout))
+        for name, action in self._actions.items():
+            action.look(ends.get(name, []), state)
+        for name, topic in self._topics.items():
+            topic.look(ends.get(name, []), listen=topics[name])
+        for name, service in self._services.items():
+            service.look(ends.get(name, []), served=services[name])
+        self.plan = Plan(actions, topics, services)
+
+
+def _keep(there: dict[str, B], wanted: Iterable[str], make: Callable[[str], B]) -> None:
+    """Close what is wanted no more, and make what is new."""
+    names = set(wanted)
+    for name in there.keys() - names:
+        there.pop(name).close()
+    for name in names - there.keys():
+        there[name] = make(name)

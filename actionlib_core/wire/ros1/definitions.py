@@ -1,0 +1,66 @@
+"""The texts of the types that a bridge meets."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING
+
+from actionlib_core.exceptions import InterfaceError
+from actionlib_core.wire.definitions import ask_definition, definition_key
+
+if TYPE_CHECKING:
+    from actionlib_core.node import Node
+    from actionlib_core.transport import Closable, Query
+    from actionlib_core.wire.ros1.sides import Typed
+
+
+class Definitions:
+    """Knows the text of a type from this program's own, from ROS 1, or from whoever has it here.
+
+    What was learned from ROS 1 is told to those who ask on our network.
+
+    Threads: any.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._lock = threading.Lock()
+        self._texts: dict[Typed, str] = {}
+        self._offers: list[Closable] = []
+        self._closed = False
+
+    def learn(self, typed: Typed, text: str) -> None:
+        """Take the text that a publisher in ROS 1 tells of its type; "" is none."""
+        with self._lock:
+            if not text or typed in self._texts or self._closed:
+                return
+            self._texts[typed] = text
+        raw = text.encode()
+
+        def answer(query: Query) -> None:
+            query.reply(raw)
+            query.finish()
+
+        offer = self._node.transport.queryable(definition_key(*typed), answer)
+        with self._lock:
+            self._offers.append(offer)
+
+    def text(self, typed: Typed) -> str:
+        """Return the text of a type, "" when nobody knows it; blocks 1 s at most."""
+        from actionlib_core.interfaces import get_message
+
+        if typed in self._texts:
+            return self._texts[typed]
+        try:
+            known = get_message(typed.type)
+        except InterfaceError:
+            return ask_definition(self._node, *typed) or ""
+        return str(known._full_text) if known._md5sum == typed.md5 else ""
+
+    def close(self) -> None:
+        """Tell no more."""
+        with self._lock:
+            self._closed = True
+            offers = list(self._offers)
+        for offer in offers:
+            offer.close()

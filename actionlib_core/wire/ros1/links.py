@@ -1,0 +1,352 @@
+"""TCP connections of a ROS 1 node: one object each, with a bounded buffer for what is sent.
+
+A connection that is received on has a thread that waits in `read_frame`, until the other side
+closes it: that is how a process that was killed is noticed. Connections that are only sent on wait
+likewise for their end.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import logging
+import select
+import socket
+import termios
+import threading
+from collections import deque
+from typing import TYPE_CHECKING
+
+from actionlib_core.exceptions import Ros1Error
+from actionlib_core.wire.ros1.frames import (
+    LARGEST_HEADER,
+    LARGEST_MESSAGE,
+    LENGTH,
+    Header,
+    pack_frame,
+    pack_header,
+    read_length,
+    unpack_header,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from typing import Self
+
+    from actionlib_core.clock import Clock, Task
+
+log = logging.getLogger("actionlib_core")
+
+CONNECT_S = 3.0  # longest wait for a connection
+HEADER_S = 5.0  # longest wait for the other side's connection header
+BUFFER = 16 << 20  # bytes that wait for a subscriber; beyond, the oldest messages are dropped
+FULL_S = 0.1
+READ_SIZE = 1 << 16
+LARGEST_READ = 1 << 20
+# A peer whose computer has gone is noticed after 11 s: 5 s of silence, then three questions.
+_KEEPALIVE = ((socket.TCP_KEEPIDLE, 5), (socket.TCP_KEEPINTVL, 2), (socket.TCP_KEEPCNT, 3))
+_GONE_MS = 11_000
+
+
+class Connection:
+    """One TCP connection to another node.
+
+    Args:
+        sock: The connected socket, which is this object's from now on.
+        peer: The other side, for error texts.
+        clock: Starts the thread that sends what did not fit at once.
+
+    Attributes:
+        peer: See above; the node's name once it is known.
+        dropped: Messages that were dropped because the other side reads too slowly.
+
+    Threads: `put` and `close` may be called from any thread and never wait; one thread reads, and
+        calls `release` at the end.
+    """
+
+    def __init__(self, sock: socket.socket, peer: str, clock: Clock) -> None:
+        self.peer = peer
+        self.dropped = 0
+        self._sock = sock
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._waiting: deque[bytes] = deque()
+        self._size = 0
+        self._sender: Task | None = None
+        self._closed = False
+        sock.settimeout(HEADER_S)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        for option, value in _KEEPALIVE:
+            sock.setsockopt(socket.IPPROTO_TCP, option, value)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _GONE_MS)
+        self._poll = select.poll()
+        self._poll.register(sock, select.POLLIN)
+        self._limit: float | None = HEADER_S
+        self._buffer = bytearray()
+        self._received = 0  # bytes in all
+        self._taken = 0  # of them, those that the thread that reads has dealt with
+        self._waits = clock.event(f"the end of what {peer} has sent")
+
+    @classmethod
+    def open(cls, host: str, port: int, peer: str, clock: Clock) -> Self:
+        """Connect.
+
+        Raises:
+            Ros1Error: nobody answers there, or the host's name is not known here.
+
+        Blocks: `CONNECT_S` at most, and as long as the system looks for the host's name.
+        """
+        try:
+            return cls(socket.create_connection((host, port), CONNECT_S), peer, clock)
+        except socket.gaierror as error:
+            raise Ros1Error(
+                peer,
+                f"host: got {host!r}, which is not known here ({error.strerror}); expected a name "
+                "or address that is. Try a line for it in /etc/hosts, or ROS_IP on the robot.",
+            ) from error
+        except OSError as error:
+            raise Ros1Error(
+                peer, f"cannot connect to {host}:{port}: {error.strerror or error}."
+            ) from error
+
+    # -- reading -------------------------------------------------------------------------------
+
+    def read_header(self) -> Header:
+        """Return the other side's connection header.
+
+        Raises:
+            Ros1Error: it did not come, is malformed, or is an error.
+
+        Blocks: `HEADER_S` at most between two parts of it.
+        """
+        raw = self.read_frame(LARGEST_HEADER)
+        if raw is None:
+            raise Ros1Error(self.peer, "connection header: got none; expected one.")
+        try:
+            header = unpack_header(raw)
+        except ValueError as error:
+            raise Ros1Error(self.peer, f"connection header: {error}.") from error
+        if "error" in header:
+            raise Ros1Error(self.peer, f"refuses the connection: {header['error']:.500}")
+        self.limit(None)
+        return header
+
+    def limit(self, seconds: float | None) -> None:
+        """Give up reading and sending after so long [s]; None: wait for the other side's end."""
+        self._limit = seconds
+        self._sock.settimeout(seconds)
+
+    def read_frame(self, limit: int = LARGEST_MESSAGE) -> bytes | None:
+        """Return the next message; None when the connection has ended.
+
+        Raises:
+            Ros1Error: the other side announces more than `limit` bytes, or is too slow.
+
+        Blocks: until there is one, or the other side closes; see `limit`.
+        """
+        raw = self.read(LENGTH.size)
+        if raw is None:
+            return None
+        try:
+            length = read_length(raw, limit)
+        except ValueError as error:
+            raise Ros1Error(self.peer, f"message {error}.") from error
+        return self.read(length)
+
+    def read(self, size: int) -> bytes | None:
+        """Return `size` bytes; None when the connection has ended; raises and blocks as above."""
+        while len(self._buffer) < size:
+            missing = size - len(self._buffer)
+            part = self._receive(min(max(missing, READ_SIZE), LARGEST_READ))
+            if not part:
+                return None
+            self._buffer += part
+        raw = bytes(self._buffer[:size])
+        del self._buffer[:size]
+        return raw
+
+    def _receive(self, most: int) -> bytes:
+        """Return what has come, some bytes at least; b"" at the end."""
+        self._taken = self._received - len(self._buffer)
+        self._waits.set()
+        try:
+            if not self._poll.poll(None if self._limit is None else self._limit * 1000):
+                raise Ros1Error(self.peer, f"silent for {self._limit:g} s; expected an answer.")
+            with self._lock:  # `wait_idle` counts what was received and what was not
+                part = self._sock.recv(most, socket.MSG_DONTWAIT)
+                self._received += len(part)
+        except BlockingIOError:  # the system thought better of it
+            return self._receive(most)
+        except OSError:  # reset by the other side
+            return b""
+        return part
+
+    def wait_idle(self, timeout: float) -> None:
+        """Wait until the thread that reads has dealt with what has come so far.
+
+        Blocks: `timeout` [s] at most.
+        """
+        deadline = self._clock.now() + timeout
+        try:
+            with self._lock:
+                there = fcntl.ioctl(self._sock, termios.FIONREAD, bytes(LENGTH.size))
+                come = self._received + int(LENGTH.unpack(there)[0])
+        except (OSError, ValueError):  # it has ended
+            return
+        while self._taken < come and (left := deadline - self._clock.now()) > 0:
+            self._waits.wait(left)
+            self._waits.clear()
+
+    # -- sending -------------------------------------------------------------------------------
+
+    def send_header(self, fields: Mapping[str, str]) -> None:
+        """Send a connection header; raises and blocks as `send`."""
+        self.send(pack_header(fields))
+
+    def send(self, data: bytes) -> None:
+        """Send bytes at once.
+
+        Raises:
+            Ros1Error: the connection has ended, or the other side does not read.
+
+        Blocks: while the other side has no room; see `limit`.
+        """
+        try:
+            self._sock.sendall(data)
+        except OSError as error:
+            raise Ros1Error(self.peer, f"cannot send: {error.strerror or error}.") from error
+
+    def put(self, payload: bytes) -> None:
+        """Send a message now, or when the other side has room; never waits.
+
+        Of what waits, the oldest are dropped beyond `BUFFER` bytes.
+        """
+        data = pack_frame(payload)
+        with self._lock:
+            if self._closed:
+                return
+            if self._sender is None:
+                try:
+                    sent = self._sock.send(data, socket.MSG_DONTWAIT)
+                except BlockingIOError:
+                    sent = 0
+                except OSError:  # its end is noticed by who reads
+                    return
+                if sent == len(data):
+                    return
+                rest = data[sent:]
+                self._sender = self._clock.spawn(lambda: self._send(rest), name="ros1-send")
+                return
+            self._waiting.append(data)
+            self._size += len(data)
+            while self._size > BUFFER and len(self._waiting) > 1:
+                self._size -= len(self._waiting.popleft())
+                self.dropped += 1
+                if self.dropped == 1:
+                    log.warning("%s: reads too slowly: messages for it are dropped", self.peer)
+
+    def _send(self, data: bytes) -> None:
+        """Send what did not fit at once, and what has come since."""
+        while True:
+            try:
+                self._sock.sendall(data)
+            except OSError:  # its end is noticed by who reads
+                return
+            with self._lock:
+                if not self._waiting:
+                    self._sender = None
+                    return
+                data = self._waiting.popleft()
+                self._size -= len(data)
+
+    # -- the end -------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """End the connection: who waits in a call is woken."""
+        with self._lock:
+            self._closed = True
+        with contextlib.suppress(OSError):
+            self._sock.shutdown(socket.SHUT_RDWR)
+
+    def release(self) -> None:
+        """End the connection and give its socket back; for the thread that reads."""
+        self.close()
+        sender = self._sender
+        if sender is not None:
+            sender.join(HEADER_S)
+        self._sock.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+
+class Listener:
+    """Takes connections at a free port, each in a thread of its own.
+
+    Args:
+        host: Address to listen at; "" is all of this computer's.
+        clock: Starts the threads.
+        name: Of the threads.
+        handle: Gets each socket and the address at the other side; the socket is closed after it.
+
+    Attributes:
+        port: Where it listens.
+    """
+
+    def __init__(
+        self, host: str, clock: Clock, name: str, handle: Callable[[socket.socket, str], object]
+    ) -> None:
+        self._clock = clock
+        self._name = name
+        self._handle = handle
+        self._lock = threading.Lock()
+        self._open: set[socket.socket] = set()
+        self._closed = False
+        self._sock = socket.create_server((host, 0), backlog=100)
+        self.port: int = self._sock.getsockname()[1]
+        self._task = clock.spawn(self._accept, name=name)
+
+    def _accept(self) -> None:
+        while not self._is_closed():
+            try:
+                sock, address = self._sock.accept()
+            except OSError:
+                if not self._is_closed():  # no file descriptor is left; others may give some back
+                    self._clock.sleep(FULL_S)
+                continue
+            with self._lock:
+                self._open.add(sock)
+            if self._is_closed():
+                sock.shutdown(socket.SHUT_RDWR)
+            self._clock.spawn(lambda s=sock, a=address: self._run(s, a), name=self._name)  # type: ignore[misc]  # mypy: lambda defaults
+
+    def _run(self, sock: socket.socket, address: tuple[str, int]) -> None:
+        try:
+            self._handle(sock, f"{address[0]}:{address[1]}")
+        except OSError as error:
+            log.debug("%s: %s", address, error)
+        finally:
+            with self._lock:
+                self._open.discard(sock)
+            sock.close()
+
+    def _is_closed(self) -> bool:
+        return self._closed
+
+    def close(self, timeout: float) -> None:
+        """Take no more connections and end those there are.
+
+        Blocks: until the thread that takes them has ended, `timeout` [s] at most.
+        """
+        self._closed = True
+        with self._lock:
+            there = list(self._open)
+        for sock in (self._sock, *there):
+            with contextlib.suppress(OSError):
+                sock.shutdown(socket.SHUT_RDWR)
+        self._task.join(timeout)
+        self._sock.close()

@@ -1,0 +1,673 @@
+"""A ROS 1 node of the standard library's parts: topics and services, as bytes, both ways.
+
+What is wanted of it (`advertise`, `subscribe`, `provide`) is noted at once; `register` makes the
+master know what it does not know yet, which after a restart of the master is everything.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import ipaddress
+import logging
+import os
+import re
+import socket
+import threading
+from typing import TYPE_CHECKING, Any, Protocol
+
+from actionlib_core.exceptions import ActionlibError, Ros1Error
+from actionlib_core.wire.ros1.answers import (
+    Names,
+    SystemState,
+    read_tcpros,
+    read_texts,
+    read_types,
+    registered,
+    split_address,
+)
+from actionlib_core.wire.ros1.frames import Header, pack_service_answer
+from actionlib_core.wire.ros1.links import Connection, Listener
+from actionlib_core.wire.ros1.publishers import Publishers
+from actionlib_core.wire.ros1.rpc import RpcServer, call
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from actionlib_core.clock import Clock, Task
+    from actionlib_core.wire.ros1.publishers import Change
+
+log = logging.getLogger("actionlib_core")
+
+RETRY_FIRST_S = 0.2  # a publisher that cannot be reached is tried again, twice as late each time
+RETRY_LONGEST_S = 10.0
+UNREGISTER_S = 1.0  # longest silence of a master when a node leaves it
+CLOSE_S = 1.0
+ANY = "*"
+PORT = 11311  # a master's by custom
+
+
+class Receiver(Protocol):
+    """What hears one publisher."""
+
+    def take(self, payload: bytes) -> None:
+        """Take a message."""
+
+    def gone(self) -> None:
+        """Take notice that the connection has ended."""
+
+
+class Subscription:
+    """A topic that the node listens to.
+
+    Args:
+        node: Listens.
+        topic: Its name, with a slash in front.
+        accept: Gets the connection header of each publisher and returns what hears it; may refuse
+            with a `Ros1Error`. It runs in the connection's thread.
+    """
+
+    def __init__(self, node: Ros1Node, topic: str, accept: Callable[[Header], Receiver]) -> None:
+        self.topic = topic
+        self.accept = accept
+        self.publishers = Publishers(node.uri)
+        self.nodes: frozenset[str] = frozenset()  # those that the master had when it was asked last
+        self._node = node
+        self._lock = threading.Lock()
+        self._links: dict[str, _Link] = {}
+        self._closed = False
+
+    def apply(self, change: Change) -> None:
+        """Connect to new publishers; stop trying those that have left."""
+        with self._lock:
+            for uri in change.give_up & self._links.keys():
+                self._links[uri].wake.set()
+            if self._closed:
+                return
+            for uri in change.connect:
+                if uri in self._links:
+                    self._links[uri].wake.set()
+                else:
+                    self._links[uri] = link = _Link(self._node, self, uri)
+                    link.start()
+
+    def update(self, uris: Iterable[str]) -> None:
+        """Take the list of publishers that the master sends."""
+        with self._lock:
+            change = self.publishers.update(uris)
+        self.apply(change)
+
+    def leave(self, link: _Link) -> bool:
+        """Forget a link if its publisher has left; return whether that is so."""
+        with self._lock:
+            if link.uri in self.publishers.there and not self._closed:
+                return False
+            self._links.pop(link.uri, None)
+            return True
+
+    def wait_idle(self, timeout: float) -> None:
+        """Wait until all that has come so far has been taken; blocks `timeout` [s] at most each."""
+        with self._lock:
+            connections = [link.connection for link in self._links.values()]
+        for connection in connections:
+            if connection is not None:
+                connection.wait_idle(timeout)
+
+    @property
+    def closed(self) -> bool:
+        """Whether the node listens no more."""
+        return self._closed
+
+    def close(self) -> None:
+        """Listen no more; does not wait."""
+        with self._lock:
+            self._closed = True
+            links = list(self._links.values())
+        for link in links:
+            link.close()
+        self._node.forget(self)
+
+
+class _Link:
+    """What a subscription has for one publisher: a thread that connects, reads, and tries again."""
+
+    def __init__(self, node: Ros1Node, subscription: Subscription, uri: str) -> None:
+        self.uri = uri
+        self.wake = node.clock.event(f"publisher {uri} of {subscription.topic}")
+        self._node = node
+        self._subscription = subscription
+        self.connection: Connection | None = None
+
+    def start(self) -> None:
+        self._node.spawn(self._run, f"ros1{self._subscription.topic}")
+
+    def close(self) -> None:
+        self.wake.set()
+        if self.connection is not None:
+            self.connection.close()
+
+    def _run(self) -> None:
+        about = f"{self._subscription.topic} of {self.uri}"
+        pause = RETRY_FIRST_S
+        while not self._subscription.leave(self):
+            self.wake.clear()
+            try:
+                self._read(about)
+                pause = RETRY_FIRST_S
+            except ActionlibError as error:
+                self._node.report(about, error)
+            if self._subscription.leave(self):
+                break
+            self.wake.wait(pause)
+            pause = min(2 * pause, RETRY_LONGEST_S)
+        self._node.forget_report(about)
+
+    def _read(self, about: str) -> None:
+        """Connect, and read until the connection ends."""
+        node, subscription = self._node, self._subscription
+        topic = subscription.topic
+        where = read_tcpros(
+            self.uri, call(self.uri, "requestTopic", node.name, topic, [["TCPROS"]])
+        )
+        with Connection.open(*where, f"{topic} at {self.uri}", node.clock) as connection:
+            self.connection = connection
+            if subscription.closed:
+                return
+            fields = {"topic": topic, "type": ANY, "md5sum": ANY, "message_definition": ""}
+            connection.send_header({"callerid": node.name, **fields, "tcp_nodelay": "1"})
+            header = connection.read_header()
+            receiver = subscription.accept(header)
+            node.forget_report(about)
+            try:
+                while (payload := connection.read_frame()) is not None:
+                    receiver.take(payload)
+            finally:
+                self.connection = None
+                receiver.gone()
+
+
+class Publication:
+    """A topic that the node publishes on.
+
+    Args:
+        node: Publishes.
+        topic: Its name, with a slash in front.
+        type_name: "pkg/Type"; "" takes what each subscriber expects.
+        md5: Its checksum; "" with `type_name`.
+        definition: Its text, with that of all nested types.
+        latching: What subscribers are told.
+        accept: Gets the connection header of each subscriber and returns what is called when its
+            connection has ended; may refuse with a `Ros1Error`. It runs in the connection's thread.
+
+    Attributes:
+        kept: Sender -> its last message, which later subscribers get first. Guarded by `lock`.
+    """
+
+    def __init__(
+        self,
+        node: Ros1Node,
+        topic: str,
+        type_name: str,
+        md5: str,
+        definition: str,
+        *,
+        latching: bool,
+        accept: Callable[[Header], Callable[[], object]],
+    ) -> None:
+        self.topic = topic
+        self.type = type_name
+        self.md5 = md5
+        self.latching = latching
+        self.lock = threading.Lock()
+        self.kept: dict[str, bytes] = {}
+        self._definition = definition
+        self._accept = accept
+        self._node = node
+        self._connections: set[Connection] = set()
+        self._closed = False
+
+    def put(self, payload: bytes, *, keep: str | None = None) -> None:
+        """Send a message to all subscribers; never waits.
+
+        Args:
+            payload: The message.
+            keep: Sender whose last message it is from now on, for later subscribers.
+        """
+        with self.lock:
+            if keep is not None:
+                self.kept[keep] = payload
+            for connection in self._connections:
+                connection.put(payload)
+
+    def serve(self, connection: Connection, header: Header) -> None:
+        """Send to a subscriber until it leaves; in the connection's thread."""
+        theirs = header.get("type", ANY), header.get("md5sum", ANY)
+        ours = self.type or theirs[0], self.md5 or theirs[1]
+        if any(their not in {ANY, our} for their, our in zip(theirs, ours, strict=True)):
+            text = f"got {theirs[0]} ({theirs[1]}); expected {ours[0]} ({ours[1]})."
+            connection.send_header({"error": f"{self.topic}: type: {text}"})
+            raise Ros1Error(f"{self.topic}: subscriber {connection.peer}", f"type: {text}")
+        if ANY in ours:
+            connection.send_header({"error": f"{self.topic}: its type is not known yet"})
+            return
+        fields = {"callerid": self._node.name, "topic": self.topic, "type": ours[0]}
+        fields |= {"md5sum": ours[1], "message_definition": self._definition}
+        connection.send_header({**fields, "latching": str(int(self.latching))})
+        try:
+            with self.lock:
+                if self._closed:
+                    return
+                for payload in self.kept.values():
+                    connection.put(payload)
+                self._connections.add(connection)
+            gone = self._accept(header)  # not earlier: who hears of it may send at once
+            try:
+                while connection.read_frame() is not None:
+                    pass  # subscribers say nothing; this waits for their end
+            finally:
+                gone()
+        finally:
+            with self.lock:
+                self._connections.discard(connection)
+
+    def close(self) -> None:
+        """Publish no more; does not wait."""
+        with self.lock:
+            self._closed = True
+            connections = list(self._connections)
+        for connection in connections:
+            connection.close()
+        self._node.forget(self)
+
+
+class Offer:
+    """A service that the node answers.
+
+    Args:
+        node: Answers.
+        name: Its name, with a slash in front.
+        type_name: "pkg/Type".
+        md5: Its checksum.
+        answer: Gets a request and the caller's name, returns the response; what it raises goes to
+            the caller as text. It runs in the connection's thread.
+    """
+
+    def __init__(
+        self,
+        node: Ros1Node,
+        name: str,
+        type_name: str,
+        md5: str,
+        answer: Callable[[bytes, str], bytes],
+    ) -> None:
+        self.name = name
+        self.type = type_name
+        self.md5 = md5
+        self._answer = answer
+        self._node = node
+
+    def serve(self, connection: Connection, header: Header) -> None:
+        """Answer a caller until it leaves; in the connection's thread."""
+        if header.get("md5sum") not in {ANY, self.md5}:
+            text = f"got {header.get('md5sum')!r:.80}; expected {self.md5} ({self.type})."
+            connection.send_header({"error": f"{self.name}: md5sum: {text}"})
+            raise Ros1Error(f"{self.name}: caller {connection.peer}", f"md5sum: {text}")
+        fields = {"callerid": self._node.name, "type": self.type, "md5sum": self.md5}
+        parts = {f"{part}_type": f"{self.type}{part.title()}" for part in ("request", "response")}
+        connection.send_header({**fields, **parts})
+        if header.get("probe") == "1":
+            return
+        while (request := connection.read_frame()) is not None:
+            try:
+                answer = pack_service_answer(self._answer(request, connection.peer), good=True)
+            except Exception as error:  # noqa: BLE001  a border: the caller gets it
+                answer = pack_service_answer(str(error).encode(), good=False)
+            connection.send(answer)
+            if header.get("persistent") != "1":
+                return
+
+    def close(self) -> None:
+        """Answer no more calls; does not wait for those under way."""
+        self._node.forget(self)
+
+
+class Ros1Node:
+    """A node in a ROS 1 system.
+
+    Args:
+        name: Its full name, with a slash in front; no other node may have it, or the master ends
+            that one.
+        master: Address of the master, "http://robot:11311".
+        clock: A real one, which starts the threads.
+        host: Name or address under which the robot finds this computer; "" takes `ROS_HOSTNAME`,
+            then `ROS_IP`, then the address from which the master is reached.
+
+    Attributes:
+        uri: Address of the node's own interface.
+        ended: Why the master has ended the node, "" while it has not.
+
+    Raises:
+        Ros1Error: the master's address is none, or its host is not known here.
+    """
+
+    def __init__(self, name: str, master: str, *, clock: Clock, host: str = "") -> None:
+        self.name = name
+        self.master = master
+        self.clock = clock
+        self.ended = ""
+        self.on_ended: Callable[[], object] = lambda: None
+        self._lock = threading.Lock()
+        self._published: dict[str, Publication] = {}
+        self._subscribed: dict[str, Subscription] = {}
+        self._served: dict[str, Offer] = {}
+        self._tasks: set[Task] = set()
+        self._told: dict[str, str] = {}
+        own = find_host(master, host)
+        bind = "127.0.0.1" if is_loopback(own) else ""
+        self._rpc = RpcServer(bind, clock, self._methods())
+        self._data = Listener(bind, clock, "ros1-data", self._handle)
+        self._address = own, self._data.port
+        self.uri = f"http://{own}:{self._rpc.port}/"
+
+    # -- what is wanted ------------------------------------------------------------------------
+
+    def subscribe(self, topic: str, accept: Callable[[Header], Receiver]) -> Subscription:
+        """Listen to a topic, of whatever type; see `Subscription`."""
+        made = Subscription(self, topic, accept)
+        with self._lock:
+            self._subscribed[topic] = made
+        return made
+
+    def advertise(self, topic: str, *args: Any, **kwargs: Any) -> Publication:
+        """Publish on a topic; see `Publication`."""
+        made = Publication(self, topic, *args, **kwargs)
+        with self._lock:
+            self._published[topic] = made
+        return made
+
+    def provide(self, name: str, *args: Any) -> Offer:
+        """Answer a service; see `Offer`."""
+        made = Offer(self, name, *args)
+        with self._lock:
+            self._served[name] = made
+        return made
+
+    def forget(self, made: Subscription | Publication | Offer) -> None:
+        """Want something no more; `register` tells the master."""
+        kinds: tuple[dict[str, Any], ...] = self._published, self._subscribed, self._served
+        with self._lock:
+            for kind in kinds:
+                for name in [name for name, other in kind.items() if other is made]:
+                    del kind[name]
+
+    # -- the master ----------------------------------------------------------------------------
+
+    def ask(self, method: str, *args: Any, timeout: float | None = None) -> Any:
+        """Call a method of the master; raises and blocks as `rpc.call`."""
+        more = {} if timeout is None else {"timeout": timeout}
+        return call(self.master, method, self.name, *args, **more)
+
+    def state(self) -> SystemState:
+        """Return who is there; raises and blocks as `ask`."""
+        return SystemState.read(self.master, self.ask("getSystemState"))
+
+    def types(self) -> dict[str, str]:
+        """Return the types of all topics that the master has ever heard of; raises as `ask`."""
+        return read_types(self.master, self.ask("getTopicTypes"))
+
+    def register(self, state: SystemState) -> None:
+        """Make the master know what is wanted, and forget what is not.
+
+        A topic that is listened to is registered again when other nodes publish on it than
+        before: an update of the master's may have been lost.
+
+        Args:
+            state: What the master knows.
+
+        Raises:
+            Ros1Error: the master does not answer, or refuses; what is left is tried the next time.
+        """
+        with self._lock:
+            published, subscribed = dict(self._published), dict(self._subscribed)
+            served = dict(self._served)
+        wanted = Names(frozenset(published), frozenset(subscribed), frozenset(served))
+        there = registered(state, self.name)
+        missing = wanted - there
+        for topic in sorted(missing.published):
+            type_name = published[topic].type or ANY
+            self.ask("registerPublisher", topic, type_name, self.uri)
+        for name in sorted(missing.served):
+            self.ask("registerService", name, self._rosrpc, self.uri)
+        for topic, subscription in subscribed.items():
+            nodes = frozenset(state.publishers.get(topic, ())) - {self.name}
+            if topic in missing.subscribed or nodes != subscription.nodes:
+                asked = subscription.publishers.ask()
+                uris = self.ask("registerSubscriber", topic, ANY, self.uri)
+                uris = read_texts(self.master, "registerSubscriber", uris)
+                subscription.apply(subscription.publishers.answer(asked, uris))
+                subscription.nodes = nodes
+        self._unregister(there - wanted)
+
+    def _unregister(self, names: Names, timeout: float | None = None) -> None:
+        for topic in sorted(names.published):
+            self.ask("unregisterPublisher", topic, self.uri, timeout=timeout)
+        for topic in sorted(names.subscribed):
+            self.ask("unregisterSubscriber", topic, self.uri, timeout=timeout)
+        for name in sorted(names.served):
+            self.ask("unregisterService", name, self._rosrpc, timeout=timeout)
+
+    @property
+    def _rosrpc(self) -> str:
+        host, port = self._address
+        return f"rosrpc://{host}:{port}"
+
+    # -- services of others --------------------------------------------------------------------
+
+    def open_service(self, name: str, **fields: str) -> tuple[Connection, Header]:
+        """Connect to a service, of whatever type.
+
+        Args:
+            name: Its name, with a slash in front.
+            fields: More of the connection header: `persistent="1"`.
+
+        Returns:
+            The connection, which the caller releases, and the header that tells type and node.
+
+        Raises:
+            Ros1Error: there is no such service, or it does not answer.
+
+        Blocks: as `rpc.call`, and for the exchange of headers.
+        """
+        where = split_address(name, self.ask("lookupService", name), "rosrpc")
+        connection = Connection.open(*where, name, self.clock)
+        try:
+            wanted = {"callerid": self.name, "service": name, "md5sum": ANY, **fields}
+            connection.send_header(wanted)
+            # Not earlier than this answer: rospy drops what shares a segment with the header.
+            return connection, connection.read_header()
+        except BaseException:
+            connection.release()
+            raise
+
+    def call_service(self, name: str, request: bytes, md5: str, timeout: float) -> bytes:
+        """Call a service and return the bytes of its response.
+
+        Raises:
+            Ros1Error: there is no such service, it is of another type, its handler raised, or it
+                went away before it answered. `reason` is the handler's text if that raised.
+
+        Blocks: `timeout` [s] at most for the answer; see `open_service` for what is before.
+        """
+        connection, _ = self.open_service(name, md5sum=md5)
+        with connection:
+            connection.limit(timeout)
+            connection.send(len(request).to_bytes(4, "little") + request)
+            good = connection.read(1)
+            payload = None if good is None else connection.read_frame()
+        if payload is None:
+            raise Ros1Error(name, "the service's node died or left before it answered.")
+        if good != b"\x01":
+            raise Ros1Error(name, payload.decode(errors="replace"))
+        return payload
+
+    # -- what others ask -----------------------------------------------------------------------
+
+    def _methods(self) -> dict[str, Callable[..., Any]]:
+        return {
+            "getPid": lambda _caller: os.getpid(),
+            "getMasterUri": lambda _caller: self.master,
+            "getBusStats": lambda _caller: [[], [], []],
+            "getBusInfo": lambda _caller: [],
+            "getSubscriptions": lambda _caller: [[name, ANY] for name in list(self._subscribed)],
+            "getPublications": lambda _caller: [
+                [name, made.type or ANY] for name, made in list(self._published.items())
+            ],
+            "paramUpdate": lambda _caller, _key, _value: 0,
+            "publisherUpdate": self._on_publishers,
+            "requestTopic": self._on_request,
+            "shutdown": self._on_shutdown,
+        }
+
+    def _on_publishers(self, _caller: str, topic: str, uris: object) -> int:
+        subscription = self._subscribed.get(topic)
+        if subscription is not None:
+            subscription.update(read_texts(self.master, "publisherUpdate", uris))
+        return 0
+
+    def _on_request(self, _caller: str, topic: str, _protocols: object) -> list[object]:
+        if topic not in self._published:
+            raise Ros1Error(self.name, f"requestTopic: {topic:.200}: it is not published here")
+        return ["TCPROS", *self._address]
+
+    def _on_shutdown(self, _caller: str, reason: object = "") -> int:
+        self.ended = f"the master has ended it: {reason!s:.200}"
+        self.on_ended()
+        return 0
+
+    def _handle(self, sock: socket.socket, peer: str) -> None:
+        """Serve a node that has connected to us."""
+        with Connection(sock, peer, self.clock) as connection:
+            try:
+                header = connection.read_header()
+                connection.peer = header.get("callerid", peer)
+                topic, service = header.get("topic", ""), header.get("service", "")
+                made = self._served.get(service) if service else self._published.get(topic)
+                if made is None:
+                    name = service or topic
+                    connection.send_header({"error": f"{name!r:.200}: not offered by {self.name}"})
+                    return
+                made.serve(connection, header)
+            except ActionlibError as error:
+                self.report(str(error), error)
+
+    # -- shared --------------------------------------------------------------------------------
+
+    def spawn(self, target: Callable[[], object], name: str) -> None:
+        """Run `target` in a thread that `close` waits for."""
+
+        def run() -> None:
+            try:
+                target()
+            finally:
+                with self._lock:
+                    self._tasks.discard(task)
+
+        with self._lock:
+            task = self.clock.spawn(run, name=name)
+            self._tasks.add(task)
+
+    def report(self, about: str, error: ActionlibError) -> None:
+        """Log an error, unless the same was logged about it before."""
+        text = str(error)
+        with self._lock:
+            known = self._told.get(about) == text
+            self._told[about] = text
+            while len(self._told) > MOST_TOLD:
+                del self._told[next(iter(self._told))]
+        if not known:
+            log.error("ROS 1 bridge %s: %s", self.name, text)
+
+    def forget_report(self, about: str) -> None:
+        """Log the next error about it, even if it is the same."""
+        with self._lock:
+            self._told.pop(about, None)
+
+    def close(self) -> None:
+        """Leave the ROS 1 system: unregister everything, end all connections.
+
+        Blocks: under a second with a master that answers; `UNREGISTER_S` and `CLOSE_S` at most for
+            one that does not.
+        """
+        with self._lock:
+            made: list[Subscription | Publication | Offer] = [
+                *self._subscribed.values(),
+                *self._published.values(),
+                *self._served.values(),
+            ]
+        for wanted in made:
+            wanted.close()
+        with contextlib.suppress(Ros1Error):  # a master that is not there has nothing to forget
+            state = SystemState.read(self.master, self.ask("getSystemState", timeout=UNREGISTER_S))
+            self._unregister(registered(state, self.name), UNREGISTER_S)
+        self._data.close(CLOSE_S)
+        self._rpc.close(CLOSE_S)
+        with self._lock:
+            tasks = list(self._tasks)
+        deadline = self.clock.now() + CLOSE_S
+        for task in tasks:
+            task.join(max(0.0, deadline - self.clock.now()))
+
+
+MOST_TOLD = 1000  # what was logged; beyond, the oldest is forgotten
+
+
+def find_host(master: str, host: str = "") -> str:
+    """Return the name or address under which the robot finds this computer.
+
+    Source:
+        https://wiki.ros.org/ROS/NetworkSetup for the order of the variables; past them ROS takes
+        the computer's name, which few robots can look up: the address on the way to the master is
+        one that it can reach.
+
+    Raises:
+        Ros1Error: the master's host is not known here.
+    """
+    chosen = host or os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP")
+    if chosen:
+        return chosen
+    there, port = split_address(master, master, "http")
+    try:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.connect((there, port))  # sends nothing
+            address: str = probe.getsockname()[0]
+            return address
+    except OSError as error:
+        raise Ros1Error(
+            master,
+            f"host: got {there!r}, which cannot be reached ({error.strerror or error}). Try its "
+            "address, or a line for it in /etc/hosts.",
+        ) from error
+
+
+@functools.lru_cache(maxsize=64)
+def is_loopback(host: str) -> bool:
+    """Tell whether only this computer reaches `host`."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def check_master(uri: str) -> str:
+    """Return the address of a master in full: `robot` is "http://robot:11311".
+
+    Raises:
+        Ros1Error: it is none.
+    """
+    full = uri if "//" in uri else f"http://{uri}"
+    if not re.search(r":\d+/?\Z", full):
+        full = f"{full.rstrip('/')}:{PORT}"
+    split_address(uri, full, "http")
+    return full.rstrip("/")

@@ -1,0 +1,110 @@
+"""Which names are bridged: from what was asked for and who is there. No threads, no network."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from actionlib_core.wire.presence import Kind
+from actionlib_core.wire.ros1.answers import ACTION_WORDS, SystemState, find_actions
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from actionlib_core.wire.presence import Endpoint
+
+_ACTION = {Kind.ACTION_CLIENT, Kind.ACTION_SERVER}
+_TOPIC = {Kind.PUBLISHER, Kind.SUBSCRIBER}
+_OF_EVERY_NODE = ("get_loggers", "set_logger_level")  # services that every node has
+_LOGS = ("/rosout", "/rosout_agg")
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is to be bridged. Names are those in ROS 1, with a slash in front.
+
+    Attributes:
+        actions: Name -> type "pkg/XAction", "" when it is to be learned.
+        topics: Names.
+        services: Names.
+        used: Also what programs on our network use: their actions and topics, and all services of
+            the robot, as callers of services do not show themselves.
+        all: Also everything that there is.
+    """
+
+    actions: Mapping[str, str] = field(default_factory=dict)
+    topics: frozenset[str] = frozenset()
+    services: frozenset[str] = frozenset()
+    used: bool = False
+    all: bool = False
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is bridged now. Names are those in ROS 1.
+
+    Attributes:
+        actions: Name -> type, "" when it is not known.
+        topics: Name -> whether what is published in ROS 1 is brought here.
+        services: Name -> whether a node in ROS 1 serves it.
+    """
+
+    actions: dict[str, str]
+    topics: dict[str, bool]
+    services: dict[str, bool]
+
+
+def without(state: SystemState, prefix: str) -> SystemState:
+    """Return a state without the nodes whose names begin so."""
+
+    def of(part: dict[str, list[str]]) -> dict[str, list[str]]:
+        kept = {
+            name: [n for n in nodes if not n.startswith(prefix)] for name, nodes in part.items()
+        }
+        return {name: nodes for name, nodes in kept.items() if nodes}
+
+    return SystemState(of(state.publishers), of(state.subscribers), of(state.services))
+
+
+def make_plan(
+    wanted: Wanted,
+    ends: Mapping[str, list[Endpoint]],
+    state: SystemState,
+    types: Mapping[str, str],
+) -> Plan:
+    """Decide what is bridged.
+
+    Args:
+        wanted: What was asked for.
+        ends: Name in ROS 1 -> the ends of it on our network that belong to no bridge.
+        state: Who is there in ROS 1, without bridges.
+        types: Topic -> type, as the master knows it.
+    """
+    follow = wanted.used or wanted.all
+    kinds = {name: {end.kind for end in there} for name, there in ends.items()} if follow else {}
+    topics_there = state.publishers.keys() | state.subscribers.keys()
+    learned = find_actions(dict(types), topics_there)
+    actions = dict(wanted.actions)
+    for name, there in kinds.items():
+        if there & _ACTION:
+            actions.setdefault(name, "")
+    if wanted.all:
+        actions = {**learned, **actions}
+    actions = {name: given or learned.get(name, "") for name, given in actions.items()}
+    parts = {f"{name}/{word}" for name in actions for word in ACTION_WORDS}
+
+    topics = dict.fromkeys(wanted.topics, True)
+    for name, there in kinds.items():
+        if there & _TOPIC:
+            topics[name] = topics.get(name, False) or Kind.SUBSCRIBER in there
+    if wanted.all:
+        topics.update(dict.fromkeys(state.publishers.keys() - set(_LOGS), True))
+    services = {
+        name for name in state.services if follow and name.rpartition("/")[2] not in _OF_EVERY_NODE
+    }
+    services |= wanted.services | {name for name, there in kinds.items() if Kind.SERVICE in there}
+    return Plan(
+        actions,
+        {name: listen for name, listen in topics.items() if name not in parts},
+        {name: name in state.services for name in services},
+    )

@@ -1,0 +1,133 @@
+"""XML-RPC as ROS 1 uses it, with deadlines and bounded lengths: calls, and a node's own interface.
+
+Source:
+    https://wiki.ros.org/ROS/Master_API and https://wiki.ros.org/ROS/Slave_API.
+"""
+
+from __future__ import annotations
+
+import http.client
+import xmlrpc.client
+from typing import TYPE_CHECKING, Any
+from xmlrpc.server import SimpleXMLRPCDispatcher, SimpleXMLRPCRequestHandler
+
+from actionlib_core.exceptions import Ros1Error
+from actionlib_core.wire.ros1.answers import read_answer, split_address
+from actionlib_core.wire.ros1.links import Listener
+
+if TYPE_CHECKING:
+    import socket
+    from collections.abc import Callable
+
+    from actionlib_core.clock import Clock
+
+CALL_S = 3.0  # longest silence of a master or node that was asked
+LARGEST_ANSWER = 64 << 20  # all parameters of a robot, maps included
+LARGEST_QUESTION = 1 << 20
+SILENCE_S = 10.0  # longest silence of one that asks us
+
+
+class _Transport(xmlrpc.client.Transport):
+    """Waits no longer than a time-out and reads no more than a limit."""
+
+    accept_gzip_encoding = False  # packed bytes may grow beyond any limit
+
+    def __init__(self, timeout: float) -> None:
+        super().__init__(use_builtin_types=True)
+        self._timeout = timeout
+
+    def make_connection(self, host: Any) -> http.client.HTTPConnection:
+        if self._connection[1] is None or host != self._connection[0]:
+            connection = http.client.HTTPConnection(host, timeout=self._timeout)
+            self._connection = host, connection
+        made: http.client.HTTPConnection = self._connection[1]  # type: ignore[assignment]  # set above
+        return made
+
+    def parse_response(self, response: http.client.HTTPResponse) -> Any:
+        raw = response.read(LARGEST_ANSWER + 1)
+        if len(raw) > LARGEST_ANSWER:
+            raise ValueError(f"got more than {LARGEST_ANSWER} bytes")
+        parser, unmarshaller = self.getparser()
+        parser.feed(raw)
+        parser.close()
+        return unmarshaller.close()
+
+
+def call(uri: str, method: str, *args: Any, timeout: float = CALL_S) -> Any:
+    """Call a method of a master or node and return the value of its answer.
+
+    Args:
+        uri: Its address, "http://robot:11311".
+        method: What is called.
+        args: With what; the caller's name first, by ROS's custom.
+        timeout: Longest silence [s].
+
+    Raises:
+        Ros1Error: nobody answers, or the answer is an error or none.
+
+    Blocks: `timeout` at most between two parts of the answer.
+    """
+    split_address(uri, uri, "http")
+    proxy = xmlrpc.client.ServerProxy(uri, transport=_Transport(timeout), allow_none=True)
+    try:
+        with proxy:
+            answer = getattr(proxy, method)(*args)
+    except xmlrpc.client.Fault as error:
+        raise Ros1Error(uri, f"{method}: refused: {error.faultString:.200}") from error
+    except TimeoutError as error:
+        raise Ros1Error(uri, f"{method}: got no answer within {timeout:g} s.") from error
+    except OSError as error:
+        raise Ros1Error(uri, f"{method}: cannot be reached: {error.strerror or error}.") from error
+    except Exception as error:  # whatever a parser says of bytes that are no answer
+        raise Ros1Error(uri, f"{method}: got no XML-RPC answer: {error!s:.200}.") from error
+    return read_answer(uri, method, answer)
+
+
+class _Handler(SimpleXMLRPCRequestHandler):
+    rpc_paths = ()  # any: "/" and "/RPC2" are in use
+    timeout = SILENCE_S
+
+    def do_POST(self) -> None:  # noqa: N802  the library's name
+        length = self.headers.get("content-length", "")
+        if not (length.isascii() and length.isdigit() and int(length) <= LARGEST_QUESTION):
+            self.send_error(413, f"content-length: expected at most {LARGEST_QUESTION}")
+            return
+        super().do_POST()
+
+    def log_message(self, *_: Any) -> None:  # what others send wrong is theirs to see
+        pass
+
+
+class RpcServer(SimpleXMLRPCDispatcher):
+    """Answers the calls of master and nodes.
+
+    Args:
+        host: Address to listen at.
+        clock: Starts the threads.
+        methods: Name -> function; it returns the value, which is answered as a success. What it
+            raises goes to the caller.
+
+    Threads: each call has a thread of its own.
+    """
+
+    logRequests = False  # noqa: N815  the handler's name for it
+    _send_traceback_header = False
+
+    def __init__(self, host: str, clock: Clock, methods: dict[str, Callable[..., Any]]) -> None:
+        super().__init__(allow_none=False, encoding="utf-8")
+        self._methods = methods
+        self._listener = Listener(host, clock, "ros1-rpc", self._handle)
+        self.port = self._listener.port
+
+    def _handle(self, sock: socket.socket, peer: str) -> None:
+        _Handler(sock, peer, self)  # type: ignore[arg-type]  # all that it uses of a server is here
+
+    def _dispatch(self, method: str, params: Any) -> Any:
+        function = self._methods.get(method)
+        if function is None:
+            return [-1, f"unknown method {method:.80}", 0]
+        return [1, "", function(*params)]
+
+    def close(self, timeout: float) -> None:
+        """Answer no more; blocks `timeout` [s] at most."""
+        self._listener.close(timeout)

@@ -1,0 +1,200 @@
+"""One bridged service, one way or the other."""
+
+from __future__ import annotations
+
+import json
+from functools import partial
+from typing import TYPE_CHECKING
+
+from actionlib_core.exceptions import Ros1Error, TypeMismatchError
+from actionlib_core.wire.encoding import check_encoding
+from actionlib_core.wire.presence import Kind
+from actionlib_core.wire.ros1.node import RETRY_FIRST_S, RETRY_LONGEST_S
+from actionlib_core.wire.ros1.sides import Typed, type_of
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    from actionlib_core.transport import Query, Reply
+    from actionlib_core.wire.presence import Endpoint
+    from actionlib_core.wire.ros1.links import Connection
+    from actionlib_core.wire.ros1.node import Offer
+    from actionlib_core.wire.ros1.sides import Sides
+
+
+class ServiceBridge:
+    """A service that has its server on either side.
+
+    Args:
+        sides: The two networks.
+        name: Its name in ROS 1.
+        timeout: Longest time of a call [s].
+
+    Threads: `look` and `close` from one thread.
+    """
+
+    def __init__(self, sides: Sides, name: str, timeout: float) -> None:
+        self._sides = sides
+        self._name = name
+        self._timeout = timeout
+        self._from_ros: _FromRos | None = None
+        self._to_ros: _ToRos | None = None
+
+    def look(self, ends: Collection[Endpoint], *, served: bool) -> None:
+        """Bridge what is there now.
+
+        Args:
+            ends: The service's servers here that belong to no bridge.
+            served: A node in ROS 1 has it, which then stays the one that is used.
+        """
+        key = self._sides.key(self._name)
+        here = min(ends, key=lambda end: end.age, default=None)
+        if served and here is not None:
+            text = f"two servers: got one in ROS 1 and one of node '{here.node}' here"
+            error = Ros1Error(f"service {self._name}", f"{text}; expected one.")
+            self._sides.ros.report(f"two servers of {self._name}", error)
+        typed = None if served or here is None else Typed(here.type, here.md5)
+        if self._to_ros is not None and self._to_ros.typed != typed:
+            self._to_ros.close()
+            self._to_ros = None
+        if typed is not None and self._to_ros is None:
+            self._to_ros = _ToRos(self._sides, key, self._name, typed, self._timeout)
+        if self._from_ros is not None and not served:
+            self._from_ros.close()
+            self._from_ros = None
+        elif self._from_ros is None and served:
+            self._from_ros = _FromRos(self._sides, key, self._name, self._timeout)
+
+    def close(self) -> None:
+        """Bridge no more; does not wait."""
+        for each in (self._from_ros, self._to_ros):
+            if each is not None:
+                each.close()
+
+
+class _FromRos:
+    """A service in ROS 1, shown here while a connection to its node lasts: so its end is seen."""
+
+    def __init__(self, sides: Sides, key: str, name: str, timeout: float) -> None:
+        self._sides = sides
+        self._key = key
+        self._name = name
+        self._timeout = timeout
+        self._closed = sides.node.clock.event(f"the end of the bridge of {name}")
+        self._connection: Connection | None = None
+        sides.ros.spawn(self._follow, f"ros1-service{name}")
+
+    def close(self) -> None:
+        """Show it no more; does not wait."""
+        self._closed.set()
+        if self._connection is not None:
+            self._connection.close()
+
+    def _follow(self) -> None:
+        about, pause = f"service {self._name}", RETRY_FIRST_S
+        while not self._closed.is_set():
+            try:
+                self._show(about)
+                pause = RETRY_FIRST_S
+            except Ros1Error as error:
+                self._sides.ros.report(about, error)
+            self._closed.wait(pause)
+            pause = min(2 * pause, RETRY_LONGEST_S)
+
+    def _show(self, about: str) -> None:
+        ros, transport = self._sides.ros, self._sides.node.transport
+        connection, header = ros.open_service(self._name, persistent="1")
+        with connection:
+            self._connection = connection
+            if self._closed.is_set():
+                return
+            typed = type_of(header, about)
+            ros.forget_report(about)
+            answer = transport.queryable(self._key, partial(self._on_query, typed))
+            token = self._sides.show(Kind.SERVICE, self._key, typed, header.get("callerid", ""))
+            connection.read(1)  # a service says nothing unasked: this waits for its end
+            self._connection = None
+            token.close()
+            answer.close()
+
+    def _on_query(self, typed: Typed, query: Query) -> None:
+        class_of = type(typed.type, (), {"_type": typed.type, "_md5sum": typed.md5})
+        try:
+            check_encoding(query.encoding, class_of, name=self._key)
+        except TypeMismatchError as error:
+            _refuse(query, error)
+            return
+        call = partial(self._call, typed, query)
+        self._sides.ros.spawn(call, f"ros1-call{self._name}")
+
+    def _call(self, typed: Typed, query: Query) -> None:
+        try:
+            ros = self._sides.ros
+            answer = ros.call_service(self._name, query.payload, typed.md5, self._timeout)
+            query.reply(answer, typed.encoding)
+            query.finish()
+        except Ros1Error as error:
+            _refuse(query, error)
+
+
+def _refuse(query: Query, error: Exception) -> None:
+    """Answer with an error, as our own services do."""
+    told = error.reason if isinstance(error, Ros1Error) else str(error)
+    query.reply_error(json.dumps({"type": type(error).__name__, "text": told}))
+    query.finish()
+
+
+class _ToRos:
+    """A service of ours, for callers in ROS 1."""
+
+    def __init__(self, sides: Sides, key: str, name: str, typed: Typed, timeout: float) -> None:
+        self.typed = typed
+        self._sides = sides
+        self._key = key
+        self._timeout = timeout
+        self._offer: Offer = sides.ros.provide(name, *typed, self._answer)
+
+    def close(self) -> None:
+        """Offer it no more; does not wait."""
+        self._offer.close()
+
+    def _answer(self, request: bytes, caller: str) -> bytes:
+        """Call our service; in the thread of the caller's connection.
+
+        Raises:
+            Ros1Error: it raised, is gone, or does not answer in time.
+        """
+        node = self._sides.node
+        replies: list[Reply] = []
+        done = node.clock.event(f"the answer of service {self._key}")
+
+        def on_reply(reply: Reply) -> None:
+            replies.append(reply)
+            done.set()
+
+        asking = node.transport.query(
+            self._key,
+            request,
+            encoding=self.typed.encoding,
+            timeout=self._timeout,
+            on_reply=on_reply,
+            on_done=done.set,
+        )
+        in_time = done.wait(self._timeout)
+        asking.close()
+        if not replies:
+            why = "its server died or left before it answered" if in_time else "no answer in time"
+            raise Ros1Error(self._key, f"called by {caller}: {why}.")
+        if replies[0].error:
+            raise Ros1Error(self._key, _read_error(replies[0].payload))
+        return replies[0].payload
+
+
+def _read_error(payload: bytes) -> str:
+    """Return the text of an error reply: JSON with type and text, if the server is ours."""
+    text = payload.decode(errors="replace")
+    try:
+        told = json.loads(text)
+        return f"{told['type']}: {told['text']}"
+    except (ValueError, TypeError, KeyError):
+        return text

@@ -1,0 +1,150 @@
+"""One bridged topic, both ways."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING
+
+from actionlib_core.transport import Quality
+from actionlib_core.wire.presence import Kind
+from actionlib_core.wire.ros1.sides import Typed, type_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection
+
+    from actionlib_core.transport import Closable, Presence, Sample
+    from actionlib_core.wire.presence import Endpoint
+    from actionlib_core.wire.ros1.definitions import Definitions
+    from actionlib_core.wire.ros1.frames import Header
+    from actionlib_core.wire.ros1.node import Publication, Subscription
+    from actionlib_core.wire.ros1.sides import Sides
+
+LATCHED = "1"
+
+
+class TopicBridge:
+    """A topic on both sides.
+
+    Each publisher in ROS 1 has a publisher and a token of its own here, with its node's name, so
+    that several latched ones keep a message each. All publishers here are one in ROS 1.
+
+    Args:
+        sides: The two networks.
+        topic: Its name in ROS 1.
+        definitions: Texts of types, of which more are learned here.
+
+    Threads: `look` and `close` from one thread.
+    """
+
+    def __init__(self, sides: Sides, topic: str, definitions: Definitions) -> None:
+        self._sides = sides
+        self._topic = topic
+        self._key = sides.key(topic)
+        self._definitions = definitions
+        self._from_ros: Subscription | None = None
+        self._to_ros: _ToRos | None = None
+
+    def look(self, ends: Collection[Endpoint], *, listen: bool) -> None:
+        """Bridge what is wanted now.
+
+        Args:
+            ends: The publishers and subscribers of the topic here that belong to no bridge.
+            listen: Bring here what is published in ROS 1.
+        """
+        if listen and self._from_ros is None:
+            self._from_ros = self._sides.ros.subscribe(self._topic, self._accept)
+        elif not listen and self._from_ros is not None:
+            self._from_ros.close()
+            self._from_ros = None
+        types = sorted({Typed(end.type, end.md5) for end in ends if end.kind is Kind.PUBLISHER})
+        if self._to_ros is not None and self._to_ros.typed not in types:
+            self._to_ros.close()
+            self._to_ros = None
+        if types and self._to_ros is None:
+            self._to_ros = _ToRos(self._sides, self._topic, types[0], self._definitions)
+
+    def close(self) -> None:
+        """Bridge no more; does not wait."""
+        for each in (self._from_ros, self._to_ros):
+            if each is not None:
+                each.close()
+
+    def _accept(self, header: Header) -> _FromRos:
+        typed = type_of(header, self._topic)
+        self._definitions.learn(typed, header.get("message_definition", ""))
+        return _FromRos(self._sides, self._key, typed, header)
+
+
+class _FromRos:
+    """One publisher in ROS 1, as it is here."""
+
+    def __init__(self, sides: Sides, key: str, typed: Typed, header: Header) -> None:
+        latch = header.get("latching") == LATCHED
+        quality = Quality(express=True, block=True, latch=latch)
+        self._port = sides.node.transport.publisher(key, typed.encoding, quality)
+        self._token = sides.show(Kind.PUBLISHER, key, typed, header.get("callerid", ""))
+
+    def take(self, payload: bytes) -> None:
+        """Pass a message on; blocks while our network has no room, as ROS 1 buffers too."""
+        self._port.put(payload)
+
+    def gone(self) -> None:
+        """Leave the topic."""
+        self._token.close()
+        self._port.close()
+
+
+class _ToRos:
+    """The publishers here, as one in ROS 1."""
+
+    def __init__(self, sides: Sides, topic: str, typed: Typed, definitions: Definitions) -> None:
+        self.typed = typed
+        self._sides = sides
+        self._key = sides.key(topic)
+        self._lock = threading.Lock()
+        self._latched: dict[str, set[str]] = {}  # session -> keys of its latched publishers' tokens
+        self._last: dict[
+            str, bytes
+        ] = {}  # session -> its last message, which may precede the token
+        transport = sides.node.transport
+        self._publication: Publication = sides.ros.advertise(
+            topic, *typed, definitions.text(typed), latching=False, accept=self._accept
+        )
+        latches = transport.watch_alive(f"{self._key}/@latch/*/*", self._on_latch)
+        self._parts: list[Closable] = [latches, transport.subscribe(self._key, self._on_sample)]
+
+    def close(self) -> None:
+        """Publish no more; does not wait."""
+        for part in self._parts:
+            part.close()
+        self._publication.close()
+
+    def _on_latch(self, presence: Presence) -> None:
+        """Note who latches: subscribers in ROS 1 that come later get their last messages."""
+        session = presence.key.rsplit("/", 2)[1]
+        if session == self._sides.node.transport.session_id:
+            return
+        with self._lock:
+            tokens = self._latched.setdefault(session, set())
+            (tokens.add if presence.alive else tokens.discard)(presence.key)
+            if not tokens:
+                del self._latched[session]
+            self._publication.latching = bool(self._latched)
+            with self._publication.lock:
+                if not tokens:
+                    self._publication.kept.pop(session, None)
+                elif session in self._last:
+                    self._publication.kept[session] = self._last[session]
+
+    def _on_sample(self, sample: Sample) -> None:
+        if self._sides.is_own(sample) or not self._sides.fits(sample, self.typed):
+            return
+        source = sample.source
+        with self._lock:
+            self._last[source] = sample.payload
+            keep = source if source in self._latched else None
+            self._publication.put(sample.payload, keep=keep)
+
+    def _accept(self, header: Header) -> Callable[[], object]:
+        node = header.get("callerid", "")
+        return self._sides.show(Kind.SUBSCRIBER, self._key, self.typed, node).close

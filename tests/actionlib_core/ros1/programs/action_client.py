@@ -1,0 +1,30 @@
+"""An action client of ROS 1: `NAME`. Each line of standard input is a goal, or `cancel`, or `wait`.
+
+Answers each goal that has ended with `STATE RESULT TEXT`, but one below 0 only when `wait` is said.
+"""
+
+import sys
+
+import actionlib
+import rospy
+from actionlib.msg import TestAction, TestGoal
+
+rospy.init_node("ros_client")
+client = actionlib.SimpleActionClient(sys.argv[1], TestAction)
+print("ready" if client.wait_for_server(rospy.Duration(30)) else "no server", flush=True)
+for line in sys.stdin:
+    word = line.strip()
+    if word == "cancel":
+        client.cancel_goal()
+    elif word == "server?":
+        print(client.wait_for_server(rospy.Duration(0.5)), flush=True)
+        continue
+    elif word != "wait":
+        client.send_goal(TestGoal(int(word)))
+        if int(word) < 0:
+            print("sent", flush=True)
+            continue
+    client.wait_for_result(rospy.Duration(30))
+    result = client.get_result()
+    value = result.result if result else None
+    print(client.get_state(), value, client.get_goal_status_text(), flush=True)

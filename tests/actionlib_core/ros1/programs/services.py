@@ -1,0 +1,26 @@
+"""Services of ROS 1: serves `NAME`; each line of standard input `SERVICE BOOL` is a call."""
+
+import sys
+
+import rospy
+from std_srvs.srv import SetBool, SetBoolResponse
+
+rospy.init_node("ros_services")
+
+
+def handle(request):
+    if not request.data:
+        raise ValueError("not that way")
+    return SetBoolResponse(True, "by ROS 1")
+
+
+service = rospy.Service(sys.argv[1], SetBool, handle)
+print("ready", flush=True)
+for line in sys.stdin:
+    name, value = line.split()
+    try:
+        rospy.wait_for_service(name, 20)
+        answer = rospy.ServiceProxy(name, SetBool)(value == "True")
+        print(answer.success, answer.message, flush=True)
+    except (rospy.ServiceException, rospy.ROSException) as error:
+        print("error", error, flush=True)

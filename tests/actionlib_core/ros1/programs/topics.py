@@ -1,0 +1,45 @@
+"""Topics of ROS 1. Each line of standard input is a command, answered with one line."""
+
+import sys
+
+import rospy
+from std_msgs.msg import String
+
+rospy.init_node(sys.argv[1])
+publishers = {}
+subscribers = {}
+heard = {}
+print("ready", flush=True)
+
+
+def hear(message, name):
+    heard[name].append(message.data)
+
+
+for line in sys.stdin:
+    word, *arguments = line.split()
+    answer = "ok"
+    if word == "advertise":
+        name, latch = arguments
+        publishers[name] = rospy.Publisher(name, String, latch=latch == "latch", queue_size=1000)
+    elif word == "publish":
+        name, text = arguments
+        publishers[name].publish(String(text))
+    elif word == "subscribe":
+        (name,) = arguments
+        heard[name] = []
+        subscribers[name] = rospy.Subscriber(name, String, hear, name)
+    elif word == "connections":
+        (name,) = arguments
+        end = subscribers.get(name) or publishers.get(name)
+        deadline = rospy.get_time() + 20
+        while not end.get_num_connections() and rospy.get_time() < deadline:
+            rospy.sleep(0.01)
+        answer = str(end.get_num_connections())
+    elif word == "heard":
+        texts, count = heard[arguments[0]], int(arguments[1])
+        deadline = rospy.get_time() + 20
+        while len(texts) < count and rospy.get_time() < deadline:
+            rospy.sleep(0.01)
+        answer = " ".join(texts)
+    print(answer, flush=True)

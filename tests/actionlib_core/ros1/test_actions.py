@@ -1,0 +1,130 @@
+"""Actions between our network and a real ROS 1, both ways."""
+
+from __future__ import annotations
+
+import signal
+
+import pytest
+
+from actionlib_core import SimpleActionClient, SimpleActionServer
+from actionlib_core.interfaces.actionlib import msg
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
+
+pytestmark = [pytest.mark.ros1, pytest.mark.zenoh]
+
+WAIT_S = 40.0
+GOALS = 200
+
+
+def client_of(name):
+    client = SimpleActionClient(name, msg.TestAction)
+    assert client.wait_for_server(WAIT_S)
+    return client
+
+
+def send(client, number):
+    client.send_goal(msg.TestGoal(number))
+    assert client.wait_for_result(WAIT_S)
+    result = client.get_result()
+    return client.get_state(), result and result.result
+
+
+def test_goals_to_a_server_in_ros(ros, bridge):
+    ros.start("action_server", "to_ros", "worker")
+    bridge(actions={"to_ros": "actionlib/Test"})
+    client = client_of("to_ros")
+    ended = [send(client, number) for number in range(GOALS)]
+    assert ended == [(GoalStatus.SUCCEEDED, 2 * number) for number in range(GOALS)]
+    assert client.get_goal_status_text() == "done by ROS 1"
+
+
+def test_a_server_in_ros_that_comes_later_gives_feedback_and_is_cancelled(ros, bridge, node):
+    bridge(actions=["late"])
+    ros.start("action_server", "late", "late_worker")
+    client = client_of("late")
+    begun = node.clock.event()
+    client.send_goal(msg.TestGoal(-5), feedback_cb=lambda feedback: begun.set())
+    assert begun.wait(WAIT_S)
+    client.cancel_goal()
+    assert client.wait_for_result(WAIT_S)
+    assert client.get_state() == GoalStatus.PREEMPTED
+    assert client.get_result() == msg.TestResult(-1)
+
+
+def test_a_killed_server_in_ros_is_lost_with_its_nodes_name(ros, bridge, node):
+    server = ros.start("action_server", "mortal", "mortal_worker")
+    bridge(actions={"mortal": "actionlib/TestAction"}, namespace="robot_1")
+    client = client_of("robot_1/mortal")
+    begun = node.clock.event()
+    client.send_goal(msg.TestGoal(-5), feedback_cb=lambda feedback: begun.set())
+    assert begun.wait(WAIT_S)
+    server.send_signal(signal.SIGKILL)
+    assert client.wait_for_result(WAIT_S)
+    assert client.get_state() == GoalStatus.LOST
+    assert "robot_1/mortal_worker" in client.get_goal_status_text()
+    ros.start("action_server", "mortal", "mortal_worker")
+    assert client.wait_for_server(WAIT_S)
+    assert send(client, 4) == (GoalStatus.SUCCEEDED, 8)
+
+
+def test_a_server_in_ros_that_hangs_is_lost_and_comes_back(ros, bridge, node):
+    server = ros.start("action_server", "hanging", "hanging_worker")
+    bridge(actions=["hanging"], status_timeout=1.5)
+    client = client_of("hanging")
+    begun = node.clock.event()
+    client.send_goal(msg.TestGoal(-5), feedback_cb=lambda feedback: begun.set())
+    assert begun.wait(WAIT_S)
+    server.send_signal(signal.SIGSTOP)
+    try:
+        assert client.wait_for_result(WAIT_S)
+        assert client.get_state() == GoalStatus.LOST
+    finally:
+        server.send_signal(signal.SIGCONT)
+    assert client.wait_for_server(WAIT_S)
+    client.cancel_all_goals()
+    assert send(client, 4) == (GoalStatus.SUCCEEDED, 8)
+
+
+@pytest.fixture
+def serve(node):
+    servers = []
+
+    def serve(name):
+        def execute(goal):
+            while goal.goal < 0:
+                if server.is_preempt_requested():
+                    server.set_preempted(msg.TestResult(-1), "preempted here")
+                    return
+                node.clock.sleep(0.01)
+            server.set_succeeded(msg.TestResult(2 * goal.goal), "done here")
+
+        server = SimpleActionServer(name, msg.TestAction, execute)
+        servers.append(server)
+        return server
+
+    yield serve
+    for server in servers:
+        server.stop()
+
+
+def test_goals_from_a_client_in_ros(ros, bridge, serve):
+    serve("from_ros")
+    bridge(actions=["from_ros"])
+    client = ros.start("action_client", "from_ros")
+    ended = [client.ask(str(number)) for number in range(GOALS)]
+    assert ended == [f"{GoalStatus.SUCCEEDED} {2 * number} done here" for number in range(GOALS)]
+    assert client.ask("-5") == "sent"
+    assert client.ask("cancel") == f"{GoalStatus.PREEMPTED} -1 preempted here"
+
+
+def test_our_server_comes_goes_and_its_goals_are_lost_for_a_client_in_ros(ros, bridge, serve):
+    bridge(actions=["coming"])
+    client = ros.start("action_client", "coming", ready=False)
+    server = serve("coming")
+    assert client.read() == "ready"
+    assert client.ask("3") == f"{GoalStatus.SUCCEEDED} 6 done here"
+    server.stop()
+    serve("coming")
+    while client.ask("server?") != "True":
+        pass
+    assert client.ask("4") == f"{GoalStatus.SUCCEEDED} 8 done here"

@@ -1,0 +1,270 @@
+"""The bridge's decisions: bytes, answers, publishers, goals, which names."""
+
+from __future__ import annotations
+
+import contextlib
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from actionlib_core.exceptions import Ros1Error
+from actionlib_core.goal.ports import StatusEntry
+from actionlib_core.goal.states import Status
+from actionlib_core.interfaces import get_action, get_message
+from actionlib_core.wire.presence import Endpoint, Kind
+from actionlib_core.wire.ros1 import answers, frames
+from actionlib_core.wire.ros1.actions import action_type
+from actionlib_core.wire.ros1.answers import Names, SystemState
+from actionlib_core.wire.ros1.goals import GoalsOfClients, GoalsOfServer, Verdict
+from actionlib_core.wire.ros1.node import check_master
+from actionlib_core.wire.ros1.plan import Wanted, make_plan, without
+from actionlib_core.wire.ros1.publishers import Publishers
+from actionlib_core.wire.ros1.sides import Typed, type_of
+
+TEXT = st.text(st.characters(codec="utf-8"), min_size=1).filter(lambda text: "=" not in text)
+
+
+# -- bytes ---------------------------------------------------------------------------------------
+
+
+@given(st.dictionaries(TEXT, st.text(st.characters(codec="utf-8"))))
+def test_a_header_reads_as_it_was_written(fields):
+    raw = frames.pack_header(fields)
+    assert frames.read_length(raw[:4], frames.LARGEST_HEADER) == len(raw) - 4
+    assert frames.unpack_header(raw[4:]) == fields
+
+
+@given(st.binary(max_size=200))
+def test_any_bytes_are_a_header_or_an_error(raw):
+    with contextlib.suppress(ValueError):
+        frames.unpack_header(raw)
+
+
+@pytest.mark.parametrize("raw", [b"", b"\1\0\0", b"\xff\xff\xff\xff"])
+def test_a_length_that_is_cut_or_too_great_is_refused(raw):
+    with pytest.raises(ValueError, match="length"):
+        frames.read_length(raw, 1000)
+
+
+# -- answers -------------------------------------------------------------------------------------
+
+HOSTILE = [None, 0, "x", [], [1], [1, "", [], 4], {}, ["a", "b", "c"], [[1, 2]], [["a", "b"]] * 3]
+
+
+@pytest.mark.parametrize("value", HOSTILE)
+def test_answers_that_are_none_are_errors(value):
+    for read in (answers.read_types, SystemState.read, answers.read_tcpros):
+        with contextlib.suppress(Ros1Error):
+            read("http://robot:1", value)
+    with pytest.raises(Ros1Error):
+        answers.read_answer("http://robot:1", "getPid", value)
+
+
+def test_a_refusal_says_why():
+    with pytest.raises(Ros1Error) as error:
+        answers.read_answer("http://robot:1", "lookupNode", [-1, "unknown node", 0])
+    assert error.value.peer == "http://robot:1"
+    assert "unknown node" in error.value.reason
+    assert answers.read_answer("http://robot:1", "getPid", [1, "", 7]) == 7
+
+
+@pytest.mark.parametrize(
+    "uri", ["", "robot", "http://robot", "http://:1", "http://robot:x", 4, None]
+)
+def test_addresses_that_are_none_are_errors(uri):
+    with pytest.raises(Ros1Error):
+        answers.split_address("/node", uri, "http")
+
+
+def test_a_master_is_named_briefly_or_in_full():
+    assert check_master("robot") == "http://robot:11311"
+    assert check_master("robot:4") == "http://robot:4"
+    assert check_master("http://robot:11311/") == "http://robot:11311"
+    for wrong in ("https://robot:1", "robot:port", "http://"):
+        with pytest.raises(Ros1Error):
+            check_master(wrong)
+
+
+def test_what_is_registered_is_compared_with_what_is_wanted():
+    state = SystemState.read("m", [[["/a", ["/me", "/x"]]], [["/b", ["/x"]]], [["/c", ["/me"]]]])
+    there = answers.registered(state, "/me")
+    assert there == Names(frozenset({"/a"}), frozenset(), frozenset({"/c"}))
+    wanted = Names(frozenset({"/a", "/d"}), frozenset({"/b"}), frozenset())
+    assert wanted - there == Names(frozenset({"/d"}), frozenset({"/b"}), frozenset())
+    assert there - wanted == Names(served=frozenset({"/c"}))
+
+
+# -- publishers ----------------------------------------------------------------------------------
+
+
+def test_an_answer_that_an_update_has_overtaken_is_dropped():
+    publishers = Publishers("http://me/")
+    asked = publishers.ask()
+    assert publishers.update(["http://new/", "http://me/"]).connect == {"http://new/"}
+    assert publishers.answer(asked, ["http://old/"]).connect == frozenset()
+    assert publishers.there == {"http://new/"}
+    change = publishers.answer(publishers.ask(), ["http://old/"])
+    assert (change.connect, change.give_up) == ({"http://old/"}, {"http://new/"})
+
+
+# -- goals ---------------------------------------------------------------------------------------
+
+
+def entry(goal_id, status, text=""):
+    return StatusEntry(goal_id, 0, status, text)
+
+
+def test_a_goal_is_passed_until_the_server_speaks_of_it():
+    goals = GoalsOfServer()
+    assert goals.on_goal("g") is Verdict.PASS
+    goals.on_statuses([entry("g", Status.RECALLING)])
+    assert goals.on_goal("g") is Verdict.PASS
+    goals.on_statuses([entry("g", Status.ACTIVE)])
+    assert goals.on_goal("g") is Verdict.DROP
+    goals.on_statuses([])
+    assert goals.on_goal("g") is Verdict.DROP  # ended long ago: the server would run it again
+    assert goals.on_goal("") is Verdict.PASS
+
+
+def test_a_result_is_sent_again_until_it_is_acknowledged_or_old():
+    goals = GoalsOfServer()
+    goals.on_result(entry("g", Status.SUCCEEDED), b"result", now=0.0)
+    assert goals.on_goal("g") is Verdict.REPEAT_RESULT
+    assert goals.result("g") == b"result"
+    goals.on_acknowledged(["g", "unknown"])
+    assert goals.result("g") is None
+    assert goals.on_goal("g") is Verdict.DROP
+    goals.on_result(entry("h", Status.ABORTED), b"", now=0.0)
+    goals.on_result(entry("i", Status.ABORTED), b"", now=61.0)
+    assert goals.result("h") is None
+
+
+def test_a_final_status_without_a_result_says_that_the_message_was_lost():
+    goals = GoalsOfServer()
+    assert goals.status("g").status == Status.LOST
+    goals.on_statuses([entry("g", Status.ACTIVE, "on my way")])
+    assert goals.status("g").text == "on my way"
+    goals.on_statuses([entry("g", Status.SUCCEEDED, "there")])
+    assert goals.status("g").status == Status.SUCCEEDED
+    assert "result message itself was lost" in goals.status("g").text
+
+
+def test_an_idle_servers_status_is_news_once():
+    goals = GoalsOfServer()
+    assert not goals.on_statuses([])
+    assert goals.on_statuses([entry("g", Status.ACTIVE)])
+    assert goals.on_statuses([])
+    assert not goals.on_statuses([])
+
+
+def test_goals_of_clients_are_sent_again_until_the_server_speaks_of_them():
+    goals = GoalsOfClients()
+    goals.on_goal("g", b"goal", now=0.0)
+    goals.on_goal("", b"without id", now=0.0)
+    assert goals.take_due(0.4).again == []
+    assert goals.take_due(0.5).again == [b"goal"]
+    assert goals.take_due(1.4).again == []
+    assert goals.take_due(1.5).again == [b"goal"]
+    goals.on_status(entry("g", Status.ACTIVE), now=2.0)
+    goals.on_status(entry("stranger", Status.SUCCEEDED), now=2.0)
+    assert goals.next_due() is None
+    goals.on_status(entry("g", Status.SUCCEEDED), now=3.0)
+    assert goals.take_due(3.2) == ([], ["g"])
+    assert goals.on_result("g")
+    assert not goals.on_result("g")  # the answer came beside the message
+    assert goals.next_due() is None
+    assert goals.on_result("stranger")
+
+
+# -- types ---------------------------------------------------------------------------------------
+
+
+def test_the_type_of_an_action_follows_from_those_of_its_topics():
+    def typed(name):
+        found = get_message(name)
+        return Typed(found._type, found._md5sum)
+
+    name = "move_base_msgs/MoveBaseAction"
+    parts = {word: typed(f"{name}{word.title()}") for word in ("goal", "result", "feedback")}
+    assert action_type(parts) == Typed(name, get_action(name)._md5sum)
+    with pytest.raises(Ros1Error):
+        action_type({**parts, "goal": Typed("std_msgs/String", "x")})
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        {},
+        {"type": "std_msgs/String"},
+        {"type": "*", "md5sum": "*"},
+        {"type": "a/B;md5=1", "md5sum": "2"},
+        {"type": "a/B", "md5sum": "2", "callerid": "/smachpy_bridge_1_2"},
+    ],
+)
+def test_headers_without_a_usable_type_are_refused(header):
+    with pytest.raises(Ros1Error):
+        type_of(header, "/topic")
+
+
+# -- which names ---------------------------------------------------------------------------------
+
+ACTION_TOPICS = {
+    "/nav/goal": "m/NavActionGoal",
+    "/nav/cancel": "actionlib_msgs/GoalID",
+    "/nav/status": "actionlib_msgs/GoalStatusArray",
+    "/nav/feedback": "m/NavActionFeedback",
+    "/nav/result": "m/NavActionResult",
+}
+STATE = SystemState(
+    {"/scan": ["/lidar"], "/rosout": ["/lidar"], **{t: ["/nav"] for t in ACTION_TOPICS}},
+    {"/cmd_vel": ["/base"]},
+    {"/clear": ["/nav"], "/nav/get_loggers": ["/nav"]},
+)
+
+
+def end(kind, name):
+    return Endpoint(kind, name.strip("/"), "a/B", "md5", "session", "node")
+
+
+def plan(wanted, ends=(), state=STATE):
+    by_name = {}
+    for each in ends:
+        by_name.setdefault(f"/{each.name}", []).append(each)
+    return make_plan(wanted, by_name, state, ACTION_TOPICS)
+
+
+def test_names_alone_are_bridged_when_they_are_given():
+    made = plan(
+        Wanted({"/nav": "", "/x": "a/XAction"}, frozenset({"/scan"}), frozenset({"/clear", "/y"})),
+        [end(Kind.SUBSCRIBER, "/other"), end(Kind.ACTION_CLIENT, "/more")],
+    )
+    assert made.actions == {"/nav": "m/NavAction", "/x": "a/XAction"}
+    assert made.topics == {"/scan": True}
+    assert made.services == {"/clear": True, "/y": False}
+
+
+def test_what_is_used_here_is_bridged():
+    ends = [
+        end(Kind.SUBSCRIBER, "/scan"),
+        end(Kind.PUBLISHER, "/cmd_vel"),
+        end(Kind.ACTION_CLIENT, "/nav"),
+        end(Kind.SERVICE, "/ours"),
+    ]
+    made = plan(Wanted(used=True), ends)
+    assert made.actions == {"/nav": "m/NavAction"}
+    assert made.topics == {"/scan": True, "/cmd_vel": False}
+    assert made.services == {"/clear": True, "/ours": False}
+    assert plan(Wanted(used=True)).topics == {}
+
+
+def test_all_is_all_but_the_log_and_the_topics_of_actions():
+    made = plan(Wanted(all=True))
+    assert made.actions == {"/nav": "m/NavAction"}
+    assert made.topics == {"/scan": True}
+    assert made.services == {"/clear": True}
+
+
+def test_other_bridges_do_not_count():
+    state = SystemState({"/scan": ["/smachpy_bridge_1_2"], "/odom": ["/base", "/smachpy_bridge_1"]})
+    assert without(state, "/smachpy_bridge_") == SystemState({"/odom": ["/base"]})
