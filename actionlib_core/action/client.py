@@ -589,13 +589,13 @@ class GoalManager:
                 if error is not None and not handle.goal.acknowledged:
                     self._pass(handle, handle.goal.lose(str(error)))
 
-    def on_server_gone(self, server: Server) -> None:
+    def on_server_gone(self, server: Server, why: str = "is gone") -> None:
         """Handle the disappearance of a server."""
         with self.lock:
             if not self._servers.vanish(server):
                 return  # unknown, or of another type
             if self._servers.has_said_farewell(server) or self._server_lost_timeout <= 0:
-                self._lose_goals_of(server, "is gone")
+                self._lose_goals_of(server, why)
             else:
                 until = self.clock.now() + self._server_lost_timeout
                 self._servers.expect_back(server, until)
@@ -666,8 +666,8 @@ class GoalManager:
 
     # -- what arrives about goals --------------------------------------------------------------
 
-    def on_statuses(self, entries: list[StatusEntry], session: str) -> None:
-        """Handle a status list."""
+    def on_statuses(self, entries: list[StatusEntry], session: str, *, whole: bool = True) -> None:
+        """Handle a status list, or with `whole` false a part of one."""
         now = self.clock.now()
         servers, goals = self._servers, self._goals
         if servers.current is None or session in servers.foreign:
@@ -686,7 +686,7 @@ class GoalManager:
                 handle = goals.get(entry.id)
                 if handle is not None and self._believes(session, handle):
                     self._hear(handle, entry, session, now)
-            if len(listed) < len(goals) or not listed.issuperset(goals):
+            if whole and (len(listed) < len(goals) or not listed.issuperset(goals)):
                 answers = servers.current is not None
                 for handle in list(goals.values()):
                     if handle.goal.id not in listed and handle.goal.server in {"", session}:
@@ -770,18 +770,22 @@ class GoalManager:
             status, text = Status.LOST, f"the result cannot be read: {error}"
         self._end(handle, status, text, result, session)
 
-    def on_answer(self, entry: StatusEntry) -> None:
+    def follows(self, goal_id: str) -> bool:
+        """Return whether a goal is followed, and not over."""
+        return goal_id in self._goals
+
+    def on_answer(self, entry: StatusEntry, session: str = "") -> None:
         """Handle a status that was asked for: there is no result, or not yet."""
         handle = self._goals.get(entry.id)
         if handle is None:
             return
         status = _STATUSES.get(entry.status)
         if status in TERMINAL:
-            self._end(handle, status, entry.text, None, "")
+            self._end(handle, status, entry.text, None, session)
             return
         with self.lock:
             if status is not Status.LOST:
-                self._hear(handle, entry, "", self.clock.now())
+                self._hear(handle, entry, session, self.clock.now())
             elif not self._servers.conflict:  # else another server may have it
                 self._pass(handle, handle.goal.on_unknown(entry.text))
 

@@ -103,11 +103,11 @@ class ClientListener(Protocol):
     def on_server(self, server: Any, error: TypeMismatchError | None) -> None:
         """Handle the appearance of a server; `error` when it has another type."""
 
-    def on_server_gone(self, server: Any) -> None:
-        """Handle the disappearance of a server."""
+    def on_server_gone(self, server: Any, why: str = "is gone") -> None:
+        """Handle the disappearance of a server; `why` goes into the text of the goals it had."""
 
-    def on_statuses(self, entries: list[StatusEntry], session: str) -> None:
-        """Handle a list of all goals."""
+    def on_statuses(self, entries: list[StatusEntry], session: str, *, whole: bool = True) -> None:
+        """Handle a list of all goals; without `whole`, of those of which there is news."""
 
     def on_farewell(self, entries: list[StatusEntry], server: Any) -> None:
         """Handle the last list of a server that leaves: the goals it ever took."""
@@ -120,8 +120,11 @@ class ClientListener(Protocol):
     ) -> None:
         """Handle a result; `answered`: it was asked for."""
 
-    def on_answer(self, entry: StatusEntry) -> None:
+    def on_answer(self, entry: StatusEntry, session: str = "") -> None:
         """Handle the answer to `ask` when there is no result to send."""
+
+    def follows(self, goal_id: str) -> bool:
+        """Return whether a goal is followed, and not over."""
 
     def on_stranger(self, session: str) -> None:
         """Report a session that speaks as a server it is not."""

@@ -42,13 +42,23 @@ class Presence(NamedTuple):
 
 
 class Reply(NamedTuple):
-    """An answer to a query; `error` replies carry their text in `payload`."""
+    """An answer to a query.
+
+    Attributes:
+        key: The key that was asked; "" for an error.
+        payload: The bytes; the text of an error.
+        encoding: What the bytes are.
+        error: It says why there is no answer.
+        attachment: What the sender put beside the payload; None when nothing.
+        source: Session id of the sender; "" when unknown.
+    """
 
     key: str
     payload: bytes
     encoding: str
     error: bool
     attachment: bytes | None = None
+    source: str = ""
 
 
 @dataclass(frozen=True, slots=True)

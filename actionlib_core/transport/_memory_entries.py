@@ -424,10 +424,12 @@ class MemoryQuery(Entry):
         session.declared[self] = None
 
     def reply(self, payload: bytes, encoding: str = "", *, attachment: bytes | None = None) -> None:
-        self._reply(Reply(self.key, payload, encoding, error=False, attachment=attachment))
+        source = self.session.session_id
+        self._reply(Reply(self.key, payload, encoding, False, attachment, source))  # noqa: FBT003
 
     def reply_error(self, text: str) -> None:
-        self._reply(Reply(self.key, text.encode(), "", error=True))
+        source = self.session.session_id
+        self._reply(Reply("", text.encode(), "", error=True, source=source))
 
     def _reply(self, reply: Reply) -> None:
         with self.network.lock:

@@ -349,7 +349,7 @@ def test_attachments_go_with_question_and_answer(network):
     network.meet(a, b)
     _, replies, done = ask(network, a, attachment=b"number 1")
     done.wait_for(1)
-    assert replies.items == [Reply("add", b"yes", "", error=False, attachment=b"number 1, again")]
+    assert [reply.attachment for reply in replies.items] == [b"number 1, again"]
     assert seen == [b"number 1"]
     ask(network, a)[2].wait_for(1)
     assert seen == [b"number 1", None]
@@ -387,7 +387,7 @@ def test_query_gets_the_answer_and_one_done(network):
     network.meet(a, b)
     _, replies, done = ask(network, a)
     done.wait_for(1)
-    assert replies.items == [Reply("add", b"yes", "r", error=False)]
+    assert replies.items == [Reply("add", b"yes", "r", error=False, source=b.session_id)]
     assert seen == [("add", b"?", "q")]
     ask(network, a)[2].wait_for(1)
     assert done.items == ["done"]
@@ -480,7 +480,9 @@ def test_error_reply_is_marked(network):
     network.meet(a, b)
     _, replies, done = ask(network, a)
     done.wait_for(1)
-    assert [(r.payload.decode(), r.error) for r in replies.items] == [("no: überlast", True)]
+    assert replies.items == [
+        Reply("", "no: überlast".encode(), "", error=True, source=b.session_id)
+    ]
 
 
 def test_query_ends_at_its_timeout_without_a_reply(network):

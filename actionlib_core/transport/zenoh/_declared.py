@@ -543,13 +543,14 @@ def _is_astray(info: zenoh.SourceInfo | None, mark: int, key: str) -> bool:
 
 def _convert_reply(raw: zenoh.Reply) -> Reply | None:
     """Return an answer; None for zenoh's own note that the time is over."""
-    good = raw.ok
+    good, replier = raw.ok, raw.replier_id
+    source = "" if replier is None else str(replier.zid)
     if good is not None:
         encoding = _convert_encoding(good.encoding)
         attachment = _convert_attachment(good.attachment)
         payload = good.payload.to_bytes()
-        return Reply(str(good.key_expr), payload, encoding, error=False, attachment=attachment)
+        return Reply(str(good.key_expr), payload, encoding, False, attachment, source)  # noqa: FBT003
     bad = raw.err
     if bad is None or str(bad.encoding) != _ERROR:
         return None
-    return Reply("", bad.payload.to_bytes(), "", error=True)
+    return Reply("", bad.payload.to_bytes(), "", error=True, source=source)

@@ -1,0 +1,238 @@
+"""What a client has to ask a ROS 2 server about one goal, and what the answers mean: decides only.
+
+A goal is sent in one request, never blindly repeated. When that ends without an answer, the result
+of the same id is asked for: a server that has the goal keeps that question until the goal ends, one
+that has not says so at once, and only then the goal may be sent again. A server that knows an id
+refuses it, so that a second sending that is refused has to be settled in the same way.
+"""
+
+from __future__ import annotations
+
+import enum
+from typing import TYPE_CHECKING
+
+from actionlib_core.wire.ros2.goal_states import ENDED, CancelCode, GoalCode, to_status
+
+if TYPE_CHECKING:
+    from actionlib_core.goal.states import Status
+
+# A server may forget a goal some time after its end, 10 s by default. Doubt that is settled later
+# than this after the goal was sent is settled no more: it may have run and been forgotten.
+SETTLED_S = 5.0
+
+
+class Phase(enum.Enum):
+    """What is known about where a goal is."""
+
+    HERE = "no server can have it"
+    QUEUED = "it waits for its turn to be sent"
+    SENT = "the answer is awaited"
+    UNSURE = "there was no answer: it may or may not be at the server"
+    TAKEN = "the server has it, or had it"
+
+
+class Step(enum.Flag):
+    """What is to be done next."""
+
+    NOTHING = 0
+    QUEUE = enum.auto()
+    """Send the goal when it is its turn, and call `on_sent` then."""
+    ASK = enum.auto()
+    """Ask for the result; the answer comes when the goal ends."""
+    ASK_LATER = enum.auto()
+    """Call `ask_again` after a pause."""
+    CANCEL = enum.auto()
+    """Ask for its end."""
+    TELL = enum.auto()
+    """Tell the client's goal its `status`."""
+    END = enum.auto()
+    """Hand the result on; it is over."""
+    REFUSED = enum.auto()
+    """It is over: the server has refused it."""
+    RECALLED = enum.auto()
+    """It is over: it was cancelled before any server could have it."""
+    UNKNOWN = enum.auto()
+    """It is over: the server does not know it."""
+    KEEPS_RUNNING = enum.auto()
+    """The server has refused to cancel it."""
+
+
+class GoalExchange:
+    """One goal between its client and a ROS 2 server.
+
+    Args:
+        attached: It was sent in an earlier life of the program: it is asked for and never sent.
+
+    Attributes:
+        phase: See `Phase`.
+        code: The last state the server has told, see `GoalCode`.
+        asking: The question for its result is open.
+        sent_at: When it was last sent [s, clock].
+
+    Threads: none of its own, no lock; the owner calls it under its lock.
+    """
+
+    __slots__ = (
+        "_attached",
+        "_cancel_refused",
+        "_cancel_wanted",
+        "_cancelling",
+        "_refused",
+        "_sendings",
+        "_was_active",
+        "asking",
+        "code",
+        "phase",
+        "sent_at",
+    )
+
+    def __init__(self, *, attached: bool = False) -> None:
+        self.phase = Phase.TAKEN if attached else Phase.HERE
+        self.code = GoalCode.UNKNOWN
+        self.asking = False
+        self.sent_at = 0.0
+        self._attached = attached
+        self._sendings = 0
+        self._refused = False
+        self._was_active = False
+        self._cancel_wanted = False
+        self._cancelling = False
+        self._cancel_refused = False
+
+    @property
+    def status(self) -> Status:
+        """What a ROS 1 client would be told."""
+        return to_status(self.code, was_active=self._was_active)
+
+    # -- sending -------------------------------------------------------------------------------
+
+    def want(self) -> Step:
+        """Take the wish that the goal reaches the server, made again while nothing is known."""
+        if self.phase is Phase.HERE:
+            self.phase = Phase.QUEUED
+            return Step.QUEUE
+        return self.ask_again() if self.phase is Phase.UNSURE else Step.NOTHING
+
+    def on_sent(self, now: float) -> None:
+        """Note that the request goes out."""
+        self.phase = Phase.SENT
+        self.sent_at = now
+        self._sendings += 1
+
+    def on_answer(self, *, accepted: bool) -> Step:
+        """Take the answer to the request."""
+        if accepted:
+            return self._take(GoalCode.ACCEPTED)
+        if self.phase is Phase.TAKEN:  # the refusal of a repetition
+            return Step.NOTHING
+        if self._sendings == 1:
+            return Step.REFUSED
+        self._refused = True
+        self.phase = Phase.UNSURE
+        return self.ask_again()
+
+    def on_unanswered(self) -> Step:
+        """Take the end of the request without an answer."""
+        if self.phase is not Phase.SENT:
+            return Step.NOTHING
+        self.phase = Phase.UNSURE
+        return self.ask_again()
+
+    # -- what the server says of it --------------------------------------------------------------
+
+    def on_state(self, code: int) -> Step:
+        """Take its state from the list that the server publishes."""
+        return self._take(code) if code in _STATES else Step.NOTHING
+
+    def on_feedback(self) -> Step:
+        """Take feedback, which shows that it runs."""
+        return self._take(max(self.code, GoalCode.EXECUTING))
+
+    def _take(self, code: int) -> Step:
+        step = Step.NOTHING
+        if self.phase is not Phase.TAKEN:
+            self.phase = Phase.TAKEN
+            step |= self.ask_again()
+            if self._cancel_wanted and not self._cancelling:
+                self._cancelling = True
+                step |= Step.CANCEL
+        if code > self.code:  # one that was overtaken says nothing new
+            self.code = GoalCode(code)
+            self._was_active = self._was_active or self.code is GoalCode.EXECUTING
+            step |= Step.TELL
+        return step
+
+    # -- the result ------------------------------------------------------------------------------
+
+    def ask_again(self) -> Step:
+        """Return whether to ask for the result now."""
+        if self.asking or self.phase not in {Phase.UNSURE, Phase.TAKEN}:
+            return Step.NOTHING
+        self.asking = True
+        return Step.ASK
+
+    def on_result(self, code: int, now: float) -> Step:
+        """Take the answer to the question for the result."""
+        self.asking = False
+        if code in ENDED:
+            self.code = GoalCode(code)
+            return Step.END
+        if code != GoalCode.UNKNOWN:
+            return self.on_state(code) | Step.ASK_LATER
+        if self.phase is Phase.TAKEN or now > self.sent_at + SETTLED_S:
+            return Step.UNKNOWN
+        if self._refused:
+            return Step.REFUSED
+        self.phase = Phase.HERE
+        if self._cancel_wanted:
+            return Step.RECALLED
+        return self.want()
+
+    def on_no_result(self) -> Step:
+        """Take the end of that question without an answer."""
+        self.asking = False
+        return Step.ASK_LATER
+
+    # -- its cancel ------------------------------------------------------------------------------
+
+    def cancel(self, *, again: bool = False) -> Step:
+        """Take the wish that it ends; `again`: nobody wished it anew, it is only repeated."""
+        if self.phase in {Phase.HERE, Phase.QUEUED} and not self._attached:
+            return Step.RECALLED
+        self._cancel_wanted = True
+        if self.phase is not Phase.TAKEN or self._cancelling or self.code >= GoalCode.CANCELING:
+            return Step.NOTHING
+        if again and self._cancel_refused:
+            return Step.NOTHING
+        self._cancelling = True
+        return Step.CANCEL
+
+    def on_cancel_answer(self, code: int, *, listed: bool) -> Step:
+        """Take the answer to a cancel.
+
+        Args:
+            code: See `CancelCode`. It is 0 also where a server has refused and listed nothing.
+            listed: The goal is among those that the server says are canceling.
+        """
+        self._cancelling = False
+        if listed:
+            return self._take(GoalCode.CANCELING)
+        if code in {CancelCode.UNKNOWN_GOAL, CancelCode.GOAL_TERMINATED}:
+            return Step.NOTHING  # the answer to the question for the result says what it is
+        self._cancel_refused = True
+        return Step.KEEPS_RUNNING
+
+    def on_no_cancel_answer(self) -> None:
+        """Take the end of a cancel without an answer: it may be repeated."""
+        self._cancelling = False
+
+    def on_link_lost(self) -> None:
+        """Take the loss of the server: what was asked is answered no more."""
+        self.asking = self._cancelling = False
+        if self.phase is Phase.SENT:
+            self.phase = Phase.UNSURE
+        elif self.phase is Phase.QUEUED:
+            self.phase = Phase.HERE
+
+
+_STATES = frozenset(code.value for code in GoalCode if code is not GoalCode.UNKNOWN)
