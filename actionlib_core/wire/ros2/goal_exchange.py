@@ -111,7 +111,9 @@ class GoalExchange:
         if self.phase is Phase.HERE:
             self.phase = Phase.QUEUED
             return Step.QUEUE
-        return self.ask_again() if self.phase is Phase.UNSURE else Step.NOTHING
+        if self.phase is Phase.TAKEN:
+            return Step.TELL if self.code else Step.NOTHING  # it was told while nobody was there
+        return self.ask_again()
 
     def on_sent(self, now: float) -> None:
         """Note that the request goes out."""

@@ -252,7 +252,7 @@ class ActionServers:
     a server whose tokens differ from ours in either is reported with what differs.
 
     Args:
-        name: The action's full name.
+        name: The action's full name there.
         parts: The types of the five ends, in the order of `names.ActionNames`.
 
     Threads: none of its own, no lock; the owner calls it under its lock.
@@ -261,13 +261,14 @@ class ActionServers:
     def __init__(
         self, name: str, parts: tuple[RosType, RosType, RosType, RosType, RosType]
     ) -> None:
+        self.name = name
         names = action_names(name)
         self._types = dict(zip(names, parts, strict=True))
         services = (names.send_goal, names.cancel_goal, names.get_result)
         self._kinds = {part: Kind.SERVICE if part in services else Kind.PUBLISHER for part in names}
         self._seen: dict[tuple[str, int], set[Token]] = {}
         self._servers: dict[tuple[str, int], RosServer] = {}
-        self._numbers = itertools.count()
+        self._numbers: dict[tuple[str, int], int] = {}
 
     def __len__(self) -> int:
         return len(self._servers)
@@ -289,7 +290,8 @@ class ActionServers:
             return None
         if not complete:
             return ServerChange(self._servers.pop(which), alive=False)
-        server = RosServer(token.session, token.full_node, token.node_id, next(self._numbers))
+        number = self._numbers.setdefault(which, len(self._numbers))  # one that returns is the same
+        server = RosServer(token.session, token.full_node, token.node_id, number)
         self._servers[which] = server
         return ServerChange(server, alive=True, mismatches=self._mismatches(seen))
 

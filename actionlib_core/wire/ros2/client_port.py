@@ -1,0 +1,628 @@
+"""An action client's end of ROS 2's wire: three service clients and two subscriptions.
+
+What is to be asked about a goal `GoalExchange` decides; here are the requests, the tokens of the
+servers, and what is told of all this to the client. Acknowledgements and farewells do not exist
+there: a server keeps a result as long as its own `result_timeout` says.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import deque
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from actionlib_core.exceptions import ActionlibError, TransportError, TypeMismatchError
+from actionlib_core.goal.ports import StatusEntry
+from actionlib_core.goal.states import Status
+from actionlib_core.interfaces import ros2_action
+from actionlib_core.wire.bursts import Bursts
+from actionlib_core.wire.readable import Readable
+from actionlib_core.wire.ros2.action_messages import (
+    Asked,
+    pack_cancel,
+    pack_id,
+    pack_with_id,
+    status_in,
+    unpack_accepted,
+    unpack_canceling,
+    unpack_statuses,
+    unpack_with_id,
+)
+from actionlib_core.wire.ros2.goal_exchange import GoalExchange, Step
+from actionlib_core.wire.ros2.goal_states import CancelCode
+from actionlib_core.wire.ros2.graph import ActionServers
+from actionlib_core.wire.ros2.link_probe import LinkProbe
+from actionlib_core.wire.ros2.names import (
+    DEFAULT,
+    LATCHED,
+    NO_GOAL,
+    Kind,
+    action_names,
+    goal_uuid,
+)
+from actionlib_core.wire.ros2.network import ros_network
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.goal.ports import ClientListener
+    from actionlib_core.node import Node
+    from actionlib_core.transport import Closable, Reply, Sample
+    from actionlib_core.wire.action_messages import ActionTypes
+    from actionlib_core.wire.ros2.action_messages import Canceling
+    from actionlib_core.wire.ros2.graph import End, RosServer, ServerChange
+    from actionlib_core.wire.ros2.names import Token
+
+T = TypeVar("T")
+
+log = logging.getLogger(__name__)
+
+FOREVER_S = 1e8  # for the network, which wants a number: three years
+AT_ONCE = 8  # goals on their way: a ROS 2 server's queue holds 10 requests and drops the oldest
+PAUSE_S = 0.1  # before a question that was not answered is asked again; then twice as long
+LONGEST_S = 2.0
+
+TEXT_REFUSED = "the server refused the goal"
+TEXT_RECALLED = "This goal was canceled before any action server could have it"
+TEXT_UNKNOWN = "the action server does not know this goal: it has restarted or forgotten it"
+
+
+class _Goal:
+    """A goal and what is under way for it."""
+
+    __slots__ = ("body", "exchange", "id", "on_asked", "pause", "question", "server", "uuid")
+
+    def __init__(self, goal_id: str, body: bytes, server: str, *, attached: bool = False) -> None:
+        self.id = goal_id
+        self.uuid = goal_uuid(goal_id)
+        self.body = body
+        self.server = server
+        self.exchange = GoalExchange(attached=attached)
+        self.pause = PAUSE_S
+        self.on_asked: list[Callable[[], None]] = []
+        self.question: Closable | None = None  # the open one for its result
+
+
+class RosClientPort:
+    """Declares the ends of an action client on a ROS 2 network and speaks through them.
+
+    Args:
+        node: On whose network.
+        name: The action's full name here.
+        types: Its message classes.
+        spawn: Starts a named thread for a burst of feedback.
+
+    Raises:
+        ConfigError: no network of ROS 2 has the name.
+        InterfaceError: the network's distribution does not define the action.
+        TransportError: the network cannot be joined.
+
+    Blocks: the first time on a network, until it is joined.
+
+    Threads: any. The listener is called on the network's threads; feedback that comes in a burst is
+        handed on in a thread of its own.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        name: str,
+        types: ActionTypes,
+        spawn: Callable[[Callable[[], object], str], object],
+    ) -> None:
+        self._network = network = ros_network(node, name)
+        self._clock = node.clock
+        self._name = name
+        self._types = types
+        self._parts = parts = ros2_action(types.action, network.settings.distro)
+        name_there = network.name(name)
+        names = action_names(name_there)
+        send, cancel, result, feedback, status = (
+            network.type(part.type, part.hash)
+            for part in (
+                parts.send_goal,
+                parts.cancel_goal,
+                parts.get_result,
+                parts.feedback,
+                parts.status,
+            )
+        )
+        end = network.ros.end
+        self._send = end(Kind.CLIENT, names.send_goal, send)
+        self._cancel = end(Kind.CLIENT, names.cancel_goal, cancel)
+        self._result = end(Kind.CLIENT, names.get_result, result)
+        self._feedback_end = end(Kind.SUBSCRIPTION, names.feedback, feedback, DEFAULT)
+        self._status_end = end(Kind.SUBSCRIPTION, names.status, status, LATCHED)
+        self._servers = ActionServers(name_there, (send, cancel, result, feedback, status))
+        self._lock = threading.Lock()
+        self._closed = False
+        self._declared: list[Closable] = []
+        self._questions: set[Closable] = set()
+        self._goals: dict[str, _Goal] = {}
+        self._by_uuid: dict[bytes, _Goal] = {}
+        self._queue: deque[_Goal] = deque()
+        self._on_their_way = 0
+        self._there: dict[RosServer, TypeMismatchError | None] = {}
+        self._silent: set[RosServer] = set()
+        self._has_status = False
+        self._probe = LinkProbe(
+            node.clock,
+            network.settings.probe,
+            self._subscribe_to_status,
+            lambda: bool(self._has_status and (self._goals or self._silent)),
+            self._on_silent,
+        )
+        self._readable = Readable(log)
+        self._feedback: Bursts[Sample] = Bursts(node.clock, spawn, self._on_feedback)
+
+    def open(self, listener: ClientListener) -> None:
+        self._listener = listener
+        subscribe = self._network.transport.subscribe
+        ends = (self._send, self._cancel, self._result, self._feedback_end, self._status_end)
+        self._declared = [
+            self._subscribe_to_status(),
+            subscribe(self._feedback_end.key, self._feedback.take, history=False),
+            *ends,
+            self._network.ros.watch_action(self._servers.name, self._on_token),
+        ]
+        for end in ends:
+            end.show()
+
+    def _subscribe_to_status(self) -> Closable:
+        return self._network.transport.subscribe(self._status_end.key, self._on_status, cached=1)
+
+    def close(self) -> None:
+        self._probe.close()
+        with self._lock:
+            declared = [*self._declared, *self._questions]
+            self._declared, self._questions = [], set()
+            self._closed = True
+        for entry in reversed(declared):
+            entry.close()
+
+    # -- what the client wants -----------------------------------------------------------------
+
+    def is_heard(self) -> bool:
+        return any(error is None for error in self._there.values())
+
+    def pack_goal(self, goal: Any) -> bytes:
+        body: bytes = goal.to_cdr()
+        return body
+
+    def read_feedback(self, body: bytes) -> Any:
+        return self._parts.feedback.message.from_cdr(body).feedback
+
+    def read_result(self, body: bytes) -> Any:
+        if not body:  # a goal that never began
+            return self._types.result()
+        return self._parts.get_result.response.from_cdr(body).result
+
+    def send_goal(
+        self,
+        goal_id: str,
+        stamp_ns: int,  # noqa: ARG002  the server stamps it
+        body: bytes,
+        server: RosServer | None,
+        *,
+        wait: bool = True,  # noqa: ARG002  a request is not dropped
+    ) -> None:
+        """See to it that a goal reaches the server, unless that is under way.
+
+        Raises:
+            TransportError: the client is stopped.
+        """
+        with self._lock:
+            if self._closed:
+                raise TransportError(f"action '{self._name}': the client is stopped.")
+            goal = self._goals.get(goal_id)
+            if goal is None:
+                goal = self._keep(_Goal(goal_id, body, server.session if server else ""))
+            step = goal.exchange.want()
+        self._do(goal, step)
+
+    def send_cancel(self, goal_id: str, stamp_ns: int, *, wait: bool = True) -> None:
+        if not goal_id:
+            self._cancel_many(stamp_ns)
+            return
+        with self._lock:
+            goal = self._goals.get(goal_id)
+            if goal is None:
+                goal = self._keep(_Goal(goal_id, b"", "", attached=True))
+            step = goal.exchange.cancel(again=not wait)
+        self._do(goal, step)
+
+    def _cancel_many(self, stamp_ns: int) -> None:
+        def on_answer(answer: Canceling, _: Reply) -> None:
+            for uuid, _ in answer.goals:
+                goal = self._by_uuid.get(uuid)
+                if goal is not None:
+                    with self._lock:
+                        step = goal.exchange.on_cancel_answer(CancelCode.NONE, listed=True)
+                    self._do(goal, step)
+
+        request = pack_cancel(Asked(NO_GOAL, stamp_ns))
+        self._ask(self._cancel, request, unpack_canceling, on_answer)
+
+    def acknowledge(self, goal_ids: list[str], *, farewell: bool = False) -> None:
+        """Say nothing: ROS 2 has no acknowledgements."""
+
+    def ask(self, goal_id: str, on_done: Callable[[], None]) -> None:
+        with self._lock:
+            goal = self._goals.get(goal_id)
+            if goal is None:
+                goal = self._keep(_Goal(goal_id, b"", "", attached=True))
+            step = goal.exchange.ask_again()
+            waits = goal.exchange.asking
+            if waits:
+                goal.on_asked.append(on_done)
+        if not waits:
+            on_done()
+        self._do(goal, step)
+
+    def _keep(self, goal: _Goal) -> _Goal:
+        """Keep a new goal. Needs the lock."""
+        self._goals[goal.id] = self._by_uuid[goal.uuid] = goal
+        goal.server = goal.server or next((server.session for server in self._there), "")
+        return goal
+
+    def _drop(self, goal: _Goal) -> None:
+        """Forget a goal that is over, or that nobody follows any more."""
+        with self._lock:
+            self._goals.pop(goal.id, None)
+            self._by_uuid.pop(goal.uuid, None)
+            if goal in self._queue:
+                self._queue.remove(goal)
+            question, goal.question = goal.question, None
+        if question is not None:
+            question.close()
+
+    # -- what is decided -----------------------------------------------------------------------
+
+    def _do(self, goal: _Goal, step: Step) -> None:
+        """Do what `GoalExchange` has decided."""
+        if Step.TELL in step:
+            self._tell(goal)
+        if Step.QUEUE in step:
+            self._enqueue(goal)
+        if Step.ASK in step:
+            self._ask_result(goal)
+        if Step.ASK_LATER in step:
+            self._clock.call_later(goal.pause, partial(self._ask_again, goal))
+            goal.pause = min(2 * goal.pause, LONGEST_S)
+        if Step.CANCEL in step:
+            self._ask_cancel(goal)
+        if Step.KEEPS_RUNNING in step:
+            log.warning("action '%s': the server refused to cancel goal %s", self._name, goal.id)
+        for end, status, text in _ENDS:
+            if end in step:
+                self._end(goal, status, text)
+
+    def _tell(self, goal: _Goal) -> None:
+        """Tell the client's goal where it stands."""
+        if not self._there:  # who speaks without a server would count as one
+            return
+        status = goal.exchange.status
+        tell = partial(self._listener.on_statuses, session=goal.server, whole=False)
+        if status is Status.RECALLING:  # which says nothing of a goal that was not heard of before
+            tell([StatusEntry(goal.id, 0, Status.PENDING, "")])
+        tell([StatusEntry(goal.id, 0, status, "")])
+
+    def _end(self, goal: _Goal, status: Status, text: str) -> None:
+        self._drop(goal)
+        entry = StatusEntry(goal.id, 0, status, text)
+        if status is Status.LOST:
+            self._listener.on_answer(entry, goal.server)
+        else:
+            self._listener.on_result(entry, b"", goal.server, answered=True)
+
+    def _enqueue(self, goal: _Goal) -> None:
+        """Send a goal when it is its turn, if the client still wants it."""
+        if not self._listener.follows(goal.id):
+            self._drop(goal)
+            return
+        with self._lock:
+            self._queue.append(goal)
+        self._probe.watch()
+        self._send_next()
+
+    def _send_next(self) -> None:
+        """Send goals that wait, as long as few are on their way."""
+        while True:
+            with self._lock:
+                if not self._queue or self._on_their_way >= AT_ONCE or self._closed:
+                    return
+                goal = self._queue.popleft()
+                self._on_their_way += 1
+                goal.exchange.on_sent(self._clock.now())
+            self._ask(
+                self._send,
+                pack_with_id(goal.uuid, goal.body),
+                unpack_accepted,
+                partial(self._on_sent_answer, goal),
+                partial(self._on_sent_done, goal),
+            )
+
+    def _on_sent_answer(self, goal: _Goal, stamp_ns: int | None, reply: Reply) -> None:
+        with self._lock:
+            self._note_sender(goal, reply.source)
+            step = goal.exchange.on_answer(accepted=stamp_ns is not None)
+        self._do(goal, step)
+
+    def _on_sent_done(self, goal: _Goal, answered: bool) -> None:
+        with self._lock:
+            self._on_their_way -= 1
+            step = Step.NOTHING if answered else goal.exchange.on_unanswered()
+        self._do(goal, step)
+        self._send_next()
+
+    def _ask_result(self, goal: _Goal) -> None:
+        self._probe.watch()
+        question = self._ask(
+            self._result,
+            pack_id(goal.uuid),
+            status_in,
+            partial(self._on_result, goal),
+            partial(self._on_result_done, goal),
+        )
+        with self._lock:
+            if question in self._questions and goal.exchange.asking:
+                goal.question = question
+
+    def _on_result(self, goal: _Goal, code: int, reply: Reply) -> None:
+        self._feedback.flush()
+        with self._lock:
+            step = goal.exchange.on_result(code, self._clock.now())
+            status = goal.exchange.status
+        if Step.END not in step:
+            self._do(goal, step)
+            return
+        self._drop(goal)
+        entry = StatusEntry(goal.id, 0, status, "")
+        session = reply.source or goal.server
+        self._listener.on_result(entry, reply.payload, session, answered=True)
+
+    def _on_result_done(self, goal: _Goal, answered: bool) -> None:
+        with self._lock:
+            goal.question = None
+            told, goal.on_asked = goal.on_asked, []
+            step = Step.NOTHING if answered else goal.exchange.on_no_result()
+        for on_done in told:
+            on_done()
+        self._do(goal, step)
+
+    def _ask_again(self, goal: _Goal) -> None:
+        """Ask once more for a result, if somebody is there to answer."""
+        with self._lock:
+            known = not self._closed and self._goals.get(goal.id) is goal
+            step = goal.exchange.ask_again() if known and self._there else Step.NOTHING
+        if step and not self._listener.follows(goal.id):
+            self._drop(goal)
+        else:
+            self._do(goal, step)
+
+    def _ask_cancel(self, goal: _Goal) -> None:
+        self._ask(
+            self._cancel,
+            pack_cancel(Asked(goal.uuid, 0)),
+            unpack_canceling,
+            partial(self._on_cancel_answer, goal),
+            partial(self._on_cancel_done, goal),
+        )
+
+    def _on_cancel_answer(self, goal: _Goal, answer: Canceling, _: Reply) -> None:
+        listed = any(uuid == goal.uuid for uuid, _ in answer.goals)
+        with self._lock:
+            step = goal.exchange.on_cancel_answer(answer.code, listed=listed)
+        self._do(goal, step)
+
+    def _on_cancel_done(self, goal: _Goal, answered: bool) -> None:
+        with self._lock:
+            if not answered:
+                goal.exchange.on_no_cancel_answer()
+        if not self._listener.follows(goal.id):
+            self._drop(goal)
+
+    # -- requests ------------------------------------------------------------------------------
+
+    def _ask(
+        self,
+        end: End,
+        request: bytes,
+        read: Callable[[bytes], T],
+        on_answer: Callable[[T, Reply], object],
+        on_done: Callable[[bool], object] = bool,
+    ) -> Closable | None:
+        """Ask one server.
+
+        A request has an attachment of its own, so that no two are alike.
+
+        Args:
+            end: Our end of the service.
+            request: The request.
+            read: Reads an answer; raises ValueError.
+            on_answer: Gets the first answer that can be read.
+            on_done: Gets, in the end, whether there was one.
+
+        Returns:
+            The question; None when it could not be asked, of which `on_done` has heard.
+        """
+        answered: list[bool] = []
+        asked: list[Closable] = []
+        over: list[bool] = []
+
+        def take(reply: Reply) -> None:
+            self._hear()
+            if answered or self._closed:
+                return
+            if reply.error:
+                self._report("an answer", reply.payload.decode(errors="replace"))
+                return
+            try:
+                answer = read(reply.payload)
+            except ValueError as error:
+                self._report("an answer", error)
+                return
+            answered.append(True)
+            on_answer(answer, reply)
+
+        def done() -> None:
+            with self._lock:
+                over.append(True)
+                self._questions.difference_update(asked)
+            if not self._closed:
+                on_done(bool(answered))
+
+        try:
+            question = self._network.transport.query(
+                end.key,
+                request,
+                attachment=end.attachment(),
+                best=True,
+                timeout=FOREVER_S,
+                on_reply=take,
+                on_done=done,
+            )
+        except TransportError as error:
+            self._readable.report("ask", error)
+            done()
+            return None
+        with self._lock:
+            asked.append(question)
+            if not over:
+                self._questions.add(question)
+        return question
+
+    def _report(self, what: str, error: object) -> None:
+        """Report a message that is dropped; once of a kind, a server may go on like this."""
+        text = f"action '{self._name}': {what} cannot be read: {error}"
+        self._readable.report(what, ActionlibError(text))
+
+    # -- topics --------------------------------------------------------------------------------
+
+    def _on_status(self, sample: Sample) -> None:
+        self._feedback.flush()
+        self._has_status = True
+        self._hear()
+        try:
+            states = unpack_statuses(sample.payload)
+        except ValueError as error:
+            self._report("a status", error)
+            return
+        steps = []
+        with self._lock:
+            for uuid, _, code in states:
+                goal = self._by_uuid.get(uuid)
+                if goal is not None and code > goal.exchange.code:
+                    self._note_sender(goal, sample.source)
+                    steps.append((goal, goal.exchange.on_state(code)))
+        for goal, step in steps:
+            self._do(goal, step)
+
+    def _on_feedback(self, sample: Sample) -> None:
+        self._hear()
+        try:
+            uuid, _ = unpack_with_id(sample.payload)
+        except ValueError as error:
+            self._report("feedback", error)
+            return
+        with self._lock:
+            goal = self._by_uuid.get(uuid)
+            if goal is None:
+                return
+            self._note_sender(goal, sample.source)
+            step = goal.exchange.on_feedback()
+            status = goal.exchange.status
+        self._do(goal, step)
+        entry = StatusEntry(goal.id, 0, status, "")
+        self._listener.on_feedback(entry, sample.payload, goal.server)
+
+    def _note_sender(self, goal: _Goal, session: str) -> None:
+        """Note which of several servers has a goal, where that is known. Needs the lock."""
+        if any(server.session == session for server in self._there):
+            goal.server = session
+
+    # -- servers -------------------------------------------------------------------------------
+
+    def _on_token(self, token: Token, key: str, alive: bool) -> None:  # noqa: ARG002
+        with self._lock:
+            change = self._servers.on_token(token, alive=alive)
+            if change is None:
+                return
+            server, error = change.server, self._explain(change)
+            self._silent.discard(server)
+            if change.alive:
+                self._there[server] = error
+                for goal in self._goals.values():
+                    goal.server = goal.server or server.session
+            else:
+                self._there.pop(server, None)
+        if not change.alive:
+            self._lose(server, "is gone")
+            return
+        self._hear()
+        if error is not None:
+            self._readable.report(f"{server.session} {server.node}", error)
+        self._listener.on_server(server, error)
+
+    def _explain(self, change: ServerChange) -> TypeMismatchError | None:
+        """Return what is wrong with the types of a server; None when nothing is."""
+        if not change.mismatches:
+            return None
+        first = change.mismatches[0]
+        own, found = (first.own.name, first.own.hash), (first.found.name, first.found.hash)
+        return TypeMismatchError(
+            self._name, own, found, by=f"action server of node {change.server.node!r}"
+        )
+
+    def _lose(self, server: RosServer, why: str) -> None:
+        """Take the loss of a server: what was asked there is answered no more."""
+        self._feedback.flush()
+        self._listener.on_server_gone(server, why)
+        with self._lock:
+            mine = [g for g in self._goals.values() if g.server in {"", server.session}]
+            questions = [goal.question for goal in mine if goal.question is not None]
+            told = [on_done for goal in mine for on_done in goal.on_asked]
+            for goal in mine:
+                goal.question = None
+                goal.on_asked.clear()
+                goal.exchange.on_link_lost()
+                if goal in self._queue:
+                    self._queue.remove(goal)
+            self._questions.difference_update(questions)
+        for question in questions:
+            question.close()
+        for on_done in told:
+            on_done()
+        for goal in mine:
+            if not self._listener.follows(goal.id):
+                self._drop(goal)
+
+    def _hear(self) -> None:
+        """Note that a server was heard; those that had been silent are there again."""
+        self._probe.hear()
+        if not self._silent:
+            return
+        with self._lock:
+            back, self._silent = self._silent, set()
+            self._there.update(dict.fromkeys(back))
+        for server in back:
+            self._listener.on_server(server, None)
+
+    def _on_silent(self, seconds: float) -> None:
+        """Give up servers that do not answer, although their tokens are there."""
+        with self._lock:
+            silent = [server for server, error in self._there.items() if error is None]
+            self._silent.update(silent)
+            for server in silent:
+                del self._there[server]
+        for server in silent:
+            self._lose(server, f"has not been heard for {seconds:.1f} s")
+
+
+_ENDS = (
+    (Step.REFUSED, Status.REJECTED, TEXT_REFUSED),
+    (Step.RECALLED, Status.RECALLED, TEXT_RECALLED),
+    (Step.UNKNOWN, Status.LOST, TEXT_UNKNOWN),
+)
