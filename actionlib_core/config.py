@@ -31,7 +31,7 @@ ROUTER_ENDPOINT = "tcp/127.0.0.1:7447"
 PROBE_S = 5.0  # a ROS 2 server whose tokens are there is asked this often whether it is alive
 
 Mode = Literal["peer", "client", "router"]
-Distro = Literal["humble", "jazzy", "kilted", "rolling"]
+Distro = Literal["humble", "jazzy", "kilted", "lyrical", "rolling"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,7 +34,7 @@ from actionlib_core.node import get_node
 from actionlib_core.shutdown import current_shutdown
 from actionlib_core.time import Time
 from actionlib_core.wire.action_messages import ActionTypes
-from actionlib_core.wire.client_port import ActionClientPort
+from actionlib_core.wire.ports import make_client_port
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
@@ -958,7 +958,7 @@ class ActionClient(Generic[A_co]):
         self.manager = GoalManager(
             self.node,
             self.ns,
-            ActionClientPort(self.node, self.ns, self.types, callbacks.spawn),
+            make_client_port(self.node, self.ns, self.types, callbacks.spawn),
             callbacks,
             server_lost_timeout=grace,
             status_list_timeout=silence,

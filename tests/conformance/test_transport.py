@@ -547,6 +547,32 @@ def test_closed_query_calls_nothing(network):
     assert (replies.items, done.items) == ([], [])
 
 
+def test_query_may_be_closed_by_its_own_answer(network):
+    a, b = network.session(), network.session()
+
+    def answer(query):
+        query.reply(b"1")
+        query.reply(b"2")
+        query.finish()
+
+    b.queryable("add", answer)
+    network.meet(a, b)
+    replies, done, handles = network.inbox(), network.inbox(), []
+    handed_over = network.clock.event()
+
+    def on_reply(reply):
+        handed_over.wait(5.0)
+        handles[0].close()
+        replies(reply)
+
+    on_done = lambda: done("done")  # noqa: E731
+    handles.append(a.query("add", b"", timeout=5.0, on_reply=on_reply, on_done=on_done))
+    handed_over.set()
+    assert payloads(replies.wait_for(1)) == [b"1"]
+    ask(network, a)[2].wait_for(1)
+    assert (payloads(replies.items), done.items) == ([b"1"], [])
+
+
 def test_closed_queryable_is_not_asked(network):
     a, b = network.session(), network.session()
     asked = network.inbox()

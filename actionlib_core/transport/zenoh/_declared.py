@@ -455,6 +455,7 @@ class Asking(Declared):
         super().__init__(transport)
         self._on_reply = on_reply
         self._on_done = on_done
+        self._replying: int | None = None  # thread that is in the callback
         # Dropped when it is over: the token knows the callbacks, which know this object.
         self.token: zenoh.CancellationToken | None = zenoh.CancellationToken()
 
@@ -467,7 +468,11 @@ class Asking(Declared):
     def _deliver(self, raw: zenoh.Reply) -> None:
         reply = _convert_reply(raw)
         if reply is not None:
-            self._on_reply(reply)
+            self._replying = get_ident()
+            try:
+                self._on_reply(reply)
+            finally:
+                self._replying = None
 
     def _finish(self, _: None) -> None:
         self.token = None
@@ -478,8 +483,15 @@ class Asking(Declared):
         self._inlet.closed = True
         token, self.token = self.token, None
         if self._transport.forget(self) and token is not None:
-            with inside:
-                token.cancel()  # type: ignore[no-untyped-call]  # zenoh's stub
+            if self._replying == get_ident():  # zenoh waits for our callback, which is this one
+                self._transport.loopback.submit(partial(_cancel, token))
+            else:
+                _cancel(token)
+
+
+def _cancel(token: zenoh.CancellationToken) -> None:
+    with inside:
+        token.cancel()  # type: ignore[no-untyped-call]  # zenoh's stub
 
 
 class Watcher(Declared):

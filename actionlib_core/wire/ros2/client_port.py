@@ -235,7 +235,7 @@ class RosClientPort:
 
     def _cancel_many(self, stamp_ns: int) -> None:
         def on_answer(answer: Canceling, _: Reply) -> None:
-            for uuid, _ in answer.goals:
+            for uuid, _stamp in answer.goals:
                 goal = self._by_uuid.get(uuid)
                 if goal is not None:
                     with self._lock:
