@@ -67,12 +67,16 @@ LONGEST_S = 2.0
 TEXT_REFUSED = "the server refused the goal"
 TEXT_RECALLED = "This goal was canceled before any action server could have it"
 TEXT_UNKNOWN = "the action server does not know this goal: it has restarted or forgotten it"
+TEXT_UNSETTLED = (
+    "the answer to this goal was lost, and the action server does not know it now: it may or may "
+    "not have run"
+)
 
 
 class _Goal:
     """A goal and what is under way for it."""
 
-    __slots__ = ("body", "exchange", "id", "on_asked", "pause", "question", "server", "uuid")
+    __slots__ = ("body", "exchange", "id", "on_asked", "open", "pause", "server", "uuid")
 
     def __init__(self, goal_id: str, body: bytes, server: str, *, attached: bool = False) -> None:
         self.id = goal_id
@@ -82,7 +86,38 @@ class _Goal:
         self.exchange = GoalExchange(attached=attached)
         self.pause = PAUSE_S
         self.on_asked: list[Callable[[], None]] = []
-        self.question: Closable | None = None  # the open one for its result
+        self.open: dict[End, Closable] = {}  # its questions that are not answered yet
+
+
+class _Question:
+    """A request on its way: its first answer that can be read counts.
+
+    Args:
+        read: Reads an answer; raises ValueError.
+        on_answer: Gets what was read, and the answer.
+    """
+
+    __slots__ = ("_on_answer", "_read", "answered", "over")
+
+    def __init__(self, read: Callable[[bytes], T], on_answer: Callable[[T, Reply], object]) -> None:
+        self._read = read
+        self._on_answer: Callable[[Any, Reply], object] = on_answer
+        self.answered = False
+        self.over = False
+
+    def take(self, reply: Reply) -> str:
+        """Take an answer; return what is wrong with it, or ""."""
+        if self.answered:
+            return ""
+        if reply.error:
+            return reply.payload.decode(errors="replace") or "an error without a text"
+        try:
+            answer = self._read(reply.payload)
+        except ValueError as error:
+            return str(error)
+        self.answered = True
+        self._on_answer(answer, reply)
+        return ""
 
 
 class RosClientPort:
@@ -139,19 +174,18 @@ class RosClientPort:
         self._lock = threading.Lock()
         self._closed = False
         self._declared: list[Closable] = []
-        self._questions: set[Closable] = set()
+        self._last_status: Sample | None = None
         self._goals: dict[str, _Goal] = {}
         self._by_uuid: dict[bytes, _Goal] = {}
         self._queue: deque[_Goal] = deque()
-        self._on_their_way = 0
+        self._sending: set[_Goal] = set()
         self._there: dict[RosServer, TypeMismatchError | None] = {}
         self._silent: set[RosServer] = set()
-        self._has_status = False
         self._probe = LinkProbe(
             node.clock,
             network.settings.probe,
             self._subscribe_to_status,
-            lambda: bool(self._has_status and (self._goals or self._silent)),
+            lambda: bool(self._last_status and (self._goals or self._silent)),
             self._on_silent,
         )
         self._readable = Readable(log)
@@ -176,8 +210,10 @@ class RosClientPort:
     def close(self) -> None:
         self._probe.close()
         with self._lock:
-            declared = [*self._declared, *self._questions]
-            self._declared, self._questions = [], set()
+            declared, self._declared = self._declared, []
+            for goal in self._goals.values():
+                declared += goal.open.values()
+                goal.open.clear()
             self._closed = True
         for entry in reversed(declared):
             entry.close()
@@ -243,7 +279,7 @@ class RosClientPort:
                     self._do(goal, step)
 
         request = pack_cancel(Asked(NO_GOAL, stamp_ns))
-        self._ask(self._cancel, request, unpack_canceling, on_answer)
+        self._ask(None, self._cancel, request, unpack_canceling, on_answer)
 
     def acknowledge(self, goal_ids: list[str], *, farewell: bool = False) -> None:
         """Say nothing: ROS 2 has no acknowledgements."""
@@ -251,15 +287,18 @@ class RosClientPort:
     def ask(self, goal_id: str, on_done: Callable[[], None]) -> None:
         with self._lock:
             goal = self._goals.get(goal_id)
+            known = goal is not None
             if goal is None:
                 goal = self._keep(_Goal(goal_id, b"", "", attached=True))
-            step = goal.exchange.ask_again()
+            step = goal.exchange.ask_again() if self._there else Step.NOTHING
             waits = goal.exchange.asking
             if waits:
                 goal.on_asked.append(on_done)
         if not waits:
             on_done()
         self._do(goal, step)
+        if not known and self._last_status is not None:
+            self._read_states(self._last_status)
 
     def _keep(self, goal: _Goal) -> _Goal:
         """Keep a new goal. Needs the lock."""
@@ -274,9 +313,17 @@ class RosClientPort:
             self._by_uuid.pop(goal.uuid, None)
             if goal in self._queue:
                 self._queue.remove(goal)
-            question, goal.question = goal.question, None
-        if question is not None:
+            questions = self._take_back(goal)
+        for question in questions:
             question.close()
+
+    def _take_back(self, goal: _Goal) -> list[Closable]:
+        """Return the open questions of a goal, which count as unanswered now. Needs the lock."""
+        self._sending.discard(goal)
+        questions = list(goal.open.values())
+        goal.open.clear()
+        goal.exchange.on_link_lost()
+        return questions
 
     # -- what is decided -----------------------------------------------------------------------
 
@@ -312,10 +359,12 @@ class RosClientPort:
     def _end(self, goal: _Goal, status: Status, text: str) -> None:
         self._drop(goal)
         entry = StatusEntry(goal.id, 0, status, text)
-        if status is Status.LOST:
+        if status is not Status.LOST:
+            self._listener.on_result(entry, b"", goal.server, answered=True)
+        elif text is TEXT_UNKNOWN:
             self._listener.on_answer(entry, goal.server)
         else:
-            self._listener.on_result(entry, b"", goal.server, answered=True)
+            self._listener.on_statuses([entry], goal.server, whole=False)
 
     def _enqueue(self, goal: _Goal) -> None:
         """Send a goal when it is its turn, if the client still wants it."""
@@ -331,12 +380,13 @@ class RosClientPort:
         """Send goals that wait, as long as few are on their way."""
         while True:
             with self._lock:
-                if not self._queue or self._on_their_way >= AT_ONCE or self._closed:
+                if not self._queue or len(self._sending) >= AT_ONCE or self._closed:
                     return
                 goal = self._queue.popleft()
-                self._on_their_way += 1
+                self._sending.add(goal)
                 goal.exchange.on_sent(self._clock.now())
             self._ask(
+                goal,
                 self._send,
                 pack_with_id(goal.uuid, goal.body),
                 unpack_accepted,
@@ -352,23 +402,20 @@ class RosClientPort:
 
     def _on_sent_done(self, goal: _Goal, answered: bool) -> None:
         with self._lock:
-            self._on_their_way -= 1
             step = Step.NOTHING if answered else goal.exchange.on_unanswered()
         self._do(goal, step)
         self._send_next()
 
     def _ask_result(self, goal: _Goal) -> None:
         self._probe.watch()
-        question = self._ask(
+        self._ask(
+            goal,
             self._result,
             pack_id(goal.uuid),
             status_in,
             partial(self._on_result, goal),
             partial(self._on_result_done, goal),
         )
-        with self._lock:
-            if question in self._questions and goal.exchange.asking:
-                goal.question = question
 
     def _on_result(self, goal: _Goal, code: int, reply: Reply) -> None:
         self._feedback.flush()
@@ -385,7 +432,6 @@ class RosClientPort:
 
     def _on_result_done(self, goal: _Goal, answered: bool) -> None:
         with self._lock:
-            goal.question = None
             told, goal.on_asked = goal.on_asked, []
             step = Step.NOTHING if answered else goal.exchange.on_no_result()
         for on_done in told:
@@ -404,6 +450,7 @@ class RosClientPort:
 
     def _ask_cancel(self, goal: _Goal) -> None:
         self._ask(
+            goal,
             self._cancel,
             pack_cancel(Asked(goal.uuid, 0)),
             unpack_canceling,
@@ -428,54 +475,46 @@ class RosClientPort:
 
     def _ask(
         self,
+        goal: _Goal | None,
         end: End,
         request: bytes,
         read: Callable[[bytes], T],
         on_answer: Callable[[T, Reply], object],
         on_done: Callable[[bool], object] = bool,
-    ) -> Closable | None:
+    ) -> None:
         """Ask one server.
 
         A request has an attachment of its own, so that no two are alike.
 
         Args:
+            goal: What it is about; it keeps the question until that ends.
             end: Our end of the service.
             request: The request.
             read: Reads an answer; raises ValueError.
             on_answer: Gets the first answer that can be read.
-            on_done: Gets, in the end, whether there was one.
-
-        Returns:
-            The question; None when it could not be asked, of which `on_done` has heard.
+            on_done: Gets, in the end, whether there was one; not called for a question taken back.
         """
-        answered: list[bool] = []
-        asked: list[Closable] = []
-        over: list[bool] = []
+        question = _Question(read, on_answer)
 
         def take(reply: Reply) -> None:
             self._hear()
-            if answered or self._closed:
-                return
-            if reply.error:
-                self._report("an answer", reply.payload.decode(errors="replace"))
-                return
-            try:
-                answer = read(reply.payload)
-            except ValueError as error:
-                self._report("an answer", error)
-                return
-            answered.append(True)
-            on_answer(answer, reply)
+            if not self._closed:
+                problem = question.take(reply)
+                if problem:
+                    self._report("an answer", problem)
 
         def done() -> None:
             with self._lock:
-                over.append(True)
-                self._questions.difference_update(asked)
+                question.over = True
+                if goal is not None:
+                    goal.open.pop(end, None)
+                if end is self._send and goal is not None:
+                    self._sending.discard(goal)
             if not self._closed:
-                on_done(bool(answered))
+                on_done(question.answered)
 
         try:
-            question = self._network.transport.query(
+            asked = self._network.transport.query(
                 end.key,
                 request,
                 attachment=end.attachment(),
@@ -487,12 +526,10 @@ class RosClientPort:
         except TransportError as error:
             self._readable.report("ask", error)
             done()
-            return None
+            return
         with self._lock:
-            asked.append(question)
-            if not over:
-                self._questions.add(question)
-        return question
+            if goal is not None and not question.over:
+                goal.open[end] = asked
 
     def _report(self, what: str, error: object) -> None:
         """Report a message that is dropped; once of a kind, a server may go on like this."""
@@ -503,8 +540,12 @@ class RosClientPort:
 
     def _on_status(self, sample: Sample) -> None:
         self._feedback.flush()
-        self._has_status = True
+        self._last_status = sample
         self._hear()
+        self._read_states(sample)
+
+    def _read_states(self, sample: Sample) -> None:
+        """Take in what a status list says of goals that are followed."""
         try:
             states = unpack_statuses(sample.payload)
         except ValueError as error:
@@ -582,15 +623,12 @@ class RosClientPort:
         self._listener.on_server_gone(server, why)
         with self._lock:
             mine = [g for g in self._goals.values() if g.server in {"", server.session}]
-            questions = [goal.question for goal in mine if goal.question is not None]
+            questions = [question for goal in mine for question in self._take_back(goal)]
             told = [on_done for goal in mine for on_done in goal.on_asked]
             for goal in mine:
-                goal.question = None
                 goal.on_asked.clear()
-                goal.exchange.on_link_lost()
                 if goal in self._queue:
                     self._queue.remove(goal)
-            self._questions.difference_update(questions)
         for question in questions:
             question.close()
         for on_done in told:
@@ -625,4 +663,5 @@ _ENDS = (
     (Step.REFUSED, Status.REJECTED, TEXT_REFUSED),
     (Step.RECALLED, Status.RECALLED, TEXT_RECALLED),
     (Step.UNKNOWN, Status.LOST, TEXT_UNKNOWN),
+    (Step.UNSETTLED, Status.LOST, TEXT_UNSETTLED),
 )

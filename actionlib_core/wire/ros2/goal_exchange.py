@@ -52,7 +52,9 @@ class Step(enum.Flag):
     RECALLED = enum.auto()
     """It is over: it was cancelled before any server could have it."""
     UNKNOWN = enum.auto()
-    """It is over: the server does not know it."""
+    """It is over: the server has forgotten it, or is another one."""
+    UNSETTLED = enum.auto()
+    """It is over: nobody can say whether the server has run it."""
     KEEPS_RUNNING = enum.auto()
     """The server has refused to cancel it."""
 
@@ -181,8 +183,14 @@ class GoalExchange:
             return Step.END
         if code != GoalCode.UNKNOWN:
             return self.on_state(code) | Step.ASK_LATER
-        if self.phase is Phase.TAKEN or now > self.sent_at + SETTLED_S:
+        return self._on_unknown(now)
+
+    def _on_unknown(self, now: float) -> Step:
+        """Take the word that the server does not know the goal."""
+        if self.phase is Phase.TAKEN:
             return Step.UNKNOWN
+        if now > self.sent_at + SETTLED_S:
+            return Step.UNSETTLED
         if self._refused:
             return Step.REFUSED
         self.phase = Phase.HERE

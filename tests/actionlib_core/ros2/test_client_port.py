@@ -1,0 +1,529 @@
+"""Our action clients at a server of ROS 2 that answers as a test says, in virtual time."""
+
+from __future__ import annotations
+
+import contextlib
+
+import pytest
+
+from actionlib_core.action.client import ActionClient
+from actionlib_core.action.simple_client import SimpleActionClient
+from actionlib_core.config import Config, Ros2
+from actionlib_core.exceptions import TypeMismatchError
+from actionlib_core.goal.states import CommState, Status
+from actionlib_core.interfaces.nav2_msgs.action import NavigateToPose
+from actionlib_core.interfaces.ros2.test_msgs.action import Fibonacci
+from actionlib_core.node import Node
+from actionlib_core.transport.faulty import FaultyTransport
+from actionlib_core.transport.memory import MemoryNetwork
+from actionlib_core.wire.ros2.action_messages import pack_accepted
+from actionlib_core.wire.ros2.client_port import AT_ONCE
+from actionlib_core.wire.ros2.goal_exchange import SETTLED_S
+from actionlib_core.wire.ros2.graph import RosNode
+from actionlib_core.wire.ros2.names import Kind, goal_uuid
+from tests.ros2_server import Ros2Server
+
+
+class World:
+    """A mission's node, whose link can be cut, and a robot's session beside it."""
+
+    def __init__(self, clock):
+        self.clock, self.network = clock, MemoryNetwork(clock)
+        self.left = contextlib.ExitStack()
+        self.link = FaultyTransport(self.network.session(), clock=clock, lease=60.0)
+        self.mission = self.node(self.link)
+        self.robot = self.session()
+
+    def node(self, transport, **settings):
+        config = Config(ros2=(Ros2(**settings),))
+        node = Node("mission", transport=transport, clock=self.clock, config=config)
+        self.left.callback(transport.close)
+        self.left.callback(node.close)
+        return node
+
+    def session(self):
+        session = self.network.session()
+        self.left.callback(session.close)
+        return session
+
+    def server(self, action=Fibonacci, **options):
+        return Ros2Server(self.robot, self.clock, "fib", action, **options)
+
+    def client(self, node=None, action=Fibonacci, **options):
+        client = ActionClient("fib", action, node=node or self.mission, **options)
+        assert client.wait_for_server(5.0)
+        return client
+
+
+@pytest.fixture
+def world(clock):
+    made = World(clock)
+    with made.left:
+        yield made
+
+
+def begin(server, client, order=3):
+    """Send a goal, and wait until the server has it and the question for its result."""
+    states = []
+    handle = client.send_goal(
+        Fibonacci.Goal(order=order), lambda goal: states.append(goal.get_comm_state().name)
+    )
+    uuid = goal_uuid(handle.get_goal_id())
+    server.wait(lambda: uuid in server.asked)
+    return handle, uuid, states
+
+
+def test_goal_is_sent_once_and_its_result_asked_for_at_once(world):
+    server, client = world.server(), world.client()
+    handle, uuid, states = begin(server, client, order=5)
+    server.set_state(uuid, 2)
+    world.clock.sleep(120.0)
+    server.end(uuid, 4, Fibonacci.Result(sequence=[1, 2]))
+    assert handle.wait(5.0)
+    assert handle.get_result() == Fibonacci.Result(sequence=[1, 2])
+    assert handle.get_terminal_state() == Status.SUCCEEDED
+    assert states == ["PENDING", "ACTIVE", "WAITING_FOR_RESULT", "DONE"]
+    assert (server.sent, server.goals[uuid].order) == ([uuid], 5)
+    assert len(server._seen) == 2  # the goal and one question
+    assert server.problems == []
+
+
+def test_refused_goal_is_rejected(world):
+    server, client = world.server(), world.client()
+    server.on_goal = server.refuse
+    handle = client.send_goal(Fibonacci.Goal(order=1))
+    assert handle.wait(5.0)
+    assert handle.get_goal_status() == Status.REJECTED
+    assert handle.get_result() == Fibonacci.Result()
+
+
+@pytest.mark.parametrize(("code", "status"), [(5, Status.PREEMPTED), (6, Status.ABORTED)])
+def test_other_ends(world, code, status):
+    server, client = world.server(), world.client()
+    handle, uuid, _ = begin(server, client)
+    server.set_state(uuid, 2)
+    server.end(uuid, code)
+    assert handle.wait(5.0)
+    assert handle.get_goal_status() == status
+
+
+def test_feedback_before_the_acceptance_and_result_before_the_last_state(world):
+    server, client = world.server(), world.client()
+    seen, states, kept = [], [], []
+    server.on_goal = lambda query, uuid: kept.append((query, uuid))
+    handle = client.send_goal(
+        Fibonacci.Goal(order=1),
+        lambda goal: states.append(goal.get_comm_state().name),
+        lambda _, feedback: seen.append(list(feedback.sequence)),
+    )
+    server.wait(lambda: kept)
+    query, uuid = kept[0]
+    server.states[uuid] = 2
+    for numbers in ([0], [0, 1]):
+        server.publish_feedback(uuid, Fibonacci.Feedback(sequence=numbers))
+    world.clock.sleep(0.1)
+    server.reply(query, pack_accepted(1))
+    for question in server.asked.pop(uuid):
+        server.answer_result(question, 4, Fibonacci.Result(sequence=[7]))
+    assert handle.wait(5.0)
+    server.set_state(uuid, 4)
+    assert seen == [[0], [0, 1]]
+    assert states == ["ACTIVE", "WAITING_FOR_RESULT", "DONE"]
+    assert list(handle.get_result().sequence) == [7]
+
+
+def test_goal_of_another_client_says_nothing(world):
+    server, client = world.server(), world.client()
+    handle, uuid, _ = begin(server, client)
+    server.set_state(bytes(range(16)), 2)
+    server.publish_feedback(bytes(range(16)), Fibonacci.Feedback(sequence=[1]))
+    server.end(bytes(range(16)), 4)
+    world.clock.sleep(1.0)
+    assert handle.get_comm_state() == CommState.PENDING
+    server.end(uuid, 4)
+    assert handle.wait(5.0)
+
+
+# -- doubt -----------------------------------------------------------------------------------------
+
+
+def drop(query, uuid):
+    """End a query without an answer, as a full queue does."""
+    query.finish()
+
+
+def test_goal_that_the_queue_dropped_is_sent_again_with_a_new_number(world):
+    server, client = world.server(), world.client()
+    server.on_goal = drop
+    handle = client.send_goal(Fibonacci.Goal(order=1))
+    uuid = goal_uuid(handle.get_goal_id())
+    server.wait(lambda: server.sent)
+    server.on_goal = server.accept
+    server.wait(lambda: uuid in server.asked)
+    assert server.sent == [uuid, uuid]
+    assert server.problems == []
+    server.end(uuid, 4)
+    assert handle.wait(5.0)
+    assert handle.get_goal_status() == Status.SUCCEEDED
+
+
+def test_goal_whose_acceptance_was_lost_is_not_sent_again(world):
+    server, client = world.server(), world.client()
+
+    def run_silently(query, uuid):
+        server.states[uuid] = 2
+        query.finish()
+
+    server.on_goal = run_silently
+    handle = client.send_goal(Fibonacci.Goal(order=1))
+    uuid = goal_uuid(handle.get_goal_id())
+    server.wait(lambda: uuid in server.asked)
+    world.clock.sleep(10.0)
+    server.end(uuid, 4, Fibonacci.Result(sequence=[1]))
+    assert handle.wait(5.0)
+    assert server.sent == [uuid]
+    assert list(handle.get_result().sequence) == [1]
+
+
+def test_repetition_that_is_refused_is_followed_when_the_server_knows_the_goal(world):
+    server, client = world.server(), world.client()
+    dropped = []
+
+    def drop_first(query, uuid):
+        dropped.append(uuid)
+        query.finish()
+        server.on_goal = take_silently
+
+    def take_silently(query, uuid):  # the first sending had been late, not lost
+        server.states[uuid] = 2
+        server.refuse(query, uuid)
+
+    server.on_goal = drop_first
+    handle = client.send_goal(Fibonacci.Goal(order=1))
+    uuid = goal_uuid(handle.get_goal_id())
+    server.wait(lambda: uuid in server.asked)
+    server.end(uuid, 6)
+    assert handle.wait(5.0)
+    assert handle.get_goal_status() == Status.ABORTED
+
+
+def test_result_that_was_not_answered_is_asked_for_again(world):
+    server, client = world.server(), world.client()
+    handle, uuid, _ = begin(server, client)
+    for _ in range(3):
+        for question in server.asked.pop(uuid):
+            question.finish()
+        server.wait(lambda: uuid in server.asked)
+    server.end(uuid, 4)
+    assert handle.wait(5.0)
+    assert server.problems == []
+
+
+def test_server_that_forgot_the_goal_makes_it_lost(world):
+    server, client = world.server(), world.client()
+    handle, uuid, _ = begin(server, client)
+    for question in server.asked.pop(uuid):
+        server.answer_result(question, 0)
+    assert handle.wait(5.0)
+    assert handle.get_goal_status() == Status.LOST
+    assert "does not know" in handle.get_goal_status_text()
+
+
+@pytest.mark.parametrize("broken", [b"", b"\x00\x01\x00\x00", b"\x00\x07\x00\x00" + bytes(20)])
+def test_answers_that_cannot_be_read_are_no_answers(world, broken):
+    server, client = world.server(), world.client()
+    taken = []
+
+    def answer_badly(query, uuid):
+        taken.append(uuid)
+        server.states[uuid] = 1
+        query.reply(broken)
+        query.reply_error("so what")
+        query.finish()
+
+    server.on_goal = answer_badly
+    handle = client.send_goal(Fibonacci.Goal(order=1))
+    server.wait(lambda: taken and taken[0] in server.asked)
+    server.status.put(broken, b"")
+    server.feedback.put(broken, None)
+    server.end(taken[0], 4)
+    assert handle.wait(5.0)
+    assert len(taken) == 1
+
+
+def test_many_goals_never_overfill_the_queue_of_a_server(world):
+    server, client = world.server(), world.client()
+    waiting, most = [], 0
+
+    def take_later(query, uuid):
+        nonlocal most
+        waiting.append((query, uuid))
+        most = max(most, len(waiting))
+        world.clock.call_later(0.01, answer_one)
+
+    def answer_one():
+        query, uuid = waiting.pop(0)
+        server.accept(query, uuid)
+        server.end(uuid, 4)
+
+    server.on_goal = take_later
+
+    def answer_late(query, uuid):
+        server.answer_result(query, server.states.get(uuid, 0))
+
+    server.on_result = answer_late
+    handles = [client.send_goal(Fibonacci.Goal(order=1)) for _ in range(100)]
+    assert all(handle.wait(30.0) for handle in handles)
+    assert {handle.get_goal_status() for handle in handles} == {Status.SUCCEEDED}
+    assert most <= AT_ONCE
+    assert len(server.sent) == len(set(server.sent)) == 100
+
+
+# -- cancels ---------------------------------------------------------------------------------------
+
+
+def test_cancel_names_one_goal_and_is_told_by_the_list(world):
+    server, client = world.server(), world.client()
+    handle, uuid, states = begin(server, client)
+    server.set_state(uuid, 2)
+    world.clock.sleep(0.1)
+    handle.cancel()
+    server.wait(lambda: server.states[uuid] == 3)
+    server.end(uuid, 5)
+    assert handle.wait(5.0)
+    assert server.cancels == [(uuid, 0)]
+    assert handle.get_goal_status() == Status.PREEMPTED
+    assert "PREEMPTING" in states
+
+
+def test_refused_cancel_with_code_0_leaves_the_goal_running(world):
+    server, client = world.server(), world.client()
+    server.on_cancel = server.refuse_cancel
+    handle, uuid, _ = begin(server, client)
+    server.set_state(uuid, 2)
+    handle.cancel()
+    world.clock.sleep(30.0)
+    assert server.cancels == [(uuid, 0)]
+    assert handle.get_comm_state() == CommState.WAITING_FOR_CANCEL_ACK
+    server.end(uuid, 4)
+    assert handle.wait(5.0)
+    assert handle.get_goal_status() == Status.SUCCEEDED
+
+
+def test_cancel_of_a_goal_that_waits_for_its_answer_follows_the_acceptance(world):
+    server, client = world.server(), world.client()
+    kept = []
+    server.on_goal = lambda query, uuid: kept.append((query, uuid))
+    handle = client.send_goal(Fibonacci.Goal(order=1))
+    server.wait(lambda: kept)
+    handle.cancel()
+    world.clock.sleep(5.0)
+    assert server.cancels == []
+    server.accept(*kept[0])
+    uuid = kept[0][1]
+    server.wait(lambda: server.states[uuid] == 3)
+    server.end(uuid, 5)
+    assert handle.wait(5.0)
+    assert handle.get_goal_status() == Status.RECALLED
+    assert server.sent == [uuid]
+
+
+def test_cancel_of_all_goals(world):
+    server, client = world.server(), world.client()
+    first, one, _ = begin(server, client)
+    second, two, _ = begin(server, client)
+    client.cancel_all_goals()
+    server.wait(lambda: {server.states[one], server.states[two]} == {3})
+    server.end(one, 5)
+    server.end(two, 5)
+    assert first.wait(5.0)
+    assert second.wait(5.0)
+    assert server.cancels[0] == (bytes(16), 0)
+
+
+# -- servers that die, return, do not fit ----------------------------------------------------------
+
+
+def test_goals_of_a_server_that_dies_are_lost_at_once(world):
+    server, client = world.server(), world.client()
+    handle, _, _ = begin(server, client)
+    start = world.clock.now()
+    world.robot.kill()
+    assert handle.wait(5.0)
+    assert world.clock.now() - start < 0.05
+    assert handle.get_goal_status() == Status.LOST
+    assert "node 'robot'" in handle.get_goal_status_text()
+
+
+def test_goal_outlives_a_lost_link_within_the_time_given(world):
+    server, client = world.server(), world.client(server_lost_timeout=300.0)
+    handle, uuid, _ = begin(server, client)
+    server.set_state(uuid, 2)
+    world.clock.sleep(0.1)
+    world.link.cut(100.0)
+    world.clock.sleep(90.0)
+    server.asked.clear()
+    server.end(uuid, 4)
+    server.on_result = lambda query, _: server.answer_result(
+        query, 4, Fibonacci.Result(sequence=[1])
+    )
+    assert handle.wait(60.0)
+    assert handle.get_goal_status() == Status.SUCCEEDED
+    assert server.sent == [uuid]
+    assert server.problems == []
+
+
+def test_goal_whose_answer_a_lost_link_took_is_settled_not_sent_again(world):
+    server, client = world.server(), world.client(server_lost_timeout=300.0)
+    server.on_goal = lambda query, uuid: server.states.update({uuid: 2})
+    handle = client.send_goal(Fibonacci.Goal(order=1))
+    server.wait(lambda: server.sent)
+    world.link.cut(100.0)
+    world.clock.sleep(110.0)
+    uuid = server.sent[0]
+    server.wait(lambda: uuid in server.asked)
+    server.end(uuid, 4)
+    assert handle.wait(60.0)
+    assert server.sent == [uuid]
+
+
+def test_doubt_that_outlasts_what_a_server_remembers_ends_as_lost(world):
+    server, client = world.server(), world.client(server_lost_timeout=300.0)
+    server.on_goal = lambda query, uuid: None
+    handle = client.send_goal(Fibonacci.Goal(order=1))
+    server.wait(lambda: server.sent)
+    world.link.cut(70.0 + SETTLED_S)
+    assert handle.wait(200.0)
+    assert handle.get_goal_status() == Status.LOST
+    assert "may or may not have run" in handle.get_goal_status_text()
+    assert len(server.sent) == 1
+
+
+def test_server_with_another_definition_is_told_with_both_hashes(world):
+    world.server(action=NavigateToPose, distro="rolling")
+    client = ActionClient("fib", NavigateToPose, node=world.mission)
+    with pytest.raises(TypeMismatchError) as caught:
+        client.wait_for_server(5.0)
+    assert str(caught.value).count("RIHS01_") == 2
+
+
+def test_other_domain_is_another_network(world):
+    world.server(domain=7)
+    client = ActionClient("fib", Fibonacci, node=world.mission)
+    assert not client.wait_for_server(1.0)
+    there = SimpleActionClient("fib", Fibonacci, node=world.node(world.session(), domain=7))
+    assert there.wait_for_server(1.0)
+
+
+def test_server_that_comes_late_gets_the_goal(world):
+    client = ActionClient("fib", Fibonacci, node=world.mission)
+    handle = client.send_goal(Fibonacci.Goal(order=1))
+    world.clock.sleep(100.0)
+    server = world.server(show=False)
+    world.clock.sleep(10.0)
+    assert server.sent == []
+    server.show()
+    uuid = goal_uuid(handle.get_goal_id())
+    server.wait(lambda: uuid in server.asked)
+    server.end(uuid, 4)
+    assert handle.wait(5.0)
+
+
+def test_goal_is_found_again_by_its_id(world):
+    server, client = world.server(), world.client()
+    handle, uuid, _ = begin(server, client)
+    server.set_state(uuid, 2)
+    goal_id = handle.get_goal_id()
+    client.stop()
+    later = world.client(world.node(world.session()))
+    again = later.attach(goal_id)
+    server.wait(lambda: len(server.asked[uuid]) == 2)
+    world.clock.sleep(1.0)
+    assert again.get_comm_state() == CommState.ACTIVE
+    server.end(uuid, 4, Fibonacci.Result(sequence=[3]))
+    assert again.wait(5.0)
+    assert list(again.get_result().sequence) == [3]
+    unknown = later.attach("no-such-goal")
+    assert unknown.wait(5.0)
+    assert unknown.get_goal_status() == Status.LOST
+
+
+# -- a silent link ---------------------------------------------------------------------------------
+
+
+def test_silent_link_is_noticed_by_the_probe_long_before_the_lease(world):
+    server, client = world.server(), world.client()
+    handle, uuid, _ = begin(server, client)
+    server.set_state(uuid, 2)
+    world.clock.sleep(0.1)
+    world.link.cut()
+    start = world.clock.now()
+    assert handle.wait(59.0)
+    assert world.clock.now() - start < 10.0
+    assert handle.get_goal_status() == Status.LOST
+    assert "has not been heard for" in handle.get_goal_status_text()
+
+
+def test_busy_server_whose_link_is_there_is_left_in_peace(world):
+    server, client = world.server(), world.client()
+    handle, uuid, _ = begin(server, client)
+    server.set_state(uuid, 2)
+    requests = len(server._seen)
+    world.clock.sleep(600.0)  # it says nothing, and nothing is asked of its executor
+    assert handle.get_comm_state() == CommState.ACTIVE
+    assert len(server._seen) == requests
+    server.end(uuid, 4)
+    assert handle.wait(5.0)
+
+
+def test_silent_server_that_is_heard_again_gets_its_goals_back(world):
+    server, client = world.server(), world.client(server_lost_timeout=100.0)
+    handle, uuid, _ = begin(server, client)
+    server.set_state(uuid, 2)
+    world.clock.sleep(0.1)
+    world.link.cut(20.0)
+    world.clock.sleep(15.0)
+    assert not client.wait_for_server(0.1)
+    world.clock.sleep(15.0)
+    assert client.wait_for_server(1.0)
+    server.wait(lambda: len(server.asked[uuid]) == 2)
+    server.end(uuid, 4)
+    assert handle.wait(5.0)
+    assert handle.get_goal_status() == Status.SUCCEEDED
+    assert server.sent == [uuid]
+
+
+def test_probe_can_be_left_out(world):
+    server, client = world.server(), world.client(world.node(world.link, probe=0.0))
+    handle, uuid, _ = begin(server, client)
+    server.set_state(uuid, 2)
+    world.clock.sleep(0.1)
+    world.link.cut()
+    assert not handle.wait(50.0)
+    assert handle.wait(20.0)
+    assert handle.get_goal_status() == Status.LOST
+
+
+# -- the graph -------------------------------------------------------------------------------------
+
+
+def test_client_shows_its_node_and_five_ends_and_takes_them_back(world):
+    looker = RosNode(world.session(), world.clock, domain=0, full_name="looker")
+    client = ActionClient("fib", Fibonacci, node=world.mission)
+    tokens = looker.list()
+    assert sorted(token.kind for token in tokens) == sorted(
+        [Kind.NODE, *3 * [Kind.CLIENT], *2 * [Kind.SUBSCRIPTION]]
+    )
+    assert {token.node for token in tokens} == {"mission"}
+    client.stop()
+    assert [token.kind for token in looker.list()] == [Kind.NODE]
+
+
+def test_closed_client_leaves_no_question_open(world):
+    server, client = world.server(), world.client()
+    handle, uuid, _ = begin(server, client)
+    client.stop()
+    assert handle.get_comm_state() == CommState.LOST
+    server.end(uuid, 4)
+    world.clock.sleep(1.0)
+    assert handle.get_result() is None

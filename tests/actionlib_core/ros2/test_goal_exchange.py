@@ -1,0 +1,216 @@
+"""What a client asks a ROS 2 server about a goal: once sent, doubt settled, cancels told truly."""
+
+from __future__ import annotations
+
+import hypothesis.strategies as st
+import pytest
+from hypothesis import given
+
+from actionlib_core.goal.states import Status
+from actionlib_core.wire.ros2.goal_exchange import SETTLED_S, GoalExchange, Phase, Step
+
+
+def sent(now=0.0):
+    goal = GoalExchange()
+    assert goal.want() is Step.QUEUE
+    goal.on_sent(now)
+    return goal
+
+
+def test_accepted_goal_is_told_and_its_result_asked_for_at_once():
+    goal = sent()
+    assert goal.on_answer(accepted=True) == Step.TELL | Step.ASK
+    assert (goal.phase, goal.status) == (Phase.TAKEN, Status.PENDING)
+    assert goal.on_state(2) is Step.TELL
+    assert goal.status is Status.ACTIVE
+    assert goal.on_result(4, 1.0) is Step.END
+    assert goal.status is Status.SUCCEEDED
+
+
+def test_refusal_of_the_only_sending_is_a_refusal():
+    assert sent().on_answer(accepted=False) is Step.REFUSED
+
+
+def test_wish_is_not_a_second_sending():
+    goal = GoalExchange()
+    assert goal.want() is Step.QUEUE
+    assert goal.want() is Step.NOTHING
+    goal.on_sent(0.0)
+    assert goal.want() is Step.NOTHING
+
+
+def test_doubt_is_settled_by_the_result_of_the_same_id():
+    goal = sent()
+    assert goal.on_unanswered() is Step.ASK
+    assert goal.want() is Step.NOTHING  # the question is open: the server has the goal, or is slow
+    assert goal.on_state(2) is Step.TELL
+    assert goal.on_result(6, 1.0) is Step.END
+    assert goal.status is Status.ABORTED
+
+
+def test_goal_that_is_not_known_is_sent_again_and_then_a_refusal_is_settled():
+    goal = sent()
+    goal.on_unanswered()
+    assert goal.on_result(0, 1.0) is Step.QUEUE
+    goal.on_sent(1.0)
+    assert goal.on_answer(accepted=False) is Step.ASK  # it may be known by the first sending
+    assert goal.on_result(0, 1.1) is Step.REFUSED
+
+
+def test_refused_repetition_of_a_goal_that_runs_is_followed():
+    goal = sent()
+    goal.on_unanswered()
+    goal.on_result(0, 1.0)
+    goal.on_sent(1.0)
+    goal.on_answer(accepted=False)
+    assert goal.on_state(2) & Step.TELL
+    assert goal.on_result(5, 3.0) is Step.END
+
+
+def test_doubt_of_long_ago_is_not_settled_by_sending_again():
+    goal = sent()
+    goal.on_unanswered()
+    assert goal.on_no_result() is Step.ASK_LATER
+    assert goal.ask_again() is Step.ASK
+    assert goal.on_result(0, SETTLED_S + 0.1) is Step.UNSETTLED
+
+
+def test_unanswered_question_for_the_result_is_asked_again_later():
+    goal = sent()
+    goal.on_answer(accepted=True)
+    assert goal.ask_again() is Step.NOTHING
+    assert goal.on_no_result() is Step.ASK_LATER
+    assert goal.ask_again() is Step.ASK
+
+
+def test_accepted_goal_that_the_server_forgot_is_lost():
+    goal = sent()
+    goal.on_answer(accepted=True)
+    assert goal.on_result(0, 1.0) is Step.UNKNOWN
+
+
+def test_feedback_before_the_answer_shows_that_the_goal_runs():
+    goal = sent()
+    assert goal.on_feedback() == Step.TELL | Step.ASK
+    assert goal.status is Status.ACTIVE
+    assert goal.on_answer(accepted=True) is Step.NOTHING
+    assert goal.on_state(1) is Step.NOTHING
+
+
+def test_states_that_were_overtaken_say_nothing():
+    goal = sent()
+    goal.on_answer(accepted=True)
+    assert goal.on_state(3) is Step.TELL
+    assert goal.status is Status.RECALLING  # it was never seen to run
+    assert goal.on_state(2) is Step.NOTHING
+    assert goal.on_state(99) is Step.NOTHING
+
+
+def test_cancel_of_what_no_server_has_recalls_it():
+    goal = GoalExchange()
+    assert goal.cancel() is Step.RECALLED
+    goal = GoalExchange()
+    goal.want()
+    assert goal.cancel() is Step.RECALLED
+
+
+def test_cancel_before_the_answer_goes_out_with_the_acceptance():
+    goal = sent()
+    assert goal.cancel() is Step.NOTHING
+    assert goal.on_answer(accepted=True) == Step.TELL | Step.ASK | Step.CANCEL
+    assert goal.cancel(again=True) is Step.NOTHING
+    assert goal.on_cancel_answer(0, listed=True) is Step.TELL
+    assert goal.status is Status.RECALLING
+    assert goal.cancel() is Step.NOTHING
+
+
+def test_cancelled_goal_that_turns_out_not_to_be_there_is_recalled():
+    goal = sent()
+    goal.cancel()
+    goal.on_unanswered()
+    assert goal.on_result(0, 1.0) is Step.RECALLED
+
+
+@pytest.mark.parametrize("code", [0, 1])
+def test_refused_cancel_is_told_and_repeated_only_when_it_is_wished_anew(code):
+    goal = sent()
+    goal.on_answer(accepted=True)
+    assert goal.cancel() is Step.CANCEL
+    assert goal.on_cancel_answer(code, listed=False) is Step.KEEPS_RUNNING
+    assert goal.cancel(again=True) is Step.NOTHING
+    assert goal.cancel() is Step.CANCEL
+
+
+@pytest.mark.parametrize("code", [2, 3])
+def test_cancel_of_what_has_ended_leaves_the_word_to_the_result(code):
+    goal = sent()
+    goal.on_answer(accepted=True)
+    goal.cancel()
+    assert goal.on_cancel_answer(code, listed=False) is Step.NOTHING
+
+
+def test_cancel_that_was_not_answered_is_repeated():
+    goal = sent()
+    goal.on_answer(accepted=True)
+    goal.cancel()
+    goal.on_no_cancel_answer()
+    assert goal.cancel(again=True) is Step.CANCEL
+
+
+def test_attached_goal_is_asked_for_and_never_sent():
+    goal = GoalExchange(attached=True)
+    assert goal.want() is Step.NOTHING
+    assert goal.ask_again() is Step.ASK
+    assert goal.cancel() is Step.CANCEL
+    assert goal.on_result(0, 9.0) is Step.UNKNOWN
+
+
+def test_lost_link_leaves_doubt_about_what_was_sent_and_none_about_what_waits():
+    goal = sent()
+    goal.on_link_lost()
+    assert goal.phase is Phase.UNSURE
+    waiting = GoalExchange()
+    waiting.want()
+    waiting.on_link_lost()
+    assert waiting.phase is Phase.HERE
+
+
+EVENTS = {
+    "want": lambda goal, _: goal.want(),
+    "accepted": lambda goal, _: goal.on_answer(accepted=True),
+    "refused": lambda goal, _: goal.on_answer(accepted=False),
+    "unanswered": lambda goal, _: goal.on_unanswered(),
+    "unknown": lambda goal, now: goal.on_result(0, now),
+    "ended": lambda goal, now: goal.on_result(4, now),
+    "no result": lambda goal, _: goal.on_no_result(),
+    "again": lambda goal, _: goal.ask_again(),
+    "active": lambda goal, _: goal.on_state(2),
+    "feedback": lambda goal, _: goal.on_feedback(),
+    "cancel": lambda goal, _: goal.cancel(),
+    "canceling": lambda goal, _: goal.on_cancel_answer(0, listed=True),
+    "link lost": lambda goal, _: goal.on_link_lost() or Step.NOTHING,
+}
+OVER = Step.END | Step.REFUSED | Step.RECALLED | Step.UNKNOWN | Step.UNSETTLED
+
+
+@given(st.lists(st.sampled_from(sorted(EVENTS)), max_size=40))
+def test_goal_is_sent_again_only_after_a_server_has_said_that_it_does_not_know_it(events):
+    goal, asked, may_send = GoalExchange(), 0, True
+    for now, event in enumerate(events):
+        awaited = {"accepted": Phase.SENT, "refused": Phase.SENT, "unanswered": Phase.SENT}
+        if goal.phase is not awaited.get(event, goal.phase):
+            continue
+        if event in {"unknown", "ended", "no result"} and not goal.asking:
+            continue
+        if event == "unknown" and goal.phase is Phase.UNSURE:
+            may_send = True
+        step = EVENTS[event](goal, now / 10)
+        asked += Step.ASK in step
+        if step & OVER:
+            return
+        if Step.QUEUE in step:
+            assert may_send
+            may_send = False
+            goal.on_sent(now / 10)
+        assert goal.asking == (goal.asking and asked > 0)
+        assert not (goal.phase in {Phase.HERE, Phase.QUEUED} and goal.asking)
