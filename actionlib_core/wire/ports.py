@@ -1,4 +1,4 @@
-"""Which wire an action is on: its type says so."""
+"""Which wire an action is on: its type says so, or the configuration of its name."""
 
 from __future__ import annotations
 
@@ -27,12 +27,13 @@ def make_client_port(
         spawn: Starts a named thread for a burst of feedback.
 
     Raises:
-        ConfigError: the action is one of ROS 2, and no network of ROS 2 has the name.
+        ConfigError: the action is one of ROS 2, and no network of ROS 2 has the name; or it has no
+            counterpart on the network that has it.
         TransportError: that network cannot be joined.
 
     Blocks: the first time on a network of ROS 2, until it is joined.
     """
-    if getattr(types.action, "_wire", "") == "ros2":
+    if _is_on_ros2(node, name, types):
         from actionlib_core.wire.ros2.client_port import RosClientPort
 
         return RosClientPort(node, name, types, spawn)
@@ -57,3 +58,13 @@ def make_server_port(node: Node, name: str, types: ActionTypes) -> ServerPort:
     from actionlib_core.wire.server_port import ActionServerPort
 
     return ActionServerPort(node, name, types)
+
+
+def _is_on_ros2(node: Node, name: str, types: ActionTypes) -> bool:
+    """Return whether an action is on a network of ROS 2."""
+    wire = getattr(types.action, "_wire", "ros1")
+    if wire == "ros1" and not node.config.ros2:  # without loading what ROS 2 needs
+        return False
+    from actionlib_core.wire.ros2.mapping import find_network
+
+    return find_network(node, name, wire) is not None

@@ -34,6 +34,7 @@ from actionlib_core.wire.ros2.goal_exchange import GoalExchange, Step
 from actionlib_core.wire.ros2.goal_states import CancelCode
 from actionlib_core.wire.ros2.graph import ActionServers
 from actionlib_core.wire.ros2.link_probe import LinkProbe
+from actionlib_core.wire.ros2.mapping import action_on_ros2
 from actionlib_core.wire.ros2.names import (
     DEFAULT,
     LATCHED,
@@ -130,8 +131,8 @@ class RosClientPort:
         spawn: Starts a named thread for a burst of feedback.
 
     Raises:
-        ConfigError: no network of ROS 2 has the name.
-        InterfaceError: the network's distribution does not define the action.
+        ConfigError: no network of ROS 2 has the name, or the network's distribution has no
+            counterpart of the action or of some of its fields.
         TransportError: the network cannot be joined.
 
     Blocks: the first time on a network, until it is joined.
@@ -151,8 +152,9 @@ class RosClientPort:
         self._clock = node.clock
         self._name = name
         self._types = types
-        self._parts = parts = ros2_action(types.action, network.settings.distro)
-        name_there = network.name(name)
+        self._on_ros2 = there = action_on_ros2(network.settings, name, types)
+        self._parts = parts = ros2_action(there.action)
+        name_there = network.name(there.name)
         names = action_names(name_there)
         send, cancel, result, feedback, status = (
             network.type(part.type, part.hash)
@@ -224,16 +226,18 @@ class RosClientPort:
         return any(error is None for error in self._there.values())
 
     def pack_goal(self, goal: Any) -> bytes:
-        body: bytes = goal.to_cdr()
+        body: bytes = self._on_ros2.to_goal(goal).to_cdr()
         return body
 
     def read_feedback(self, body: bytes) -> Any:
-        return self._parts.feedback.message.from_cdr(body).feedback
+        message = self._parts.feedback.message.from_cdr(body)
+        return self._on_ros2.from_feedback(message.feedback)
 
     def read_result(self, body: bytes) -> Any:
         if not body:  # a goal that never began
             return self._types.result()
-        return self._parts.get_result.response.from_cdr(body).result
+        response = self._parts.get_result.response.from_cdr(body)
+        return self._on_ros2.from_result(response.result)
 
     def send_goal(
         self,

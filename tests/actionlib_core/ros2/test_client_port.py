@@ -11,6 +11,11 @@ from actionlib_core.action.simple_client import SimpleActionClient
 from actionlib_core.config import Config, Ros2
 from actionlib_core.exceptions import TypeMismatchError
 from actionlib_core.goal.states import CommState, Status
+from actionlib_core.interfaces.move_base_msgs.msg import (
+    MoveBaseAction,
+    MoveBaseGoal,
+    MoveBaseResult,
+)
 from actionlib_core.interfaces.nav2_msgs.action import NavigateToPose
 from actionlib_core.interfaces.ros2.test_msgs.action import Fibonacci
 from actionlib_core.node import Node
@@ -527,3 +532,30 @@ def test_closed_client_leaves_no_question_open(world):
     server.end(uuid, 4)
     world.clock.sleep(1.0)
     assert handle.get_result() is None
+
+
+# -- names of ROS 1's types ------------------------------------------------------------------------
+
+
+def test_client_of_move_base_drives_by_navigate_to_pose(world):
+    server = Ros2Server(world.robot, world.clock, "navigate_to_pose", NavigateToPose)
+    node = world.node(world.session(), names=("move_base",))
+    client = ActionClient("move_base", MoveBaseAction, node=node)
+    assert client.wait_for_server(5.0)
+    seen = []
+    goal = MoveBaseGoal()
+    goal.target_pose.header.frame_id = "map"
+    goal.target_pose.pose.position.x = 3.5
+    handle = client.send_goal(goal, None, lambda _, feedback: seen.append(feedback))
+    uuid = goal_uuid(handle.get_goal_id())
+    server.wait(lambda: uuid in server.asked)
+    got = server.goals[uuid]
+    assert (got.pose.header.frame_id, got.pose.pose.position.x) == ("map", 3.5)
+    feedback = NavigateToPose.Feedback()
+    feedback.current_pose.pose.position.x = 1.5
+    server.publish_feedback(uuid, feedback)
+    world.clock.sleep(0.1)
+    server.end(uuid, 4)
+    assert handle.wait(5.0)
+    assert [message.base_position.pose.position.x for message in seen] == [1.5]
+    assert handle.get_result() == MoveBaseResult()
