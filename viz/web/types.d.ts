@@ -114,6 +114,15 @@ interface Edge {
 }
 interface Link extends Edge {
   rule: string | null;
+  join: number | null; // number of the join that it leads to
+}
+// The bar at which the arrows of a rule over several children end.
+interface Join {
+  outcome: string;
+  text: string;
+  conditions: [string, string][];
+  need: number; // so many of the conditions must hold
+  change: Change;
 }
 interface StateNode {
   path: string;
@@ -137,6 +146,7 @@ interface StateNode {
   name: string;
   shown: string;
   links: Link[];
+  joins: Join[];
   wired: string[];
 }
 interface MachinePayload {

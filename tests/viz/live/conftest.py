@@ -100,12 +100,13 @@ class Served:
         self._server = self._thread = None
         self.began = time.time_ns()
 
-    def add(self, name, label="JOB", labels="AB", events=(), **history):
-        """A chain of states; `events` are (kind, path[, facts]) a millisecond apart."""
-        sm = StateMachine(outcomes=["done"], name=label)
-        with sm:
-            for one, after in zip(labels, [*labels[1:], "done"], strict=True):
-                StateMachine.add(one, CBState(lambda _: "ok", outcomes=["ok"]), {"ok": after})
+    def add(self, name, label="JOB", labels="AB", events=(), sm=None, **history):
+        """A chain of states, or `sm`; `events` are (kind, path[, facts]) a millisecond apart."""
+        if sm is None:
+            sm = StateMachine(outcomes=["done"], name=label)
+            with sm:
+                for one, after in zip(labels, [*labels[1:], "done"], strict=True):
+                    StateMachine.add(one, CBState(lambda _: "ok", outcomes=["ok"]), {"ok": after})
         machine = self.machines.obtain(name)
         told = {"epoch": f"{name} {label}", "problems": [], "base": None, "control": None}
         record = asdict(describe(sm))

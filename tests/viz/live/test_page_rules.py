@@ -11,6 +11,7 @@ from dataclasses import asdict
 
 import pytest
 
+from smachpy import CBState, Concurrence, StateMachine
 from viz.live import app
 from viz.live.machines import KEPT_RUNS
 
@@ -95,6 +96,38 @@ def test_so_many_runs_before_are_kept(served):
     assert all(one["outcome"] == "done" and one["recorded"] for one in kept)
     assert machine.before in [one["name"] for one in kept]
     assert machine.summary()["outcome"] == "done"
+
+
+def test_a_rule_over_several_children_is_a_bar_that_counts(served, look):
+    both = Concurrence(
+        outcomes=["low", "all"],
+        default_outcome="all",
+        outcome_map={"low": {"DRIVE": "preempted", "BATTERY": "invalid"}},
+    )
+    with both:
+        Concurrence.add("DRIVE", CBState(lambda _: "ok", outcomes=["ok", "preempted"]))
+        Concurrence.add("BATTERY", CBState(lambda _: "ok", outcomes=["ok", "invalid"]))
+    sm = StateMachine(outcomes=["done"], name="JOB")
+    with sm:
+        StateMachine.add("A", both, {"low": "done", "all": "done"})
+    begun = [("Started", "/JOB", {"initial": ["A"]})]
+    begun += [("Entered", f"/JOB/A{path}") for path in ("", "/DRIVE", "/BATTERY")]
+    machine = served.add("one", sm=sm, events=begun)
+    page = look(served.start())
+    assert page.locator("rect.join").count() == 1
+    wait_for(page, "document.querySelector('.label.joined').textContent === 'both'")
+    # Both arrows end on the bar, and one leads from it.
+    ends = page.evaluate(
+        """() => { const bar = document.querySelector('rect.join').getBBox();
+        const near = (p) => p.x > bar.x - 2 && p.x < bar.x + bar.width + 2 && p.y > bar.y - 2 && p.y < bar.y + bar.height + 2;
+        const lines = [...document.querySelectorAll('path.edge')].map((e) => [e.getPointAtLength(0), e.getPointAtLength(e.getTotalLength())]);
+        return [lines.filter(([, to]) => near(to)).length, lines.filter(([from]) => near(from)).length]; }"""
+    )
+    assert ends == [2, 1]
+    left = [("Left", "/JOB/A/BATTERY", {"outcome": "invalid"})]
+    machine.add(served.events(left, after=4))
+    wait_for(page, "document.querySelector('.label.joined').textContent === 'both: 1 of 2'")
+    assert page.locator("path.edge.arrived").count() == 1
 
 
 GOAL = ("GoalSent", "/JOB/A", {"action": "drive", "goal_id": "1", "goal": {"x": 1}})

@@ -53,6 +53,7 @@ export class Model {
       this.#index(child, node, depth + 1);
       node.total += child.total;
     }
+    node.joins = joinsOf(node);
     node.links = linksOf(node);
     const wired = new Map();
     for (const link of node.links)
@@ -107,21 +108,55 @@ export class Model {
 }
 
 /**
+ * The rules of a container that several of its children decide together: a bar each.
+ * The same choice as the static picture's (viz.pictures.shapes).
+ * @param {StateNode} node
+ * @returns {Join[]}
+ */
+function joinsOf(node) {
+  const labels = new Set(node.children.map((child) => child.label));
+  return node.rules.flatMap(({ outcome, conditions, text, change }) => {
+    const known = conditions.filter(([label]) => labels.has(label));
+    if (new Set(known.map(([label]) => label)).size < 2 || text.startsWith("any of")) return [];
+    const quorum = /^(\d+) of /.exec(text);
+    return [{ outcome, text, change, conditions: known, need: quorum ? Number(quorum[1]) : known.length }];
+  });
+}
+
+/**
+ * What stands at a join: what it needs, and while it waits how much of that has come.
+ * @param {Join} join @param {number} come
+ */
+export function joinText({ need, conditions }, come) {
+  const all = conditions.length;
+  const what = need < all ? `${need} of ${all}` : all === 2 ? "both" : `all ${all}`;
+  return come > 0 && come < need ? `${what}: ${come} of ${need}` : what;
+}
+
+/**
  * The arrows of a container: its transitions, and what its rules make of its children's outcomes.
  * @param {StateNode} node
  * @returns {Link[]}
  */
 function linksOf(node) {
   /** @type {Link[]} */
-  const found = node.edges.map((edge) => ({ ...edge, rule: null }));
-  const known = new Set(found.flatMap((edge) => edge.outcomes.map((o) => `${edge.source}\n${o}\n${edge.target}`)));
-  for (const rule of node.rules)
+  const found = node.edges.map((edge) => ({ ...edge, rule: null, join: null }));
+  const keyOf = (/** @type {(string | number | null)[]} */ ...parts) => parts.join("\n");
+  const known = new Set(found.flatMap((edge) => edge.outcomes.map((o) => keyOf(edge.source, o, edge.target, null))));
+  for (const rule of node.rules) {
+    const number = node.joins.findIndex((one) => one.outcome === rule.outcome && one.text === rule.text);
+    const join = number < 0 ? null : number;
     for (const [source, outcome] of rule.conditions) {
-      const key = `${source}\n${outcome}\n${rule.outcome}`;
+      const key = keyOf(source, outcome, rule.outcome, join);
       if (known.has(key) || !node.children.some((child) => child.label === source)) continue;
       known.add(key);
       const same = found.find(
-        (edge) => edge.rule && edge.source === source && edge.target === rule.outcome && edge.change === rule.change,
+        (edge) =>
+          edge.rule &&
+          edge.source === source &&
+          edge.target === rule.outcome &&
+          edge.change === rule.change &&
+          edge.join === join,
       );
       if (same) same.outcomes = [...same.outcomes, outcome];
       else
@@ -133,9 +168,11 @@ function linksOf(node) {
           implicit: false,
           back: false,
           rule: rule.text || rule.outcome,
+          join,
           change: rule.change,
           note: "",
         });
     }
+  }
   return found;
 }

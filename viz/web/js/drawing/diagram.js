@@ -1,6 +1,6 @@
 // The diagram: built once per layout, restyled by class when something happens.
-import { ms } from "#core/fold.js";
-import { CHANGE_SIGNS, KIND_NAMES, signed } from "#core/model.js";
+import { containerOf, ms, own } from "#core/fold.js";
+import { CHANGE_SIGNS, joinText, KIND_NAMES, signed } from "#core/model.js";
 import { commonClass, outcomeClass } from "#core/outcomes.js";
 import { duration } from "#core/text.js";
 import { measure } from "#drawing/measure.js";
@@ -28,6 +28,8 @@ const TAGS = { concurrence: "concurrent", iterator: "repeats", sequence: "sequen
  * }} StateView
  * @typedef {{ element: SVGElement, text: string }} TextOf
  * @typedef {{ line: SVGElement, edge: PlacedEdge, count: SVGElement | null, note: string }} Arrow
+ * @typedef {{ join: Join, path: string, text: TextOf | null, lines: Map<string, SVGElement> }} JoinView a bar, with
+ *   the lines that end there by child and outcome
  */
 
 export class Diagram {
@@ -35,6 +37,8 @@ export class Diagram {
   states = new Map();
   /** @type {Map<string, Arrow[]>} */
   arrows = new Map(); // by path of the state and outcome
+  /** @type {Map<string, JoinView[]>} */
+  joins = new Map(); // by path of the container
   /** @type {Map<string, Box>} */
   boxes = new Map();
   /** @type {Map<string, SVGElement>} */
@@ -64,7 +68,8 @@ export class Diagram {
    * @param {Problem[]} problems
    */
   draw(layout, model, problems) {
-    for (const map of [this.states, this.arrows, this.boxes, this.minimapRects, this.minimapDue]) map.clear();
+    for (const map of [this.states, this.arrows, this.joins, this.boxes, this.minimapRects, this.minimapDue])
+      map.clear();
     this.problems = groupByPath(problems);
     const isCompared = model.order.some((n) => n.change || n.note || n.edges.some((e) => e.change || e.note));
     this.svg.classList.toggle("compared", isCompared);
@@ -95,6 +100,11 @@ export class Diagram {
     group.append(frame, icon(node.kind, x + 9, y + 7.5), title);
     this.#register(node, group, frame, null, { ...box, h: 26 }, box.w);
     into.append(group);
+    if (layout.joins.length)
+      this.joins.set(
+        node.path,
+        node.joins.map((join) => ({ join, path: node.path, text: null, lines: new Map() })),
+      );
     for (const edge of layout.edges) into.append(this.#edge(edge, x, y));
     for (const child of layout.boxes) {
       if (child.inner) this.#container(child.inner, x + child.x, y + child.y, into);
@@ -103,6 +113,14 @@ export class Diagram {
     for (const edge of layout.edges) this.#edgeLabels(edge, x, y, into);
     if (layout.entry)
       into.append(el("circle", { class: "entry", cx: x + layout.entry.x, cy: y + layout.entry.y, r: 4.5 }));
+    for (const { join, ...place } of layout.joins)
+      into.append(
+        el(
+          "rect",
+          { class: "join", x: x + place.x, y: y + place.y, width: place.w, height: place.h, rx: 3 },
+          el("title", {}, join.text),
+        ),
+      );
     for (const pill of layout.pills) into.append(outcomePill(node, pill, x, y));
   }
 
@@ -203,6 +221,10 @@ export class Diagram {
       d: roundedLine(points),
       "marker-end": `url(#arrow-${edge.kind === "link" ? kind : "plain"})`,
     });
+    if (edge.link && edge.link.join !== null) {
+      const lines = this.joins.get(containerOf(edge.source))?.[edge.link.join]?.lines;
+      for (const outcome of edge.outcomes) lines?.set(edge.link.source + SEP + outcome, line);
+    }
     const arrow = { line, edge, count: null, note: "" };
     for (const outcome of edge.outcomes) {
       const key = edge.source + SEP + outcome;
@@ -213,6 +235,16 @@ export class Diagram {
 
   /** @param {PlacedEdge} edge @param {number} x @param {number} y @param {DocumentFragment} into */
   #edgeLabels(edge, x, y, into) {
+    if (edge.join) {
+      const [place] = edge.labels;
+      const known = this.joins.get(edge.source)?.find((one) => one.join === edge.join);
+      if (!place || !known) return;
+      const text = joinText(edge.join, 0);
+      const at = { x: x + place.x, y: y + place.y + 9.2, "text-anchor": "middle" };
+      known.text = { element: el("text", { class: "label joined", ...at }, text), text };
+      into.append(known.text.element);
+      return;
+    }
     for (const label of edge.labels) {
       const place = { x: x + label.x, y: y + label.y + 9.2, "text-anchor": "middle" };
       const name = signed(edge.link?.change, label.text);
@@ -298,6 +330,26 @@ export class Diagram {
       view.group.setAttribute("aria-label", label);
     }
     this.minimapDue.set(path, active);
+  }
+
+  /**
+   * Show at the joins of a container what has come, since it was entered.
+   * @param {string} path
+   * @param {Record<string, StateRun>} states
+   */
+  paintJoins(path, states) {
+    const since = own(states, path)?.since ?? null;
+    for (const { join, text, lines } of this.joins.get(path) ?? []) {
+      let come = 0;
+      for (const [label, outcome] of join.conditions) {
+        const child = own(states, `${path}/${label}`);
+        const isThere = since !== null && child?.since == null && (child?.left ?? -1) >= since;
+        const arrived = isThere && child?.outcome === outcome;
+        if (arrived) come += 1;
+        lines.get(label + SEP + outcome)?.classList.toggle("arrived", arrived);
+      }
+      if (text) write(text, joinText(join, come));
+    }
   }
 
   /** The minimap follows a few times a second: drawing it at every event costs as much as the rest. */

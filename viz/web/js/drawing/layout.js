@@ -1,5 +1,6 @@
 // Where things are: one ELK graph per open container, bottom-up, in a worker, and cached.
 // Opening or closing a container lays out itself and its ancestors only.
+import { joinText } from "#core/model.js";
 import { measure } from "#drawing/measure.js";
 
 /**
@@ -10,13 +11,14 @@ import { measure } from "#drawing/measure.js";
  *   node: StateNode, inner: ContainerLayout | null, hasRows: boolean, nameWidth: number,
  *   dots: (Point & { outcome: string })[],
  * }} PlacedBox a state, with a row for each of its outcomes or without
+ * @typedef {Box & { join: Join }} PlacedJoin
  * @typedef {{
- *   kind: "link" | "initial" | "fork", link?: Link, source: string, outcomes: string[],
+ *   kind: "link" | "initial" | "fork", link?: Link, join?: Join, source: string, outcomes: string[],
  *   points: Point[], labels: (Point & { text: string })[],
  * }} PlacedEdge
  * @typedef {{
  *   node: StateNode, dir: Direction, w: number, h: number, cost: number, boxes: PlacedBox[],
- *   pills: PlacedPill[], ports: PlacedPort[], edges: PlacedEdge[], entry: Point | null,
+ *   pills: PlacedPill[], joins: PlacedJoin[], ports: PlacedPort[], edges: PlacedEdge[], entry: Point | null,
  * }} ContainerLayout where things are in a container, relative to its corner
  * @typedef {{ entry: string, out: (outcome?: string) => string, split: boolean }} Ends ids to connect a state by
  */
@@ -26,6 +28,7 @@ const ROW_H = 14;
 const LEAF_H = 26;
 const PILL_H = 15;
 const ENTRY = 10;
+const BAR = 6; // thickness of a join
 const MOST_CACHED = 2000; // layouts of containers
 /** @type {Direction[]} */
 const DIRECTIONS = ["DOWN", "RIGHT"];
@@ -238,6 +241,7 @@ class Plan {
     /** @type {Map<string, Ends>} */
     this.ends = new Map(node.children.map((child) => [child.label, this.#child(child)]));
     this.targets = new Map(this.outcomes.map((outcome) => [outcome, this.#outcome(outcome)]));
+    this.bars = node.joins.map((join) => this.#join(join));
     this.#edges();
   }
 
@@ -406,6 +410,15 @@ class Plan {
     return id;
   }
 
+  /** @param {Join} join */
+  #join(join) {
+    const id = this.#next({ kind: "join", join });
+    const long = 12 + 12 * join.conditions.length;
+    const [width, height] = this.dir === "DOWN" ? [long, BAR] : [BAR, long];
+    this.graph.children.push({ id, width, height });
+    return id;
+  }
+
   #edges() {
     const { node } = this;
     for (const label of node.initial) {
@@ -415,16 +428,24 @@ class Plan {
     }
     for (const link of node.links) {
       const source = this.ends.get(link.source);
-      const target = link.to_outcome ? this.targets.get(link.target) : this.ends.get(link.target)?.entry;
+      const outcome = link.join === null ? this.targets.get(link.target) : this.bars[link.join];
+      const target = link.to_outcome ? outcome : this.ends.get(link.target)?.entry;
       if (!source || !target) continue;
       const meaning = { kind: "link", link, source: `${node.path}/${link.source}` };
       if (source.split)
         for (const outcome of link.outcomes)
           this.#edge({ ...meaning, outcomes: [outcome] }, source.out(outcome), target);
       else {
-        const plain = link.to_outcome && link.outcomes.length === 1 && link.outcomes[0] === link.target;
+        const plain =
+          link.to_outcome && link.join === null && link.outcomes.length === 1 && link.outcomes[0] === link.target;
         this.#edge({ ...meaning, outcomes: link.outcomes }, source.out(), target, plain ? [] : link.outcomes);
       }
+    }
+    for (const [i, join] of node.joins.entries()) {
+      const target = this.targets.get(join.outcome);
+      const meaning = { kind: "link", join, source: node.path, outcomes: [join.outcome] };
+      // As wide as what stands there while it waits
+      if (target) this.#edge(meaning, this.bars[i], target, [joinText(join, join.need - 1)]);
     }
   }
 
@@ -463,6 +484,7 @@ function placed(plan, found) {
     cost: cost(found.width, found.height),
     boxes: [],
     pills: [],
+    joins: [],
     ports: [],
     edges: [],
     entry: null,
@@ -478,6 +500,7 @@ function placed(plan, found) {
     const meaning = plan.meanings.get(child.id);
     const place = { x: child.x, y: child.y, w: child.width, h: child.height };
     if (meaning.kind === "entry") result.entry = { x: child.x + 4.5, y: child.y + 4.5 };
+    else if (meaning.kind === "join") result.joins.push({ ...place, join: meaning.join });
     else if (meaning.kind === "pill") result.pills.push({ ...place, outcome: meaning.outcome });
     else
       result.boxes.push({

@@ -1,6 +1,7 @@
 // The drawing as a whole: what happens reaches the diagram and the timeline, and the panels at
 // their own pace. What the user does comes in by the methods below.
 import { connect, isFile, makeLayoutWorker, messageOf } from "#core/connection.js";
+import { containerOf } from "#core/fold.js";
 import { numbersFor } from "#core/statistics.js";
 import * as store from "#core/store.js";
 import { shorten } from "#core/text.js";
@@ -195,6 +196,8 @@ export class Page {
 
   /** @param {string} path @param {RunState} data @param {number} now */
   #paint(path, data, now) {
+    this.diagram.paintJoins(path, data.states);
+    this.diagram.paintJoins(containerOf(path), data.states);
     if (!this.diagram.states.has(path)) return;
     const goal = Object.values(data.goals).findLast((one) => one.path === path && one.ended == null);
     this.diagram.paint(path, data.states[path], now, goal, store.hasNoServer(goal));
@@ -210,6 +213,7 @@ export class Page {
       const goal = goals.get(path);
       this.diagram.paint(path, data.states[path], now, goal, store.hasNoServer(goal));
     }
+    for (const path of this.diagram.joins.keys()) this.diagram.paintJoins(path, data.states);
     const stops = store.facts.value?.control?.breakpoints ?? [];
     const pathsOf = (/** @type {typeof stops} */ some) => some.map(([path]) => path);
     this.diagram.mark(pathsOf(stops.filter(([, outcome]) => outcome === null)), "stopped");

@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { Model } from "#core/model.js";
+import { joinText, Model } from "#core/model.js";
 import { fixture } from "./fixtures.js";
 
 const model = (implicit = false) => new Model(fixture("page_model.json"), implicit);
@@ -63,4 +63,57 @@ test("levels", () => {
   assert.deepEqual([...model().toDepth(9)], ["/PATROL", "/PATROL/ROUND"]);
   assert.equal(model().readableDepth(), 2);
   assert.equal(model().readableDepth(4), 1);
+});
+
+/** @param {string} text @param {[string, string][]} conditions */
+function ruled(text, conditions) {
+  const payload = fixture("page_model.json");
+  payload.explicit.children[0].rules = [{ outcome: "low", conditions, text, change: "" }];
+  return /** @type {StateNode} */ (new Model(payload, false).get("/PATROL/ROUND"));
+}
+
+test("the arrows of a rule over several children end at one bar", () => {
+  const node = ruled("BATTERY:low, DRIVE:preempted", [
+    ["BATTERY", "low"],
+    ["DRIVE", "preempted"],
+    ["GONE", "x"], // no child
+  ]);
+  assert.deepEqual(
+    node.joins.map(({ outcome, need, conditions }) => [outcome, need, conditions.length]),
+    [["low", 2, 2]],
+  );
+  assert.deepEqual(
+    node.links.map((link) => [link.source, link.outcomes, link.target, link.join]),
+    [
+      ["BATTERY", ["low"], "low", 0],
+      ["DRIVE", ["preempted"], "low", 0],
+    ],
+  );
+});
+
+test("a rule of one child, and one that any child decides, have no bar", () => {
+  /** @type {[string, string][]} */
+  const both = [
+    ["BATTERY", "low"],
+    ["DRIVE", "preempted"],
+  ];
+  assert.deepEqual(ruled("BATTERY:low", [both[0]]).joins, []);
+  const any = ruled("any of BATTERY:low, DRIVE:preempted", both);
+  assert.deepEqual(any.joins, []);
+  assert.deepEqual(
+    any.links.map((link) => link.join),
+    [null, null],
+  );
+  assert.equal(ruled("1 of them", both).joins[0].need, 1);
+});
+
+test("a bar says what it needs, and while it waits what has come", () => {
+  const join = (/** @type {number} */ need, /** @type {number} */ all) =>
+    /** @type {Join} */ ({ need, conditions: Array(all).fill(["A", "ok"]) });
+  assert.deepEqual(
+    [0, 1, 2].map((come) => joinText(join(2, 2), come)),
+    ["both", "both: 1 of 2", "both"],
+  );
+  assert.equal(joinText(join(5, 5), 3), "all 5: 3 of 5");
+  assert.equal(joinText(join(2, 5), 1), "2 of 5: 1 of 2");
 });
