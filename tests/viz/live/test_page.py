@@ -399,7 +399,7 @@ def test_two_machines_of_one_name_are_two_machines(start, look):
     page = look(view.address.replace("/#", "/?machine=twin#"))
     start.robot("--name", "twin", "--rate", 4, "--states", 12, "--control")
     wait_for(page, "smachpy.store.machines.value.some((m) => m.name === 'twin (2)')")
-    twins = "smachpy.store.machines.value.filter((m) => m.name.startsWith('twin'))"
+    twins = "smachpy.store.machines.value.filter((m) => m.name.startsWith('twin') && !m.after)"
     labels = page.evaluate(f"() => {twins}.map((m) => [m.name, m.label])")
     assert labels == [["twin", "DELIVER"], ["twin (2)", "FACTORY_12"]]
     page.wait_for_timeout(1500)

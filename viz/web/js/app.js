@@ -11,7 +11,7 @@ import { ActionsPage } from "#panels/actions.js";
 import { html } from "#panels/html.js";
 import { Inspector } from "#panels/inspector.js";
 import { listenToKeys } from "#panels/keys.js";
-import { Help, Legend, Notice, Overlay } from "#panels/messages.js";
+import { Help, Laying, Legend, Notice, Overlay } from "#panels/messages.js";
 import { TopBar } from "#panels/top_bar.js";
 import { Tree } from "#panels/tree.js";
 
@@ -59,6 +59,7 @@ function App() {
     <main class="stage">
       <${Mounted} element=${svg} />
       <${Overlay} page=${page} />
+      <${Laying} />
       <${Mounted} element=${minimap} />
       <${Legend} />
     </main>

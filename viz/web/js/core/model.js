@@ -93,10 +93,10 @@ export class Model {
   }
 
   /** The greatest depth at which a page is readable at a glance. */
-  readableDepth(most = READABLE) {
+  readableDepth(most = READABLE, from = this.root) {
     let visible = 0;
     let depth = 0;
-    let level = [this.root];
+    let level = [from];
     while (level.length) {
       visible += level.length;
       if (visible > most && depth > 1) break;

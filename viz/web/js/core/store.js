@@ -63,6 +63,9 @@ export const theme = signal(saved("theme", "system"));
 /** @type {Signal<Set<string>>} */
 export const opened = signal(new Set()); // paths of containers
 export const help = signal(false);
+export const overview = signal(false); // so many states are open that they are tiles, without arrows
+/** @type {Signal<{ done: number, all: number } | null>} */
+export const laidOut = signal(null); // so many states, while it takes a while
 /** @type {Signal<string | null>} */
 export const dismissed = signal(null); // the run before whose notice was closed
 export const actionsOpen = signal(false);
@@ -243,6 +246,8 @@ export function hasNoServer(goal) {
 
 // -- the machine, and which of its containers are open ------------------------------------------
 
+const AROUND = 60; // states to open around one of an overview
+
 let autoDepth = 0; // levels opened without the user; 0: the user has chosen
 
 /** @param {MachinePayload} payload */
@@ -283,6 +288,18 @@ export function keepOpened(paths) {
 export function setOpened(paths) {
   keepOpened(paths);
   if (model.value) save(`open.${model.value.root.label}`, [...paths]);
+}
+
+/** Open a state's container and what is in it as far as it can be read, and no other. @param {StateNode} node */
+export function openAround(node) {
+  const top = node.children.length ? node : node.parent;
+  if (!model.value || !top) return;
+  const below = top.depth + model.value.readableDepth(AROUND, top);
+  const inside = model.value.order.filter(
+    (one) => one.children.length && one.depth < below && (one === top || one.path.startsWith(`${top.path}/`)),
+  );
+  follow.value = false;
+  setOpened(new Set([...model.value.ancestors(top.path), ...inside].map((one) => one.path)));
 }
 
 /** @param {string} path */

@@ -96,8 +96,14 @@ export class Diagram {
     const frame = el("rect", { class: "frame", x, y, width: box.w, height: box.h, rx: 9 });
     frame.style.fill = `var(--depth${Math.min(node.depth, 11)})`;
     const title = el("text", { x: x + 24, y: y + 16.5, class: "title" }, node.shown);
-    if (TAGS[node.kind]) title.append(el("tspan", { dx: 7, class: "tag" }, TAGS[node.kind]));
-    group.append(frame, icon(node.kind, x + 9, y + 7.5), title);
+    if (layout.head) {
+      // a tile of the overview
+      const size = 0.5 * layout.head;
+      title.setAttribute("y", String(y + 0.7 * layout.head));
+      title.setAttribute("x", String(x + 8));
+      title.style.fontSize = `${size}px`;
+    } else if (TAGS[node.kind]) title.append(el("tspan", { dx: 7, class: "tag" }, TAGS[node.kind]));
+    group.append(frame, ...(layout.head ? [] : [icon(node.kind, x + 9, y + 7.5)]), title);
     this.#register(node, group, frame, null, { ...box, h: 26 }, box.w);
     into.append(group);
     if (layout.joins.length)

@@ -35,7 +35,40 @@ export function restart() {
 }
 
 /**
- * The largest box around what runs whose text is legible when it fills the view.
+ * The box around all that runs; what is folded away is where the container is that holds it.
+ * @param {Map<string, Box>} boxes
+ * @returns {Box | null}
+ */
+function boxOfActive(boxes) {
+  const found = store.activeLeaves.value.flatMap((path) => {
+    let at = path;
+    while (at && !boxes.has(at)) at = at.slice(0, Math.max(0, at.lastIndexOf("/")));
+    return boxes.get(at) ?? [];
+  });
+  if (!found.length) return null;
+  const x = Math.min(...found.map((box) => box.x));
+  const y = Math.min(...found.map((box) => box.y));
+  const right = Math.max(...found.map((box) => box.x + box.w));
+  const bottom = Math.max(...found.map((box) => box.y + box.h));
+  return { x, y, w: right - x, h: bottom - y };
+}
+
+/** Whether all that runs is legible at once. @param {Map<string, Box>} boxes @param {Viewport} view */
+export function isLegible(boxes, view) {
+  const box = boxOfActive(boxes);
+  return !box || view.scaleFor(box) >= READABLE;
+}
+
+/** Without the deepest of these containers; null when only the outermost is left. @param {Set<string>} open */
+export function oneLevelLess(open) {
+  const depth = (/** @type {string} */ path) => path.split("/").length;
+  const deepest = Math.max(...[...open].map(depth));
+  const less = [...open].filter((path) => depth(path) < deepest);
+  return less.length ? new Set(less) : null;
+}
+
+/**
+ * The largest box around all that runs whose text is legible when it fills the view.
  * @param {Diagram} diagram
  * @param {Viewport} view
  * @param {Box} whole the whole diagram
@@ -43,16 +76,30 @@ export function restart() {
 export function boxToFrame(diagram, view, whole) {
   const leaves = store.activeLeaves.value;
   const model = store.model.value;
-  if (!leaves.length || !model) return whole;
-  const deepest = leaves.reduce((a, b) => (b.split("/").length > a.split("/").length ? b : a));
-  const around = model.ancestors(deepest);
+  const active = boxOfActive(diagram.boxes);
+  if (!active || !model) return whole;
+  const around = model.ancestors(leaves[0]);
   const shared = around.filter((node) => leaves.every((leaf) => leaf.startsWith(`${node.path}/`)));
-  /** @type {(nodes: StateNode[]) => Box[]} */
-  const boxesOf = (nodes) => nodes.map((node) => diagram.boxOf(node.path)).filter((box) => box !== undefined);
-  /** @type {(boxes: Box[]) => Box | undefined} */
-  const legible = (boxes) => boxes.find((box) => view.scaleFor(box) >= READABLE);
-  const deep = boxesOf(around);
-  return atLeast(legible(boxesOf(shared)) ?? legible(deep) ?? deep.at(-1) ?? whole, view);
+  for (const { path } of shared) {
+    const box = diagram.boxOf(path);
+    if (box && view.scaleFor(box) >= READABLE) return atLeast(box, view);
+  }
+  if (view.scaleFor(active) >= READABLE) return atLeast(active, view);
+  // More runs than can be read at once, with all folded: what began last is in the middle
+  const states = store.shown().states;
+  const newest = leaves.reduce((a, b) => ((states[b]?.since ?? 0) > (states[a]?.since ?? 0) ? b : a));
+  const at = boxOfOne(diagram, newest) ?? active;
+  const [w, h] = [view.width / READABLE, view.height / READABLE];
+  return { x: at.x + at.w / 2 - w / 2, y: at.y + at.h / 2 - h / 2, w, h };
+}
+
+/** @param {Diagram} diagram @param {string} path */
+function boxOfOne(diagram, path) {
+  for (let at = path; at; at = at.slice(0, Math.max(0, at.lastIndexOf("/")))) {
+    const box = diagram.boxOf(at);
+    if (box) return box;
+  }
+  return null;
 }
 
 /** Something small is shown with what is around it, not enlarged. @param {Box} box @param {Viewport} view */

@@ -17,9 +17,12 @@ import { measure } from "#drawing/measure.js";
  *   points: Point[], labels: (Point & { text: string })[],
  * }} PlacedEdge
  * @typedef {{
- *   node: StateNode, dir: Direction, w: number, h: number, cost: number, boxes: PlacedBox[],
+ *   node: StateNode, shape: Shape, w: number, h: number, boxes: PlacedBox[],
  *   pills: PlacedPill[], joins: PlacedJoin[], ports: PlacedPort[], edges: PlacedEdge[], entry: Point | null,
+ *   isOverview?: boolean, head?: number,
  * }} ContainerLayout where things are in a container, relative to its corner
+ * @typedef {{ dir: Direction, columns?: number, folded?: boolean }} Shape how a container is laid out: along a
+ *   direction, in a grid of so many columns, or folded as a long line of text is
  * @typedef {{ entry: string, out: (outcome?: string) => string, split: boolean }} Ends ids to connect a state by
  */
 
@@ -30,6 +33,15 @@ const PILL_H = 15;
 const ENTRY = 10;
 const BAR = 6; // thickness of a join
 const MOST_CACHED = 2000; // layouts of containers
+const GRID_FROM = 4; // children of a concurrence
+const FOLD_FROM = 7; // children of another container
+const FOLD_COST = 1.3; // its lines are longer
+const OVERVIEW_FROM = 150; // states that are seen
+const TILE_GAP = 6;
+const HEAD = 24; // height of the name of a tile
+const HEAD_GROWS = 1.7; // by every level around it
+const MOST_COLUMNS = 60;
+const ASPECTS = { least: 0.6, most: 2.4 };
 /** @type {Direction[]} */
 const DIRECTIONS = ["DOWN", "RIGHT"];
 const FLOW = {
@@ -98,8 +110,11 @@ export function leafWidth(node) {
 export class Layout {
   /** @type {Map<string, ContainerLayout>} */
   cache = new Map(); // by container, what is open in it, its direction and that around it
-  /** @type {Map<string, Direction>} */
-  chosen = new Map(); // of the containers shown, kept so that nothing jumps about
+  /** @type {Map<string, string>} */
+  chosen = new Map(); // shapes of the containers shown, kept so that nothing jumps about
+  /** @type {Map<string, string[]>} */
+  tried = new Map(); // names of the shapes of a container, by what is open in it
+  aspect = 1.6; // width of the view by its height
 
   /** @param {Worker} worker */
   constructor(worker) {
@@ -108,20 +123,32 @@ export class Layout {
 
   clear() {
     this.forget();
-    this.chosen.clear();
+    this.choose(this.aspect);
   }
 
-  /** Forget the layouts, but keep the directions. */
+  /** Choose the shapes anew for a view of that aspect. @param {number} aspect */
+  choose(aspect) {
+    this.chosen.clear();
+    const next = Math.max(ASPECTS.least, Math.min(ASPECTS.most, aspect));
+    if (Math.abs(next - this.aspect) > 0.1 * this.aspect) this.forget(); // grids and folds go by it
+    this.aspect = next;
+  }
+
+  /** Forget the layouts, but keep the shapes. */
   forget() {
     this.cache.clear();
+    this.tried.clear();
   }
 
   /**
    * Lay out everything below `root`, with the containers of `open` opened.
    * @param {StateNode} root
    * @param {Set<string>} open
+   * @param {(done: number, all: number) => void} [onProgress] told of the states that are laid out
    */
-  async run(root, open) {
+  async run(root, open, onProgress) {
+    const all = countOf(root, open);
+    if (all > OVERVIEW_FROM) return overview(root, open, this.aspect);
     if (this.cache.size > MOST_CACHED) this.forget();
     /** @type {StateNode[][]} */
     const levels = []; // innermost containers first
@@ -136,14 +163,13 @@ export class Layout {
     if (height(root) < 0) return null;
     const keys = new Map();
     for (const node of levels.flat()) keys.set(node, keyOf(node, open, keys));
-    for (const level of levels) await this.#layOut(level, root, open, keys);
+    let done = 0;
+    for (const level of levels) {
+      await this.#layOut(level, root, open, keys);
+      done += level.reduce((sum, node) => sum + node.children.length, 0);
+      onProgress?.(done, all);
+    }
     return this.#best(root, null, keys);
-  }
-
-  /** @param {StateNode} node @returns {Direction[]} */
-  #directions(node) {
-    const chosen = this.chosen.get(node.path);
-    return chosen ? [chosen] : DIRECTIONS;
   }
 
   /**
@@ -154,16 +180,22 @@ export class Layout {
    */
   async #layOut(level, root, open, keys) {
     const plans = [];
-    for (const node of level)
+    for (const node of level) {
+      const known = keys.get(node) ?? "";
+      const names = new Set(this.tried.get(known));
+      const chosen = this.chosen.get(node.path);
       for (const outer of node === root ? [null] : DIRECTIONS)
-        for (const dir of this.#directions(node)) {
-          const key = keys.get(node) + SEP + dir + SEP + outer;
+        for (const shape of shapesOf(node, this.#inside(node, open, keys, "DOWN"), this.aspect)) {
+          const name = nameOf(shape);
+          if (chosen !== undefined && chosen !== name) continue;
+          names.add(name);
+          const key = known + SEP + name + SEP + outer;
           if (this.cache.has(key)) continue;
-          plans.push({
-            key,
-            plan: new Plan(node, dir, outer, `g${plans.length}`, this.#inside(node, open, keys, dir)),
-          });
+          const inner = this.#inside(node, open, keys, shape.dir);
+          plans.push({ key, plan: new Plan(node, shape, outer, `g${plans.length}`, inner, this.aspect) });
         }
+      this.tried.set(known, [...names]);
+    }
     if (!plans.length) return;
     const result = await this.elk.layout({
       id: "batch",
@@ -191,19 +223,117 @@ export class Layout {
   #best(node, outer, keys) {
     /** @type {ContainerLayout | null} */
     let best = null;
-    for (const dir of this.#directions(node)) {
-      const one = this.cache.get(keys.get(node) + SEP + dir + SEP + outer);
-      if (one && (!best || one.cost < best.cost)) best = one;
+    const known = keys.get(node) ?? "";
+    const chosen = this.chosen.get(node.path);
+    const names = this.tried.get(known) ?? [];
+    for (const name of chosen !== undefined && names.includes(chosen) ? [chosen] : names) {
+      const one = this.cache.get(known + SEP + name + SEP + outer);
+      if (one && (!best || badness(one, this.aspect) < badness(best, this.aspect))) best = one;
     }
     if (outer === null && best) this.#settle(best);
     return best;
   }
 
-  /** Keep the directions of what is shown. @param {ContainerLayout} result */
+  /** Keep the shapes of what is shown. @param {ContainerLayout} result */
   #settle(result) {
-    this.chosen.set(result.node.path, result.dir);
+    this.chosen.set(result.node.path, nameOf(result.shape));
     for (const child of result.boxes) if (child.inner) this.#settle(child.inner);
   }
+}
+
+/** So many states are seen. @param {StateNode} node @param {Set<string>} open @returns {number} */
+const countOf = (node, open) =>
+  isOpen(node, open) ? node.children.reduce((sum, child) => sum + countOf(child, open), 1) : 1;
+
+/**
+ * What is too much for arrows: tiles by nesting, in the order of the machine, so that a state is always at the same
+ * place.
+ * @param {StateNode} node
+ * @param {Set<string>} open
+ * @param {number} aspect
+ * @returns {ContainerLayout}
+ */
+export function overview(node, open, aspect) {
+  const tiles = node.children.map((child) => {
+    const inner = isOpen(child, open) ? overview(child, open, aspect) : null;
+    return { node: child, inner, w: inner?.w ?? leafWidth(child), h: inner?.h ?? LEAF_H };
+  });
+  // What is further out has a larger name: it is still legible when all is in view.
+  const head = HEAD_GROWS * Math.max(HEAD / HEAD_GROWS, ...tiles.map((tile) => tile.inner?.head ?? 0));
+  const least = measure(node.shown, 11, true) * (head / HEAD) + 40;
+  const tried = tiles.slice(0, MOST_COLUMNS).map((_, i) => inRows(tiles, i + 1, head, least));
+  const best = tried.reduce((a, b) => (cost(b, aspect) < cost(a, aspect) ? b : a));
+  const none = { pills: [], joins: [], ports: [], edges: [], entry: null };
+  return { node, shape: { dir: "DOWN" }, ...best, ...none, head, isOverview: true };
+}
+
+/**
+ * @param {{ node: StateNode, inner: ContainerLayout | null, w: number, h: number }[]} tiles
+ * @param {number} columns
+ * @param {number} head room for the name
+ * @param {number} least width
+ */
+function inRows(tiles, columns, head, least) {
+  let [y, w] = [head, least];
+  const boxes = [];
+  for (let i = 0; i < tiles.length; i += columns) {
+    const row = tiles.slice(i, i + columns);
+    let x = TILE_GAP;
+    for (const tile of row) {
+      boxes.push({ ...tile, x, y, hasRows: false, nameWidth: 0, dots: [] });
+      x += tile.w + TILE_GAP;
+    }
+    w = Math.max(w, x);
+    y += Math.max(...row.map((tile) => tile.h)) + TILE_GAP;
+  }
+  return { boxes, w, h: y };
+}
+
+/** Where every state that is drawn is. @param {ContainerLayout} layout @param {number} x @param {number} y */
+export function boxesOf(layout, x = 0, y = 0, found = /** @type {Map<string, Box>} */ (new Map())) {
+  found.set(layout.node.path, { x, y, w: layout.w, h: layout.h });
+  for (const { node, inner, ...box } of layout.boxes)
+    if (inner) boxesOf(inner, x + box.x, y + box.y, found);
+    else found.set(node.path, { x: x + box.x, y: y + box.y, w: box.w, h: box.h });
+  return found;
+}
+
+/** @param {Shape} shape */
+const nameOf = ({ dir, columns, folded }) => `${dir}${columns ?? ""}${folded ? "~" : ""}`;
+
+/**
+ * The shapes to try for a container.
+ * @param {StateNode} node
+ * @param {Map<string, ContainerLayout>} inner the open containers in it
+ * @param {number} aspect
+ * @returns {Shape[]}
+ */
+export function shapesOf(node, inner, aspect) {
+  /** @type {Shape[]} */
+  const shapes = DIRECTIONS.map((dir) => ({ dir }));
+  const { children } = node;
+  if (node.kind !== "concurrence") {
+    if (children.length >= FOLD_FROM) shapes.push(...DIRECTIONS.map((dir) => ({ dir, folded: true })));
+    return shapes;
+  }
+  if (children.length < GRID_FROM) return shapes;
+  const sizes = children.map((child) => inner.get(child.label) ?? { w: leafWidth(child), h: LEAF_H });
+  /** @param {number} columns */
+  const size = (columns) => {
+    let [w, h] = [0, 0];
+    for (let i = 0; i < sizes.length; i += columns) {
+      const row = sizes.slice(i, i + columns);
+      w = Math.max(
+        w,
+        row.reduce((sum, one) => sum + one.w + 30, 0),
+      );
+      h += Math.max(...row.map((one) => one.h)) + 40;
+    }
+    return { w, h };
+  };
+  const columns = children.map((_, i) => i + 1).slice(1, -1);
+  const best = columns.reduce((a, b) => (cost(size(b), aspect) < cost(size(a), aspect) ? b : a));
+  return [...shapes, { dir: "DOWN", columns: best }];
 }
 
 /** @param {StateNode} node @param {Set<string>} open */
@@ -223,25 +353,40 @@ class Plan {
 
   /**
    * @param {StateNode} node
-   * @param {Direction} dir its own
-   * @param {Direction | null} outer that of the container around it; null: it is the outermost
+   * @param {Shape} shape its own
+   * @param {Direction | null} outer direction of the container around it; null: it is the outermost
    * @param {string} id
    * @param {Map<string, ContainerLayout>} inner by label
+   * @param {number} aspect of what is folded
    */
-  constructor(node, dir, outer, id, inner) {
+  constructor(node, shape, outer, id, inner, aspect) {
     this.node = node;
+    this.shape = shape;
+    const { dir } = shape;
     this.dir = dir;
     this.outer = outer;
     this.id = id;
     this.inner = inner;
-    this.hasRows = dir === "RIGHT";
+    this.hasRows = dir === "RIGHT"; // a row for each outcome
     this.outcomes = this.#shownOutcomes();
     this.graph = this.#frame();
+    if (shape.columns)
+      Object.assign(this.graph.layoutOptions, {
+        "elk.partitioning.activate": "true",
+        "elk.layered.nodePlacement.strategy": "SIMPLE", // rows stand under each other
+        "elk.separateConnectedComponents": "false",
+      });
+    if (shape.folded)
+      Object.assign(this.graph.layoutOptions, {
+        "elk.layered.wrapping.strategy": "MULTI_EDGE",
+        "elk.aspectRatio": String(aspect),
+      });
     this.entry = this.#entry();
     /** @type {Map<string, Ends>} */
     this.ends = new Map(node.children.map((child) => [child.label, this.#child(child)]));
     this.targets = new Map(this.outcomes.map((outcome) => [outcome, this.#outcome(outcome)]));
     this.bars = node.joins.map((join) => this.#join(join));
+    if (shape.columns) this.#makeRows(shape.columns);
     this.#edges();
   }
 
@@ -288,7 +433,7 @@ class Plan {
         "elk.layered.considerModelOrder.strategy": "NODES_AND_EDGES",
         "elk.layered.cycleBreaking.strategy": "MODEL_ORDER",
         "elk.layered.edgeLabels.sideSelection": "SMART_DOWN",
-        "elk.nodeLabels.placement": "[H_LEFT, V_TOP, INSIDE]",
+        "elk.nodeLabels.placement": "[H_CENTER, V_TOP, INSIDE]",
         "elk.nodeSize.constraints": "[NODE_LABELS, PORTS, PORT_LABELS, MINIMUM_SIZE]",
         "elk.portConstraints": "FIXED_SIDE",
       },
@@ -410,6 +555,20 @@ class Plan {
     return id;
   }
 
+  /** Put children into rows, and what follows from them below. @param {number} columns */
+  #makeRows(columns) {
+    const rows = Math.ceil(this.node.children.length / columns);
+    let i = 0;
+    for (const one of this.graph.children) {
+      const { kind } = this.meanings.get(one.id);
+      const row = { entry: 0, join: rows + 1, pill: rows + 2 }[/** @type {string} */ (kind)];
+      one.layoutOptions = {
+        ...one.layoutOptions,
+        "elk.partitioning.partition": String(row ?? 1 + Math.floor(i++ / columns)),
+      };
+    }
+  }
+
   /** @param {Join} join */
   #join(join) {
     const id = this.#next({ kind: "join", join });
@@ -424,7 +583,8 @@ class Plan {
     for (const label of node.initial) {
       const kind = node.kind === "concurrence" ? "fork" : "initial";
       const target = this.ends.get(label);
-      if (target) this.#edge({ kind, source: "", outcomes: [] }, this.entry, target.entry);
+      // In a grid its tag says that all of them begin; lines to all of them would hide it.
+      if (target && !this.shape.columns) this.#edge({ kind, source: "", outcomes: [] }, this.entry, target.entry);
     }
     for (const link of node.links) {
       const source = this.ends.get(link.source);
@@ -465,8 +625,14 @@ class Plan {
   }
 }
 
-/** @param {number} w @param {number} h */
-const cost = (w, h) => Math.max(w, 1.6 * h) + 0.15 * Math.sqrt(w * h);
+/** @param {ContainerLayout} layout @param {number} aspect */
+const badness = (layout, aspect) => cost(layout, aspect) * (layout.shape.folded ? FOLD_COST : 1);
+
+/**
+ * How badly something fills a view of that aspect.
+ * @param {{ w: number, h: number }} size @param {number} aspect
+ */
+const cost = ({ w, h }, aspect) => Math.max(w, aspect * h) + 0.15 * Math.sqrt(w * h);
 
 /**
  * What ELK found, in the page's terms.
@@ -478,10 +644,9 @@ function placed(plan, found) {
   /** @type {ContainerLayout} */
   const result = {
     node: plan.node,
-    dir: plan.dir,
+    shape: plan.shape,
     w: found.width,
     h: found.height,
-    cost: cost(found.width, found.height),
     boxes: [],
     pills: [],
     joins: [],

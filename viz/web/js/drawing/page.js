@@ -7,7 +7,7 @@ import * as store from "#core/store.js";
 import { shorten } from "#core/text.js";
 import { Diagram } from "#drawing/diagram.js";
 import * as framing from "#drawing/framing.js";
-import { Layout } from "#drawing/layout.js";
+import { boxesOf, Layout } from "#drawing/layout.js";
 import { applyTheme, systemIsDark } from "#drawing/theme.js";
 import { Timeline } from "#drawing/timeline.js";
 import { drag, Viewport } from "#drawing/viewport.js";
@@ -18,6 +18,7 @@ const BEAT_MS = 200; // between two looks at what changes without events
 const BUSY = 15; // events in a second from which transitions do not fade one by one
 const ANNOUNCE_MS = 1000;
 const READABLE = 0.55; // the scale below which fewer levels are opened at first
+const SLOW_MS = 300; // a layout that takes longer shows how far it is
 const BURST = 500; // so many events at once are a snapshot, whose delay is not measured
 
 export class Page {
@@ -269,7 +270,22 @@ export class Page {
     const model = store.model.value;
     if (!model || !this.layout) return;
     const begun = performance.now();
-    const result = await this.layout.run(model.root, new Set(store.opened.value).add(model.root.path));
+    if (this.afterLayout.frame) this.layout.choose(this.view.width / this.view.height);
+    const progress = (/** @type {number} */ done, /** @type {number} */ all) => {
+      if (performance.now() - begun > SLOW_MS) store.laidOut.value = { done, all };
+    };
+    let open = new Set(store.opened.value).add(model.root.path);
+    let result = await this.layout.run(model.root, open, progress);
+    if (this.afterLayout.frame === "follow")
+      while (result && !framing.isLegible(boxesOf(result), this.view)) {
+        const less = framing.oneLevelLess(open);
+        if (!less) break;
+        open = less;
+        store.opened.value = less;
+        result = await this.layout.run(model.root, less, progress);
+      }
+    store.laidOut.value = null;
+    store.overview.value = Boolean(result?.isOverview);
     this.layoutMs = performance.now() - begun;
     if (!result || model !== store.model.value) return;
     const anchor = this.#anchor();
@@ -361,6 +377,11 @@ export class Page {
 
   /** Open or close a container, unless it is the outermost. @param {StateNode | undefined} node */
   #toggle(node) {
+    if (store.overview.value && node) {
+      store.openAround(node);
+      this.relayout({ focus: node.path });
+      return;
+    }
     if (!node?.children.length || !node.parent) return;
     this.toggled = node.path;
     store.toggle(node.path);

@@ -108,6 +108,16 @@ function Empty() {
     }</div>`;
 }
 
+/** How far a layout is that takes a while. */
+export function Laying() {
+  const laid = store.laidOut.value;
+  if (!laid) return null;
+  const { done, all } = laid;
+  const text = `${done.toLocaleString("en")} of ${all.toLocaleString("en")} states`;
+  return html`<div class="laying" role="progressbar" aria-valuenow=${done} aria-valuemax=${all} aria-label=${text}>
+    <i style=${`width:${(100 * done) / all}%`}></i><span>${text}</span></div>`;
+}
+
 export function Legend() {
   if (store.comparison.value) {
     const changes = /** @type {const} */ (["added", "removed", "changed"]);
@@ -117,7 +127,7 @@ export function Legend() {
   }
   return html`<div class="legend" aria-hidden="true">${LEGEND.map(
     ([kind, text]) => html`<span><b class=${kind}></b>${text}</span>`,
-  )}</div>`;
+  )}${store.overview.value && html`<span class="hint">double-click a state to open its diagram</span>`}</div>`;
 }
 
 export function Notice() {

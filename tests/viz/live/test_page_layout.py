@@ -1,0 +1,136 @@
+"""Where the page puts things: grids, folded chains, the overview, what is followed."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from smachpy import CBState, Concurrence, StateMachine
+
+pytestmark = pytest.mark.browser
+
+MOST_LAYOUT_MS = 3000  # of 300 states
+
+
+def wait_for(page, condition, timeout=20.0):
+    deadline = time.monotonic() + timeout
+    while not page.evaluate(f"() => Boolean({condition})"):
+        assert time.monotonic() < deadline, f"never true: {condition}"
+        page.wait_for_timeout(50)
+
+
+def chain(names, of=None, name=None):
+    """States one after the other; `of(name)` makes each."""
+    sm = StateMachine(outcomes=["done"], **({} if name is None else {"name": name}))
+    with sm:
+        for one, after in zip(names, [*names[1:], "done"], strict=True):
+            state = of(one) if of else CBState(lambda _: "done", outcomes=["done"])
+            StateMachine.add(one, state, {"done": after})
+    return sm
+
+
+def nested(width, depth):
+    names = [f"S{n}" for n in range(width)]
+    return chain(names, None if depth == 0 else lambda _: nested(width, depth - 1), "TOP")
+
+
+def regions(count):
+    fleet = Concurrence(outcomes=["done"], default_outcome="done", name="FLEET")
+    with fleet:
+        for n in range(count):
+            Concurrence.add(f"ROBOT_{n}", chain(["NEXT", "DRIVE", "PARK"]))
+    return fleet
+
+
+def all_levels(page):
+    page.evaluate("() => { smachpy.page.setDepth(99); return smachpy.page.drawing; }")
+    return page.evaluate(
+        """() => { const { page } = smachpy; return { size: page.diagram.size, k: page.view.k, ms: page.layoutMs,
+        stage: page.view.width / page.view.height, boxes: Object.fromEntries(page.diagram.boxes) }; }"""
+    )
+
+
+def fills(shown):
+    """How far the drawing's aspect is from the view's; 1 is the same."""
+    aspect = shown["size"]["w"] / shown["size"]["h"]
+    return max(aspect / shown["stage"], shown["stage"] / aspect)
+
+
+def test_independent_regions_stand_in_a_grid(served, look):
+    served.add("fleet", sm=regions(8))
+    shown = all_levels(look(served.start()))
+    robots = [shown["boxes"][f"/FLEET/ROBOT_{n}"] for n in range(8)]
+    assert len({round(box["y"]) for box in robots}) in {2, 3, 4}  # rows
+    assert fills(shown) < 2
+
+
+def test_a_long_chain_is_folded(served, look):
+    served.add("chain", sm=chain([f"STEP_{n}" for n in range(53)], name="CHAIN"))
+    shown = all_levels(look(served.start()))
+    assert fills(shown) < 2
+    assert shown["k"] > 0.5
+
+
+def test_levels_lay_out_anew_for_the_view(served, look):
+    served.add("chain", sm=chain([f"STEP_{n}" for n in range(24)], name="CHAIN"))
+    page = look(served.start())
+    wide = all_levels(page)
+    page.set_viewport_size({"width": 760, "height": 1400})
+    wait_for(page, "smachpy.page.view.width < smachpy.page.view.height")
+    narrow = all_levels(page)
+    assert narrow["size"]["w"] / narrow["size"]["h"] < wide["size"]["w"] / wide["size"]["h"]
+    assert fills(narrow) < 2.5
+
+
+def test_too_many_states_for_arrows_are_tiles_where_the_running_ones_are_lit(served, look):
+    sm = nested(10, 2)
+    path = "/TOP/S3/S7/S5"
+    parts = [path.rsplit("/", cut)[0] for cut in (3, 2, 1)] + [path]
+    served.add("big", sm=sm, events=[("Started", "/TOP"), *(("Entered", p) for p in parts[1:])])
+    page = look(served.start())
+    shown = all_levels(page)
+    assert page.evaluate("() => smachpy.store.overview.value")
+    assert len(shown["boxes"]) == 1111
+    assert shown["ms"] < MOST_LAYOUT_MS
+    assert fills(shown) < 1.6
+    assert page.evaluate(f"() => !!document.querySelector('g.leaf.active[data-path=\"{path}\"]')")
+    tiles = [shown["boxes"][f"/TOP/S3/S{n}"] for n in range(10)]
+    for i, a in enumerate(tiles):
+        for b in tiles[:i]:
+            aside = a["x"] >= b["x"] + b["w"] or b["x"] >= a["x"] + a["w"]
+            assert aside or a["y"] >= b["y"] + b["h"] or b["y"] >= a["y"] + a["h"]
+    again = all_levels(page)
+    assert again["boxes"] == shown["boxes"]
+    page.dblclick(f'g[data-path="{path}"] .frame', force=True)  # its diagram, there
+    wait_for(page, "!smachpy.store.overview.value && !smachpy.page.drawing")
+    assert page.evaluate(f"() => smachpy.page.diagram.boxes.has('{path}')")
+    assert page.locator("path.edge").count() > 5
+    page.keyboard.press("9")  # and back
+    wait_for(page, "smachpy.store.overview.value")
+
+
+def test_three_hundred_states_are_there_in_time(served, look):
+    served.add("big", sm=nested(17, 1))  # 307
+    assert all_levels(look(served.start()))["ms"] < MOST_LAYOUT_MS
+
+
+def test_follow_frames_all_that_runs_and_never_below_nine_pixels(served, look):
+    running = [
+        ("Entered", path)
+        for n in range(40)
+        for path in (f"/FLEET/ROBOT_{n}", f"/FLEET/ROBOT_{n}/DRIVE")
+    ]
+    served.add("fleet", sm=regions(40), events=[("Started", "/FLEET"), *running])
+    page = look(served.start(follow=True))
+    wait_for(
+        page, "smachpy.store.follow.value && !smachpy.page.drawing && smachpy.page.view.k > 0.8"
+    )
+    wait_for(
+        page,
+        """(() => { const { view, diagram } = smachpy.page;
+        const robots = [...diagram.boxes].filter(([path]) => /ROBOT_\\d+$/.test(path)).map(([, box]) => box);
+        return robots.length === 40 && view.k * 11 >= 9 && robots.every((b) =>
+          b.x * view.k + view.x > -1 && (b.x + b.w) * view.k + view.x < view.width + 1 &&
+          b.y * view.k + view.y > -1 && (b.y + b.h) * view.k + view.y < view.height + 1); })()""",
+    )
