@@ -149,12 +149,22 @@ def _info(args: argparse.Namespace) -> int:
 
 
 def _message_class(node: Node, args: argparse.Namespace) -> type[Message]:
+    """Return the class of a topic's messages; one that is not known here may come with it."""
+    from actionlib_core.exceptions import InterfaceError
     from actionlib_core.interfaces import get_message
+    from actionlib_core.wire.definitions import ask_definition, define
 
     if args.type:
         return known(get_message, args.type)
     ends = find_ends(node, args.name, TOPIC_KINDS)
-    return known(get_message, only_type(ends, args.name))
+    type_name = only_type(ends, args.name)
+    try:
+        return known(get_message, type_name)
+    except InterfaceError:
+        text = ask_definition(node, type_name, ends[0].md5)
+        if text is None:
+            raise
+        return define(type_name, ends[0].md5, text)
 
 
 def _echo(args: argparse.Namespace) -> int:

@@ -3,6 +3,7 @@
 import sys
 
 import rospy
+from roscpp.msg import Logger
 from std_msgs.msg import String
 
 rospy.init_node(sys.argv[1])
@@ -22,6 +23,10 @@ for line in sys.stdin:
     if word == "advertise":
         name, latch = arguments
         publishers[name] = rospy.Publisher(name, String, latch=latch == "latch", queue_size=1000)
+    elif word == "advertise_logger":
+        (name,) = arguments
+        publishers[name] = rospy.Publisher(name, Logger, latch=True, queue_size=1)
+        publishers[name].publish(Logger("rosout", "info"))
     elif word == "publish":
         name, text = arguments
         publishers[name].publish(String(text))
