@@ -700,12 +700,13 @@ class GoalManager:
             log.error("action '%s': unknown status %d of a goal", self.name, entry.status)
             return
         goal = handle.goal
-        if session:
-            goal.server = session
         if not goal.stamp_ns:  # one that was attached to
             goal.stamp_ns = entry.stamp_ns
         before = goal.comm
-        self._pass(handle, goal.on_status(status, entry.text, now))
+        path = goal.on_status(status, entry.text, now)
+        if session and goal.acknowledged:  # not one that knows of the cancel only
+            goal.server = session
+        self._pass(handle, path)
         if goal.comm is not before:
             self._arm(goal.due)
 

@@ -283,6 +283,12 @@ class Iterator(Container):
             raise unknown_outcome(frame.path, self._smachpy.outcomes, outcome)
         return outcome
 
+    def _terminal_labels(self, frame: Frame) -> list[str]:
+        """Return the child, as in SMACH; even when there was no item."""
+        super()._terminal_labels(frame)
+        assert self._label is not None
+        return [self._label]
+
     def _loop(self, frame: Frame, step: Step) -> str:
         """Run the child for item after item; return its last outcome, or that of the end."""
         run, label = frame.run, self._items_label

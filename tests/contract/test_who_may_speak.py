@@ -118,6 +118,30 @@ def test_copy_that_is_sent_again_keeps_its_first_address(world, monkeypatch):
     assert world.runs[handle.get_goal_id()] == 1
 
 
+@pytest.mark.usefixtures("blind")
+def test_farewell_of_another_server_is_no_proof_that_a_goal_was_not_taken(world, monkeypatch):
+    """Both servers hear the cancel; the younger one remembers it for a goal that it never gets."""
+    elder = world.serve(world.robot, seconds=LONG_S / 2)
+    world.clock.sleep(1.0)
+    client = world.client()
+    assert client.wait_for_server(LONG_S)
+    send_status = elder.keeper.port.send_status
+    monkeypatch.setattr(elder.keeper.port, "send_status", lambda *_: None)
+    handle = client.send_goal(Goal(1))
+    world.clock.sleep(0.1)
+    assert world.runs.total() == 1
+    younger = world.serve(world.node("second"))
+    world.clock.sleep(0.1)
+    handle.cancel()
+    world.clock.sleep(0.1)
+    younger.stop()
+    assert not handle.wait(0.0)
+    monkeypatch.setattr(elder.keeper.port, "send_status", send_status)
+    assert handle.wait(LONG_S)
+    assert handle.get_goal_status() == GoalStatus.SUCCEEDED
+    assert world.runs.total() == 1
+
+
 def test_younger_server_gives_way_and_its_goal_is_lost_with_the_reason(world, monkeypatch):
     monkeypatch.setattr(server_port, "list_endpoints", lambda *_, **__: [])
     elder = world.serve(world.robot)
