@@ -5,7 +5,8 @@ lets nobody else in. Everything beyond that is said here: a router to connect to
 password, who may use which names, and the name space of a robot.
 
 The file is YAML with the fields of `Config`; `SMACHPY_CONFIG` names it, or an argument does.
-`SMACHPY_DOMAIN` alone sets the domain where no file does.
+`SMACHPY_DOMAIN` alone sets the domain where no file does. `SMACHPY_ROS2` names the router of a
+ROS 2 robot, with or without a file, `SMACHPY_ROS2_DOMAIN` and `SMACHPY_ROS2_DISTRO` the rest.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import math
 import os
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from actionlib_core.exceptions import ConfigError, NameSetupError
 from actionlib_core.names import clean_namespace
@@ -24,6 +25,10 @@ if TYPE_CHECKING:
 
 ENVIRONMENT_VARIABLE = "SMACHPY_CONFIG"
 DOMAIN_VARIABLE = "SMACHPY_DOMAIN"
+ROS2_VARIABLE = "SMACHPY_ROS2"
+ROS2_DOMAIN_VARIABLE = "SMACHPY_ROS2_DOMAIN"
+ROS2_DISTRO_VARIABLE = "SMACHPY_ROS2_DISTRO"
+ALL_NAMES = "**"
 LAST_DOMAIN = 9999
 MOST_DIGITS = 9  # of a number that is read
 ROUTER_ENDPOINT = "tcp/127.0.0.1:7447"
@@ -134,7 +139,9 @@ class Ros2:
             `odom` there, under `namespace`.
         names: Full names here that are on this network, `*` for a word, `**` for any number of
             them; needed where there are several networks and no `robot`, and for ends whose types
-            are those of ROS 1, which use the corresponding ones of ROS 2 then.
+            are those of ROS 1, which use the corresponding ones of ROS 2 then. `**` alone is every
+            name whose type ROS 2 has, but for std_msgs and std_srvs, which programs use among
+            themselves, too.
         map: Names here that have another name or type there; they need not be in `names`.
         mode: "client" reaches nodes through the router only, as it has to be from another machine;
             "peer" talks to them directly, faster, on the robot's own machine.
@@ -420,17 +427,43 @@ def load_config(source: Config | str | Path | None = None) -> Config:
     if source is None:
         source = os.environ.get(ENVIRONMENT_VARIABLE) or None
     if source is None:
-        return Config(domain=_domain_of_environment())
-    from actionlib_core._config_file import read_config_file
+        config = Config(domain=_number_of_environment(DOMAIN_VARIABLE, LAST_DOMAIN))
+    else:
+        from actionlib_core._config_file import read_config_file
 
-    return read_config_file(Path(source))
+        config = read_config_file(Path(source))
+    return _with_ros2_of_environment(config)
 
 
-def _domain_of_environment() -> int:
-    text = os.environ.get(DOMAIN_VARIABLE) or "0"
+def _with_ros2_of_environment(config: Config) -> Config:
+    """Add the network that the environment names, or say which robot the file's one is of."""
+    router = os.environ.get(ROS2_VARIABLE) or ""
+    if not router:
+        return config
+    if len(config.ros2) > 1:
+        raise ConfigError(
+            "environment",
+            f"{ROS2_VARIABLE}: got {router!r} beside {len(config.ros2)} networks in the file; "
+            "expected one at most, of which it replaces the router.",
+        )
+    values: dict[str, Any] = {"router": router}
+    if os.environ.get(ROS2_DOMAIN_VARIABLE):
+        values["domain"] = _number_of_environment(ROS2_DOMAIN_VARIABLE, LAST_DOMAIN)
+    if distro := os.environ.get(ROS2_DISTRO_VARIABLE):
+        values["distro"] = distro.lower()
+    try:
+        if config.ros2:
+            return replace(config, ros2=(replace(config.ros2[0], **values),))
+        return replace(config, ros2=(Ros2(names=(ALL_NAMES,), **values),))
+    except ConfigError as error:
+        raise ConfigError("environment (SMACHPY_ROS2...)", *error.problems) from error
+
+
+def _number_of_environment(variable: str, last: int) -> int:
+    text = os.environ.get(variable) or "0"
     if not (text.isascii() and text.isdigit() and len(text) <= MOST_DIGITS):
         raise ConfigError(
             "environment",
-            f"{DOMAIN_VARIABLE}: not a number: got {text!r}; expected 0 to {LAST_DOMAIN}.",
+            f"{variable}: not a number: got {text!r}; expected 0 to {last}.",
         )
     return int(text)

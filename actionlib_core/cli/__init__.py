@@ -22,6 +22,7 @@ from actionlib_core.cli._command import while_read
 from actionlib_core.exceptions import ActionlibError
 from actionlib_core.names import parse_arguments
 from actionlib_core.output import printable, run_program, tell
+from actionlib_core.ros2_options import add_ros2_options, ros2_of_options
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -79,7 +80,7 @@ def _run(given: list[str], node: Node | None, on_ready: Callable[[], object]) ->
         args.node, args.names = node, names
         on_ready()
         code = 0  # `actionlib list | head`: the reader has seen enough
-        with _terminable(), while_read():
+        with _terminable(), while_read(), ros2_of_options(args):
             code = int(args.run(args))
             sys.stdout.flush()
     except Terminated:
@@ -120,6 +121,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"actionlib {version('smachpy')}")
     parser.add_argument("--config", metavar="FILE", help="how to join the network")
+    add_ros2_options(parser)
     subparsers = parser.add_subparsers(
         metavar="COMMAND", required=True, parser_class=_Parser, dest="command"
     )

@@ -37,6 +37,7 @@ class ServiceType:
     """Base of all service classes; a class is a pair of message classes, never instantiated."""
 
     __slots__: ClassVar[Any] = ()
+    _wire: ClassVar[str] = "ros1"
     _type: ClassVar[str]
     """ROS name, "pkg/Name"."""
     _md5sum: ClassVar[str]

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from actionlib_core.names import check_name
 from actionlib_core.output import printable
+from actionlib_core.ros2_options import add_ros2_options
 from smachpy.command.arguments import Text, parameters_of, read_words, usage, wants_help
 from smachpy.command.robot import add_robot_options
 from smachpy.command.ros1_options import add_options as add_ros1_options
@@ -94,6 +95,7 @@ def register(subparsers: Any) -> None:
         help="how long to wait for the mission's action servers [s] (default: %(default)g)",
     )
     _add_watching(parser)
+    add_ros2_options(parser)
     add_ros1_options(parser, loads=False)
     robot = parser.add_argument_group("the simulated robot")
     robot.add_argument(

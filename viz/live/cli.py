@@ -9,6 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.clock import SerialExecutor
+from actionlib_core.ros2_options import add_ros2_options, ros2_of_options
 
 if TYPE_CHECKING:
     import argparse
@@ -58,6 +59,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--runs", metavar="DIR", action="append", default=[], help="recorded runs for statistics"
     )
+    add_ros2_options(parser)
     parser.add_argument("--tui", action="store_true", help="show it in this terminal instead")
     parser.add_argument("--child", action="store_true", help=argparse.SUPPRESS)
     parser.set_defaults(run=_run)
@@ -81,10 +83,12 @@ def _run(args: argparse.Namespace) -> int:
     machines = Machines()
     _load(machines, args.files)
     runs = StatisticsOfFiles(args.runs)
-    network = Network(get_node(), machines, control=args.control)
-    actions = None if args.tui else Actions(get_node())
+    with ros2_of_options(args):
+        node = get_node()
+    network = Network(node, machines, control=args.control)
+    actions = None if args.tui else Actions(node)
     try:
-        with private_runs(get_node(), [network] if actions is None else [network, actions]):
+        with private_runs(node, [network] if actions is None else [network, actions]):
             if actions is None:
                 return _show_in_terminal(machines, network, control=args.control)
             return _serve(args, machines, runs, network, actions)

@@ -8,23 +8,27 @@ same name.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.config import ALL_NAMES
 from actionlib_core.exceptions import ConfigError, CorrespondenceError, InterfaceError
 from actionlib_core.interfaces import ros2
 from actionlib_core.interfaces._correspondence import converter
+from actionlib_core.interfaces._ros2 import ros2_registry
 from actionlib_core.wire.ros2.network import choose_network, is_named
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from actionlib_core.config import Mapped, Ros2
+    from actionlib_core.interfaces._sources import Kind
     from actionlib_core.node import Node
     from actionlib_core.wire.action_messages import ActionTypes
 
     Convert = Callable[[Any], Any]
 
+_OF_PROGRAMS = frozenset({"std_msgs", "std_srvs"})
 KNOWN_ACTIONS = {
     "move_base_msgs/MoveBase": ("move_base", "navigate_to_pose", "nav2_msgs/NavigateToPose"),
 }
@@ -73,21 +77,44 @@ class MessageOnRos2:
     from_ros2: Convert
 
 
-def find_network(node: Node, name: str, wire: str) -> Ros2 | None:
+def find_network(node: Node, name: str, cls: Any) -> Ros2 | None:
     """Return the network of ROS 2 that a full name is on, None when it is on our own wire.
 
     Args:
         node: Whose configuration counts.
         name: Of an action, topic or service.
-        wire: `_wire` of its class.
+        cls: Its class.
 
     Raises:
         ConfigError: The class is one of ROS 2, and no network has the name.
     """
     networks = node.config.ros2
-    if wire == "ros2" or any(is_named(network, name) for network in networks):
+    if cls._wire == "ros2":
         return choose_network(networks, name)
-    return None
+    if not any(is_named(network, name) for network in networks):
+        return None
+    network = choose_network(networks, name)
+    others = tuple(pattern for pattern in network.names if pattern != ALL_NAMES)
+    if others != network.names and not is_named(replace(network, names=others), name):
+        return network if _is_of_robots(network, cls) else None
+    return network
+
+
+def _is_of_robots(network: Ros2, cls: Any) -> bool:
+    """Tell whether `ALL_NAMES` means a type: one of ROS 2 that programs have no use for alone."""
+    if cls._type in {f"{known}Action" for known in KNOWN_ACTIONS}:
+        return True
+    found = ros2_registry(network.distro)
+    package, _, short = cls._type.partition("/")
+    if package in _OF_PROGRAMS:
+        return False
+    kinds = {"srv": short, "action": short.removesuffix("Action"), "msg": short}
+    kind: Kind = "msg"
+    if hasattr(cls, "_request_class"):
+        kind = "srv"
+    elif "action_goal" in cls.__slots__:
+        kind = "action"
+    return found.sources.find(kind, package, kinds[kind]) is not None
 
 
 def action_on_ros2(network: Ros2, name: str, types: ActionTypes) -> ActionOnRos2:

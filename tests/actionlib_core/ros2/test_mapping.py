@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from actionlib_core import interfaces
@@ -69,12 +71,58 @@ def test_which_names_are_on_ros2() -> None:
         config=Config(ros2=networks),
     )
     for name in ("odom", "robot1/scan", "move_base"):
-        assert find_network(node, name, "ros1") is networks[0]
-    assert find_network(node, "robot2/move_base", "ros1") is networks[1]
-    assert find_network(node, "scan", "ros1") is None
-    assert find_network(node, "robot2/spin", "ros2") is networks[1]
+        assert find_network(node, name, MoveBaseAction) is networks[0]
+    assert find_network(node, "robot2/move_base", MoveBaseAction) is networks[1]
+    assert find_network(node, "scan", MoveBaseAction) is None
+    assert find_network(node, "robot2/spin", NavigateToPose) is networks[1]
     with pytest.raises(ConfigError):
-        find_network(node, "spin", "ros2")
+        find_network(node, "spin", NavigateToPose)
+
+
+def test_all_names_are_those_of_robots() -> None:
+    clock = RealClock()
+    network = Ros2(names=("**", "lamp"))
+    node = Node(
+        "mission",
+        clock=clock,
+        transport=MemoryNetwork(clock).session(),
+        config=Config(ros2=(network,)),
+    )
+    scan, text = (
+        interfaces.get_message(name) for name in ("sensor_msgs/LaserScan", "std_msgs/String")
+    )
+    for cls in (
+        MoveBaseAction,
+        GripperCommandAction,
+        scan,
+        interfaces.get_service("nav_msgs/GetMap"),
+    ):
+        assert find_network(node, "a/b", cls) is network
+    for cls in (text, SetBool):
+        assert find_network(node, "a/b", cls) is None
+        assert find_network(node, "lamp", cls) is network
+    assert find_network(node, "a/b", interfaces.get_message("actionlib_msgs/GoalID")) is None
+
+
+def test_the_environment_names_a_robot(monkeypatch, tmp_path) -> None:
+    monkeypatch.delenv("SMACHPY_CONFIG", raising=False)
+    monkeypatch.setenv("SMACHPY_ROS2", "tcp/127.0.0.1:7447")
+    monkeypatch.setenv("SMACHPY_ROS2_DOMAIN", "42")
+    monkeypatch.setenv("SMACHPY_ROS2_DISTRO", "Kilted")
+    expected = Ros2("tcp/127.0.0.1:7447", 42, "kilted", names=("**",))
+    assert load_config().ros2 == (expected,)
+    path = tmp_path / "robot.yaml"
+    path.write_text("ros2: {router: tcp/127.0.0.1:1, names: [odom]}\n")
+    assert load_config(path).ros2 == (replace(expected, names=("odom",)),)
+    path.write_text("ros2: [{robot: a}, {robot: b}]\n")
+    with pytest.raises(ConfigError, match="2 networks"):
+        load_config(path)
+    monkeypatch.setenv("SMACHPY_ROS2_DISTRO", "kiltd")
+    with pytest.raises(ConfigError, match="kiltd"):
+        load_config()
+    monkeypatch.setenv("SMACHPY_ROS2_DOMAIN", "x")
+    with pytest.raises(ConfigError, match="SMACHPY_ROS2_DOMAIN"):
+        load_config()
 
 
 def test_move_base_is_navigate_to_pose_without_being_told() -> None:

@@ -1,0 +1,59 @@
+"""`--ros2`, `--domain` and `--distro`, which the commands have in common: whose robot to use."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from typing import TYPE_CHECKING
+
+from actionlib_core.config import ROS2_DISTRO_VARIABLE, ROS2_DOMAIN_VARIABLE, ROS2_VARIABLE
+from actionlib_core.exceptions import ConfigError
+
+if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Iterator
+
+
+def add_ros2_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options to a command."""
+    group = parser.add_argument_group("a ROS 2 robot, over rmw_zenoh")
+    group.add_argument(
+        "--ros2",
+        metavar="ENDPOINT",
+        help="its Zenoh router, tcp/robot.local:7447 for example (default: SMACHPY_ROS2, or the "
+        "configuration)",
+    )
+    group.add_argument("--domain", metavar="N", help="its ROS_DOMAIN_ID (default: 0)")
+    group.add_argument(
+        "--distro", metavar="NAME", help="its release: humble, jazzy, ... (default: jazzy)"
+    )
+
+
+@contextlib.contextmanager
+def ros2_of_options(args: argparse.Namespace) -> Iterator[None]:
+    """Let the networks that are joined inside be those of the options, in child processes too.
+
+    Raises:
+        ConfigError: a domain or a release without a router.
+    """
+    given = {
+        ROS2_VARIABLE: args.ros2,
+        ROS2_DOMAIN_VARIABLE: args.domain,
+        ROS2_DISTRO_VARIABLE: args.distro,
+    }
+    if not (args.ros2 or os.environ.get(ROS2_VARIABLE)) and (args.domain or args.distro):
+        raise ConfigError(
+            "command line",
+            "--domain and --distro are of a ROS 2 robot: got no --ros2; expected its router. "
+            "Try --ros2 tcp/robot.local:7447.",
+        )
+    before = {name: os.environ.get(name) for name in given}
+    os.environ.update({name: value for name, value in given.items() if value})
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
