@@ -67,4 +67,4 @@ def _is_on_ros2(node: Node, name: str, types: ActionTypes) -> bool:
         return False
     from actionlib_core.wire.ros2.mapping import find_network
 
-    return find_network(node, name, wire) is not None
+    return find_network(node, name, types.action) is not None

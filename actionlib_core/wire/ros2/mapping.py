@@ -89,7 +89,7 @@ def find_network(node: Node, name: str, cls: Any) -> Ros2 | None:
         ConfigError: The class is one of ROS 2, and no network has the name.
     """
     networks = node.config.ros2
-    if cls._wire == "ros2":
+    if getattr(cls, "_wire", "ros1") == "ros2":
         return choose_network(networks, name)
     if not any(is_named(network, name) for network in networks):
         return None
@@ -102,6 +102,8 @@ def find_network(node: Node, name: str, cls: Any) -> Ros2 | None:
 
 def _is_of_robots(network: Ros2, cls: Any) -> bool:
     """Tell whether `ALL_NAMES` means a type: one of ROS 2 that programs have no use for alone."""
+    if not hasattr(cls, "_type"):  # made by a program, with the attributes of an action
+        return False
     if cls._type in {f"{known}Action" for known in KNOWN_ACTIONS}:
         return True
     found = ros2_registry(network.distro)
