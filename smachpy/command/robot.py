@@ -5,12 +5,13 @@ from __future__ import annotations
 import argparse
 import dataclasses
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from actionlib_core import shutdown
 from actionlib_core.clock import current_clock
+from actionlib_core.config import Distro, Ros2
 from smachpy.sim.config import SimConfig, load_config
-from smachpy.sim.exceptions import NavigationError
+from smachpy.sim.exceptions import MissionError, NavigationError
 from smachpy.sim.geometry import Pose2D, finite, wrap_angle
 from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
 from smachpy.sim.robot_process import end_with_stdin
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from actionlib_core.node import Node
+    from smachpy.sim.nav2 import Nav2Server
     from smachpy.sim.server import RobotServer
     from smachpy.sim.simulation import Simulation
     from smachpy.sim.world import Robot
@@ -46,6 +48,22 @@ def register(subparsers: Any) -> None:
     )
     several.add_argument(
         "--robots", type=_count, metavar="N", help="N robots in namespaces robot_0, robot_1, ..."
+    )
+    ros2 = parser.add_argument_group("for ROS 2", "a Nav2 robot on a network of ROS 2 nodes")
+    ros2.add_argument(
+        "--ros2",
+        metavar="ROUTER",
+        help="offer navigate_to_pose, spin and back_up to ROS 2 nodes behind this Zenoh router, "
+        "tcp/127.0.0.1:7447 for example",
+    )
+    ros2.add_argument(
+        "--domain", type=_domain, default=0, metavar="N", help="their ROS_DOMAIN_ID (default: 0)"
+    )
+    ros2.add_argument(
+        "--distro",
+        choices=get_args(Distro),
+        default=Ros2().distro,
+        help="whose definitions of messages to take (default: %(default)s)",
     )
     parser.add_argument("--parameters", action="store_true", help="list all parameters and end")
     parser.add_argument("--child", action="store_true", help=argparse.SUPPRESS)
@@ -93,6 +111,7 @@ def serve(args: argparse.Namespace) -> int:
     """
     from actionlib_core.config import load_config as load_network
     from actionlib_core.node import Node
+    from smachpy.sim.nav2 import Nav2Server
     from smachpy.sim.server import RobotServer
     from smachpy.sim.simulation import Simulation
 
@@ -104,12 +123,22 @@ def serve(args: argparse.Namespace) -> int:
         spec = _world(args) if served is None else None
         config = load_network()
         name, space = ("move_base", config.namespace) if served else ("simulation", "")
+        if args.ros2:
+            if served is None:
+                raise MissionError(
+                    "--ros2: got --world or --robots beside it; expected one robot. Try starting "
+                    "one robot for each, with --namespace."
+                )
+            name = "simulated_robot"
+            network = Ros2(router=args.ros2, domain=args.domain, distro=args.distro)
+            config = dataclasses.replace(config, ros2=(network,))
         if args.namespace is not None:
             space = args.namespace
         with Node(name, namespace=space, config=config, arguments=args.names) as node:
-            server: RobotServer | Simulation
+            server: RobotServer | Simulation | Nav2Server
             if served is not None:
-                server = RobotServer(served, node=node)
+                make = Nav2Server if args.ros2 else RobotServer
+                server = make(served, node=node)
             else:
                 assert spec is not None
                 server = Simulation(spec.build(current_clock().now()), node=node)
@@ -160,14 +189,19 @@ def _world(args: argparse.Namespace) -> WorldSpec:
     return WorldSpec(args.map.name, grid, place_robots(grid, config, args.robots))
 
 
-def _ready(server: RobotServer | Simulation, node: Node, args: argparse.Namespace) -> str:
+def _ready(
+    server: RobotServer | Simulation | Nav2Server, node: Node, args: argparse.Namespace
+) -> str:
     """Return the line that says what is served."""
-    from smachpy.sim.server import RobotServer
+    from smachpy.sim.simulation import Simulation
 
-    if isinstance(server, RobotServer):
+    if not isinstance(server, Simulation):
         x, y, _ = server.robot.body.pose
         where = f"{args.map.name} at ({x:.2f}, {y:.2f})"
-        return f"{node.resolve('move_base')}: ready on {where}; Ctrl-C ends it"
+        if args.ros2:
+            where = f"{where}, ROS 2 {args.distro}, domain {args.domain}"
+        served = "navigate_to_pose" if args.ros2 else "move_base"
+        return f"{node.resolve(served)}: ready on {where}; Ctrl-C ends it"
     floor = args.world.name if args.world else args.map.name
     names = list(server.robots)
     robots = f"{names[0]} to {names[-1]}" if len(names) > 1 else names[0]
@@ -199,4 +233,11 @@ def _count(text: str) -> int:
     """Read how many robots."""
     if not (text.isdecimal() and 1 <= int(text) <= _MOST_ROBOTS):
         raise argparse.ArgumentTypeError(f"got {text!r}; expected 1 to {_MOST_ROBOTS}")
+    return int(text)
+
+
+def _domain(text: str) -> int:
+    """Read a ROS_DOMAIN_ID."""
+    if not (text.isascii() and text.isdecimal()):
+        raise argparse.ArgumentTypeError(f"got {text!r}; expected 0 or more")
     return int(text)

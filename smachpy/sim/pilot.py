@@ -56,10 +56,19 @@ class Pilot:
         self._goal, self._done = goal, done
         self._script, self._plan_anew = self._journey(goal), False
 
+    def run(self, script: Generator[Command, None, str], done: Callable[[str], object]) -> None:
+        """Follow a script of commands in place of what it does; arguments as `drive`.
+
+        Args:
+            script: Yields a command for each control step; returns what went wrong, "" for nothing.
+            done: See `drive`.
+        """
+        self._goal, self._done = None, done
+        self._script, self._plan_anew = script, False
+
     def stop(self, done: Callable[[str], object]) -> None:
         """Brake in place of what it does; `done("")` is called when it stands."""
-        self._goal, self._done = None, done
-        self._script, self._plan_anew = self._halt(), False
+        self.run(self._halt(), done)
 
     def let_go(self) -> None:
         """Drop what it does without telling anybody; it brakes unless there is a new order."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.interfaces.geometry_msgs.msg import (
@@ -230,7 +230,7 @@ class RobotServer:
 
     def _drive(self, goal: MoveBaseGoal) -> None:
         try:
-            target = self._target(goal.target_pose)
+            target = read_pose(goal.target_pose, self._robot, self._node.namespace)
             self._robot.check_place(target.x, target.y)
         except NavigationError as error:
             self._order(self._pilot.stop)
@@ -297,31 +297,6 @@ class RobotServer:
                 pose=PoseWithCovariance(pose=_pose_message(body.pose)),
                 twist=TwistWithCovariance(twist=twist),
             )
-        )
-
-    def _target(self, stamped: PoseStamped) -> Pose2D:
-        """Return a goal's pose in the map frame.
-
-        Raises:
-            NavigationError: the frame is unknown or the pose is none.
-        """
-        position, turn = stamped.pose.position, stamped.pose.orientation
-        values = (position.x, position.y, turn.x, turn.y, turn.z, turn.w)
-        if not all(math.isfinite(value) for value in values):
-            raise NavigationError("goal pose: some coordinates are no finite numbers")
-        if math.hypot(turn.x, turn.y, turn.z, turn.w) < _SHORTEST_ROTATION:
-            raise NavigationError(
-                "goal orientation: all zeros are no rotation; for 'as it lies' use w = 1"
-            )
-        pose = Pose2D(position.x, position.y, yaw_of(turn.x, turn.y, turn.z, turn.w))
-        frame = stamped.header.frame_id.removeprefix("/")
-        if frame == MAP_FRAME:
-            return pose
-        own = f"{self._node.namespace}/{BASE_FRAME}".removeprefix("/")
-        if frame in {BASE_FRAME, own}:
-            return self._robot.body.pose.then(pose)
-        raise NavigationError(
-            f"goal frame: got {stamped.header.frame_id!r}; expected {MAP_FRAME!r} or {own!r}"
         )
 
     # -- charge --------------------------------------------------------------------------------
@@ -422,3 +397,34 @@ class RobotServer:
 def _pose_message(pose: Pose2D) -> Pose:
     x, y, z, w = quaternion_of(pose.yaw)
     return Pose(Point(pose.x, pose.y, 0.0), Quaternion(x, y, z, w))
+
+
+def read_pose(stamped: Any, robot: Robot, namespace: str) -> Pose2D:
+    """Return a goal's pose in the map frame.
+
+    Args:
+        stamped: A PoseStamped, of ROS 1 or 2.
+        robot: In whose frame it may be.
+        namespace: Of the robot's node; its frame may have it in front.
+
+    Raises:
+        NavigationError: the frame is unknown or the pose is none.
+    """
+    position, turn = stamped.pose.position, stamped.pose.orientation
+    values = (position.x, position.y, turn.x, turn.y, turn.z, turn.w)
+    if not all(math.isfinite(value) for value in values):
+        raise NavigationError("goal pose: some coordinates are no finite numbers")
+    if math.hypot(turn.x, turn.y, turn.z, turn.w) < _SHORTEST_ROTATION:
+        raise NavigationError(
+            "goal orientation: all zeros are no rotation; for 'as it lies' use w = 1"
+        )
+    pose = Pose2D(position.x, position.y, yaw_of(turn.x, turn.y, turn.z, turn.w))
+    frame = stamped.header.frame_id.removeprefix("/")
+    if frame == MAP_FRAME:
+        return pose
+    own = f"{namespace}/{BASE_FRAME}".removeprefix("/")
+    if frame in {BASE_FRAME, own}:
+        return robot.body.pose.then(pose)
+    raise NavigationError(
+        f"goal frame: got {stamped.header.frame_id!r}; expected {MAP_FRAME!r} or {own!r}"
+    )

@@ -1,0 +1,344 @@
+"""The robot as a Nav2 robot on a network of ROS 2: `navigate_to_pose`, `spin` and `back_up`.
+
+A stand-in for those who have no robot.
+
+Source:
+    https://docs.nav2.org (interfaces and error codes), nav2_behaviors (what `back_up` takes).
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+
+from actionlib_core.action.simple_server import SimpleActionServer
+from actionlib_core.interfaces import ros2
+from actionlib_core.node import get_node
+from actionlib_core.wire.ros2.network import choose_network
+from smachpy.sim.behaviors import back_up, spin
+from smachpy.sim.exceptions import NavigationError
+from smachpy.sim.geometry import ORIGIN, Pose2D, quaternion_of, wrap_angle
+from smachpy.sim.pilot import Pilot
+from smachpy.sim.server import MAP_FRAME, read_pose
+from smachpy.sim.stepper import Stepper
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.clock import Event
+    from actionlib_core.exceptions import ServerConflictError
+    from actionlib_core.node import Node
+    from smachpy.sim.world import Robot
+
+    Order = Callable[[Callable[[str], object]], object]  # starts the pilot; tells it the end
+
+_JUST_PAST: Final = 1e-3  # [s] waited longer, as a rounding error would never pass
+_NS: Final = 1_000_000_000
+_UNKNOWN: Final = {"navigate_to_pose": 9000, "spin": 700, "back_up": 710}
+"""Nav2's error code of each action for "something else went wrong"."""
+_TIMEOUT: Final = {"navigate_to_pose": 9003, "spin": 701, "back_up": 711}
+_INVALID_INPUT: Final = 713
+_COLLISION_AHEAD: Final = 714
+_TAKEN: Final = "another behavior has taken over"
+
+
+class _Stopped(Exception):  # noqa: N818  no error: the goal was asked to stop
+    """The goal is to stop."""
+
+
+class _Behavior:
+    """One action: its server, and the goal of it that the pilot carries out."""
+
+    def __init__(
+        self, name: str, action: Any, execute: Callable[[Any], object], node: Node
+    ) -> None:
+        self.name = name
+        self.action = action
+        self.wake: Event = node.clock.event(f"the end of {name}")
+        self.server = SimpleActionServer(name, action, execute, auto_start=False, node=node)
+        self.server.register_preempt_callback(self.wake.set)
+        self.begun = 0.0
+        self.from_pose = ORIGIN
+        self.goal: Any = None
+
+    def result(self, elapsed: float, code: int = 0, text: str = "") -> Any:
+        """Return a result message; definitions of older distributions have fewer fields."""
+        result = self.action.Result()
+        if hasattr(result, "total_elapsed_time"):
+            set_time(result.total_elapsed_time, round(elapsed * _NS))
+        if hasattr(result, "error_code"):
+            result.error_code, result.error_msg = code, text
+        return result
+
+
+class Nav2Server:
+    """Serves one robot as Nav2 does, on the ROS 2 network that the node's configuration says.
+
+    Args:
+        robot: The robot; nothing else may steer it.
+        node: Where it is on the network; None takes the node in force.
+
+    Raises:
+        ConfigError: there are several ROS 2 networks, and none has the names.
+        TransportError: the network cannot be joined.
+
+    Threads: `start` and `close` may be called from any thread. A stepper's thread moves the robot.
+    """
+
+    def __init__(self, robot: Robot, *, node: Node | None = None) -> None:
+        self._node = node if node is not None else get_node()
+        self._clock = clock = self._node.clock
+        self._robot = robot
+        self._pilot = Pilot(robot)
+        control = robot.config.control
+        self._stepper = Stepper(clock, rate=control.rate)
+        self._feedback_period = 1.0 / control.feedback_rate
+        self._closing = clock.event("the robot closes")
+        self._busy: _Behavior | None = None
+        self._reported = -math.inf
+        self._turned, self._yaw = 0.0, robot.body.yaw
+        network = choose_network(self._node.config.ros2, self._node.resolve("navigate_to_pose"))
+        self._behaviors = {
+            name: _Behavior(name, ros2.get_action(action, network.distro), execute, self._node)
+            for name, action, execute in (
+                ("navigate_to_pose", "nav2_msgs/NavigateToPose", self._navigate),
+                ("spin", "nav2_msgs/Spin", self._spin),
+                ("back_up", "nav2_msgs/BackUp", self._back_up),
+            )
+        }
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self._robot
+
+    def start(self) -> None:
+        """Show the robot on the network and take goals.
+
+        Raises:
+            ServerConflictError: another server has one of the names.
+        """
+        for behavior in self._behaviors.values():
+            behavior.server.start()
+        self._stepper.add(self)
+
+    def wait(self) -> None:
+        """Wait until `close` was called.
+
+        Raises:
+            ServerConflictError: see `start`.
+
+        Blocks: until then.
+        """
+        self._behaviors["navigate_to_pose"].server.wait()
+
+    @property
+    def conflict(self) -> ServerConflictError | None:
+        """Why it left its names by itself; else None."""
+        errors = (b.server.action_server.error for b in self._behaviors.values())
+        return next((error for error in errors if error is not None), None)
+
+    def close(self) -> None:
+        """Stop taking goals; running ones are aborted. A second call does nothing.
+
+        Blocks: until the robot's threads have seen it, two seconds at most.
+        """
+        self._closing.set()
+        for behavior in self._behaviors.values():
+            behavior.wake.set()
+        for behavior in self._behaviors.values():
+            behavior.server.stop()
+        self._stepper.remove(self)
+        self._stepper.close()
+
+    # -- goals: each on its server's thread ----------------------------------------------------
+
+    def _navigate(self, goal: Any) -> None:
+        behavior = self._behaviors["navigate_to_pose"]
+        try:
+            target = read_pose(goal.pose, self._robot, self._node.namespace)
+            self._robot.check_place(target.x, target.y)
+        except NavigationError as error:
+            self._refuse(behavior, _UNKNOWN[behavior.name], str(error))
+            return
+        self._carry_out(behavior, goal, partial(self._pilot.drive, target))
+
+    def _spin(self, goal: Any) -> None:
+        behavior = self._behaviors["spin"]
+        angle = float(goal.target_yaw)
+        if not math.isfinite(angle):
+            self._refuse(behavior, _UNKNOWN["spin"], "target_yaw: got no finite number")
+            return
+        script = spin(self._robot, angle)
+        self._carry_out(behavior, goal, partial(self._pilot.run, script), allowance_of(goal))
+
+    def _back_up(self, goal: Any) -> None:
+        behavior = self._behaviors["back_up"]
+        distance, speed = abs(goal.target.x), abs(goal.speed)
+        if goal.target.y or goal.target.z:
+            trouble = "target: got y or z; expected x alone: it drives straight back"
+        elif not (math.isfinite(distance) and math.isfinite(speed) and speed > 0.0):
+            trouble = f"got distance {distance}, speed {speed}; expected finite ones, speed above 0"
+        else:
+            fastest = self._robot.config.robot.max_reverse_speed
+            script = back_up(self._robot, distance, min(speed, fastest))
+            order = partial(self._pilot.run, script)
+            self._carry_out(behavior, goal, order, allowance_of(goal), _COLLISION_AHEAD)
+            return
+        self._refuse(behavior, _INVALID_INPUT, trouble)
+
+    def _refuse(self, behavior: _Behavior, code: int, text: str) -> None:
+        behavior.server.set_aborted(behavior.result(0.0, code, text), text)
+
+    def _carry_out(
+        self,
+        behavior: _Behavior,
+        goal: Any,
+        order: Order,
+        allowance: float = math.inf,
+        code: int | None = None,
+    ) -> None:
+        """Give the pilot an order, wait for its end, and end the goal accordingly.
+
+        Args:
+            behavior: Whose goal it is.
+            goal: The goal.
+            order: Starts the pilot.
+            allowance: It fails when it takes longer than this [s].
+            code: Nav2's error code when the pilot reports trouble.
+
+        Blocks: until the goal has ended.
+        """
+        server, begun = behavior.server, self._clock.now()
+        code = _UNKNOWN[behavior.name] if code is None else code
+        try:
+            trouble = self._wait_for(behavior, goal, order, begun + allowance)
+        except TimeoutError:
+            code, trouble = _TIMEOUT[behavior.name], f"it took longer than {allowance:g} s"
+        except _Stopped:
+            result = behavior.result(self._clock.now() - begun)
+            if self._closing.is_set():
+                server.set_aborted(result, "the robot is shutting down")
+            else:
+                server.set_preempted(result, "stopped on request")
+            return
+        elapsed = self._clock.now() - begun
+        if trouble:
+            server.set_aborted(behavior.result(elapsed, code, trouble), trouble)
+        else:
+            server.set_succeeded(behavior.result(elapsed))
+
+    def _wait_for(
+        self,
+        behavior: _Behavior,
+        goal: Any,
+        order: Order,
+        until: float,
+    ) -> str:
+        """Return what went wrong, "" for nothing.
+
+        Raises:
+            TimeoutError: it has not ended by then.
+            _Stopped: it is to stop.
+        """
+        ended: list[str] = []
+
+        def done(trouble: str) -> None:
+            ended.append(trouble)
+            behavior.wake.set()
+
+        with self._stepper.lock:
+            before, self._busy = self._busy, behavior
+            behavior.begun, behavior.from_pose = self._clock.now(), self._robot.body.pose
+            behavior.goal, self._turned, self._yaw = goal, 0.0, self._robot.body.yaw
+            order(done)
+        if before is not None:
+            before.wake.set()
+        self._stepper.wake()
+        server = behavior.server
+        try:
+            while not ended:
+                if self._busy is not behavior:
+                    return _TAKEN
+                stop = server.is_preempt_requested() or server.is_new_goal_available()
+                if stop or self._closing.is_set():
+                    raise _Stopped
+                if not behavior.wake.wait(None if math.isinf(until) else until - self._clock.now()):
+                    raise TimeoutError
+                behavior.wake.clear()
+        finally:
+            with self._stepper.lock:
+                if self._busy is behavior:
+                    self._busy = None
+                    if not ended:
+                        self._pilot.let_go()
+        return ended[0]
+
+    # -- steps: the stepper's thread -----------------------------------------------------------
+
+    def is_busy(self, now: float) -> bool:
+        """Tell whether the robot moves or is to move."""
+        return self._pilot.is_busy(now)
+
+    def step(self, now: float, dt: float) -> None:
+        """Drive for `dt` seconds."""
+        self._pilot.step(now, dt)
+        yaw = self._robot.body.yaw
+        self._turned += abs(wrap_angle(yaw - self._yaw))
+        self._yaw = yaw
+
+    def report(self, now: float) -> None:
+        """Send feedback where it is due; tell what has ended."""
+        if now - self._reported > self._feedback_period - _JUST_PAST:
+            self._reported = now
+            self._publish_feedback(now)
+        with self._stepper.lock:
+            ended = self._pilot.take_ends()
+        for tell in ended:
+            tell()
+
+    def _publish_feedback(self, now: float) -> None:
+        behavior = self._busy
+        if behavior is None or not behavior.server.is_active():
+            return
+        body = self._robot.body
+        feedback = behavior.action.Feedback()
+        if behavior.name == "spin":
+            feedback.angular_distance_traveled = self._turned
+        elif behavior.name == "back_up":
+            feedback.distance_traveled = behavior.from_pose.distance(body.pose)
+        else:
+            self._fill_header(feedback.current_pose.header, MAP_FRAME)
+            fill_pose(feedback.current_pose.pose, body.pose)
+            target = behavior.goal.pose.pose.position
+            follower = self._robot.follower
+            straight = math.hypot(target.x - body.x, target.y - body.y)
+            left = follower.remaining if follower is not None else straight
+            feedback.distance_remaining = left
+            set_time(feedback.navigation_time, round((now - behavior.begun) * _NS))
+            seconds = left / self._robot.config.robot.max_speed
+            set_time(feedback.estimated_time_remaining, round(seconds * _NS))
+        behavior.server.publish_feedback(feedback)
+
+    def _fill_header(self, header: Any, frame: str) -> None:
+        set_time(header.stamp, self._clock.time_ns())
+        header.frame_id = frame
+
+
+def set_time(message: Any, nanoseconds: int) -> None:
+    """Set a Time or Duration of ROS 2."""
+    message.sec, message.nanosec = divmod(nanoseconds, _NS)
+
+
+def fill_pose(message: Any, pose: Pose2D) -> None:
+    """Set a Pose of ROS 2."""
+    message.position.x, message.position.y = pose.x, pose.y
+    turn = message.orientation
+    turn.x, turn.y, turn.z, turn.w = quaternion_of(pose.yaw)
+
+
+def allowance_of(goal: Any) -> float:
+    """Return how long a goal may take [s]; Nav2 takes 0 for "as long as it likes"."""
+    allowance = goal.time_allowance
+    return float(allowance.sec + allowance.nanosec / _NS) or math.inf
