@@ -92,35 +92,35 @@ class ActionServerWrapper:
         problems.word("server_name", server_name)
         self.wrapped_container = wrapped_container
         self.userdata = UserData()
-        self._server_name = server_name
-        self._types = ActionTypes.of(action_spec)
-        self._outcomes = {
+        self.__server_name = server_name
+        self.__types = ActionTypes.of(action_spec)
+        self.__outcomes = {
             "succeeded_outcomes": problems.names("succeeded_outcomes", succeeded_outcomes),
             "aborted_outcomes": problems.names("aborted_outcomes", aborted_outcomes),
             "preempted_outcomes": problems.names("preempted_outcomes", preempted_outcomes),
         }
-        self._goal_key = problems.word("goal_key", goal_key)
-        self._feedback_key = problems.word("feedback_key", feedback_key)
-        self._result_key = problems.word("result_key", result_key)
+        self.__goal_key = problems.word("goal_key", goal_key)
+        self.__feedback_key = problems.word("feedback_key", feedback_key)
+        self.__result_key = problems.word("result_key", result_key)
         holds = "field -> userdata key"
-        self._goal_slots_map = problems.names_of("goal_slots_map", goal_slots_map, holds)
-        self._feedback_slots_map = problems.names_of(
+        self.__goal_slots_map = problems.names_of("goal_slots_map", goal_slots_map, holds)
+        self.__feedback_slots_map = problems.names_of(
             "feedback_slots_map", feedback_slots_map, holds
         )
-        self._result_slots_map = problems.names_of("result_slots_map", result_slots_map, holds)
-        self._expand_goal_slots = expand_goal_slots
-        self._pack_result_slots = pack_result_slots
+        self.__result_slots_map = problems.names_of("result_slots_map", result_slots_map, holds)
+        self.__expand_goal_slots = expand_goal_slots
+        self.__pack_result_slots = pack_result_slots
         if hasattr(wrapped_container, "register_transition_cb"):
-            problems.add(*self._outcome_problems())
+            problems.add(*self.__outcome_problems())
         else:
             problems.add(f"wrapped_container: got {wrapped_container!r}; expected a container.")
-        problems.add(*self._slot_problems())
+        problems.add(*self.__slot_problems())
         problems.raise_all()
-        self._lock = threading.Lock()
-        self._executing = False
-        self._feedback_sent = b""
-        self._unsubscribe: Callable[[], None] | None = None
-        self._action_server = SimpleActionServer(
+        self.__lock = threading.Lock()
+        self.__executing = False
+        self.__feedback_sent = b""
+        self.__unsubscribe: Callable[[], None] | None = None
+        self.__action_server = SimpleActionServer(
             server_name,
             action_spec,
             self.execute_cb,
@@ -132,15 +132,15 @@ class ActionServerWrapper:
         wrapped_container.register_transition_cb(self.transition_cb)
         wrapped_container.register_termination_cb(self.termination_cb)
 
-    def _outcome_problems(self) -> Iterator[str]:
-        for problem in self._outcome_slips():
+    def __outcome_problems(self) -> Iterator[str]:
+        for problem in self.__outcome_slips():
             if not accepts(problem):
                 yield problem
 
-    def _outcome_slips(self) -> Iterator[str]:
+    def __outcome_slips(self) -> Iterator[str]:
         known = self.wrapped_container.get_registered_outcomes()
         listed: dict[str, str] = {}
-        for name, outcomes in self._outcomes.items():
+        for name, outcomes in self.__outcomes.items():
             for outcome in outcomes:
                 if outcome not in known:
                     yield (
@@ -151,11 +151,11 @@ class ActionServerWrapper:
                     yield f"{name}: got {outcome!r}, which is in {listed[outcome]} too."
                 listed[outcome] = name
 
-    def _slot_problems(self) -> Iterator[str]:
+    def __slot_problems(self) -> Iterator[str]:
         for name, slots, message in (
-            ("goal_slots_map", self._goal_slots_map, self._types.goal),
-            ("feedback_slots_map", self._feedback_slots_map, self._types.feedback),
-            ("result_slots_map", self._result_slots_map, self._types.result),
+            ("goal_slots_map", self.__goal_slots_map, self.__types.goal),
+            ("feedback_slots_map", self.__feedback_slots_map, self.__types.feedback),
+            ("result_slots_map", self.__result_slots_map, self.__types.result),
         ):
             known = list(message.__slots__)
             for slot in slots:
@@ -173,26 +173,26 @@ class ActionServerWrapper:
         Raises:
             ServerConflictError: the name has a server already.
         """
-        if self._unsubscribe is None:
-            self._unsubscribe = self.wrapped_container.subscribe(self._on_event)
-        self._action_server.register_preempt_callback(self.preempt_cb)
-        self._action_server.start()
-        log.loginfo(f"action server '{self._server_name}' offers a machine")
+        if self.__unsubscribe is None:
+            self.__unsubscribe = self.wrapped_container.subscribe(self.__on_event)
+        self.__action_server.register_preempt_callback(self.preempt_cb)
+        self.__action_server.start()
+        log.loginfo(f"action server '{self.__server_name}' offers a machine")
 
     def stop(self) -> None:
         """Preempt what runs and take the offer back; a second call does nothing.
 
         Blocks: as `SimpleActionServer.stop`.
         """
-        with self._lock:
-            executing = self._executing
+        with self.__lock:
+            executing = self.__executing
         if executing:
-            with asking("action", self._server_name, "the server stops"):
+            with asking("action", self.__server_name, "the server stops"):
                 request_soon(self.wrapped_container)
-        self._action_server.stop()
-        if self._unsubscribe is not None:
-            self._unsubscribe()
-            self._unsubscribe = None
+        self.__action_server.stop()
+        if self.__unsubscribe is not None:
+            self.__unsubscribe()
+            self.__unsubscribe = None
 
     # -- goals ---------------------------------------------------------------------------------
 
@@ -203,84 +203,84 @@ class ActionServerWrapper:
 
         Blocks: until the container has ended.
         """
-        server = self._action_server
-        with self._lock:
+        server = self.__action_server
+        with self.__lock:
             if server.is_preempt_requested():
                 early = True
             else:
-                early, self._executing = False, True
+                early, self.__executing = False, True
         if early:
             server.set_preempted(None, "preempted before it began")
             return
         try:
-            outcome = self._run(goal)
+            outcome = self.__run(goal)
         finally:
-            with self._lock:  # a preempt that comes too late does not stay for the next goal
-                self._executing = False
+            with self.__lock:  # a preempt that comes too late does not stay for the next goal
+                self.__executing = False
                 self.wrapped_container.recall_preempt()
-        result = self._make_result()
+        result = self.__make_result()
         text = f"the machine ended with {outcome!r}"
-        if outcome in self._outcomes["succeeded_outcomes"]:
+        if outcome in self.__outcomes["succeeded_outcomes"]:
             server.set_succeeded(result, text)
-        elif self._means_preempted(outcome):
+        elif self.__means_preempted(outcome):
             server.set_preempted(result, text)
         else:
             server.set_aborted(result, text)
 
-    def _means_preempted(self, outcome: str) -> bool:
+    def __means_preempted(self, outcome: str) -> bool:
         """Tell whether to answer PREEMPTED; unlisted, 'preempted' is, when asked for."""
-        if outcome in self._outcomes["preempted_outcomes"]:
+        if outcome in self.__outcomes["preempted_outcomes"]:
             return True
-        asked = outcome == "preempted" and self._action_server.is_preempt_requested()
-        return asked and outcome not in self._outcomes["aborted_outcomes"]
+        asked = outcome == "preempted" and self.__action_server.is_preempt_requested()
+        return asked and outcome not in self.__outcomes["aborted_outcomes"]
 
-    def _run(self, goal: Any) -> str:
+    def __run(self, goal: Any) -> str:
         container = self.wrapped_container
         inputs = container.get_registered_input_keys()
         outputs = container.get_registered_output_keys()
-        self._fill_userdata(goal)
-        for key in (self._feedback_key, self._result_key):
+        self.__fill_userdata(goal)
+        for key in (self.__feedback_key, self.__result_key):
             if key in outputs or _is_used(container, key):
                 container.userdata[key] = self.userdata[key]
-        self._feedback_sent = self.userdata[self._feedback_key].to_bytes()
+        self.__feedback_sent = self.userdata[self.__feedback_key].to_bytes()
         return container.execute(Remapper(self.userdata, inputs, outputs))
 
-    def _fill_userdata(self, goal: Any) -> None:
+    def __fill_userdata(self, goal: Any) -> None:
         userdata = self.userdata
-        if self._pack_result_slots:  # what an earlier goal left must not become a result
-            for slot in self._types.result.__slots__:
+        if self.__pack_result_slots:  # what an earlier goal left must not become a result
+            for slot in self.__types.result.__slots__:
                 if slot in userdata:
                     del userdata[slot]
-        if self._expand_goal_slots:
+        if self.__expand_goal_slots:
             for slot in goal.__slots__:
                 userdata[slot] = getattr(goal, slot)
-        for slot, key in self._goal_slots_map.items():
+        for slot, key in self.__goal_slots_map.items():
             userdata[key] = getattr(goal, slot)
-        userdata[self._goal_key] = goal
-        userdata[self._feedback_key] = self._types.feedback()
-        userdata[self._result_key] = self._types.result()
+        userdata[self.__goal_key] = goal
+        userdata[self.__feedback_key] = self.__types.feedback()
+        userdata[self.__result_key] = self.__types.result()
 
-    def _make_result(self) -> Any:
+    def __make_result(self) -> Any:
         userdata = self.userdata
-        result = userdata[self._result_key]
-        if self._pack_result_slots:
+        result = userdata[self.__result_key]
+        if self.__pack_result_slots:
             for slot in result.__slots__:
                 if slot in userdata:
                     setattr(result, slot, userdata[slot])
-        for slot, key in self._result_slots_map.items():
+        for slot, key in self.__result_slots_map.items():
             setattr(result, slot, userdata[key])
         return result
 
     def preempt_cb(self) -> None:
         """Preempt the container; the action server calls it."""
-        with self._lock:  # so that it never hits the run of the next goal; nothing here waits
-            if self._executing and self._action_server.is_preempt_requested():
-                with asking("action", self._server_name, self._why()):
+        with self.__lock:  # so that it never hits the run of the next goal; nothing here waits
+            if self.__executing and self.__action_server.is_preempt_requested():
+                with asking("action", self.__server_name, self.__why()):
                     request_soon(self.wrapped_container)
 
-    def _why(self) -> str:
+    def __why(self) -> str:
         """Say whether a cancel or a newer goal asks; goal ids begin with the client's name."""
-        newer, current = self._action_server.next_goal, self._action_server.current_goal
+        newer, current = self.__action_server.next_goal, self.__action_server.current_goal
         if newer is not None:
             return f"newer goal {newer.get_goal_id().id}"
         return "cancel" if current is None else f"cancel of goal {current.get_goal_id().id}"
@@ -290,14 +290,14 @@ class ActionServerWrapper:
     def transition_cb(self, userdata: UserData, active_states: Sequence[str]) -> None:
         """Send feedback if it has changed; the container calls it."""
         del active_states
-        self._publish_change(userdata)
+        self.__publish_change(userdata)
 
     def termination_cb(
         self, userdata: UserData, terminal_states: Sequence[str], container_outcome: str
     ) -> None:
         """Send feedback if it has changed; the container calls it."""
         del terminal_states, container_outcome
-        self._publish_change(userdata)
+        self.__publish_change(userdata)
 
     def publish_feedback(self, userdata: UserData) -> None:
         """Send the feedback that is in `userdata`.
@@ -306,37 +306,37 @@ class ActionServerWrapper:
             ActionException: its value is no XFeedback.
             FieldError: a field of it has a wrong type.
         """
-        feedback = self._make_feedback(userdata)
-        self._action_server.publish_feedback(feedback)
-        self._feedback_sent = feedback.to_bytes()
+        feedback = self.__make_feedback(userdata)
+        self.__action_server.publish_feedback(feedback)
+        self.__feedback_sent = feedback.to_bytes()
 
-    def _make_feedback(self, userdata: UserData) -> Any:
+    def __make_feedback(self, userdata: UserData) -> Any:
         feedback = (
-            userdata[self._feedback_key]
-            if self._feedback_key in userdata
-            else self._types.feedback()
+            userdata[self.__feedback_key]
+            if self.__feedback_key in userdata
+            else self.__types.feedback()
         )
-        for slot, key in self._feedback_slots_map.items():
+        for slot, key in self.__feedback_slots_map.items():
             if key in userdata:
                 setattr(feedback, slot, userdata[key])
         return feedback
 
-    def _publish_change(self, userdata: UserData) -> None:
-        if self._executing and self._make_feedback(userdata).to_bytes() != self._feedback_sent:
+    def __publish_change(self, userdata: UserData) -> None:
+        if self.__executing and self.__make_feedback(userdata).to_bytes() != self.__feedback_sent:
             self.publish_feedback(userdata)
 
-    def _on_event(self, event: Event) -> None:
+    def __on_event(self, event: Event) -> None:
         """Send feedback that a state of the container itself has written, at once."""
         if isinstance(event, UserdataWritten) and event.path.count("/") == 2:  # noqa: PLR2004
-            keys = {self._feedback_key, *self._feedback_slots_map.values()}
-            if event.key in keys and self._executing:
+            keys = {self.__feedback_key, *self.__feedback_slots_map.values()}
+            if event.key in keys and self.__executing:
                 self.publish_feedback(self.wrapped_container.userdata)
 
 
 def _is_used(container: Container, key: str) -> bool:
     """Tell whether a child of `container` reads or writes `key`."""
     for label, child in container.get_children().items():
-        names = container._remappings.get(label, {})  # noqa: SLF001  there is no other way to ask
+        names = container._smachpy.remappings.get(label, {})
         keys = {*child.get_registered_input_keys(), *child.get_registered_output_keys()}
         if key in {names.get(own, own) for own in keys}:
             return True

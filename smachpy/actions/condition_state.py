@@ -62,22 +62,23 @@ class ConditionState(State):
         with problems:
             super().__init__(("true", "false", "preempted"), input_keys, **options)
         call = "cond_cb(userdata)"
-        self._cond_cb = problems.function("cond_cb", cond_cb, call, 1, optional=False)
+        self.__cond_cb = problems.function("cond_cb", cond_cb, call, 1, optional=False)
+        self._smachpy.code = (cond_cb,)
         poll_s = problems.seconds("poll_rate", poll_rate)
-        self._poll_s = None if poll_s is None else max(poll_s, _SHORTEST_POLL_S)
-        self._timeout_s = problems.seconds("timeout", timeout)
+        self.__poll_s = None if poll_s is None else max(poll_s, _SHORTEST_POLL_S)
+        self.__timeout_s = problems.seconds("timeout", timeout)
         expected = "-1 (no limit) or a number of checks"
-        self._max_checks = problems.whole("max_checks", max_checks, -1, expected)
-        self._wake_on = problems.values("wake_on", wake_on)
-        for topic in self._wake_on:
+        self.__max_checks = problems.whole("max_checks", max_checks, -1, expected)
+        self.__wake_on = problems.values("wake_on", wake_on)
+        for topic in self.__wake_on:
             if not (isinstance(topic, (tuple, list)) and len(topic) == 2):  # noqa: PLR2004  a pair
                 problems.add(f"wake_on: got {topic!r} in it; expected (topic, message class).")
-        if poll_rate is None and not self._wake_on:
+        if poll_rate is None and not self.__wake_on:
             problems.add(
                 "poll_rate: got None without topics; expected seconds between two checks. Try "
                 "wake_on=[(topic, message class)]."
             )
-        self._node = node
+        self.__node = node
         problems.raise_all()
         adopt_interface(self, cond_cb, outcomes=False)
 
@@ -89,13 +90,13 @@ class ConditionState(State):
         Blocks: see above.
         """
         with Wakeup(self) as wake, contextlib.ExitStack() as listening:
-            for topic, msg_type in self._wake_on:
-                listening.enter_context(_listen(topic, msg_type, wake, self._node))
-            return self._watch(ud, wake)
+            for topic, msg_type in self.__wake_on:
+                listening.enter_context(_listen(topic, msg_type, wake, self.__node))
+            return self.__watch(ud, wake)
 
-    def _watch(self, ud: Any, wake: Wakeup) -> str:
+    def __watch(self, ud: Any, wake: Wakeup) -> str:
         clock = wake.clock
-        until = None if self._timeout_s is None else clock.now() + self._timeout_s
+        until = None if self.__timeout_s is None else clock.now() + self.__timeout_s
         checks = 0
         while True:
             wake.clear()
@@ -104,23 +105,23 @@ class ConditionState(State):
                 return "preempted"
             if checks and until is not None and clock.now() >= until:
                 return "false"
-            if self._cond_cb(ud):
+            if self.__cond_cb(ud):
                 return "true"
             checks += 1
-            if self._max_checks != -1 and checks >= self._max_checks:
+            if self.__max_checks != -1 and checks >= self.__max_checks:
                 return "false"
-            due = None if self._poll_s is None else clock.now() + self._poll_s
+            due = None if self.__poll_s is None else clock.now() + self.__poll_s
             wake.wait_until(due, until)
 
     def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
         """Add the condition and the limits."""
         kind, details = super().describe_details()
-        own = [("condition", name_of(self._cond_cb))]
-        own += [("wakes on", topic) for topic, _ in self._wake_on]
-        if self._timeout_s is not None:
-            own.append(("timeout", f"{self._timeout_s:g} s -> false"))
-        if self._max_checks != -1:
-            own.append(("checks", str(max(1, self._max_checks))))
+        own = [("condition", name_of(self.__cond_cb))]
+        own += [("wakes on", topic) for topic, _ in self.__wake_on]
+        if self.__timeout_s is not None:
+            own.append(("timeout", f"{self.__timeout_s:g} s -> false"))
+        if self.__max_checks != -1:
+            own.append(("checks", str(max(1, self.__max_checks))))
         return kind, (*own, *details)
 
 

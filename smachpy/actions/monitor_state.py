@@ -71,19 +71,20 @@ class MonitorState(State):
         problems = Problems(f"{type(self).__name__} {topic!r}")
         with problems:
             super().__init__(("valid", "invalid", "preempted"), input_keys, output_keys, **options)
-        self._topic = problems.word("topic", topic)
+        self.__topic = problems.word("topic", topic)
         problems.kind_of("msg_type", msg_type, "_slot_types", "a class of messages")
-        self._msg_type = msg_type
+        self.__msg_type = msg_type
         call = "cond_cb(userdata, message)"
-        self._cond_cb = problems.function("cond_cb", cond_cb, call, 2, optional=False)
+        self.__cond_cb = problems.function("cond_cb", cond_cb, call, 2, optional=False)
+        self._smachpy.code = (cond_cb,)
         expected = "-1 (no limit) or a number of checks"
-        self._max_checks = problems.whole("max_checks", max_checks, -1, expected)
-        self._timeout_s = problems.seconds("timeout", timeout)
-        self._timeout_outcome = problems.word("timeout_outcome", timeout_outcome)
-        self._latest = latest
-        self._node = node
+        self.__max_checks = problems.whole("max_checks", max_checks, -1, expected)
+        self.__timeout_s = problems.seconds("timeout", timeout)
+        self.__timeout_outcome = problems.word("timeout_outcome", timeout_outcome)
+        self.__latest = latest
+        self.__node = node
         problems.raise_all()
-        if self._timeout_s is not None:
+        if self.__timeout_s is not None:
             self.register_outcomes([timeout_outcome])
         adopt_interface(self, cond_cb, outcomes=False)
 
@@ -92,7 +93,7 @@ class MonitorState(State):
 
         Blocks: see above.
         """
-        waiting: deque[Any] = deque(maxlen=1 if self._latest else None)
+        waiting: deque[Any] = deque(maxlen=1 if self.__latest else None)
 
         with Wakeup(self) as wake:
 
@@ -100,12 +101,12 @@ class MonitorState(State):
                 waiting.append(message)
                 wake.set()
 
-            with NotingSubscriber(self._topic, self._msg_type, note, node=self._node):
-                return self._watch(ud, wake, waiting)
+            with NotingSubscriber(self.__topic, self.__msg_type, note, node=self.__node):
+                return self.__watch(ud, wake, waiting)
 
-    def _watch(self, ud: Any, wake: Wakeup, waiting: deque[Any]) -> str:
+    def __watch(self, ud: Any, wake: Wakeup, waiting: deque[Any]) -> str:
         clock = wake.clock
-        until = None if self._timeout_s is None else clock.now() + self._timeout_s
+        until = None if self.__timeout_s is None else clock.now() + self.__timeout_s
         good = 0
         while True:
             wake.clear()
@@ -113,38 +114,38 @@ class MonitorState(State):
                 self.service_preempt()
                 return "preempted"
             if until is not None and clock.now() >= until:
-                return self._timeout_outcome
+                return self.__timeout_outcome
             if not waiting:
                 wake.wait_until(until)
                 continue
-            if not self._check(ud, waiting.popleft()):
+            if not self.__check(ud, waiting.popleft()):
                 return "invalid"
             good += 1
-            if good == self._max_checks:
+            if good == self.__max_checks:
                 return "valid"
 
-    def _check(self, ud: Any, message: Any) -> bool:
+    def __check(self, ud: Any, message: Any) -> bool:
         try:
-            return bool(self._cond_cb(ud, message))
+            return bool(self.__cond_cb(ud, message))
         except Exception as error:  # noqa: BLE001  SMACH's rule: a broken check is not passed
             text = f"{type(error).__name__}: {error}"
             scope = current_scope()
-            where = f"MonitorState {self._topic!r}" if scope is None else scope.path
-            log.log_exception(f"{where}: condition {name_of(self._cond_cb)} raised {text}", error)
+            where = f"MonitorState {self.__topic!r}" if scope is None else scope.path
+            log.log_exception(f"{where}: condition {name_of(self.__cond_cb)} raised {text}", error)
             if scope is not None:
-                scope.emit(CallbackFailed, name_of(self._cond_cb), text)
+                scope.emit(CallbackFailed, name_of(self.__cond_cb), text)
             return False
 
     def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
         """Add the topic, the condition and the limits."""
         kind, details = super().describe_details()
         own = [
-            ("topic", self._topic),
-            ("type", str(self._msg_type._type)),
-            ("condition", name_of(self._cond_cb)),
+            ("topic", self.__topic),
+            ("type", str(self.__msg_type._type)),
+            ("condition", name_of(self.__cond_cb)),
         ]
-        if self._max_checks > 0:
-            own.append(("checks", str(self._max_checks)))
-        if self._timeout_s is not None:
-            own.append(("timeout", f"{self._timeout_s:g} s -> {self._timeout_outcome}"))
+        if self.__max_checks > 0:
+            own.append(("checks", str(self.__max_checks)))
+        if self.__timeout_s is not None:
+            own.append(("timeout", f"{self.__timeout_s:g} s -> {self.__timeout_outcome}"))
         return kind, (*own, *details)

@@ -105,9 +105,9 @@ class ServiceState(State):
         given = ("succeeded", "aborted", "preempted", *problems.names("outcomes", outcomes))
         with problems:
             super().__init__(given, input_keys, output_keys, **options)
-        self._service_name = problems.word("service_name", service_name)
-        self._service_spec = service_spec
-        self._request = Outgoing(
+        self.__service_name = problems.word("service_name", service_name)
+        self.__service_spec = service_spec
+        self.__request = Outgoing(
             "request",
             service_spec._request_class,
             copy.deepcopy(request),
@@ -122,7 +122,7 @@ class ServiceState(State):
                 request_cb_kwargs,
             ),
         )
-        self._response = Incoming(
+        self.__response = Incoming(
             "response",
             service_spec._response_class,
             response_key,
@@ -136,15 +136,16 @@ class ServiceState(State):
                 response_cb_kwargs,
             ),
         )
-        self._timeout_s = problems.seconds("timeout", timeout)
-        self._timeout_outcome = problems.word("timeout_outcome", timeout_outcome)
-        self._node = node
-        self._proxy: ServiceProxy | None = None
-        problems.add(*self._request.problems(), *self._response.problems())
+        self.__timeout_s = problems.seconds("timeout", timeout)
+        self.__timeout_outcome = problems.word("timeout_outcome", timeout_outcome)
+        self.__node = node
+        self.__proxy: ServiceProxy | None = None
+        problems.add(*self.__request.problems(), *self.__response.problems())
         problems.raise_all()
         self.register_outcomes([timeout_outcome])
-        self._request.declare(self)
-        self._response.declare(self)
+        self._smachpy.code = (self.__request,)
+        self.__request.declare(self)
+        self.__response.declare(self)
 
     def execute(self, ud: Any) -> str:
         """Call the service.
@@ -159,69 +160,69 @@ class ServiceState(State):
             left.
         """
         with Wakeup(self) as wake:
-            if self._is_preempted():
+            if self.__is_preempted():
                 return "preempted"
-            request = self._request.build(ud)
-            if self._is_preempted():
+            request = self.__request.build(ud)
+            if self.__is_preempted():
                 return "preempted"
-            call = _Call(self._get_proxy(), request, self._timeout_s, wake)
+            call = _Call(self.__get_proxy(), request, self.__timeout_s, wake)
             try:
                 while not (call.over or self.preempt_requested()):
                     wake.wait_until()
                     wake.clear()
             except BaseException:  # KeyboardInterrupt and the like: nobody waits for the answer
-                self._drop_proxy()
+                self.__drop_proxy()
                 raise
         if not call.over:
-            self._drop_proxy()
+            self.__drop_proxy()
             call.task.join()
-            if self._is_preempted():
+            if self.__is_preempted():
                 return "preempted"
-        return self._finish(ud, call)
+        return self.__finish(ud, call)
 
-    def _finish(self, ud: Any, call: _Call) -> str:
-        if call.error is not None and (self._is_preempted() or is_shutdown()):
+    def __finish(self, ud: Any, call: _Call) -> str:
+        if call.error is not None and (self.__is_preempted() or is_shutdown()):
             return "preempted"
         if isinstance(call.error, (ServiceException, WaitTimeoutError)):
             scope = current_scope()
-            where = f"ServiceState {self._service_name!r}" if scope is None else scope.path
-            log.logwarn(f"{where}: service '{self._service_name}': {call.error}")
-            return self._timeout_outcome if isinstance(call.error, _TIMED_OUT) else "aborted"
+            where = f"ServiceState {self.__service_name!r}" if scope is None else scope.path
+            log.logwarn(f"{where}: service '{self.__service_name}': {call.error}")
+            return self.__timeout_outcome if isinstance(call.error, _TIMED_OUT) else "aborted"
         if call.error is not None:
             raise call.error
-        self._response.store(ud, call.response)
-        chosen = self._response.callback(ud, call.response)
+        self.__response.store(ud, call.response)
+        chosen = self.__response.callback(ud, call.response)
         return "succeeded" if chosen is None else chosen
 
-    def _is_preempted(self) -> bool:
+    def __is_preempted(self) -> bool:
         if not self.preempt_requested():
             return False
         self.service_preempt()
         return True
 
-    def _get_proxy(self) -> ServiceProxy:
+    def __get_proxy(self) -> ServiceProxy:
         """Return the proxy on the node in force, made when there is none yet."""
-        node = self._node if self._node is not None else get_node()
-        proxy = self._proxy
+        node = self.__node if self.__node is not None else get_node()
+        proxy = self.__proxy
         if proxy is None or proxy.node is not node or node.closed:
-            self._drop_proxy()
-            proxy = self._proxy = ServiceProxy(
-                self._service_name, self._service_spec, timeout=self._timeout_s, node=node
+            self.__drop_proxy()
+            proxy = self.__proxy = ServiceProxy(
+                self.__service_name, self.__service_spec, timeout=self.__timeout_s, node=node
             )
         return proxy
 
-    def _drop_proxy(self) -> None:
+    def __drop_proxy(self) -> None:
         """Leave the service; a call that is under way ends with an error at once."""
-        proxy, self._proxy = self._proxy, None
+        proxy, self.__proxy = self.__proxy, None
         if proxy is not None:
             proxy.close()
 
     def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
         """Add the service and the timeout."""
         kind, details = super().describe_details()
-        own = [("service", self._service_name), ("type", str(self._service_spec._type))]
-        if self._timeout_s is not None:
-            own.append(("timeout", f"{self._timeout_s:g} s -> {self._timeout_outcome}"))
+        own = [("service", self.__service_name), ("type", str(self.__service_spec._type))]
+        if self.__timeout_s is not None:
+            own.append(("timeout", f"{self.__timeout_s:g} s -> {self.__timeout_outcome}"))
         return kind, (*own, *details)
 
 

@@ -16,7 +16,7 @@ from smachpy.actions.messages import Incoming, Outgoing, UserCallback
 from smachpy.actions.wakeup import Wakeup
 from smachpy.context import current_frame
 from smachpy.machines.problems import Problems
-from smachpy.machines.state import State
+from smachpy.machines.state import Shown, State
 from smachpy.run.child import on_preempt
 from smachpy.run.frame import current_scope
 from smachpy.run.grace import inherited_grace
@@ -154,11 +154,11 @@ class SimpleActionState(State):
         given = (*OUTCOMES, *problems.names("outcomes", outcomes))
         with problems:
             super().__init__(given, input_keys, output_keys, **options)
-        self._action_name = problems.word("action_name", action_name)
-        self._types = ActionTypes.of(action_spec)
-        self._goal = Outgoing(
+        self.__action_name = problems.word("action_name", action_name)
+        self.__types = ActionTypes.of(action_spec)
+        self.__goal = Outgoing(
             "goal",
-            self._types.goal,
+            self.__types.goal,
             copy.deepcopy(goal),
             goal_key,
             problems.names("goal_slots", goal_slots),
@@ -166,9 +166,9 @@ class SimpleActionState(State):
                 problems, "goal_cb", ("userdata", "goal"), goal_cb, goal_cb_args, goal_cb_kwargs
             ),
         )
-        self._result = Incoming(
+        self.__result = Incoming(
             "result",
-            self._types.result,
+            self.__types.result,
             result_key,
             problems.names("result_slots", result_slots),
             UserCallback.of(
@@ -180,20 +180,21 @@ class SimpleActionState(State):
                 result_cb_kwargs,
             ),
         )
-        self._feedback_cb = problems.function(
+        self.__feedback_cb = problems.function(
             "feedback_cb", feedback_cb, "feedback_cb(userdata, feedback)", 2
         )
-        self._feedback_key = feedback_key
-        self._exec_s = problems.seconds("exec_timeout", exec_timeout)
-        self._server_wait_s = problems.seconds("server_wait_timeout", server_wait_timeout)
+        self.__feedback_key = feedback_key
+        self.__exec_s = problems.seconds("exec_timeout", exec_timeout)
+        self.__server_wait_s = problems.seconds("server_wait_timeout", server_wait_timeout)
         if preempt_timeout is not DEFAULT_PREEMPT_S:
             self._smachpy_set_options({"preempt_timeout": preempt_timeout}, problems)
-        self._node = node
-        self._exchange: GoalExchange | None = None
-        problems.add(*self._goal.problems(), *self._result.problems())
+        self.__node = node
+        self.__exchange: GoalExchange | None = None
+        problems.add(*self.__goal.problems(), *self.__result.problems())
         problems.raise_all()
-        self._goal.declare(self)
-        self._result.declare(self)
+        self._smachpy.code = (self.__goal,)
+        self.__goal.declare(self)
+        self.__result.declare(self)
         self.register_output_keys([] if feedback_key is None else [feedback_key])
         adopt_interface(self, feedback_cb, outcomes=False)
 
@@ -212,11 +213,11 @@ class SimpleActionState(State):
             cancels the goal at once.
         """
         frame: Frame | None = current_frame()
-        if frame is None or self._exec_s is None:
-            return self._execute(ud, None)
-        limit = Timeout(frame, self._exec_s)
+        if frame is None or self.__exec_s is None:
+            return self.__execute(ud, None)
+        limit = Timeout(frame, self.__exec_s)
         try:
-            outcome = self._execute(ud, limit)
+            outcome = self.__execute(ud, limit)
         except Interruption:
             if not limit.end(PREEMPTED):
                 raise
@@ -228,19 +229,19 @@ class SimpleActionState(State):
         limit.end(outcome)
         return outcome
 
-    def _execute(self, ud: Any, limit: Timeout | None) -> str:
+    def __execute(self, ud: Any, limit: Timeout | None) -> str:
         """Do it; when `exec_timeout` is over while foreign code runs, `limit` is told."""
         with Wakeup(self) as wake:
-            if self._is_preempted():
+            if self.__is_preempted():
                 return PREEMPTED
-            goal = self._goal.build(ud)
-            client = self._get_client()
-            if self._is_preempted():
+            goal = self.__goal.build(ud)
+            client = self.__get_client()
+            if self.__is_preempted():
                 return PREEMPTED
             own = self._smachpy.options.preempt_timeout
             grace = _shorter(inherited_grace(current_frame())) if own == "inherit" else own
-            run = GoalRun(exec_timeout=self._exec_s, preempt_timeout=grace)
-            wanted = self._feedback_cb is not None or self._feedback_key is not None
+            run = GoalRun(exec_timeout=self.__exec_s, preempt_timeout=grace)
+            wanted = self.__feedback_cb is not None or self.__feedback_key is not None
 
             def is_asked() -> bool:
                 return self._preempt_requested and (limit is None or not limit.is_alone())
@@ -254,13 +255,13 @@ class SimpleActionState(State):
                 on_late=None if limit is None else limit.over,
                 wants_feedback=wanted,
             )
-            self._exchange = exchange
+            self.__exchange = exchange
             forget = on_preempt(self, exchange.hurry)
-            wait_s = self._server_wait_s
+            wait_s = self.__server_wait_s
             wait_s = None if wait_s is None else max(wait_s, SHORTEST_ACK_S)
             try:
                 exchange.send(goal, ack_timeout=wait_s)
-                exchange.follow(lambda feedback: self._on_feedback(ud, feedback))
+                exchange.follow(lambda feedback: self.__on_feedback(ud, feedback))
             except BaseException:  # KeyboardInterrupt and the like: nobody waits for the goal now
                 exchange.cancel()
                 raise
@@ -269,7 +270,7 @@ class SimpleActionState(State):
                 exchange.close()
             if limit is not None and not run.preempted:  # for `result_cb`
                 limit.start(run.left(wake.clock.now()))
-        return self._finish(ud, exchange)
+        return self.__finish(ud, exchange)
 
     def _smachpy_grace(self, inherited: Grace) -> Grace:
         own: Grace = self._smachpy.options.preempt_timeout
@@ -278,77 +279,78 @@ class SimpleActionState(State):
             return goal + (MARGIN_S if goal == DEFAULT_PREEMPT_S else INHERITED_MARGIN_S)
         return None if own is None else float(own) + MARGIN_S
 
-    def _is_preempted(self) -> bool:
+    def __is_preempted(self) -> bool:
         if not self.preempt_requested():
             return False
         self.service_preempt()
         return True
 
-    def _get_client(self) -> ActionClient[Any]:
+    def __get_client(self) -> ActionClient[Any]:
         """Return the client on the node in force, which all states of the action share."""
-        node = self._node if self._node is not None else get_node()
-        action = self._types.action
-        key = ("action client", node.resolve(self._action_name, "action name"), action)
-        return node.shared(key, lambda: ActionClient(self._action_name, action, node=node))
+        node = self.__node if self.__node is not None else get_node()
+        action = self.__types.action
+        key = ("action client", node.resolve(self.__action_name, "action name"), action)
+        return node.shared(key, lambda: ActionClient(self.__action_name, action, node=node))
 
-    def _on_feedback(self, ud: Any, feedback: Any) -> None:
-        if self._feedback_key is not None:
-            ud[self._feedback_key] = feedback
-        if self._feedback_cb is not None:
-            self._feedback_cb(ud, feedback)
+    def __on_feedback(self, ud: Any, feedback: Any) -> None:
+        if self.__feedback_key is not None:
+            ud[self.__feedback_key] = feedback
+        if self.__feedback_cb is not None:
+            self.__feedback_cb(ud, feedback)
 
-    def _finish(self, ud: Any, exchange: GoalExchange) -> str:
+    def __finish(self, ud: Any, exchange: GoalExchange) -> str:
         """Hand the result on and choose the outcome."""
         run, result = exchange.run, exchange.result
         if run.outcome == PREEMPTED:  # else the goal was done first, and the preempt is still due
             self.service_preempt()
         if result is not None:
-            self._result.store(ud, result)
+            self.__result.store(ud, result)
         if run.outcome == ABORTED or run.abandoned:
-            log.logwarn(self._explain(exchange))
+            log.logwarn(self.__explain(exchange))
         status = getattr(GoalStatus, run.status)
-        chosen = self._result.callback(
-            ud, status, self._types.result() if result is None else result
+        chosen = self.__result.callback(
+            ud, status, self.__types.result() if result is None else result
         )
         return run.outcome if chosen is None else chosen
 
-    def _explain(self, exchange: GoalExchange) -> str:
+    def __explain(self, exchange: GoalExchange) -> str:
         run, scope = exchange.run, current_scope()
-        where = f"{type(self).__name__} {self._action_name!r}" if scope is None else scope.path
-        text = f"{where}: goal {exchange.goal_id} on '{self._action_name}': {run.reason}"
+        where = f"{type(self).__name__} {self.__action_name!r}" if scope is None else scope.path
+        text = f"{where}: goal {exchange.goal_id} on '{self.__action_name}': {run.reason}"
         if run.abandoned:
             return f"{text}. It was abandoned and may still run."
         if exchange.unanswered:
-            name = self._types.action._type
+            name = self.__types.action._type
             return (
-                f"{text}. Try starting an action server of type {name} on '{self._action_name}'; "
+                f"{text}. Try starting an action server of type {name} on '{self.__action_name}'; "
                 "`actionlib list -t` shows those that run."
             )
         return text
 
     # -- for pictures and for SMACH ------------------------------------------------------------
 
-    @property
-    def _status(self) -> int:
-        """Which of the five constants holds."""
-        exchange = self._exchange
+    def __get_status(self) -> int:
+        """Return which of the five constants holds."""
+        constants, exchange = SimpleActionState, self.__exchange
         if exchange is None:
-            return self.INACTIVE
+            return constants.INACTIVE
         if exchange.run.status:
-            return self.COMPLETED
+            return constants.COMPLETED
         if exchange.run.cancelling:
-            return self.PREEMPTING
-        return self.ACTIVE if exchange.accepted else self.WAITING_FOR_SERVER
+            return constants.PREEMPTING
+        return constants.ACTIVE if exchange.accepted else constants.WAITING_FOR_SERVER
+
+    _status = Shown(__get_status)
 
     def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
         """Add the action and the timeouts."""
         kind, details = super().describe_details()
-        own = [("action", self._action_name), ("type", str(self._types.action._type))]
+        own = [("action", self.__action_name), ("type", str(self.__types.action._type))]
         grace = self._smachpy.options.preempt_timeout
         for name, seconds in (
-            ("exec_timeout", self._exec_s),
+            ("exec_timeout", self.__exec_s),
             ("preempt_timeout", DEFAULT_PREEMPT_S if grace == "inherit" else grace),
-            ("server_wait_timeout", self._server_wait_s),
+            ("server_wait_timeout", self.__server_wait_s),
         ):
             if seconds is not None:
                 own.append((name, f"{seconds:g} s"))

@@ -51,7 +51,7 @@ def _signature_problems(state: State) -> Iterator[str]:
     if getattr(code, "__func__", None) is State.execute:
         yield f"execute: got none in {type(state).__name__}; expected a method of its own."
     if isinstance(state, CBState):
-        code = state._cb  # noqa: SLF001  one package
+        code = state._smachpy.code[0]
     if inspect.isgeneratorfunction(code) or inspect.isasyncgenfunction(code):
         yield "execute: got a function with `yield`, which returns no outcome; expected `return`."
 
@@ -101,18 +101,16 @@ def _of_container(container: Container) -> Facts:
     if isinstance(container, Concurrence):
         rules = tuple(
             OutcomeRule(outcome, rule.need, rule.conditions)
-            for outcome, rule in container._rules  # noqa: SLF001  one package
+            for outcome, rule in container._smachpy.rules
         )
-    items = container._items if isinstance(container, IteratorState) else None  # noqa: SLF001
+    data = container._smachpy
+    items = container._smachpy.items if isinstance(container, IteratorState) else None
     return Facts(
         preset=frozenset(container.userdata.keys()),
         outcome_rules=rules,
-        any_outcome=getattr(container, "_outcome_cb", None) is not None,
-        cuts=getattr(container, "_child_termination_cb", None) is not None,
-        watched=any(
-            getattr(container, name)
-            for name in ("_start_cbs", "_transition_cbs", "_termination_cbs")
-        ),
+        any_outcome=getattr(data, "outcome_cb", None) is not None,
+        cuts=getattr(data, "child_termination_cb", None) is not None,
+        watched=bool(data.start_cbs or data.transition_cbs or data.termination_cbs),
         prepared=get_options(container).on_enter is not None,
         made=frozenset(get_options(container).made_outcomes()),
         empty=isinstance(items, (list, tuple, range, dict, set, str)) and not items,
@@ -155,7 +153,7 @@ def _of_leaf(state: State, record: StateRecord) -> Facts:
 
 def _function(given: Any) -> Callable[..., Any] | None:
     """Return the plain function that a callback or the state of one calls, if it is one."""
-    callback = given._cb if isinstance(given, CBState | CBInterface) else given  # noqa: SLF001
+    callback = given._smachpy.code[0] if isinstance(given, CBState) else given
     callback = callback._cb if isinstance(callback, CBInterface) else callback  # noqa: SLF001
     return callback if inspect.isfunction(callback) else None
 
@@ -164,11 +162,13 @@ def _sent_keys(state: State) -> Reads:
     """Return the keys that a state of this package reads for what it sends or tests."""
     keys: set[str] = set()
     sometimes: set[str] = set()
-    callbacks = [getattr(state, "_cond_cb", None)]
-    for sent in (getattr(state, "_goal", None), getattr(state, "_request", None)):
-        if isinstance(sent, Outgoing):
-            keys |= {*sent.slots} if sent.key is None else {sent.key, *sent.slots}
-            callbacks.append(sent.callback.function)
+    callbacks: list[Any] = []
+    for code in state._smachpy.code:
+        if isinstance(code, Outgoing):
+            keys |= {*code.slots} if code.key is None else {code.key, *code.slots}
+            callbacks.append(code.callback.function)
+        else:
+            callbacks.append(code)
     for callback in map(_function, callbacks):
         code = None if callback is None else source.look_at(callback, userdata=0, owner=None)
         if code is not None and code.reads is not None:

@@ -162,9 +162,8 @@ class Control:
         """
         above, _, label = path.rpartition("/")
         frame = self._frame_at(above, path)
-        if label not in frame.container.get_children() or not hasattr(
-            frame.container, "_transitions"
-        ):
+        is_machine = hasattr(frame.container._smachpy, "transitions")
+        if label not in frame.container.get_children() or not is_machine:
             known = sorted(frame.container.get_children())
             raise ControlError(path, f"no jump there; children: {known}", self.active())
         with asking("operator", "", f"jump to {path}"):

@@ -14,9 +14,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from smachpy.events import Event
+    from smachpy.run.child import Callback
     from smachpy.userdata.user_data import UserData
-
-Callback = tuple["Callable[..., object]", "tuple[Any, ...]"]
 
 
 class Callbacks:
@@ -24,11 +23,6 @@ class Callbacks:
 
     userdata: UserData
     _smachpy: Any
-
-    def __init__(self) -> None:
-        self._start_cbs: list[Callback] = []
-        self._transition_cbs: list[Callback] = []
-        self._termination_cbs: list[Callback] = []
 
     def get_initial_states(self) -> list[str]:
         """Return the labels of the children that run first."""
@@ -43,14 +37,16 @@ class Callbacks:
     ) -> None:
         """Call `start_cb(userdata, initial_states, *cb_args)` at the start of each run."""
         call = "start_cb(userdata, initial_states, *cb_args)"
-        self._start_cbs.append(_checked("start_cb", start_cb, call, 2, cb_args))
+        self._smachpy.start_cbs.append(_checked("start_cb", start_cb, call, 2, cb_args))
 
     def register_transition_cb(
         self, transition_cb: Callable[..., object], cb_args: Iterable[Any] = ()
     ) -> None:
         """Call `transition_cb(userdata, active_states, *cb_args)` after each transition."""
         call = "transition_cb(userdata, active_states, *cb_args)"
-        self._transition_cbs.append(_checked("transition_cb", transition_cb, call, 2, cb_args))
+        self._smachpy.transition_cbs.append(
+            _checked("transition_cb", transition_cb, call, 2, cb_args)
+        )
         SUBSCRIPTIONS.version = object()
 
     def register_termination_cb(
@@ -58,21 +54,23 @@ class Callbacks:
     ) -> None:
         """Call `termination_cb(userdata, terminal_states, outcome, *cb_args)` at the end."""
         call = "termination_cb(userdata, terminal_states, outcome, *cb_args)"
-        self._termination_cbs.append(_checked("termination_cb", termination_cb, call, 3, cb_args))
+        self._smachpy.termination_cbs.append(
+            _checked("termination_cb", termination_cb, call, 3, cb_args)
+        )
 
     def call_start_cbs(self) -> None:
         """Call the start callbacks; one that raises is reported, the others still run."""
-        self._call(self._start_cbs, self.get_initial_states())
+        self.__call(self._smachpy.start_cbs, self.get_initial_states())
 
     def call_transition_cbs(self) -> None:
         """Call the transition callbacks; one that raises is reported, the others still run."""
-        self._call(self._transition_cbs, self.get_active_states())
+        self.__call(self._smachpy.transition_cbs, self.get_active_states())
 
     def call_termination_cbs(self, terminal_states: Sequence[str], outcome: str) -> None:
         """Call the termination callbacks; one that raises is reported, the others still run."""
-        self._call(self._termination_cbs, terminal_states, outcome)
+        self.__call(self._smachpy.termination_cbs, terminal_states, outcome)
 
-    def _call(self, callbacks: list[Callback], *arguments: object) -> None:
+    def __call(self, callbacks: list[Callback], *arguments: object) -> None:
         frame = self._smachpy.frame
         for callback, extra in tuple(callbacks):
             given = (self.userdata, *arguments, *extra)
@@ -101,11 +99,11 @@ class Callbacks:
         problems.raise_all()
         data = self._smachpy
         data.listeners = (*data.listeners, listener)
-        self._subscriptions_changed()
+        self.__subscriptions_changed()
 
         def unsubscribe() -> None:
             data.listeners = tuple(item for item in data.listeners if item is not listener)
-            self._subscriptions_changed()
+            self.__subscriptions_changed()
 
         return unsubscribe
 
@@ -130,14 +128,14 @@ class Callbacks:
     def _smachpy_add_tape(self, tape: Tape) -> None:
         data = self._smachpy
         data.tapes = (*data.tapes, tape)
-        self._subscriptions_changed()
+        self.__subscriptions_changed()
 
     def _smachpy_remove_tape(self, tape: Tape) -> None:
         data = self._smachpy
         data.tapes = tuple(item for item in data.tapes if item is not tape)
-        self._subscriptions_changed()
+        self.__subscriptions_changed()
 
-    def _subscriptions_changed(self) -> None:
+    def __subscriptions_changed(self) -> None:
         SUBSCRIPTIONS.version = object()
         frame = self._smachpy.frame or self._smachpy.root
         if frame is not None:

@@ -21,9 +21,11 @@ from smachpy.machines.old_states import as_state
 from smachpy.machines.problems import Problems
 from smachpy.machines.rules import Rule, all_of, any_of, as_rules, decide, n_of
 from smachpy.machines.spec import ChildSpec, ConcurrenceSpec
+from smachpy.machines.state import DataOf
 from smachpy.machines.validate import concurrence_problems
 from smachpy.run.branches import Group
 from smachpy.run.callback import call_bounded
+from smachpy.run.child import ContainerData
 from smachpy.run.interrupt import Interruption
 from smachpy.run.origin import asking
 from smachpy.run.visit import End
@@ -60,6 +62,19 @@ class _Plan:
         return any(step.is_stale() for step in self.steps)
 
 
+class ConcurrenceData(ContainerData):
+    """What the library knows of one concurrence; see the arguments of `Concurrence`."""
+
+    __slots__ = _kept = ("child_termination_cb", "default_outcome", "outcome_cb", "rules")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.rules: tuple[tuple[str, Rule], ...] = ()
+        self.default_outcome = ""
+        self.outcome_cb: Callable[[dict[str, str | None]], str | None] | None = None
+        self.child_termination_cb: Callable[[dict[str, str | None]], Any] | None = None
+
+
 class Concurrence(Container):
     """A container that runs all its children at once and ends when all have ended.
 
@@ -87,6 +102,7 @@ class Concurrence(Container):
         returns, except those left behind after a preempt they ignored (docs/preemption.md).
     """
 
+    _smachpy: DataOf[ConcurrenceData] = DataOf(ConcurrenceData)
     _smachpy_kind: ClassVar[Kind] = "concurrence"
     _smachpy_replaces: ClassVar[bool] = True
 
@@ -122,19 +138,18 @@ class Concurrence(Container):
                     if outcome not in known and (outcome or outcome_map is named)
                 )
             )
-        self._rules: tuple[tuple[str, Rule], ...] = ()
+        self._smachpy.rules = ()
         with problems:
-            self._rules = as_rules(outcome_map)
+            self._smachpy.rules = as_rules(outcome_map)
         ended = "({label: outcome})"
         problems.function("outcome_cb", outcome_cb, f"outcome_cb{ended}", 1)
         problems.function(
             "child_termination_cb", child_termination_cb, f"child_termination_cb{ended}", 1
         )
         problems.raise_all()
-        self._default_outcome = default_outcome
-        self._outcome_map = outcome_map
-        self._outcome_cb = outcome_cb
-        self._child_termination_cb = child_termination_cb
+        self._smachpy.default_outcome = default_outcome
+        self._smachpy.outcome_cb = outcome_cb
+        self._smachpy.child_termination_cb = child_termination_cb
 
     @construction_method
     def add(
@@ -159,7 +174,7 @@ class Concurrence(Container):
         """
         if self._smachpy.frame is not None:
             raise InvalidConstructionError(f"{label}: add: got a new state while it runs.")
-        for other, child in self._states.items():
+        for other, child in self._smachpy.children.items():
             if child is state:
                 problem = (
                     f"{label}: state: got the instance that runs as {other!r} at the same time; "
@@ -167,14 +182,16 @@ class Concurrence(Container):
                 )
                 if not accepts(problem):
                     raise InvalidStateError(problem)
-        self._store_child(label, as_state(state, label) if accepting() else state, remapping)
+        self._smachpy_store_child(
+            label, as_state(state, label) if accepting() else state, remapping
+        )
         return state
 
     # -- structure -----------------------------------------------------------------------------
 
     def get_initial_states(self) -> list[str]:
         """Return all labels."""
-        return list(self._states)
+        return list(self._smachpy.children)
 
     def set_initial_state(
         self, initial_states: SequenceOf[str], userdata: UserData | None = None
@@ -184,13 +201,14 @@ class Concurrence(Container):
         Raises:
             InvalidStateError: a label that is not there.
         """
-        unknown = sorted(set(initial_states) - set(self._states))
+        known = self._smachpy.children
+        unknown = sorted(set(initial_states) - set(known))
         if unknown:
             raise InvalidStateError(
-                f"initial states: got {unknown}; expected labels of {sorted(self._states)}."
-                f"{did_you_mean(unknown[0], self._states)}"
+                f"initial states: got {unknown}; expected labels of {sorted(known)}."
+                f"{did_you_mean(unknown[0], known)}"
             )
-        if initial_states and set(initial_states) != set(self._states):
+        if initial_states and set(initial_states) != set(self._smachpy.children):
             log.logwarn("Concurrence.set_initial_state: all children start together; ignored.")
         if userdata is not None:
             self.userdata.update(userdata)
@@ -205,7 +223,7 @@ class Concurrence(Container):
         """Return what the outcome map names as (child outcome, child label, outcome)."""
         return [
             (child_outcome, label, outcome)
-            for outcome, rule in self._rules
+            for outcome, rule in self._smachpy.rules
             for label, wanted in rule.conditions
             for child_outcome in wanted
         ]
@@ -214,18 +232,22 @@ class Concurrence(Container):
         """Return what is wrong with this concurrence itself."""
         children = tuple(
             ChildSpec(label, tuple(state.get_registered_outcomes()))
-            for label, state in self._states.items()
+            for label, state in self._smachpy.children.items()
         )
         spec = ConcurrenceSpec(
-            where, self._smachpy.outcomes, children, self._default_outcome, self._rules
+            where,
+            self._smachpy.outcomes,
+            children,
+            self._smachpy.default_outcome,
+            self._smachpy.rules,
         )
-        shared = (problem for problem in self._shared_states(where) if not accepts(problem))
+        shared = (problem for problem in self.__shared_states(where) if not accepts(problem))
         return (*concurrence_problems(spec), *shared)
 
-    def _shared_states(self, where: str) -> Iterator[str]:
+    def __shared_states(self, where: str) -> Iterator[str]:
         """Yield the states that two branches would run at the same time."""
         branch_of: dict[int, str] = {}
-        for label, child in self._states.items():
+        for label, child in self._smachpy.children.items():
             for state in {id(state): state for state in below(child)}.values():
                 other = branch_of.setdefault(id(state), label)
                 if other != label:
@@ -237,8 +259,8 @@ class Concurrence(Container):
     def describe_structure(self) -> Structure:
         """Return the children and the rules."""
         children = tuple(
-            (label, state, tuple(self._remappings[label].items()))
-            for label, state in self._states.items()
+            (label, state, tuple(self._smachpy.remappings[label].items()))
+            for label, state in self._smachpy.children.items()
         )
         rules = [
             RuleRecord(
@@ -246,45 +268,47 @@ class Concurrence(Container):
                 tuple((label, one) for label, wanted in rule.conditions for one in wanted),
                 str(rule),
             )
-            for outcome, rule in self._rules
+            for outcome, rule in self._smachpy.rules
         ]
         return Structure(
             children,
-            tuple(self._states),
+            tuple(self._smachpy.children),
             (),
             tuple(rules),
-            self._default_outcome or None,
-            (("outcome callback", _name_of(self._outcome_cb)),) if self._outcome_cb else (),
+            self._smachpy.default_outcome or None,
+            (("outcome callback", _name_of(self._smachpy.outcome_cb)),)
+            if self._smachpy.outcome_cb
+            else (),
         )
 
     # -- running -------------------------------------------------------------------------------
 
-    def _compile(self, frame: Frame) -> _Plan:
+    def _smachpy_compile(self, frame: Frame) -> _Plan:
         problems = self.find_problems(frame.path)
         if problems:
             raise InconsistentMachineError(f"{type(self).__name__} {frame.path!r}", problems)
-        return _Plan(self, [self._make_step(label) for label in self._states])
+        return _Plan(self, [self._smachpy_make_step(label) for label in self._smachpy.children])
 
-    def _run_children(self, frame: Frame, plan: _Plan) -> str:
-        each = bool(self._child_termination_cb or self._transition_cbs)
+    def _smachpy_run_children(self, frame: Frame, plan: _Plan) -> str:
+        each = bool(self._smachpy.child_termination_cb or self._smachpy.transition_cbs)
         group = frame.group = Group(frame, plan.steps, each=each)
         try:
-            if self._start_cbs:
+            if self._smachpy.start_cbs:
                 self.call_start_cbs()
             if self._preempt_requested:
                 frame.answered = True
                 frame.emit_own(Preempted, "")
                 return "preempted"
-            self._run_group(group)
-            return self._outcome(frame, group)
+            self.__run_group(group)
+            return self.__outcome(frame, group)
         finally:
             frame.group = None  # else run and branches would wait for the garbage collector
             group.end_run()
 
-    def _terminal_labels(self, frame: Frame) -> list[str]:  # noqa: ARG002  that of any container
-        return list(self._states)
+    def _smachpy_terminal_labels(self, frame: Frame) -> list[str]:  # noqa: ARG002  that of any container
+        return list(self._smachpy.children)
 
-    def _run_group(self, group: Group) -> None:
+    def __run_group(self, group: Group) -> None:
         """Start the branches and see them end.
 
         Raises:
@@ -292,57 +316,57 @@ class Concurrence(Container):
         """
         try:
             group.start()
-            self._see_them_end(group)
+            self.__see_them_end(group)
         except BaseException as error:
             with asking("concurrence", group.frame.path, f"raised {type(error).__name__}"):
                 group.ask(group.running())
             raise
 
-    def _see_them_end(self, group: Group) -> None:
+    def __see_them_end(self, group: Group) -> None:
         failure: InvalidUserCodeError | None = None
         running = True
-        if self._transition_cbs:
+        if self._smachpy.transition_cbs:
             try:
                 for _ in group.branches:
                     self.call_transition_cbs()
             except Interruption as error:
-                self._stop_calling(group, error)
+                self.__stop_calling(group, error)
         while running or group.reports:
             running = group.wait() if running else False
             while group.reports:
                 branch = group.reports.popleft()
                 try:
-                    self._branch_ended(group, branch)
+                    self.__branch_ended(group, branch)
                 except InvalidUserCodeError as error:
                     failure = error
                     group.failed = True
                     with asking("concurrence", group.frame.path, "child_termination_cb raised"):
                         group.ask(group.running())
                 except Interruption as error:
-                    self._stop_calling(group, error)
+                    self.__stop_calling(group, error)
         group.raise_errors(failure)
         if group.interruption is not None:
             raise group.interruption
 
-    def _stop_calling(self, group: Group, interruption: Interruption) -> None:
+    def __stop_calling(self, group: Group, interruption: Interruption) -> None:
         """Call no callback more: one did not listen, so the others might not either."""
         if group.frame.dead:
             raise interruption
         group.failed = True
         group.interruption = interruption
 
-    def _branch_ended(self, group: Group, branch: ChildBranch) -> None:
+    def __branch_ended(self, group: Group, branch: ChildBranch) -> None:
         if branch.error is not None:
             with asking("concurrence", branch.here(), f"raised {type(branch.error).__name__}"):
                 group.ask(group.running())
             return
-        if self._transition_cbs and group.interruption is None:
+        if self._smachpy.transition_cbs and group.interruption is None:
             self.call_transition_cbs()
-        if self._child_termination_cb is None or group.failed:
+        if self._smachpy.child_termination_cb is None or group.failed:
             return  # an outcome that a child did not live to give would pass for one that runs
         try:
             answer = call_bounded(
-                self, group.frame, self._child_termination_cb, (group.outcomes(),)
+                self, group.frame, self._smachpy.child_termination_cb, (group.outcomes(),)
             )
         except Exception as error:
             raise InvalidUserCodeError(
@@ -350,25 +374,26 @@ class Concurrence(Container):
                 path=group.frame.path,
             ) from error
         with asking("concurrence", branch.here(), f"ended with {branch.outcome!r}"):
-            group.ask(self._chosen(group, answer))
+            group.ask(self.__chosen(group, answer))
 
-    def _chosen(self, group: Group, answer: Any) -> list[ChildBranch]:
+    def __chosen(self, group: Group, answer: Any) -> list[ChildBranch]:
         """Return the branches that the answer of child_termination_cb names."""
         if answer is True or answer is False or answer is None:
             return group.running() if answer else []
         labels = [answer] if isinstance(answer, str) else answer
         if not isinstance(labels, (list, tuple, set, frozenset)):
             return group.running() if answer else []
-        unknown = sorted(set(labels) - set(self._states))
+        known = self._smachpy.children
+        unknown = sorted(set(labels) - set(known))
         if unknown:
             raise InvalidUserCodeError(
                 f"{group.frame.path}: child_termination_cb: got labels {unknown}; expected labels "
-                f"of {sorted(self._states)}.{did_you_mean(unknown[0], self._states)}",
+                f"of {sorted(known)}.{did_you_mean(unknown[0], known)}",
                 path=group.frame.path,
             )
         return [branch for branch in group.running() if branch.step.label in labels]
 
-    def _outcome(self, frame: Frame, group: Group) -> str:
+    def __outcome(self, frame: Frame, group: Group) -> str:
         """Return the outcome that the callback, the rules or the default give.
 
         It answers a preempt only if every child behind it answered: when one just finished its
@@ -377,37 +402,37 @@ class Concurrence(Container):
         outcomes = group.outcomes()
         answered = [b.step.label for b in group.branches if b.answered]
         asked = self._preempt_requested
-        if self._outcome_cb is not None:
-            answer = self._ask_callback(frame, outcomes)
+        if self._smachpy.outcome_cb is not None:
+            answer = self.__ask_callback(frame, outcomes)
             if answer is not None:
                 frame.answered = asked and len(answered) == len(outcomes)
                 return answer
-        ruled = decide(self._rules, outcomes)
+        ruled = decide(self._smachpy.rules, outcomes)
         if ruled is not None:
             outcome, rule = ruled
             frame.answered = asked and set(rule.met_by(outcomes)) <= set(answered)
             return outcome
         frame.answered = asked and bool(answered)
-        if frame.answered and self._may_end_preempted():
+        if frame.answered and self.__may_end_preempted():
             frame.emit_own(Preempted, "")
             return "preempted"
-        return self._default_outcome
+        return self._smachpy.default_outcome
 
-    def _ask_callback(self, frame: Frame, outcomes: dict[str, str | None]) -> str | None:
-        assert self._outcome_cb is not None
+    def __ask_callback(self, frame: Frame, outcomes: dict[str, str | None]) -> str | None:
+        assert self._smachpy.outcome_cb is not None
         try:
-            answer = call_bounded(self, frame, self._outcome_cb, (dict(outcomes),))
+            answer = call_bounded(self, frame, self._smachpy.outcome_cb, (dict(outcomes),))
         except Exception as error:
             raise InvalidUserCodeError(
                 f"{frame.path}: outcome_cb raised {type(error).__name__}: {error}",
                 path=frame.path,
             ) from error
-        return self._registered(frame, answer) if answer else None
+        return self.__registered(frame, answer) if answer else None
 
-    def _may_end_preempted(self) -> bool:
-        return "preempted" in self._smachpy.outcomes or not self._default_outcome
+    def __may_end_preempted(self) -> bool:
+        return "preempted" in self._smachpy.outcomes or not self._smachpy.default_outcome
 
-    def _registered(self, frame: Frame, answer: object) -> str:
+    def __registered(self, frame: Frame, answer: object) -> str:
         known = self._smachpy.outcomes
         if answer in known:
             return str(answer)

@@ -68,9 +68,7 @@ class construction_method(Generic[P, R_co]):  # noqa: N801  a decorator
 class Openable:
     """The part of a container that `with` opens."""
 
-    def __init__(self) -> None:
-        self._open_tokens: list[Any] = []
-        self._context_kwargs: dict[str, Any] = {}
+    _smachpy: Any
 
     def check_consistency(self) -> None:
         """Check the container and all below it."""
@@ -78,7 +76,7 @@ class Openable:
 
     def __enter__(self) -> Self:
         """Open the container for `add`."""
-        self._open_tokens.append(OPEN.set((*OPEN.get(), self)))
+        self._smachpy.open_tokens.append(OPEN.set((*OPEN.get(), self)))
         return self
 
     def __exit__(
@@ -88,8 +86,8 @@ class Openable:
         traceback: TracebackType | None,
     ) -> None:
         """Close it; at the outermost container everything is checked."""
-        OPEN.reset(self._open_tokens.pop())
-        if error is None and not OPEN.get() and self._context_kwargs.get("check", True):
+        OPEN.reset(self._smachpy.open_tokens.pop())
+        if error is None and not OPEN.get() and self._smachpy.context_kwargs.get("check", True):
             try:
                 self.check_consistency()
             except InconsistentMachineError as problems:
@@ -104,12 +102,12 @@ class Openable:
             **kwargs: `check=False` leaves the check to the next `with` or to `execute`, so that
                 a machine can be built in several steps.
         """
-        before, self._context_kwargs = self._context_kwargs, kwargs
+        before, self._smachpy.context_kwargs = self._smachpy.context_kwargs, kwargs
         try:
             with self:
                 yield self
         finally:
-            self._context_kwargs = before
+            self._smachpy.context_kwargs = before
 
     def open(self) -> None:
         """Open the container for `add`, until `close`."""

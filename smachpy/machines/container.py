@@ -20,7 +20,7 @@ from smachpy.exceptions import (
 from smachpy.machines.callbacks import Callbacks
 from smachpy.machines.construction import Openable
 from smachpy.machines.problems import Problems, takes
-from smachpy.machines.state import DataOf, State, get_options, make_step
+from smachpy.machines.state import DataOf, Shown, State, get_options, make_step
 from smachpy.run.child import EPOCH, ContainerData, on_preempt
 from smachpy.run.frame import Frame, clock_of_run
 from smachpy.run.grace import forget_visit, request, request_soon
@@ -65,6 +65,9 @@ class Container(Openable, Callbacks, State):
     _smachpy_replaces: ClassVar[bool] = False
     """Whether SMACH's container of this kind replaced a child by another one of its label."""
     name: str | None = None
+    _states = Shown(lambda container: container._smachpy.children)
+    _remappings = Shown(lambda container: container._smachpy.remappings)
+    _is_running = Shown(lambda container: container._smachpy.frame is not None)
 
     def __init__(
         self,
@@ -79,19 +82,14 @@ class Container(Openable, Callbacks, State):
         problems = Problems(type(self).__name__)
         with problems:
             State.__init__(self, outcomes, input_keys, output_keys, **options)
-        Openable.__init__(self)
-        Callbacks.__init__(self)
         with problems:
             self.userdata = UserData() if userdata_type is None else typed_userdata(userdata_type)
         if name is not None:
             self.name = problems.word("name", name)
         problems.raise_all()
-        self._states: dict[str, State] = {}
-        self._remappings: dict[str, dict[str, str]] = {}
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return what a copy of the container needs: the structure and the userdata, no run."""
-        return {**super().__getstate__(), "_open_tokens": []}
+        data = self._smachpy  # a second call of __init__ begins anew
+        data.children, data.remappings = {}, {}
+        data.start_cbs, data.transition_cbs, data.termination_cbs = [], [], []
 
     # -- structure -----------------------------------------------------------------------------
 
@@ -104,13 +102,14 @@ class Container(Openable, Callbacks, State):
     def __getitem__(self, key: str) -> State:
         """Return the child with this label."""
         try:
-            return self._states[key]
+            child: State = self._smachpy.children[key]
         except KeyError:
-            self._no_child(key)
+            self.__no_child(key)
+        return child
 
     def get_children(self) -> dict[str, State]:
         """Return label -> child, in the order in which they were added."""
-        return self._states
+        return self._smachpy.children
 
     def set_initial_state(
         self, initial_states: Sequence[str], userdata: UserData | None = None
@@ -133,11 +132,11 @@ class Container(Openable, Callbacks, State):
             InconsistentMachineError: with all problems found.
         """
         where = f"/{self.name or 'SM_ROOT'}"
-        problems = [*self._own_problems(where), *_all_problems(self, where)]
+        problems = [*self.__own_problems(where), *_all_problems(self, where)]
         if problems:
             raise InconsistentMachineError(f"{type(self).__name__} {where!r}", problems)
 
-    def _own_problems(self, where: str) -> Iterator[str]:
+    def __own_problems(self, where: str) -> Iterator[str]:
         """Yield what is wrong with its options, which `add` checks if it is no root."""
         for problem in retry_problems(self._smachpy.options, self._smachpy.outcomes):
             yield f"{where}: {problem}"
@@ -175,7 +174,7 @@ class Container(Openable, Callbacks, State):
             if isinstance(child, Container):
                 child.reset_userdata()
 
-    def _store_child(
+    def _smachpy_store_child(
         self,
         label: object,
         state: object,
@@ -188,10 +187,10 @@ class Container(Openable, Callbacks, State):
             if not isinstance(label, str) or not accepts(problem):
                 raise InvalidStateError(problem)
         problems = problems or Problems(label)
-        if label in self._states:
+        if label in self._smachpy.children:
             problem = (
                 "label is taken: got a second state with it; expected a label not in "
-                f"{sorted(self._states)}."
+                f"{sorted(self._smachpy.children)}."
             )
             if not (self._smachpy_replaces and accepts(f"{label}: {problem}")):
                 problems.add(problem)
@@ -206,16 +205,16 @@ class Container(Openable, Callbacks, State):
         names = problems.names_of("remapping", remapping, "key of the state -> key here")
         problems.raise_all()
         assert isinstance(state, State)
-        self._states[label] = state
-        self._remappings[label] = names
+        self._smachpy.children[label] = state
+        self._smachpy.remappings[label] = names
         self._smachpy.plan = None
 
     def _smachpy_exchange(self, label: str, state: State) -> None:
         """Put another state in the place of a child; for doubles, between two runs."""
-        self._states[label] = state
+        self._smachpy.children[label] = state
         self._smachpy.plan = None
 
-    def _no_child(self, key: str) -> NoReturn:
+    def __no_child(self, key: str) -> NoReturn:
         labels = sorted(self.get_children())
         raise KeyError(
             f"{type(self).__name__}: no such state: got {key!r}; expected one of {labels}."
@@ -248,9 +247,9 @@ class Container(Openable, Callbacks, State):
         if callback is not None and callback.parent is parent:
             step = callback.step  # a callback of the parent runs this container
         if step is None or step.state is self:
-            return self._run(frame, parent_ud)
+            return self.__run(frame, parent_ud)
         if self._smachpy.frame is not None:
-            raise self._already_runs(frame)
+            raise self.__already_runs(frame)
         # A state runs this container by hand, maybe in a thread that it has started: a preempt of
         # the state is one of the container.
         token = None
@@ -259,36 +258,36 @@ class Container(Openable, Callbacks, State):
             token = THREAD.set(frame)
         forget = on_preempt(step.state, self.request_preempt)
         try:
-            return self._run(frame, parent_ud)
+            return self.__run(frame, parent_ud)
         finally:
             forget()
             if token is not None:
                 THREAD.reset(token)
                 frame.end_thread()
 
-    def _run(self, frame: Frame, parent_ud: UserData | Remapper | None) -> str:
+    def __run(self, frame: Frame, parent_ud: UserData | Remapper | None) -> str:
         """Run in `frame`: copy the keys, call the callbacks, run the children."""
         data = self._smachpy
         plan = data.plan
         if plan is None or plan.userdata is not self.userdata or plan.epoch != EPOCH.value:
-            plan = data.plan = self._current_plan(frame, plan)
+            plan = data.plan = self.__current_plan(frame, plan)
         if data.frame is not None:
-            raise self._already_runs(frame)
+            raise self.__already_runs(frame)
         raised = True
         try:
             data.frame = frame.first.innermost = frame
             if data.listeners or data.tapes:
                 frame.run.watched = True
             if data.input_keys and parent_ud is not None:
-                self._copy_input_keys(parent_ud, self.userdata)
+                self.__copy_input_keys(parent_ud, self.userdata)
             try:
-                outcome = self._run_children(frame, plan)
+                outcome = self._smachpy_run_children(frame, plan)
             except Interruption:  # a callback did not listen
-                outcome = self._interrupted(frame)
-            if self._termination_cbs:
-                outcome = self._call_at_end(frame, outcome)
+                outcome = self.__interrupted(frame)
+            if self._smachpy.termination_cbs:
+                outcome = self.__call_at_end(frame, outcome)
             if data.output_keys and parent_ud is not None:
-                self._copy_output_keys(self.userdata, parent_ud)
+                self.__copy_output_keys(self.userdata, parent_ud)
             raised = False
             return outcome
         finally:
@@ -299,9 +298,9 @@ class Container(Openable, Callbacks, State):
                 data.frame = None
                 data.answered = frame.answered
             if raised or self._preempt_requested or frame.visit is not None or data.end_waiters:
-                self._leave(frame)
+                self.__leave(frame)
 
-    def _interrupted(self, frame: Frame) -> str:
+    def __interrupted(self, frame: Frame) -> str:
         """Return how the container ends when a callback of it outlasted the grace."""
         if frame.dead:
             raise Interruption
@@ -310,37 +309,37 @@ class Container(Openable, Callbacks, State):
             frame.emit_own(Preempted, "")
         return "preempted"
 
-    def _call_at_end(self, frame: Frame, outcome: str) -> str:
-        labels = self._terminal_labels(frame)
+    def __call_at_end(self, frame: Frame, outcome: str) -> str:
+        labels = self._smachpy_terminal_labels(frame)
         try:
             self.call_termination_cbs(labels, outcome)
         except Interruption:
-            return self._interrupted(frame)
+            return self.__interrupted(frame)
         return outcome
 
-    def _terminal_labels(self, frame: Frame) -> list[str]:
+    def _smachpy_terminal_labels(self, frame: Frame) -> list[str]:
         """Return the children that ended last."""
         step, frame.step = frame.step, None
         return [] if step is None else [step.label]
 
-    def _already_runs(self, frame: Frame) -> InvalidStateError:
+    def __already_runs(self, frame: Frame) -> InvalidStateError:
         return InvalidStateError(
             f"{frame.path}: execute: got a second call while it runs; expected one run at a time."
         )
 
-    def _current_plan(self, frame: Frame, plan: Any) -> Any:
+    def __current_plan(self, frame: Frame, plan: Any) -> Any:
         """Return a plan for the states as they are now."""
         epoch = EPOCH.value
         if plan is None or plan.userdata is not self.userdata or plan.is_stale():
             is_root = self._smachpy.root is not None
-            problems = [*self._own_problems(frame.path)] if is_root else []
+            problems = [*self.__own_problems(frame.path)] if is_root else []
             if problems:
                 raise InconsistentMachineError(f"{type(self).__name__} {frame.path!r}", problems)
-            plan = self._compile(frame)
+            plan = self._smachpy_compile(frame)
         plan.epoch = epoch
         return plan
 
-    def _compile(self, frame: Frame) -> Any:
+    def _smachpy_compile(self, frame: Frame) -> Any:
         """Return this container's plan.
 
         Raises:
@@ -348,17 +347,17 @@ class Container(Openable, Callbacks, State):
         """
         raise NotImplementedError
 
-    def _run_children(self, frame: Frame, plan: Any) -> str:
+    def _smachpy_run_children(self, frame: Frame, plan: Any) -> str:
         """Run the children and return the outcome."""
         raise NotImplementedError
 
-    def _make_step(self, label: str) -> Step:
-        state, names = self._states[label], self._remappings[label]
+    def _smachpy_make_step(self, label: str) -> Step:
+        state, names = self._smachpy.children[label], self._smachpy.remappings[label]
         data = state._smachpy
         window = Remapper(self.userdata, data.input_keys, data.output_keys, names)
         return make_step(label, state, window)
 
-    def _leave(self, frame: Frame) -> None:
+    def __leave(self, frame: Frame) -> None:
         """Forget the run; with it ends the preempt that belonged to it."""
         data = self._smachpy
         with frame.run.lock:
@@ -388,7 +387,7 @@ class Container(Openable, Callbacks, State):
             return
         name = signal_being_handled()
         if name:
-            self._note_request(Origin("program", by) if by else Origin("signal", name))
+            self.__note_request(Origin("program", by) if by else Origin("signal", name))
             return
         token = REQUESTING.set(self)
         try:
@@ -401,7 +400,7 @@ class Container(Openable, Callbacks, State):
 
     _smachpy_request_preempt: ClassVar[object] = request_preempt
 
-    def _note_request(self, origin: Origin) -> None:
+    def __note_request(self, origin: Origin) -> None:
         """Note a signal handler's request: the code that it interrupted may hold any lock."""
         data = self._smachpy
         frame = data.root or data.frame
@@ -417,30 +416,35 @@ class Container(Openable, Callbacks, State):
         # A clock of its own, whose locks nobody holds.
         RealClock().spawn(ask, name=f"preempt of {frame.here()}")
 
-    def _copy_input_keys(self, parent_ud: UserData | Remapper, ud: UserData) -> None:
+    def __copy_input_keys(self, parent_ud: UserData | Remapper, ud: UserData) -> None:
         for key in self._smachpy.input_keys:
             if key in parent_ud:
                 ud[key] = parent_ud[key]
             else:
                 log.logwarn(f"{type(self).__name__}: input key {key!r} has no value to copy.")
 
-    def _copy_output_keys(self, ud: UserData, parent_ud: UserData | Remapper) -> None:
+    def __copy_output_keys(self, ud: UserData, parent_ud: UserData | Remapper) -> None:
         for key in self._smachpy.output_keys:
             if key in ud:
                 parent_ud[key] = ud[key]
             else:
                 log.logwarn(f"{type(self).__name__}: output key {key!r} has no value to copy.")
 
-    @property
+    @Shown
     def control(self) -> Control:
         """The operator's control of this machine: pause, step, jump and so on; see `Control`."""
-        from smachpy.events.control import Control
+        return control_of(self)
 
-        data = self._smachpy
-        if data.control is None:
-            data.control = Control(self)
-        assert isinstance(data.control, Control)
-        return data.control
+
+def control_of(container: Container) -> Control:
+    """Return the operator's control of a container, whatever its attribute `control` is."""
+    from smachpy.events.control import Control
+
+    data = container._smachpy
+    if data.control is None:
+        data.control = Control(container)
+    assert isinstance(data.control, Control)
+    return data.control
 
 
 def state_problems(state: State) -> Iterator[str]:
@@ -486,7 +490,7 @@ def _key_problems(container: Container, where: str) -> Iterator[str]:
         return
     fields = data.fields
     for label, state in container.get_children().items():
-        names = container._remappings[label]  # noqa: SLF001  its own module
+        names = container._smachpy.remappings[label]
         keys = (*state.get_registered_input_keys(), *state.get_registered_output_keys())
         for key in dict.fromkeys(names.get(key, key) for key in keys):
             if "." not in key and key not in fields.types:

@@ -31,7 +31,7 @@ class FunctionState(CBState):
 
     def __call__(self, userdata: Any) -> Any:
         """Call the function, for tests of it."""
-        return self._cb(userdata)
+        return self._smachpy.code[0](userdata)
 
 
 class _StateDecorator:

@@ -18,8 +18,10 @@ from smachpy.machines.container import Container
 from smachpy.machines.old_states import as_state
 from smachpy.machines.problems import Problems
 from smachpy.machines.spec import ChildSpec, LoopSpec
+from smachpy.machines.state import DataOf
 from smachpy.machines.validate import loop_problems
 from smachpy.run.callback import call_bounded
+from smachpy.run.child import ContainerData
 from smachpy.run.interrupt import Interruption
 from smachpy.run.runner import end_visit, run_watched, unknown_outcome, user_error
 from smachpy.run.visit import End, Why
@@ -61,6 +63,28 @@ class _Plan:
         return self.step.is_stale()
 
 
+class IteratorData(ContainerData):
+    """What the library knows of one iterator; see the arguments of `Iterator`."""
+
+    __slots__ = _kept = (
+        "break_outcomes",
+        "exhausted_outcome",
+        "final_outcome_map",
+        "items",
+        "items_label",
+        "loop_outcomes",
+    )
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.items: Any = ()
+        self.items_label = ""
+        self.exhausted_outcome = ""
+        self.loop_outcomes: tuple[str, ...] = ()
+        self.break_outcomes: tuple[str, ...] = ()
+        self.final_outcome_map: dict[str, str] = {}
+
+
 class Iterator(Container):
     """A container that runs its child once for each item.
 
@@ -76,6 +100,7 @@ class Iterator(Container):
         **options: See `StateOptions`.
     """
 
+    _smachpy: DataOf[IteratorData] = DataOf(IteratorData)
     _smachpy_kind: ClassVar[Kind] = "iterator"
 
     def __init__(
@@ -92,17 +117,18 @@ class Iterator(Container):
         **options: Unpack[StateOptions],
     ) -> None:
         problems = Problems(type(self).__name__)
-        self._exhausted_outcome = problems.word("exhausted_outcome", exhausted_outcome)
-        names = (*problems.names("outcomes", outcomes), self._exhausted_outcome)
+        exhausted = problems.word("exhausted_outcome", exhausted_outcome)
+        names = (*problems.names("outcomes", outcomes), exhausted)
         with problems:
             super().__init__(
                 names, input_keys, output_keys, name=name, userdata_type=userdata_type, **options
             )
-        self._set_items(it, it_label, problems)
+        self.__set_items(it, it_label, problems)
         problems.raise_all()
-        self._loop_outcomes: tuple[str, ...] = ()
-        self._break_outcomes: tuple[str, ...] = ()
-        self._final_outcome_map: dict[str, str] = {}
+        data = self._smachpy  # a second call of __init__ begins anew
+        data.exhausted_outcome = exhausted
+        data.loop_outcomes = data.break_outcomes = ()
+        data.final_outcome_map = {}
 
     @construction_method
     def set_iteritems(
@@ -116,7 +142,7 @@ class Iterator(Container):
             InvalidStateError: `it` cannot be iterated, or `it_label` is no name.
         """
         problems = Problems(type(self).__name__)
-        self._set_items(it, it_label, problems)
+        self.__set_items(it, it_label, problems)
         problems.raise_all()
 
     @construction_method
@@ -149,43 +175,43 @@ class Iterator(Container):
         loop = problems.names("loop_outcomes", loop_outcomes)
         breaks = problems.names("break_outcomes", break_outcomes)
         final = problems.names_of("final_outcome_map", final_outcome_map, "outcome -> outcome")
-        before = self._states, self._remappings
-        self._states, self._remappings = {}, {}
+        before = self._smachpy.children, self._smachpy.remappings
+        self._smachpy.children, self._smachpy.remappings = {}, {}
         try:
             stored = as_state(state, label) if accepting() else state
-            self._store_child(label, stored, remapping, problems)
+            self._smachpy_store_child(label, stored, remapping, problems)
         except InvalidStateError:
-            self._states, self._remappings = before
+            self._smachpy.children, self._smachpy.remappings = before
             raise
-        self._loop_outcomes, self._break_outcomes = loop, breaks
-        self._final_outcome_map = final
+        self._smachpy.loop_outcomes, self._smachpy.break_outcomes = loop, breaks
+        self._smachpy.final_outcome_map = final
         return state
 
-    def _set_items(self, it: Any, it_label: Any, problems: Problems) -> None:
+    def __set_items(self, it: Any, it_label: Any, problems: Problems) -> None:
         if not (callable(it) or hasattr(it, "__iter__") or hasattr(it, "__getitem__")):
             problems.add(f"it: got {it!r}; expected items, or a function that returns them.")
-        self._items: Any = it
-        self._items_label = problems.word("it_label", it_label)
+        self._smachpy.items = it
+        self._smachpy.items_label = problems.word("it_label", it_label)
 
     # -- structure -----------------------------------------------------------------------------
 
     @property
-    def _label(self) -> str | None:
-        return next(iter(self._states), None)
+    def __label(self) -> str | None:
+        return next(iter(self._smachpy.children), None)
 
-    def _breaks(self) -> frozenset[str]:
+    def __breaks(self) -> frozenset[str]:
         """Return the child's outcomes that end the iterator."""
-        if self._break_outcomes:
-            return frozenset(self._break_outcomes)
-        label = self._label
-        if not self._loop_outcomes or label is None:
+        if self._smachpy.break_outcomes:
+            return frozenset(self._smachpy.break_outcomes)
+        label = self.__label
+        if not self._smachpy.loop_outcomes or label is None:
             return frozenset()
-        outcomes = self._states[label].get_registered_outcomes()
-        return frozenset(o for o in outcomes if o not in self._loop_outcomes)
+        outcomes = self._smachpy.children[label].get_registered_outcomes()
+        return frozenset(o for o in outcomes if o not in self._smachpy.loop_outcomes)
 
     def get_initial_states(self) -> list[str]:
         """Return the child's label."""
-        return list(self._states)
+        return list(self._smachpy.children)
 
     def set_initial_state(
         self, initial_states: SequenceOf[str], userdata: UserData | None = None
@@ -195,22 +221,18 @@ class Iterator(Container):
         Raises:
             InvalidStateError: a label that is not the child's.
         """
-        unknown = sorted(set(initial_states) - set(self._states))
+        unknown = sorted(set(initial_states) - set(self._smachpy.children))
         if unknown:
             raise InvalidStateError(
-                f"initial state: got {unknown}; expected {sorted(self._states)}."
-                f"{did_you_mean(unknown[0], self._states)}"
+                f"initial state: got {unknown}; expected {sorted(self._smachpy.children)}."
+                f"{did_you_mean(unknown[0], self._smachpy.children)}"
             )
         if userdata is not None:
             self.userdata.update(userdata)
 
     def get_active_states(self) -> list[str]:
         """Return the child's label while the iterator runs."""
-        return list(self._states) if self._smachpy.frame is not None else []
-
-    @property
-    def _is_running(self) -> bool:
-        return self._smachpy.frame is not None
+        return list(self._smachpy.children) if self._smachpy.frame is not None else []
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
         """Return the edges as (outcome, from label, to label or container outcome)."""
@@ -221,22 +243,22 @@ class Iterator(Container):
 
     def find_problems(self, where: str) -> tuple[str, ...]:
         """Return what is wrong with this iterator itself."""
-        label = self._label
+        label = self.__label
         child = None
         breaks: tuple[str, ...] = ()
         if label is not None:
-            outcomes = tuple(self._states[label].get_registered_outcomes())
+            outcomes = tuple(self._smachpy.children[label].get_registered_outcomes())
             child = ChildSpec(label, outcomes)
-            breaks = self._break_outcomes or tuple(
-                o for o in outcomes if o in self._breaks() and o != "preempted"
+            breaks = self._smachpy.break_outcomes or tuple(
+                o for o in outcomes if o in self.__breaks() and o != "preempted"
             )
-        final = tuple(self._final_outcome_map.items())
+        final = tuple(self._smachpy.final_outcome_map.items())
         spec = LoopSpec(
             where,
             self._smachpy.outcomes,
             child,
-            self._exhausted_outcome,
-            self._loop_outcomes,
+            self._smachpy.exhausted_outcome,
+            self._smachpy.loop_outcomes,
             breaks,
             final,
         )
@@ -244,12 +266,12 @@ class Iterator(Container):
 
     def describe_structure(self) -> Structure:
         """Return the child, its edges and the loop's rules."""
-        label = self._label
+        label = self.__label
         if label is None:
             return Structure()
-        state = self._states[label]
-        breaks = self._breaks()
-        final = self._final_outcome_map
+        state = self._smachpy.children[label]
+        breaks = self.__breaks()
+        final = self._smachpy.final_outcome_map
         edges = tuple(
             TransitionRecord(
                 label, o, final.get(o, o), target_is_outcome=True, implicit=o not in final
@@ -258,66 +280,67 @@ class Iterator(Container):
             else TransitionRecord(label, o, label)
             for o in state.get_registered_outcomes()
         )
-        end = final.get(self._exhausted_outcome, self._exhausted_outcome)
+        data = self._smachpy
+        end = final.get(data.exhausted_outcome, data.exhausted_outcome)
         rules = (RuleRecord(end, (), "no item left"),)
-        details = (("items", _describe_items(self._items)), ("item key", self._items_label))
-        children = ((label, state, tuple(self._remappings[label].items())),)
+        details = (("items", _describe_items(data.items)), ("item key", data.items_label))
+        children = ((label, state, tuple(self._smachpy.remappings[label].items())),)
         return Structure(children, (label,), edges, rules, None, details)
 
     # -- running -------------------------------------------------------------------------------
 
-    def _compile(self, frame: Frame) -> _Plan:
+    def _smachpy_compile(self, frame: Frame) -> _Plan:
         problems = self.find_problems(frame.path)
         if problems:
             raise InconsistentMachineError(f"{type(self).__name__} {frame.path!r}", problems)
-        label = self._label
+        label = self.__label
         assert label is not None
-        return _Plan(self, self._make_step(label), self._breaks())
+        return _Plan(self, self._smachpy_make_step(label), self.__breaks())
 
-    def _run_children(self, frame: Frame, plan: _Plan) -> str:
-        if self._start_cbs:
+    def _smachpy_run_children(self, frame: Frame, plan: _Plan) -> str:
+        if self._smachpy.start_cbs:
             self.call_start_cbs()
-        outcome = self._loop(frame, plan.step)
-        outcome = self._final_outcome_map.get(outcome, outcome)
+        outcome = self.__loop(frame, plan.step)
+        outcome = self._smachpy.final_outcome_map.get(outcome, outcome)
         if outcome not in self._smachpy.outcomes and outcome != "preempted":
             raise unknown_outcome(frame.path, self._smachpy.outcomes, outcome)
         return outcome
 
-    def _terminal_labels(self, frame: Frame) -> list[str]:
+    def _smachpy_terminal_labels(self, frame: Frame) -> list[str]:
         """Return the child, as in SMACH; even when there was no item."""
-        super()._terminal_labels(frame)
-        assert self._label is not None
-        return [self._label]
+        super()._smachpy_terminal_labels(frame)
+        assert self.__label is not None
+        return [self.__label]
 
-    def _loop(self, frame: Frame, step: Step) -> str:
+    def __loop(self, frame: Frame, step: Step) -> str:
         """Run the child for item after item; return its last outcome, or that of the end."""
-        run, label = frame.run, self._items_label
-        for index, item in enumerate(self._iterate(frame)):
+        run, label = frame.run, self._smachpy.items_label
+        for index, item in enumerate(self.__iterate(frame)):
             self.userdata[label] = item
             frame.step = step  # first the mark, then the look: see `smachpy.run.grace.ask`
             if self._preempt_requested:
-                return self._preempted(frame, step)
+                return self.__preempted(frame, step)
             if run.watched:
                 frame.emit_own(Iterated, index)
             again = True
             while again:
-                outcome, why = self._visit(frame, step)
+                outcome, why = self.__visit(frame, step)
                 again = why is Why.JUMPED  # a pause has cancelled it: again with the same item
             if why is Why.STOPPED:
-                return self._preempted(frame, step)
+                return self.__preempted(frame, step)
             if why is Why.ANSWERED:
                 frame.answered = True
                 return outcome
             if step.next[outcome].final:
                 return outcome
-            if self._transition_cbs:
+            if self._smachpy.transition_cbs:
                 self.call_transition_cbs()
-        return self._exhausted_outcome
+        return self._smachpy.exhausted_outcome
 
-    def _visit(self, frame: Frame, step: Step) -> tuple[str, Why]:
+    def __visit(self, frame: Frame, step: Step) -> tuple[str, Why]:
         """Run the child once; return its outcome, or an operator's, and what comes of it."""
         try:
-            outcome: Any = self._run_child(frame, step)
+            outcome: Any = self.__run_child(frame, step)
         except SmachError:
             raise
         except Interruption:
@@ -336,7 +359,7 @@ class Iterator(Container):
             outcome = override.outcome
         return outcome, why
 
-    def _run_child(self, frame: Frame, step: Step) -> Any:
+    def __run_child(self, frame: Frame, step: Step) -> Any:
         run = frame.run
         if run.control is not None:
             run.control.pass_gate(frame, step)
@@ -344,19 +367,21 @@ class Iterator(Container):
                 return "preempted"
         return run_watched(frame, step) if run.watched else step.execute(step.userdata)
 
-    def _preempted(self, frame: Frame, step: Step) -> str:
+    def __preempted(self, frame: Frame, step: Step) -> str:
         frame.answered = True
         frame.emit_own(Preempted, step.label)
         return "preempted"
 
-    def _iterate(self, frame: Frame) -> IteratorOf[Any]:
+    def __iterate(self, frame: Frame) -> IteratorOf[Any]:
         """Return the items' iterator; what making or running it raises names the iterator."""
 
         def call(function: Callable[..., Any], *arguments: Any) -> Any:
             return call_bounded(self, frame, function, arguments)
 
         try:
-            items = call(self._items) if callable(self._items) else self._items
+            items = self._smachpy.items
+            if callable(items):
+                items = call(items)
             if type(items) in _PLAIN:
                 yield from items
                 return

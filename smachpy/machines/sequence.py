@@ -49,7 +49,7 @@ class Sequence(StateMachine):
             super().__init__(
                 outcomes, input_keys, output_keys, name=name, userdata_type=userdata_type, **options
             )
-        self._connector_outcome = problems.word("connector_outcome", connector_outcome)
+        self._smachpy.connector_outcome = problems.word("connector_outcome", connector_outcome)
         problems.raise_all()
 
     @construction_method
@@ -64,9 +64,9 @@ class Sequence(StateMachine):
 
         A transition given for the connector outcome takes precedence over the connection.
         """
-        return self._add(label, state, transitions, remapping, None)
+        return self._smachpy_add(label, state, transitions, remapping, None)
 
-    def _add(
+    def _smachpy_add(
         self,
         label: str,
         state: State,
@@ -74,7 +74,7 @@ class Sequence(StateMachine):
         remapping: Mapping[str, str] | None,
         constants: Mapping[str, Any] | None,
     ) -> State:
-        super()._add(label, state, transitions, remapping, constants)
-        if self._transitions[label].get(self._connector_outcome) is None:
-            self._follow_connectors = (label, (self._connector_outcome,))
+        super()._smachpy_add(label, state, transitions, remapping, constants)
+        if self._smachpy.transitions[label].get(self._smachpy.connector_outcome) is None:
+            self._smachpy.follow_connectors = (label, (self._smachpy.connector_outcome,))
         return state

@@ -45,6 +45,7 @@ if TYPE_CHECKING:
 __all__ = ["CBState", "Options", "Retry", "State", "StateOptions", "get_options", "set_options"]
 
 Data_co = TypeVar("Data_co", bound=StateData, covariant=True)
+T_co = TypeVar("T_co", covariant=True)
 Grace: TypeAlias = float | Literal["inherit"] | None
 # With None in it: within another union mypy takes the items of `["aborted", OSError]` for objects.
 RetrySpec: TypeAlias = (
@@ -98,6 +99,24 @@ class DataOf(Generic[Data_co]):
         if self.kind is StateData and accepts(problem):
             return vars(state).setdefault("_smachpy", self.kind())  # type: ignore[no-any-return]
         raise InvalidStateError(f"{name}: {problem}", [problem])
+
+
+class Shown(Generic[T_co]):
+    """An attribute that programs read, unless the user has one of that name.
+
+    Unlike a property it is no data descriptor: an attribute of the instance comes before it.
+    """
+
+    def __init__(self, get: Callable[[Any], T_co]) -> None:
+        self._get = get
+        self.__doc__ = get.__doc__
+
+    @overload
+    def __get__(self, state: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, state: State, owner: type) -> T_co: ...
+    def __get__(self, state: State | None, owner: type) -> Self | T_co:
+        return self if state is None else self._get(state)
 
 
 class State:
@@ -348,7 +367,7 @@ class State:
 def make_step(label: str, state: State, window: Any) -> Step:
     """Return a child ready to run: its `execute`, with its options around it."""
     execute: Callable[[Any], Any] = state.execute
-    callback = state._cb if isinstance(state, CBState) else None  # noqa: SLF001  its own module
+    callback = state._smachpy.code[0] if isinstance(state, CBState) else None
     is_async = inspect.iscoroutinefunction(execute) or inspect.iscoroutinefunction(callback)
     run = runner_of(state, get_options(state), execute, is_async=is_async)
     return Step(label, state, window, run)
@@ -456,12 +475,12 @@ class CBState(State):
         problems = Problems(type(self).__name__)
         with problems:
             super().__init__(outcomes, input_keys, output_keys, io_keys, **options)
-        self._args = problems.values("cb_args", cb_args)
-        self._kwargs = problems.mapping("cb_kwargs", cb_kwargs, "name -> value")
-        self._cb = cb
+        self.__args = problems.values("cb_args", cb_args)
+        self.__kwargs = problems.mapping("cb_kwargs", cb_kwargs, "name -> value")
+        self._smachpy.code = (cb,)
         call = "cb(userdata, *cb_args, **cb_kwargs)"
-        count = 1 + len(self._args)
-        problems.function("cb", cb, call, count, self._kwargs, optional=False, plain=False)
+        count = 1 + len(self.__args)
+        problems.function("cb", cb, call, count, self.__kwargs, optional=False, plain=False)
         problems.raise_all()
         interface: Any = cb
         if has_smach_interface(cb):
@@ -471,10 +490,12 @@ class CBState(State):
 
     def execute(self, ud: Remapper | UserData) -> Any:
         """Call the function."""
-        return self._cb(ud, *self._args, **self._kwargs)
+        return self._smachpy.code[0](ud, *self.__args, **self.__kwargs)
 
     def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
         """Add the function's name."""
         kind, details = super().describe_details()
-        name = getattr(self._cb, "__qualname__", None) or getattr(self._cb, "__name__", "")
+        name = getattr(self._smachpy.code[0], "__qualname__", None) or getattr(
+            self._smachpy.code[0], "__name__", ""
+        )
         return kind, (*details, ("callback", name)) if name else details

@@ -21,7 +21,9 @@ from smachpy.machines.names import unique_names
 from smachpy.machines.old_states import adopt_slips, as_state
 from smachpy.machines.problems import Problems
 from smachpy.machines.spec import ChildSpec, MachineSpec
+from smachpy.machines.state import DataOf, Shown
 from smachpy.machines.validate import machine_problems
+from smachpy.run.child import ContainerData
 from smachpy.run.frame import SUBSCRIPTIONS
 from smachpy.run.grace import forget_visit, request_soon
 from smachpy.run.interrupt import Interruption
@@ -83,6 +85,34 @@ class _Plan:
         return any(step.is_stale() for step in self.steps.values())
 
 
+class MachineData(ContainerData):
+    """What the library knows of one state machine.
+
+    Attributes:
+        transitions: Label -> outcome -> label of the next child, outcome of the machine, or None.
+        initial: Label of the initial child.
+        next_initial: That of the next run alone; None: `initial`.
+        follow_connectors: A child, and those of its outcomes that lead to the one added next.
+        connector_outcome: Of a sequence: the outcome that connects its children.
+    """
+
+    __slots__ = _kept = (
+        "connector_outcome",
+        "follow_connectors",
+        "initial",
+        "next_initial",
+        "transitions",
+    )
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.transitions: dict[str, dict[str, str | None]] = {}
+        self.initial: str | None = None
+        self.next_initial: str | None = None
+        self.follow_connectors: tuple[str, tuple[str, ...]] | None = None
+        self.connector_outcome = ""
+
+
 class StateMachine(Container):
     """A container that runs one child after the other, as their outcomes say.
 
@@ -98,7 +128,12 @@ class StateMachine(Container):
         **options: See `StateOptions`.
     """
 
+    _smachpy: DataOf[MachineData] = DataOf(MachineData)
     _smachpy_kind: ClassVar[Kind] = "machine"
+    _transitions = Shown(lambda machine: machine._smachpy.transitions)
+    _initial_state_label = Shown(lambda machine: machine._smachpy.initial)
+    _current_label = Shown(lambda machine: _current(machine, "label"))
+    _current_state = Shown(lambda machine: _current(machine, "state"))
 
     def __init__(
         self,
@@ -113,10 +148,9 @@ class StateMachine(Container):
         super().__init__(
             outcomes, input_keys, output_keys, name=name, userdata_type=userdata_type, **options
         )
-        self._transitions: dict[str, dict[str, str | None]] = {}
-        self._initial_state_label: str | None = None
-        self._next_initial: str | None = None
-        self._follow_connectors: tuple[str, tuple[str, ...]] | None = None
+        data = self._smachpy  # a second call of __init__ begins anew
+        data.transitions = {}
+        data.initial = data.next_initial = data.follow_connectors = None
 
     # -- construction --------------------------------------------------------------------------
 
@@ -147,7 +181,7 @@ class StateMachine(Container):
             InvalidStateError: the label is taken, or `state` is no state.
             InvalidConstructionError: called on the class while no machine is open.
         """
-        return self._add(label, state, transitions, remapping, constants)
+        return self._smachpy_add(label, state, transitions, remapping, constants)
 
     @construction_method
     def add_auto(
@@ -164,12 +198,12 @@ class StateMachine(Container):
         Transitions given explicitly take precedence. Other arguments as in `add`.
         """
         connectors = unique_names(connector_outcomes, "connector_outcomes")
-        self._add(label, state, transitions, remapping, constants)
-        open_ends = tuple(o for o in connectors if self._transitions[label].get(o) is None)
-        self._follow_connectors = (label, open_ends)
+        self._smachpy_add(label, state, transitions, remapping, constants)
+        open_ends = tuple(o for o in connectors if self._smachpy.transitions[label].get(o) is None)
+        self._smachpy.follow_connectors = (label, open_ends)
         return state
 
-    def _add(
+    def _smachpy_add(
         self,
         label: str,
         state: State,
@@ -190,19 +224,19 @@ class StateMachine(Container):
             stored = as_state(state, label)
             given = adopt_slips(label, stored, given)
         fixed = problems.mapping("constants", constants, "key of the state -> value")
-        self._store_child(label, stored, remapping, problems)
-        self._transitions[label] = given
+        self._smachpy_store_child(label, stored, remapping, problems)
+        self._smachpy.transitions[label] = given
         for key, value in fixed.items():
             name = f"{label}.{key}"
             self.userdata[name] = value
-            self._remappings[label][key] = name
+            self._smachpy.remappings[label][key] = name
             stored.register_input_keys([key])
-        if self._follow_connectors is not None:
-            before, outcomes = self._follow_connectors
-            self._transitions[before].update(dict.fromkeys(outcomes, label))
-            self._follow_connectors = None
-        if self._initial_state_label is None:
-            self._initial_state_label = label
+        if self._smachpy.follow_connectors is not None:
+            before, outcomes = self._smachpy.follow_connectors
+            self._smachpy.transitions[before].update(dict.fromkeys(outcomes, label))
+            self._smachpy.follow_connectors = None
+        if self._smachpy.initial is None:
+            self._smachpy.initial = label
         return state
 
     # -- structure -----------------------------------------------------------------------------
@@ -218,53 +252,39 @@ class StateMachine(Container):
         if isinstance(initial_states, str):
             initial_states = [initial_states]
         labels = list(initial_states)
-        unknown = [label for label in labels if label not in self._states]
+        unknown = [label for label in labels if label not in self._smachpy.children]
         if len(labels) > 1 or unknown:
-            problem = f"initial state: got {labels!r}; expected one of {sorted(self._states)}."
+            problem = (
+                f"initial state: got {labels!r}; expected one of {sorted(self._smachpy.children)}."
+            )
             if unknown and self.is_opened():
                 problem += " It is not added yet. Try set_initial_state after the last add()."
             elif unknown:
-                problem += did_you_mean(unknown[0], self._states)
+                problem += did_you_mean(unknown[0], self._smachpy.children)
             if not accepts(problem):
                 raise InvalidStateError(problem)
         if labels:
-            if not self.is_opened() and self._initial_state_label is not None:
-                self._next_initial = labels[0]
+            if not self.is_opened() and self._smachpy.initial is not None:
+                self._smachpy.next_initial = labels[0]
             else:
-                self._initial_state_label = labels[0]
+                self._smachpy.initial = labels[0]
         if userdata is not None:
             self.userdata.update(userdata)
 
     def get_initial_states(self) -> list[str]:
         """Return the label of the state that the next run begins with."""
-        label = self._next_initial or self._initial_state_label
+        label = self._smachpy.next_initial or self._smachpy.initial
         return [] if label is None else [label]
 
     def get_active_states(self) -> list[str]:
         """Return the label of the active state; ['None'] when idle."""
-        return [str(self._current_label)]
-
-    @property
-    def _current_label(self) -> str | None:
-        frame = self._smachpy.frame
-        step = None if frame is None else frame.step
-        return None if step is None else step.label
-
-    @property
-    def _current_state(self) -> State | None:
-        frame = self._smachpy.frame
-        step = None if frame is None else frame.step
-        return None if step is None else step.state
-
-    @property
-    def _is_running(self) -> bool:
-        return self._smachpy.frame is not None
+        return [str(_current(self, "label"))]
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
         """Return the edges as (outcome, from label, to label or container outcome)."""
         return [
             (outcome, child.label, target or outcome)
-            for child in self._child_specs()
+            for child in self.__child_specs()
             for outcome, target in child.targets().items()
         ]
 
@@ -286,44 +306,45 @@ class StateMachine(Container):
 
     def find_problems(self, where: str) -> tuple[str, ...]:
         """Return what is wrong with this machine itself."""
-        initial = self._next_initial or self._initial_state_label
+        initial = self._smachpy.next_initial or self._smachpy.initial
         outcomes = self.get_registered_outcomes()
-        spec = MachineSpec(where, outcomes, tuple(self._child_specs()), initial)
+        spec = MachineSpec(where, outcomes, tuple(self.__child_specs()), initial)
         return machine_problems(spec)
 
-    def _child_specs(self) -> Iterable[ChildSpec]:
-        for label, state in self._states.items():
+    def __child_specs(self) -> Iterable[ChildSpec]:
+        for label, state in self._smachpy.children.items():
             outcomes = tuple(state.get_registered_outcomes())
-            yield ChildSpec(label, outcomes, tuple(self._transitions[label].items()))
+            yield ChildSpec(label, outcomes, tuple(self._smachpy.transitions[label].items()))
 
     def describe_structure(self) -> Structure:
         """Return the children and the edges between them."""
         edges = []
-        for child in self._child_specs():
+        for child in self.__child_specs():
             for outcome, target in child.targets().items():
-                ends = not target or target not in self._states
+                ends = not target or target not in self._smachpy.children
                 edges.append(
                     TransitionRecord(child.label, outcome, target or outcome, ends, not target)
                 )
         children = tuple(
-            (label, state, tuple(self._remappings[label].items()))
-            for label, state in self._states.items()
+            (label, state, tuple(self._smachpy.remappings[label].items()))
+            for label, state in self._smachpy.children.items()
         )
         return Structure(children, tuple(self.get_initial_states()), tuple(edges))
 
     # -- running -------------------------------------------------------------------------------
 
-    def _compile(self, frame: Frame) -> _Plan:
+    def _smachpy_compile(self, frame: Frame) -> _Plan:
         problems = self.find_problems(frame.path)
         if problems:
             raise InconsistentMachineError(f"{type(self).__name__} {frame.path!r}", problems)
-        steps = {label: self._make_step(label) for label in self._states}
-        return _Plan(self.userdata, steps, self._smachpy.outcomes, self._child_specs())
+        steps = {label: self._smachpy_make_step(label) for label in self._smachpy.children}
+        return _Plan(self.userdata, steps, self._smachpy.outcomes, self.__child_specs())
 
-    def _run_children(self, frame: Frame, plan: _Plan) -> str:
-        if self._start_cbs:
+    def _smachpy_run_children(self, frame: Frame, plan: _Plan) -> str:
+        if self._smachpy.start_cbs:
             self.call_start_cbs()
-        label, self._next_initial = self._next_initial or self._initial_state_label, None
+        data = self._smachpy
+        label, data.next_initial = data.next_initial or data.initial, None
         assert label is not None
         logged = frame.run.logged
         if logged:
@@ -331,11 +352,11 @@ class StateMachine(Container):
         following: Following = plan.steps[label]
         while not following.final:
             try:
-                following = self._loop(frame, following)
+                following = self.__loop(frame, following)
             except Interruption:
                 if frame.dead:
                     raise
-                following = self._follow_asked(frame, frame.step, "preempted")
+                following = self.__follow_asked(frame, frame.step, "preempted")
             except SmachError:
                 raise
             except Exception as error:
@@ -346,28 +367,28 @@ class StateMachine(Container):
             log.loginfo(f"{frame.path}: {frame.step.label!r} ended it with {outcome!r}")
         return outcome
 
-    def _loop(self, frame: Frame, step: Step) -> End:
+    def __loop(self, frame: Frame, step: Step) -> End:
         """Run step after step; return how the machine ends, with the last step in the frame.
 
         This is the hot path. While nobody watches, waits or asks for a preempt, a transition is
         one call, one look-up and a few flags.
         """
-        run = frame.run
+        run, data = frame.run, self._smachpy
         while True:
             frame.step = step  # first the mark, then the look: see `smachpy.run.grace.ask`
             if (
                 self._preempt_requested
                 or frame.visit is not None
-                or self._transition_cbs
+                or data.transition_cbs
                 or run.careful
             ):
-                following = self._careful(frame, step)
+                following = self.__careful(frame, step)
             elif run.watched:
                 tape = only_tape(frame)
                 if tape is not None:
-                    following = self._taped(frame, step, tape)
+                    following = self.__taped(frame, step, tape)
                 else:
-                    following = self._follow(frame, step, run_watched(frame, step))
+                    following = self.__follow(frame, step, run_watched(frame, step))
             else:
                 outcome = step.execute(step.userdata)
                 if (
@@ -375,17 +396,17 @@ class StateMachine(Container):
                     or frame.visit is not None
                     or step.state._preempt_requested
                 ):
-                    following = self._follow_asked(frame, step, outcome)
+                    following = self.__follow_asked(frame, step, outcome)
                 else:
                     try:
                         following = step.next[outcome]
                     except (KeyError, TypeError):
-                        self._raise_bad_outcome(frame, step, outcome)
+                        self.__raise_bad_outcome(frame, step, outcome)
             if following.final:
                 return following
             step = following
 
-    def _taped(self, frame: Frame, step: Step, tape: Tape) -> Following:
+    def __taped(self, frame: Frame, step: Step, tape: Tape) -> Following:
         """Run step after step as `_loop` does while one tape is all that wants to know.
 
         Returns how the machine goes on when something else comes up. A loop of its own, because
@@ -394,7 +415,7 @@ class StateMachine(Container):
         """
         run, subscriptions = frame.run, SUBSCRIPTIONS
         version = subscriptions.version
-        if self._transition_cbs or run.careful:
+        if self._smachpy.transition_cbs or run.careful:
             return step
         base, now = frame.path, run.clock.now
         run.flush()
@@ -414,12 +435,12 @@ class StateMachine(Container):
                     or step.state._preempt_requested
                 ):
                     publish_left(frame, step, outcome)
-                    return self._follow_asked(frame, step, outcome)
+                    return self.__follow_asked(frame, step, outcome)
                 try:
                     following: Following = step.next[outcome]
                 except (KeyError, TypeError):
                     publish_left(frame, step, outcome)
-                    self._raise_bad_outcome(frame, step, outcome)
+                    self.__raise_bad_outcome(frame, step, outcome)
                 if following.final:
                     tape.put((now(), base, step, outcome, None))
                     return following
@@ -438,7 +459,7 @@ class StateMachine(Container):
                     tape.ring()
                 step = following
 
-    def _careful(self, frame: Frame, step: Step) -> Following:
+    def __careful(self, frame: Frame, step: Step) -> Following:
         """Run one step with everything that may want to know of it."""
         run = frame.run
         visit = frame.visit
@@ -447,46 +468,46 @@ class StateMachine(Container):
         if run.control is not None:
             run.control.pass_gate(frame, step)
             if frame.visit is not None and not self._preempt_requested:  # called off meanwhile
-                return self._follow_asked(frame, step, "preempted")
+                return self.__follow_asked(frame, step, "preempted")
         if run.has_shutdown_check and is_shutdown():
             with asking("shutdown", "", "the shutdown check says so"):
                 request_soon(self)
         if self._preempt_requested:
-            return self._preempted(frame, step)
+            return self.__preempted(frame, step)
         outcome = run_watched(frame, step) if run.watched else step.execute(step.userdata)
-        following = self._follow(frame, step, outcome)
-        if following.final or not (self._transition_cbs or run.logged):
+        following = self.__follow(frame, step, outcome)
+        if following.final or not (self._smachpy.transition_cbs or run.logged):
             return following
         frame.step = following
         if run.logged:
             log.loginfo(f"{frame.path}: {step.label!r} -{outcome}-> {following.label!r}")
-        return self._call_between(frame, following)
+        return self.__call_between(frame, following)
 
-    def _call_between(self, frame: Frame, following: Step) -> Following:
+    def __call_between(self, frame: Frame, following: Step) -> Following:
         """Call the transition callbacks; return what comes then."""
         try:
             self.call_transition_cbs()
         except Interruption:
             if frame.dead:
                 raise
-            return self._preempted(frame, following)
+            return self.__preempted(frame, following)
         return following
 
-    def _follow(self, frame: Frame, step: Step, outcome: Any) -> Following:
+    def __follow(self, frame: Frame, step: Step, outcome: Any) -> Following:
         """Return what comes after `step`, whether somebody asked or not."""
         if self._preempt_requested or frame.visit is not None or step.state._preempt_requested:
-            return self._follow_asked(frame, step, outcome)
+            return self.__follow_asked(frame, step, outcome)
         try:
             following: Following = step.next[outcome]
         except (KeyError, TypeError):
-            self._raise_bad_outcome(frame, step, outcome)
+            self.__raise_bad_outcome(frame, step, outcome)
         return following
 
-    def _follow_asked(self, frame: Frame, step: Step, outcome: Any) -> Following:
+    def __follow_asked(self, frame: Frame, step: Step, outcome: Any) -> Following:
         """Return what comes after `step` when somebody may have asked it to stop meanwhile."""
         decision = end_visit(frame, outcome)
         if decision.why is Why.STOPPED:
-            return self._preempted(frame, step)
+            return self.__preempted(frame, step)
         if decision.why is Why.JUMPED:
             frame.emit_own(Jumped, decision.target)
             steps: dict[str, Following] = self._smachpy.plan.steps
@@ -494,12 +515,18 @@ class StateMachine(Container):
         following: Following = decision.target
         return following
 
-    def _preempted(self, frame: Frame, step: Step) -> End:
+    def __preempted(self, frame: Frame, step: Step) -> End:
         """End because of a preempt; `step` was not started, or finished in vain."""
         frame.answered = True
         frame.emit_own(Preempted, step.label)
         return PREEMPTED
 
-    def _raise_bad_outcome(self, frame: Frame, step: Step, outcome: object) -> NoReturn:
+    def __raise_bad_outcome(self, frame: Frame, step: Step, outcome: object) -> NoReturn:
         outcomes = step.state._smachpy.outcomes
         raise unknown_outcome(step.path_in(frame), outcomes, outcome) from None
+
+
+def _current(machine: StateMachine, name: str) -> Any:
+    """Return the attribute `name` of the step that runs; None when none does."""
+    frame = machine._smachpy.frame
+    return getattr(None if frame is None else frame.step, name, None)

@@ -33,6 +33,7 @@ from actionlib_core.pubsub.service_proxy import ServiceProxy
 from actionlib_core.pubsub.topic import Publisher
 from smachpy import log
 from smachpy.exceptions import SmachError
+from smachpy.machines.container import control_of
 from smachpy.network.values import find_state
 from smachpy.run.origin import asking
 from smachpy.userdata.user_data import UserData
@@ -91,7 +92,9 @@ class ControlServer:
         self._service = Service(
             server_name + CONTROL_SERVICE, Command, self._answer, node=node, alone=False
         )
-        self._forget = machine.control.on_change(lambda: self._executor.submit(self._publish_state))
+        self._forget = control_of(machine).on_change(
+            lambda: self._executor.submit(self._publish_state)
+        )
         self._executor.submit(self._publish_state)
 
     def close(self) -> None:
@@ -107,7 +110,7 @@ class ControlServer:
 
     def state(self) -> dict[str, Any]:
         """Return whether the machine is paused, and its breakpoints."""
-        control = self._machine.control
+        control = control_of(self._machine)
         return {
             "paused": control.is_paused(),
             "breakpoints": [[self._shown(path), out] for path, out in control.breakpoints()],
@@ -127,7 +130,7 @@ class ControlServer:
         return json.dumps({"ok": not problem, "text": problem, **self.state()})
 
     def _carry_out(self, command: dict[str, Any]) -> None:
-        control = self._machine.control
+        control = control_of(self._machine)
         path = self._own(str(command.get("path", "")))
         outcome = command.get("outcome")
         actions: dict[str, Callable[[], object]] = {
@@ -155,7 +158,7 @@ class ControlServer:
             raise CommandError(
                 f"command 'break': outcome: got {outcome!r}; expected one of {sorted(outcomes)}."
             )
-        self._machine.control.add_breakpoint(path, outcome)
+        control_of(self._machine).add_breakpoint(path, outcome)
 
     def _begin_at(self, path: str, states: list[str]) -> None:
         container = self._find(path)

@@ -5,14 +5,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from smachpy.machines.names import unique_names
 from smachpy.run.options import NO_OPTIONS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
-    from typing import Self
+    from typing import Self, TypeAlias
 
     from actionlib_core.clock import Event as ClockEvent
     from smachpy.events import Event
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from smachpy.run.frame import Frame, Gate
     from smachpy.run.options import Options
     from smachpy.run.visit import Origin
+
+    Callback: TypeAlias = tuple[Callable[..., object], tuple[Any, ...]]
 
 
 class _Epoch:
@@ -42,9 +44,11 @@ class StateData:
         version: Changes with each of these.
         with_hooks: Its options and what they are with the hooks of its class; None when not known.
         preempt_callbacks: Called on each request to stop.
+        code: What it runs of the user's: functions that get the userdata, and messages made of it.
     """
 
     __slots__ = (
+        "code",
         "input_keys",
         "options",
         "outcomes",
@@ -61,6 +65,7 @@ class StateData:
         self.options = NO_OPTIONS
         self.version = 0
         self.with_hooks: tuple[Options, Options] | None = None
+        self.code: tuple[Any, ...] = ()
         self.preempt_callbacks: list[Callable[[], object]] = []
 
     def add(self, name: str, names: Iterable[str]) -> None:
@@ -78,7 +83,7 @@ class StateData:
     def copy(self) -> Self:
         """Return the data for a copy of the state, which does not run and nobody waits for."""
         made = type(self)()
-        for name in ("outcomes", "input_keys", "output_keys", "options", "version"):
+        for name in ("outcomes", "input_keys", "output_keys", "options", "version", "code"):
             setattr(made, name, getattr(self, name))
         return made
 
@@ -87,6 +92,13 @@ class ContainerData(StateData):
     """What the library knows of one container.
 
     Attributes:
+        children: Label -> child, in the order in which they were added.
+        remappings: Label -> key of the child -> key of the container.
+        start_cbs: Called at the start of each run, with their own arguments; likewise:
+        transition_cbs: after each transition;
+        termination_cbs: at the end.
+        open_tokens: One for each time that it is open now.
+        context_kwargs: What `opened` was given.
         frame: Where it runs; None between runs, and between two attempts of one run.
         root: The root's frame while it runs as the root of a machine.
         plan: Its children, compiled; None when they have changed.
@@ -103,19 +115,34 @@ class ContainerData(StateData):
     __slots__ = (
         "answered",
         "callback",
+        "children",
+        "context_kwargs",
         "control",
         "end_waiters",
         "frame",
         "is_passing_on",
         "listeners",
+        "open_tokens",
         "origin",
         "plan",
+        "remappings",
         "root",
+        "start_cbs",
         "tapes",
+        "termination_cbs",
+        "transition_cbs",
     )
+    _kept: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self) -> None:
         super().__init__()
+        self.children: dict[str, Any] = {}
+        self.remappings: dict[str, dict[str, str]] = {}
+        self.start_cbs: list[Callback] = []
+        self.transition_cbs: list[Callback] = []
+        self.termination_cbs: list[Callback] = []
+        self.open_tokens: list[Any] = []
+        self.context_kwargs: dict[str, Any] = {}
         self.frame: Frame | None = None
         self.root: Frame | None = None
         self.plan: Any = None
@@ -127,6 +154,15 @@ class ContainerData(StateData):
         self.origin: Origin | None = None
         self.is_passing_on = False
         self.end_waiters: list[ClockEvent] = []
+
+    def copy(self) -> Self:
+        """Return the data for a copy of the container: its structure and callbacks, no run."""
+        made = super().copy()
+        own = ("children", "remappings", "start_cbs", "transition_cbs", "termination_cbs")
+        for name in (*own, *self._kept):
+            value = getattr(self, name)
+            setattr(made, name, value.copy() if isinstance(value, (dict, list)) else value)
+        return made
 
 
 class Child(Protocol):

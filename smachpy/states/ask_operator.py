@@ -74,10 +74,10 @@ class AskOperator(State):
                 "'no_answer' or 'preempted'."
             )
         super().__init__((*answers, "no_answer", "preempted"), **options)
-        self.question = question
-        self.answers = answers
-        self.patience = patience
-        self.channel = channel
+        self.__question = question
+        self.__answers = answers
+        self.__patience = patience
+        self.__channel = channel
 
     def execute(self, userdata: UserData) -> str:
         """Ask.
@@ -87,39 +87,39 @@ class AskOperator(State):
         del userdata
         node = get_node()
         with contextlib.ExitStack() as open_ends:
-            inbox = _Inbox(self, node)
+            inbox = _Inbox(self, self.__question, self.__answers, node)
             open_ends.callback(on_preempt(self, inbox.wake.set))
             ask = open_ends.enter_context(
-                Publisher(f"{self.channel}/question", String, latch=True, node=node)
+                Publisher(f"{self.__channel}/question", String, latch=True, node=node)
             )
             open_ends.enter_context(
-                Subscriber(f"{self.channel}/answer", String, inbox.on_answer, node=node)
+                Subscriber(f"{self.__channel}/answer", String, inbox.on_answer, node=node)
             )
-            if self.answers == YES_NO:
-                confirm = f"{self.channel}/confirm"
+            if self.__answers == YES_NO:
+                confirm = f"{self.__channel}/confirm"
                 open_ends.enter_context(
                     Service(confirm, SetBool, inbox.on_confirm, node=node, alone=False)
                 )
-            ask.publish(String(f"{self.question} ({', '.join(self.answers)})"))
-            logwarn(self._invitation(node))
-            answer = inbox.wait(self.patience)
+            ask.publish(String(f"{self.__question} ({', '.join(self.__answers)})"))
+            logwarn(self.__invitation(node))
+            answer = inbox.wait(self.__patience)
             ask.publish(String(""))
         if answer is None and self.preempt_requested():
             self.service_preempt()
             return "preempted"
         return answer or "no_answer"
 
-    def _invitation(self, node: Node) -> str:
-        topic = node.resolve(f"{self.channel}/answer")
+    def __invitation(self, node: Node) -> str:
+        topic = node.resolve(f"{self.__channel}/answer")
         return (
-            f"{self.question} Answer {' or '.join(self.answers)} within {self.patience:g} s: "
-            f"actionlib topic pub -1 {topic} std_msgs/String '{{data: {self.answers[0]}}}'"
+            f"{self.__question} Answer {' or '.join(self.__answers)} within {self.__patience:g} s: "
+            f"actionlib topic pub -1 {topic} std_msgs/String '{{data: {self.__answers[0]}}}'"
         )
 
     def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
         """Add the question and the patience."""
         kind, details = super().describe_details()
-        own = (("question", self.question), ("timeout", f"{self.patience:g} s -> no_answer"))
+        own = (("question", self.__question), ("timeout", f"{self.__patience:g} s -> no_answer"))
         return kind, (*own, *details)
 
 
@@ -136,9 +136,11 @@ def find_answer(text: str, answers: Sequence[str]) -> str | None:
 class _Inbox:
     """Takes answers in; the first that is one wins."""
 
-    def __init__(self, state: AskOperator, node: Node) -> None:
-        self.wake = node.clock.event(f"an answer to {state.question!r}")
+    def __init__(self, state: AskOperator, question: str, known: Sequence[str], node: Node) -> None:
+        self.wake = node.clock.event(f"an answer to {question!r}")
         self._state = state
+        self._question = question
+        self._known = known
         self._clock = node.clock
         self._answers: list[str] = []
 
@@ -154,7 +156,7 @@ class _Inbox:
         return self._answers[0] if self._answers else None
 
     def on_answer(self, message: String) -> None:
-        known = self._state.answers
+        known = self._known
         meant = find_answer(message.data, known)
         if meant is not None:
             self._take(meant)
@@ -164,7 +166,7 @@ class _Inbox:
 
     def on_confirm(self, request: SetBoolRequest) -> tuple[bool, str]:
         word = YES_NO[not request.data]
-        return self._take(word), f"{self._state.question} {self._answers[0]}"
+        return self._take(word), f"{self._question} {self._answers[0]}"
 
     def _take(self, word: str) -> bool:
         self._answers.append(word)

@@ -62,7 +62,7 @@ class Serve(State):
 
     def __init__(self, *makers: Callable[[], Server]) -> None:
         super().__init__(outcomes=["preempted"])
-        self._makers = makers
+        self.__makers = makers
 
     def execute(self, userdata: UserData) -> str:
         """Serve until then.
@@ -71,7 +71,7 @@ class Serve(State):
         """
         del userdata
         with ExitStack() as stack:
-            _open(stack, self._makers)
+            _open(stack, self.__makers)
             self.wait_preempt()
         return "preempted"
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from actionlib_core.pubsub.topic import Subscriber
 from smachpy import State, UserData
 from smachpy.run.child import on_preempt
+from smachpy.run.frame import clock_of_run
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -28,10 +29,10 @@ class AwaitMessage(State):
         self, topic: str, msg_type: Any, wanted: Callable[[Any], bool], *, timeout: float
     ) -> None:
         super().__init__(outcomes=["came", "timeout", "preempted"])
-        self._topic = topic
-        self._msg_type = msg_type
-        self._wanted = wanted
-        self._longest = timeout
+        self.__topic = topic
+        self.__msg_type = msg_type
+        self.__wanted = wanted
+        self.__longest = timeout
 
     def execute(self, userdata: UserData) -> str:
         """Wait.
@@ -40,17 +41,17 @@ class AwaitMessage(State):
         """
         del userdata
         came: list[bool] = []
-        wake = self.clock().event(f"a message on {self._topic}")
+        wake = clock_of_run().event(f"a message on {self.__topic}")
 
         def on_message(message: Any) -> None:
-            if self._wanted(message):
+            if self.__wanted(message):
                 came.append(True)
                 wake.set()
 
         forget = on_preempt(self, wake.set)
         try:
-            with Subscriber(self._topic, self._msg_type, on_message):
-                wake.wait(self._longest)
+            with Subscriber(self.__topic, self.__msg_type, on_message):
+                wake.wait(self.__longest)
         finally:
             forget()
         if came:
@@ -60,7 +61,7 @@ class AwaitMessage(State):
     def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
         """Add the topic and the limit."""
         _, details = super().describe_details()
-        own = (("topic", self._topic), ("timeout", f"{self._longest:g} s -> timeout"))
+        own = (("topic", self.__topic), ("timeout", f"{self.__longest:g} s -> timeout"))
         return "monitor", (*own, *details)
 
 
@@ -74,9 +75,9 @@ class Wait(State):
     def __init__(self, seconds: float | None = None) -> None:
         keys = ["seconds"] if seconds is None else []
         super().__init__(outcomes=["done", "preempted"], input_keys=keys)
-        self.seconds = seconds
+        self.__seconds = seconds
 
     def execute(self, userdata: UserData) -> str:
         """Wait; a preempt ends it early."""
-        seconds = userdata.seconds if self.seconds is None else self.seconds
-        return "preempted" if self.sleep(seconds) else "done"
+        seconds = userdata.seconds if self.__seconds is None else self.__seconds
+        return "preempted" if State.sleep(self, seconds) else "done"

@@ -184,7 +184,7 @@ def test_a_state_that_does_not_belong_here_is_refused_before_anything_moves(
     kept = tmp_path / "state.json"
     machine = waypoints(file(), resume=kept)
     if text is None:
-        guide = machine["BEGIN"]._cb.__self__
+        guide = machine["BEGIN"]._smachpy.code[0].__self__
         text = json.dumps({"task": guide.kept.task, "first": 0, "done": "two"})
     kept.write_text(text)
     with pytest.raises(MissionError, match=r"state\.json: got .*expected.*Try deleting"):

@@ -218,7 +218,7 @@ def test_a_watcher_that_nobody_calls_off():
     found = explore(both, preempts=0)
     assert reason(found).startswith("it never ends")
     assert any("never finishes" in choice for choice in found.counterexample.choices)
-    both._child_termination_cb = lambda _: True
+    both._smachpy.child_termination_cb = lambda _: True
     assert explore(both, preempts=0).ok
 
 
