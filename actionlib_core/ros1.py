@@ -56,8 +56,8 @@ def bridge(
             that is "" or not given is learned from whoever is there first.
         topics: Topics by their names in ROS 1; their types are learned.
         services: Services by their names in ROS 1; their types are learned.
-        used: Bridge also what programs on our network use, and all services of the robot but
-            those for logs, as callers of services do not show themselves.
+        used: Bridge also all actions of the robot, all its services but those for logs, and the
+            topics that programs on our network use.
         all: Bridge everything that there is on both sides, but `/rosout`.
         namespace: What the robot's names live under here, "robot_1"; "" is nothing.
         host: Name or address under which the robot finds this computer; "" takes `ROS_HOSTNAME`,

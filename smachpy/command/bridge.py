@@ -22,7 +22,8 @@ def register(subparsers: Any) -> None:
         "ros1",
         help="a robot that runs ROS 1",
         description="Carry actions, topics and services between a ROS 1 robot and this network, "
-        "until Ctrl-C. Without names: what programs here use. Exit codes: 0, 1 the robot's master "
+        "until Ctrl-C. Without names: all actions and services of the robot, and the topics that "
+        "programs here use. Exit codes: 0, 1 the robot's master "
         "has ended the bridge, 2 bad input.",
     )
     ros1.add_argument(
@@ -40,7 +41,7 @@ def register(subparsers: Any) -> None:
             option, action="append", default=[], metavar=metavar, help=f"{text} (repeatable)"
         )
     ros1.add_argument(
-        "--used", action="store_true", help="also what programs here use, beside names"
+        "--used", action="store_true", help="beside names: also what is carried without any"
     )
     ros1.add_argument("--all", action="store_true", help="everything but the log")
     ros1.add_argument(

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from actionlib_core.ros1 import Ros1Bridge
     from smachpy.command.ros1_options import Ros1Options
     from smachpy.command.runner import RunOptions
     from smachpy.command.surroundings import Surroundings
@@ -40,11 +41,14 @@ LINGER_S: Final = 60.0
 """Virtual time that a script has to go on in after its last machine has ended [s]."""
 
 
-def run_ros1(text: str, ros1: Ros1Options, options: RunOptions) -> int:
+def run_ros1(
+    text: str, ros1: Ros1Options, options: RunOptions, robot: Ros1Bridge | None = None
+) -> int:
     """Run a script for ROS 1 to its end and return the exit code.
 
     That is the script's own when it ends by `sys.exit` with another one than 0; else the outcome of
-    the machine that ended last counts, as for a mission; a script without one ends with 0.
+    the machine that ended last counts, as for a mission; a script without one ends with 0. Of a
+    `robot` it also reads the parameters that it has not set itself.
 
     Blocks: until the script has ended. In virtual time it is asked to end when nothing can happen
         any more, or `LINGER_S` after its last machine has ended.
@@ -70,6 +74,7 @@ def run_ros1(text: str, ros1: Ros1Options, options: RunOptions) -> int:
         )
         made.shows_transitions = True
         made.parameters.merge("/", ros1.parameters())
+        made.parameters.robot = robot
         session.begin(made)
         stack.callback(session.end, made)
         runs = _Runs(script.stem, options, surroundings, stack)

@@ -16,6 +16,8 @@ from smachpy.command.arguments import Text, parameters_of, read_words, usage, wa
 from smachpy.command.robot import add_robot_options
 from smachpy.command.ros1_options import add_options as add_ros1_options
 from smachpy.command.ros1_options import options_of
+from smachpy.command.ros1_robot import add_option as add_ros1_robot
+from smachpy.command.ros1_robot import ros1_robot
 from smachpy.mission_info import mission_info
 from smachpy.sim.exceptions import MissionError
 from smachpy.sim.geometry import finite
@@ -97,6 +99,7 @@ def register(subparsers: Any) -> None:
     _add_watching(parser)
     add_ros2_options(parser)
     add_ros1_options(parser, loads=False)
+    add_ros1_robot(parser)
     robot = parser.add_argument_group("the simulated robot")
     robot.add_argument(
         "--start-robot",
@@ -204,10 +207,14 @@ def _run_mission(
     from smachpy.command.targets import load_target
 
     ros1 = options_of(args)
+    robot = None
+    if args.ros1_robot is not None and not wants_help(args.words):
+        _use_own_network(args, stack)
+        robot = stack.enter_context(ros1_robot(args))
     if ros1 is not None:
         if args.input:
             raise MissionError("--input: got it beside --ros1; expected --params FILE.")
-        return run_ros1(args.target, ros1, _options(args, {}, None, events))
+        return run_ros1(args.target, ros1, _options(args, {}, None, events), robot)
     target = load_target(args.target)
     if wants_help(args.words):
         print(usage(target))

@@ -6,15 +6,16 @@ Source:
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import io
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from actionlib_core.exceptions import ActionlibError
 from actionlib_core.suggest import did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
     from pathlib import Path
 
 
@@ -30,14 +31,29 @@ class ParameterFileError(ActionlibError):
         super().__init__(f"parameters {str(path)!r}: {problem}")
 
 
+class Robot(Protocol):
+    """A real robot, whose parameters are read."""
+
+    def get_param(self, name: str) -> Any:
+        """Return a value, or a tree of them as a dict; raises KeyError when there is none."""
+
+    def param_names(self) -> list[str]:
+        """Return the full names of all values."""
+
+
 class Parameters:
     """A tree of values. Names are full, with or without the slash in front.
+
+    Attributes:
+        robot: Has the values that are not here; None: nobody has. It is only read, and asked at
+            each call.
 
     Threads: one call at a time is atomic enough for CPython's dicts; a read gets a copy.
     """
 
     def __init__(self) -> None:
         self._tree: dict[str, Any] = {}
+        self.robot: Robot | None = None
 
     def get(self, name: str) -> Any:
         """Return a copy of a value; a name space is a dict of what is in it.
@@ -48,6 +64,9 @@ class Parameters:
         try:
             return copy.deepcopy(self._find(name))
         except KeyError:
+            if self.robot is not None:
+                with contextlib.suppress(KeyError):
+                    return self.robot.get_param(f"/{_clean(name)}")
             known = self.names()
             raise KeyError(
                 f"parameter '/{_clean(name)}': got no value; expected one."
@@ -85,7 +104,7 @@ class Parameters:
         try:
             self._find(name)
         except KeyError:
-            return False
+            return self.robot is not None and f"/{_clean(name)}" in self._robots_names()
         return True
 
     def delete(self, name: str) -> None:
@@ -119,8 +138,15 @@ class Parameters:
             words.pop()
 
     def names(self) -> list[str]:
-        """Return the full names of all values."""
-        return [f"/{name}" for name in _leaves(self._tree)]
+        """Return the full names of all values, the robot's included."""
+        own = [f"/{name}" for name in _leaves(self._tree)]
+        return own if self.robot is None else sorted({*own, *self.robot.param_names()})
+
+    def _robots_names(self) -> Collection[str]:
+        """Return the names of the robot's values and of the name spaces that they are in."""
+        assert self.robot is not None
+        words = [_words(name) for name in self.robot.param_names()]
+        return {f"/{'/'.join(name[:end])}" for name in words for end in range(1, len(name) + 1)}
 
     def load(self, path: Path, namespace: str = "/") -> None:
         """Set what a YAML file says, below `namespace`.

@@ -27,8 +27,8 @@ class Wanted:
         actions: Name -> type "pkg/XAction", "" when it is to be learned.
         topics: Names.
         services: Names.
-        used: Also what programs on our network use: their actions and topics, and all services of
-            the robot, as callers of services do not show themselves.
+        used: Also all actions and services of the robot, which programs look for before they use
+            them, and the topics that programs on our network use.
         all: Also everything that there is.
     """
 
@@ -88,7 +88,7 @@ def make_plan(
     for name, there in kinds.items():
         if there & _ACTION:
             actions.setdefault(name, "")
-    if wanted.all:
+    if follow:
         actions = {**learned, **actions}
     actions = {name: given or learned.get(name, "") for name, given in actions.items()}
     parts = {f"{name}/{word}" for name in actions for word in ACTION_WORDS}

@@ -256,6 +256,7 @@ def test_what_is_used_here_is_bridged():
     assert made.topics == {"/scan": True, "/cmd_vel": False}
     assert made.services == {"/clear": True, "/ours": False}
     assert plan(Wanted(used=True)).topics == {}
+    assert plan(Wanted(used=True)).actions == {"/nav": "m/NavAction"}
 
 
 def test_all_is_all_but_the_log_and_the_topics_of_actions():

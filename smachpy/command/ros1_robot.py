@@ -1,0 +1,54 @@
+"""`smachpy run --ros1-robot`: the robot of a mission is a real one that runs ROS 1."""
+
+from __future__ import annotations
+
+import contextlib
+from typing import TYPE_CHECKING, Any
+
+from smachpy.sim.exceptions import MissionError
+
+if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Iterator
+
+    from actionlib_core.ros1 import Ros1Bridge
+
+
+def add_option(group: Any) -> None:
+    """Add the option."""
+    group.add_argument(
+        "--ros1-robot",
+        metavar="URL",
+        help="a real robot that runs ROS 1, by its master: http://robot:11311. What the mission "
+        "uses is carried to and from it; see 'smachpy bridge ros1'",
+    )
+
+
+@contextlib.contextmanager
+def ros1_robot(args: argparse.Namespace) -> Iterator[Ros1Bridge]:
+    """Have the robot on the run's network inside the `with` block.
+
+    Raises:
+        MissionError: it stands beside a simulated robot or virtual time, or the robot's master
+            does not answer within the time that servers have.
+        Ros1Error: the address cannot be used.
+
+    Blocks: until the master has answered.
+    """
+    for given, option in (
+        (args.start_robot, "--start-robot"),
+        (args.time.virtual, f"--time {args.time}"),
+        (args.world, "--world"),
+    ):
+        if given:
+            raise MissionError(f"--ros1-robot: got it beside {option}; expected one of them.")
+    from actionlib_core import ros1
+
+    with ros1.bridge(args.ros1_robot, used=True, namespace=args.robot) as bridge:
+        if not bridge.wait_for_master(args.server_timeout):
+            raise MissionError(
+                f"--ros1-robot {args.ros1_robot}: no answer of a master at {bridge.master} within "
+                f"{args.server_timeout:g} s; expected one. Try 'curl {bridge.master}', or the "
+                "address that ROS_MASTER_URI has on the robot."
+            )
+        yield bridge

@@ -1,0 +1,89 @@
+"""`smachpy run --ros1-robot`: missions with a real robot of ROS 1."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytestmark = [pytest.mark.ros1, pytest.mark.zenoh]
+
+SMACHPY = Path(sys.executable).parent / "smachpy"
+WAIT_S = 50.0
+
+MISSION = """
+import smachpy
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
+
+def mission():
+    sm = smachpy.StateMachine(["succeeded", "aborted", "preempted"])
+    with sm:
+        goal = MoveBaseGoal()
+        smachpy.StateMachine.add(
+            "GO", smachpy.SimpleActionState("move_base", MoveBaseAction, goal), {"succeeded": "BACK"}
+        )
+        smachpy.StateMachine.add("BACK", smachpy.SimpleActionState("move_base", MoveBaseAction, goal))
+    return sm
+"""
+
+OLD_SCRIPT = """
+import rospy, smach, smach_ros
+from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
+
+rospy.init_node("old")
+print "planner", rospy.get_param("/move_base/planner"), rospy.get_param("/move_base/none", 7)
+sm = smach.StateMachine(["succeeded", "aborted", "preempted"])
+with sm:
+    smach.StateMachine.add("GO", smach_ros.SimpleActionState("move_base", MoveBaseAction, MoveBaseGoal()))
+print sm.execute()
+"""
+
+
+def run(*arguments):
+    environment = {k: v for k, v in os.environ.items() if k != "SMACHPY_DOMAIN"}
+    done = subprocess.run(
+        [SMACHPY, "run", *arguments],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=WAIT_S,
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_a_mission_drives_the_robot(ros, tmp_path):
+    ros.start("move_base")
+    (tmp_path / "errand.py").write_text(MISSION)
+    code, out, err = run(f"{tmp_path / 'errand.py'}", "--json", "--ros1-robot", ros.uri)
+    assert code == 0, err
+    events = [json.loads(line) for line in out.splitlines()]
+    assert events
+    assert ros.names_of("/smachpy_bridge") == []
+
+
+def test_a_script_for_ros_1_drives_the_robot_and_reads_its_parameters(ros, tmp_path):
+    ros.start("move_base")
+    (tmp_path / "old.py").write_text(OLD_SCRIPT)
+    code, out, err = run("--ros1", f"{tmp_path / 'old.py'}", "--plain", "--ros1-robot", ros.uri)
+    assert code == 0, err
+    assert "planner none 7" in out
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--ros1-robot", "http://127.0.0.1:1", "--server-timeout", "0.5"),
+        ("--ros1-robot", "http://127.0.0.1:1", "--start-robot"),
+        ("--ros1-robot", "http://127.0.0.1:1", "--time", "virtual"),
+        ("--ros1-robot", "ftp://robot"),
+    ],
+)
+def test_a_robot_that_cannot_be_had_is_bad_input(options):
+    code, _, err = run("there_and_back", *options)
+    assert code == 2
+    assert "Traceback" not in err
+    assert "ros1-robot" in err or "ftp" in err
