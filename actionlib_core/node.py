@@ -97,7 +97,9 @@ class Node:
         self.transport: Transport = transport if transport is not None else open_zenoh(config)
         self._lock = threading.Lock()
         self._entities = itertools.count(1)
-        self._shared_lock = threading.Lock()  # held while something is made
+        self._shared_lock = (
+            threading.RLock()
+        )  # held while something is made, of other shared things, too
         self._shared: dict[Hashable, Any] = {}
         self._closers: dict[int, Callable[[], object]] = {}
         self._asks: dict[int, Callable[[], object]] = {}

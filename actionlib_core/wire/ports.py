@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.exceptions import InterfaceError
+from actionlib_core.wire.action_messages import ActionTypes
+from actionlib_core.wire.presence import Kind, token_pattern
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from actionlib_core.goal.ports import ClientPort, ServerPort
     from actionlib_core.node import Node
-    from actionlib_core.wire.action_messages import ActionTypes
+    from actionlib_core.transport import Closable, Presence
 
 
 def make_client_port(
@@ -58,6 +62,58 @@ def make_server_port(node: Node, name: str, types: ActionTypes) -> ServerPort:
     from actionlib_core.wire.server_port import ActionServerPort
 
     return ActionServerPort(node, name, types)
+
+
+def watch_for_server(
+    node: Node, name: str, type_name: str, on_there: Callable[[], object]
+) -> Closable:
+    """Call `on_there` for each server of an action that is there or comes, on either wire.
+
+    Args:
+        node: On whose networks.
+        name: The action's full name.
+        type_name: Its type, "pkg/NameAction", or of ROS 2 "pkg/action/Name".
+        on_there: Called on the network's threads; must not wait.
+
+    Raises:
+        ConfigError: As `make_client_port`.
+        TransportError: a network of ROS 2 cannot be joined.
+
+    Blocks: as `make_client_port`.
+    """
+    types = _types_of(type_name) if node.config.ros2 or type_name.count("/") > 1 else None
+    if types is None or not _is_on_ros2(node, name, types):
+
+        def on_presence(presence: Presence) -> None:
+            if presence.alive:
+                on_there()
+
+        pattern = token_pattern(Kind.ACTION_SERVER, name)
+        return node.transport.watch_alive(pattern, on_presence)
+    from actionlib_core.wire.ros2.mapping import action_on_ros2
+    from actionlib_core.wire.ros2.names import Kind as RosKind
+    from actionlib_core.wire.ros2.names import action_names
+    from actionlib_core.wire.ros2.network import ros_network
+
+    network = ros_network(node, name)
+    there = network.name(action_on_ros2(network.settings, name, types).name)
+
+    def on_token(_token: object, _key: str, alive: bool) -> None:
+        if alive:
+            on_there()
+
+    return network.ros.watch(on_token, kind=RosKind.SERVICE, name=action_names(there).send_goal)
+
+
+def _types_of(type_name: str) -> ActionTypes | None:
+    """Return the classes of an action; None when no definition of it is known."""
+    from actionlib_core.interfaces import get_action, ros2
+
+    try:
+        found: Any = (ros2.get_action if type_name.count("/") > 1 else get_action)(type_name)
+    except InterfaceError:
+        return None
+    return ActionTypes.of(found)
 
 
 def _is_on_ros2(node: Node, name: str, types: ActionTypes) -> bool:

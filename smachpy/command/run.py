@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from actionlib_core.names import check_name
 from actionlib_core.output import printable
-from actionlib_core.ros2_options import add_ros2_options
+from actionlib_core.ros2_options import add_ros2_options, ros2_of_options
 from smachpy.command.arguments import Text, parameters_of, read_words, usage, wants_help
 from smachpy.command.robot import add_robot_options
 from smachpy.command.ros1_options import add_options as add_ros1_options
@@ -169,6 +169,7 @@ def _list(_args: argparse.Namespace) -> int:
 def _run(args: argparse.Namespace) -> int:
     events = sys.stdout if args.json else None
     with contextlib.ExitStack() as stack:
+        stack.enter_context(ros2_of_options(args))
         if args.json:  # whatever a mission prints: events are alone
             stack.enter_context(contextlib.redirect_stdout(sys.stderr))
         if args.start_robot:  # its module, once imported, may join a network

@@ -109,7 +109,9 @@ def run_mission(target: Target, options: RunOptions) -> int:
         out = None
         if options.out is not None:
             out = OutFolder(options.out, target.name, machine, options.robot)
-        surroundings.start(machine, needed_servers(record) - set(needs.serves))
+        needed = needed_servers(record)
+        others = {name: needed[name] for name in needed.keys() - set(needs.serves)}
+        surroundings.start(machine, others)
         if not surroundings.wait(options.server_timeout):
             return signal_exit(ending)
         if out is not None:
@@ -203,15 +205,10 @@ def _fit_userdata(machine: Container, key: str, value: object) -> object:
         ) from error
 
 
-def needed_servers(record: StateRecord) -> set[str]:
-    """Return the names of the actions that a machine's states call."""
-    return {
-        value
-        for state in record.walk()
-        if state.kind == "action"
-        for name, value in state.details
-        if name == "action"
-    }
+def needed_servers(record: StateRecord) -> dict[str, str]:
+    """Return the actions that a machine's states call, and their types."""
+    details = [dict(state.details) for state in record.walk() if state.kind == "action"]
+    return {detail["action"]: detail["type"] for detail in details if "action" in detail}
 
 
 def good_outcomes(record: StateRecord, options: RunOptions) -> set[str]:

@@ -6,13 +6,16 @@ import contextlib
 import difflib
 import re
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Final, Protocol
 
 from actionlib_core import shutdown
 from actionlib_core.clock import current_clock, use_clock
 from actionlib_core.exceptions import NodeError
 from actionlib_core.node import Node, get_node, init, use_node
-from actionlib_core.wire.presence import Kind, list_endpoints, parse_token, token_pattern
+from actionlib_core.output import tell
+from actionlib_core.wire.ports import watch_for_server
+from actionlib_core.wire.presence import Kind, list_endpoints
 from smachpy.sim.exceptions import MissionError
 from smachpy.sim.robot_process import RobotProcess
 
@@ -21,7 +24,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from actionlib_core.names import NameArguments
-    from actionlib_core.transport import Closable, Presence, Transport
+    from actionlib_core.transport import Closable, Transport
     from smachpy.machines.container import Container
     from smachpy.sim.geometry import Pose2D
     from smachpy.sim.occupancy import OccupancyMap
@@ -137,12 +140,12 @@ class RobotOptions:
 class Surroundings(Protocol):
     """Brings up what a mission needs around it."""
 
-    def start(self, machine: Container, needed: set[str]) -> None:
+    def start(self, machine: Container, needed: Mapping[str, str]) -> None:
         """Begin to bring it up.
 
         Args:
             machine: The mission, which is preempted when its robot refuses.
-            needed: Names of the actions that others have to serve.
+            needed: Names of the actions that others have to serve, and their types.
 
         Raises:
             MissionError: it cannot be had here.
@@ -244,7 +247,7 @@ class _Network:
         self._wait: ServerWait | None = None
         self._forget: Callable[[], None] = lambda: None
 
-    def start(self, machine: Container, needed: set[str]) -> None:
+    def start(self, machine: Container, needed: Mapping[str, str]) -> None:
         self._wait = ServerWait(needed)
         self._forget = shutdown.on_shutdown(self._wait.wake)
         if not self._options.start:
@@ -260,7 +263,7 @@ class _Network:
         self._robot.__enter__()
 
     def put_robot(self, prefix: str, timeout: float) -> None:
-        self._wait = ServerWait(set())
+        self._wait = ServerWait({})
         self._forget = shutdown.on_shutdown(self._wait.wake)
         arguments = self._options.arguments()
         if self._options.world is None:
@@ -273,9 +276,14 @@ class _Network:
     def wait(self, timeout: float) -> bool:
         assert self._wait is not None
         missing = self._wait.wait(timeout, self._robot)
-        if missing:
+        if missing and get_node().config.ros2 and self._wait.found:
+            tell("smachpy", f"{missing_on_robot(missing, timeout)} The mission runs without.")
+        elif missing:
             there = list_endpoints(get_node().transport, kind=Kind.ACTION_SERVER)
-            raise MissionError(missing_text(missing, {end.name for end in there}, timeout))
+            text = missing_text(missing, {end.name for end in there}, timeout)
+            if get_node().config.ros2:
+                text = f"{missing_on_robot(missing, timeout)} Try: smachpy doctor --ros2"
+            raise MissionError(text)
         return not shutdown.requested()
 
     def over(self) -> None:
@@ -294,7 +302,7 @@ class _Network:
             self._robot.stop()
 
 
-def _prefix_of(needed: set[str]) -> str:
+def _prefix_of(needed: Mapping[str, str]) -> str:
     """Return the name of the robot whose actions a mission calls; "" for its own.
 
     Raises:
@@ -317,10 +325,14 @@ class ServerWait:
     """Waits until every needed action has a server, or something makes waiting pointless.
 
     Args:
-        names: The actions, as the mission names them.
+        names: The actions, as the mission names them, and their types.
+
+    Raises:
+        ConfigError: one is to be on ROS 2, and nothing there corresponds to it.
+        TransportError: the robot's network cannot be joined.
     """
 
-    def __init__(self, names: set[str]) -> None:
+    def __init__(self, names: Mapping[str, str]) -> None:
         self._clock = current_clock()
         self._wake = self._clock.event("the servers of the mission's actions")
         self._missing: dict[str, str] = {}
@@ -328,11 +340,16 @@ class ServerWait:
         if names:
             self._watch(get_node(), names)
 
-    def _watch(self, node: Node, names: set[str]) -> None:
+    def _watch(self, node: Node, names: Mapping[str, str]) -> None:
         self._missing = {node.resolve(name, "action name"): name for name in names}
-        for full in list(self._missing):
-            pattern = token_pattern(Kind.ACTION_SERVER, full)
-            self._watches.append(node.transport.watch_alive(pattern, self._on_presence))
+        for full, name in list(self._missing.items()):
+            on_there = partial(self._on_server, full)
+            self._watches.append(watch_for_server(node, full, names[name], on_there))
+
+    @property
+    def found(self) -> bool:
+        """Whether one of the servers is there."""
+        return len(self._missing) < len(self._watches)
 
     def wake(self) -> None:
         """Look again whether to go on waiting; from any thread."""
@@ -368,11 +385,19 @@ class ServerWait:
             self._wake.clear()
         return {}
 
-    def _on_presence(self, presence: Presence) -> None:
-        endpoint = parse_token(presence.key)
-        if endpoint is not None and presence.alive:
-            self._missing.pop(endpoint.name, None)
-            self._wake.set()
+    def _on_server(self, full: str) -> None:
+        self._missing.pop(full, None)
+        self._wake.set()
+
+
+def missing_on_robot(missing: Mapping[str, str], timeout: float) -> str:
+    """Return what to say about actions that have no server, where a ROS 2 robot is in use."""
+    what = "action" if len(missing) == 1 else "actions"
+    listed = ", ".join(f"'/{full}'" for full in sorted(missing))
+    return (
+        f"{what} {listed}: no server after {timeout:g} s, neither on the ROS 2 robot nor here; "
+        "names there are told by 'map' in the configuration."
+    )
 
 
 def missing_text(missing: Mapping[str, str], there: Collection[str], timeout: float) -> str:
@@ -442,10 +467,10 @@ class _VirtualNetwork:
         self._pace = pace
         self._options = robot
         self._session = session
-        self._needed: set[str] = set()
+        self._needed: Mapping[str, str] = {}
         self._down = contextlib.ExitStack()
 
-    def start(self, machine: Container, needed: set[str]) -> None:
+    def start(self, machine: Container, needed: Mapping[str, str]) -> None:
         del machine
         others = {name for name in needed if name.rpartition("/")[2] not in ROBOT_ACTIONS}
         if others:

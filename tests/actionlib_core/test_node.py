@@ -247,3 +247,9 @@ def test_node_on_zenoh_closes_its_session():
     node.close()
     with pytest.raises(TransportError):
         transport.declare_alive("@x/a")
+
+
+def test_what_is_shared_may_need_other_shared_things(clock, network):
+    with Node("mission", transport=network.session(), clock=clock) as node:
+        made = node.shared("client", lambda: [node.shared("network", object)])
+        assert made == [node.shared("network", object)]

@@ -127,8 +127,11 @@ def test_which_outcomes_are_a_success(outcomes, success, good):
 def test_the_needed_servers_are_those_of_the_action_states():
     from missions.lesson_2_patrol import patrol
 
-    assert needed_servers(smachpy.describe(patrol())) == {"move_base", "charge"}
-    assert needed_servers(smachpy.describe(machine())) == set()
+    assert needed_servers(smachpy.describe(patrol())) == {
+        "move_base": "move_base_msgs/MoveBaseAction",
+        "charge": "mission_msgs/ChargeAction",
+    }
+    assert needed_servers(smachpy.describe(machine())) == {}
 
 
 def test_the_recorder_names_goals_after_waypoints_else_after_states():
