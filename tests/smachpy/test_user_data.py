@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import smachpy
 from smachpy.events import UserdataWritten
-from smachpy.userdata.user_data import get_const
+from smachpy.userdata.user_data import Remapper, UserData, get_const
 
 
 @dataclasses.dataclass
@@ -491,3 +491,107 @@ def test_what_changes_inside_a_list_is_seen_at_the_next_read(inner):
     else:
         target.append(2)
     assert window.v == [1, inner]
+
+
+# -- views that are handed out again ------------------------------------------------------------
+
+
+class Cup:
+    def __init__(self, volume):
+        self.volume = volume
+
+
+class Slots:
+    __slots__ = ("volume",)
+
+    def __init__(self, volume):
+        self.volume = volume
+
+
+NESTED = {
+    "lists": lambda: [[1, 2], [3, [4]]],
+    "dicts": lambda: [{"x": 1, "y": {"z": [2]}}],
+    "dict": lambda: {"a": [1, {"b": 2}], "c": 3},
+    "objects": lambda: [Cup(1), [Cup(2)]],
+}
+
+
+def window(value):
+    ud = UserData()
+    ud.v = value
+    return Remapper(ud, ["v"])
+
+
+@pytest.mark.parametrize("kind", NESTED)
+def test_a_nested_value_that_has_not_changed_is_not_copied_again(kind):
+    window_of = window(NESTED[kind]())
+    assert window_of.v is window_of.v
+
+
+def set_item(where, key, item):
+    where[key] = item
+
+
+CHANGES = {
+    "an item deep in lists": ("lists", lambda v: v[1][1].append(5)),
+    "an item of equal value": ("lists", lambda v: set_item(v[0], 0, True)),
+    "a list in place of another": ("lists", lambda v: set_item(v, 0, [1, 3])),
+    "a shorter list": ("lists", lambda v: v[0].pop()),
+    "a list in dicts": ("dicts", lambda v: v[0]["y"]["z"].append(3)),
+    "a key": ("dicts", lambda v: v[0].update(w=0)),
+    "a key in place of another": ("dict", lambda v: v.update(d=v.pop("c"))),
+    "the order of keys": ("dict", lambda v: v.update(a=v.pop("a"))),
+    "a value in a dict": ("dict", lambda v: v["a"][1].update(b=3)),
+    "another object": ("objects", lambda v: set_item(v, 0, Cup(3))),
+    "an object in a list": ("objects", lambda v: v[1].append(Cup(3))),
+}
+
+
+def plain(value):
+    if isinstance(value, list):
+        return [plain(item) for item in value]
+    if isinstance(value, dict):
+        return [(key, plain(item)) for key, item in value.items()]
+    return (type(value).__name__, value if isinstance(value, (int, bool)) else value.volume)
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_change_is_seen_by_the_next_read(change):
+    kind, do = CHANGES[change]
+    value = NESTED[kind]()
+    window_of = window(value)
+    before = plain(window_of.v)
+    do(value)
+    assert plain(window_of.v) == plain(value) != before
+
+
+def test_what_an_object_holds_is_seen_through_every_view():
+    cup = Cup([1])
+    window_of = window([cup])
+    seen = window_of.v
+    cup.volume = [2]
+    assert seen[0].volume == window_of.v[0].volume == [2]
+
+
+@pytest.mark.parametrize("make", [lambda: {1, 2}, lambda: Slots(1), lambda: ([1],)])
+def test_what_cannot_be_compared_is_copied_at_each_read(make):
+    value = [make()]
+    window_of = window(value)
+    window_of.v
+    changed = value[0]
+    if isinstance(changed, set):
+        changed.add(3)
+        assert window_of.v[0] == {1, 2, 3}
+    elif isinstance(changed, tuple):
+        changed[0].append(2)
+        assert window_of.v[0] == ([1, 2],)
+    else:
+        changed.volume = 2
+        assert window_of.v[0].volume == 2
+
+
+def test_a_view_that_is_handed_out_again_is_still_read_only():
+    window_of = window([[1]])
+    for _ in range(2):
+        with pytest.raises(smachpy.ReadOnlyError):
+            window_of.v[0].append(2)
