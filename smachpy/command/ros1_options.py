@@ -111,10 +111,11 @@ def load_script(text: str, options: Ros1Options) -> Target:
     """
     from smachpy.ros1 import load
 
-    place = script_of(text)
+    file, colon, function = text.partition(".py:")
+    place = script_of(f"{file}.py" if colon else text)
     stubbed: list[str] = []
     machine = load(
-        place,
+        f"{place}:{function}" if colon else place,
         options.words,
         params=options.parameters(),
         stub_missing=options.stub_missing,

@@ -21,7 +21,10 @@ if TYPE_CHECKING:
 
 _CHANGES: tuple[tuple[Any, str], ...] = (
     *((os, name) for name in ("mkdir", "makedirs", "remove", "unlink", "rename", "replace")),
-    *((os, name) for name in ("rmdir", "removedirs", "symlink", "link", "chmod", "kill", "killpg")),
+    *(
+        (os, name)
+        for name in ("fsync", "rmdir", "removedirs", "symlink", "link", "chmod", "kill", "killpg")
+    ),
     *((shutil, name) for name in ("rmtree", "move", "copy", "copy2", "copyfile", "copytree")),
 )
 

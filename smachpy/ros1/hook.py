@@ -107,13 +107,35 @@ class _Alias(Loader):
 class _Stub(Loader):
     """Makes a stand-in."""
 
+    def __init__(self, *, known: bool = False) -> None:
+        self._known = known  # there is something of that name, which may lack a part
+
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         """Make a section of interfaces or a module."""
         _, _, section = spec.name.partition(".")
-        return StubSection(spec.name) if section in _SECTIONS else StubModule(spec.name)
+        if section not in _SECTIONS:
+            return StubModule(spec.name)
+        known = import_module(f"{INTERFACES}.{spec.name}") if self._known else None
+        return StubSection(spec.name, known)
 
     def exec_module(self, module: ModuleType) -> None:
         """Nothing to run."""
+
+
+class _Generated(Loader):
+    """Makes `pkg.msg._Name`, which ROS 1's generator wrote and some programs import from."""
+
+    def create_module(self, spec: ModuleSpec) -> None:
+        """Leave it to Python."""
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Put the class in, and those that belong to a service."""
+        section, _, name = module.__name__.rpartition("._")
+        home = import_module(section)
+        setattr(module, name, getattr(home, name))
+        if section.endswith(".srv"):
+            for end in ("Request", "Response"):
+                setattr(module, name + end, getattr(home, name + end))
 
 
 class OldSourceLoader(SourceFileLoader):
@@ -151,6 +173,8 @@ class OldNames(MetaPathFinder):
             home = self._home_of(fullname)
             if home is not None:
                 return _alias(fullname, home)
+        if below.partition("._")[0] in _SECTIONS and "._" in below:
+            return ModuleSpec(fullname, _Generated())
         if below and isinstance(sys.modules.get(top), StubModule):
             return self._missing(fullname, path)
         self._know_interfaces(top)
@@ -159,6 +183,8 @@ class OldNames(MetaPathFinder):
         if not (has_interfaces and below in _SECTIONS):
             found = self._in_project(fullname, path)
         if found is None and has_interfaces and below in {"", *_SECTIONS}:
+            if below and self._stub_missing:
+                return ModuleSpec(fullname, _Stub(known=True), is_package=True)
             found = _alias(fullname, f"{INTERFACES}.{fullname}")
         return found or self._missing(fullname, path)
 
@@ -229,8 +255,9 @@ class OldNames(MetaPathFinder):
             return None
         if path is not None:
             parent = sys.modules.get(fullname.rpartition(".")[0])
-            if not isinstance(parent, StubModule):
-                return None  # its package was found, and says itself what it lacks
+            lacks = isinstance(getattr(parent, "__loader__", None), OldSourceLoader)
+            if not (isinstance(parent, StubModule) or (lacks and self._stub_missing)):
+                return None  # its package was found, and Python says what it lacks
         elif self._is_elsewhere(fullname):
             return None
         if self._stub_missing:

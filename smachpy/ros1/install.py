@@ -81,6 +81,11 @@ def uninstall() -> None:
         slips.set_accepting(False)
 
 
+def current_project() -> Project:
+    """Return what lies around the program."""
+    return _installed[0].finder.project if _installed else Project()
+
+
 @contextlib.contextmanager
 def installed(script: str | Path | None = None, *, stub_missing: bool = False) -> Iterator[None]:
     """Have the names in a `with` block; arguments as `install`."""

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from actionlib_core.clock import Deadlock, RealClock, VirtualClock, current_clock, use_clock
 from actionlib_core.node import Node, use_node
 from actionlib_core.shutdown import Shutdown, use_shutdown
+from actionlib_core.suggest import did_you_mean
 from actionlib_core.transport.memory import MemoryNetwork
 from smachpy.exceptions import SmachError
 from smachpy.machines.container import Container, below
@@ -47,12 +48,17 @@ class LoadError(SmachError):
         super().__init__(f"script {str(script)!r}: {problem}")
 
 
-def run_script(script: Path, argv: Sequence[str] = ()) -> None:
+def run_script(script: Path, argv: Sequence[str] = (), *, call: str = "") -> Any:
     """Run a script as `python script` would, with ROS 1's names, in the session in force.
 
     Args:
         script: The file.
         argv: Its arguments.
+        call: A function of it to call then, as the program that imports the file would; "" for
+            none. The file is no main program then.
+
+    Returns:
+        What the function returned.
 
     Raises:
         LoadError: the file cannot be read, or is no Python.
@@ -70,7 +76,7 @@ def run_script(script: Path, argv: Sequence[str] = ()) -> None:
             script,
             f"line {error.lineno}: got {error.msg}; expected Python, 2 or 3.",
         ) from error
-    main = types.ModuleType("__main__")
+    main = types.ModuleType(path.stem if call else "__main__")
     main.__file__ = str(path)
     main.__dict__["__builtins__"] = __builtins__
     before = sys.modules.get("__main__"), sys.argv, list(sys.path)
@@ -79,6 +85,16 @@ def run_script(script: Path, argv: Sequence[str] = ()) -> None:
     sys.path.insert(0, str(path.parent))
     try:
         exec(code, main.__dict__)  # noqa: S102  that is what running it means
+        if not call:
+            return None
+        function = getattr(main, call, None)
+        if not callable(function):
+            known = [name for name, value in vars(main).items() if callable(value)]
+            raise LoadError(
+                script,
+                f"got {call!r}; expected a function of it.{did_you_mean(call, known)}",
+            )
+        return function()
     finally:
         sys.argv, sys.path[:] = before[1], before[2]
         if before[0] is not None:
@@ -102,7 +118,8 @@ def load(
     machine may need them; `uninstall` takes them away.
 
     Args:
-        script: The file.
+        script: The file, or `file.py:function` for one that another program imports: the function
+            is called after the file has run, and may return the machine.
         argv: Its arguments; `_name:=value` gives it private parameters.
         params: Parameters by name, also as a tree.
         stub_missing: Modules, messages and parameters that nobody has get stand-ins.
@@ -117,7 +134,8 @@ def load(
 
     Blocks: as long as the script builds, `timeout` at most.
     """
-    path = Path(script)
+    place, colon, call = str(script).rpartition(":")
+    path, call = (Path(place), call) if colon and place.endswith(".py") else (Path(script), "")
     install(path, stub_missing=stub_missing)
     made = Session([str(path), *argv], dry=True, stub_missing=stub_missing)
     made.parameters.merge("/", dict(params or {}))
@@ -131,7 +149,7 @@ def load(
         OBSERVERS.append(made.stop)
         stack.callback(OBSERVERS.remove, made.stop)
         stack.enter_context(_deadline(made, timeout))
-        problem = _build(path, argv, made)
+        problem = _build(path, argv, call, made)
         stopped = made.stopped
     if stubbed is not None:
         stubbed += made.stubbed
@@ -150,10 +168,12 @@ _NOTHING = (
 )
 
 
-def _build(path: Path, argv: Sequence[str], made: Session) -> str:
+def _build(path: Path, argv: Sequence[str], call: str, made: Session) -> str:
     """Run a dry script; return what went wrong, "" for nothing."""
     try:
-        run_script(path, argv)
+        returned = run_script(path, argv, call=call)
+        if isinstance(returned, Container):
+            made.stopped = Stop(returned)
     except LoadError as error:
         return error.problem
     except Stop:

@@ -6,13 +6,22 @@ explored; they do nothing.
 
 from __future__ import annotations
 
+import sys
 import types
+from dis import opname
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core.interfaces import define_action, define_message, define_service
+from actionlib_core.interfaces import (
+    InterfaceError,
+    define_action,
+    define_message,
+    define_service,
+)
+from smachpy.ros1.session import session
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from types import FrameType
 
 _ACTION_ENDS = ("ActionGoal", "ActionResult", "ActionFeedback", "Action")
 
@@ -39,8 +48,6 @@ class Anything:
         return Anything(f"{self._stub_name}()")
 
     def __getitem__(self, key: Any) -> Any:
-        if isinstance(key, int) and key > 0:
-            raise IndexError(key)  # a loop over it ends
         return Anything(f"{self._stub_name}[...]")
 
     def __setitem__(self, key: Any, value: Any) -> None:
@@ -50,7 +57,8 @@ class Anything:
         pass
 
     def __iter__(self) -> Iterator[Any]:
-        return iter(())
+        count = _wanted_items(sys._getframe(1))  # noqa: SLF001  `a, b = stub` wants two
+        return iter([Anything(f"{self._stub_name}[...]") for _ in range(count)])
 
     def __len__(self) -> int:
         return 0
@@ -99,6 +107,14 @@ class Anything:
         return (Anything,)
 
 
+def _wanted_items(frame: FrameType) -> int:
+    """Return how many values the code unpacks from a stand-in; 0 when it loops over it."""
+    code = frame.f_code.co_code
+    if opname[code[frame.f_lasti]] == "UNPACK_SEQUENCE":
+        return code[frame.f_lasti + 1]
+    return 0
+
+
 def _number(name: str) -> Callable[..., Any]:
     def operate(self: Anything, *_others: Any) -> Any:
         del self
@@ -145,17 +161,30 @@ def stand_in_class(name: str) -> type:
 
 
 class StubSection(types.ModuleType):
-    """`pkg.msg` or `pkg.srv` of a package that is missing: its classes are made when named."""
+    """`pkg.msg` or `pkg.srv` of a package that is missing, or lacks some: made when named.
 
-    def __init__(self, name: str) -> None:
+    Args:
+        name: Its full name.
+        known: The module of what is there; None for nothing.
+    """
+
+    def __init__(self, name: str, known: Any = None) -> None:
         super().__init__(name, "Stand-ins for the interfaces of a package that is missing.")
-        self.__all__: list[str] = []
+        self.__all__: list[str] = list(known.__all__) if known is not None else []
         self.__file__ = None
+        self.__path__: list[str] = []
         self._package, _, self._kind = name.partition(".")
+        self._known = known
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
             raise AttributeError(name)
+        if name in self.__all__:
+            try:
+                return getattr(self._known, name)
+            except InterfaceError:  # it uses a type that is missing
+                return stand_in_class(name)
+        session().stand_in(f"{self._package}/{name}")
         make = _service if self._kind == "srv" else _message
         value = make(self._package, name)
         setattr(self, name, value)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
+from smachpy.ros1.names.roslib import message as message
+from smachpy.ros1.names.roslib import packages as packages
 
-__all__ = ["load_manifest"]
+__all__ = ["load_manifest", "message", "packages"]
 
 
 def load_manifest(package_name: str) -> None:

@@ -260,7 +260,7 @@ def _text(msg: Any, args: tuple[Any, ...]) -> str:
 
 def _place() -> tuple[str, int]:
     """Return the line of the program that logs."""
-    frame = sys._getframe(1)  # noqa: SLF001  as `logging` does
+    frame = sys._getframe(1)
     while frame.f_code.co_filename == __file__ and frame.f_back is not None:
         frame = frame.f_back
     return frame.f_code.co_filename, frame.f_lineno
@@ -316,4 +316,5 @@ logfatal, logfatal_throttle, logfatal_throttle_identical, logfatal_once = _funct
     logging.CRITICAL
 )
 logout = loginfo
+rospydebug, rospyinfo, rospywarn, rospyerr = logdebug, loginfo, logwarn, logerr
 logerror = logerr

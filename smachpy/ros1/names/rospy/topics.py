@@ -144,7 +144,7 @@ class _AnySubscriber(Subscriber):
     def _take(self, sample: Sample) -> None:
         encoding = parse_encoding(sample.encoding)
         message = AnyMsg().deserialize(bytes(sample.payload))
-        message._connection_header = {  # noqa: SLF001  its own package
+        message._connection_header = {
             "type": encoding.type,
             "md5sum": encoding.md5,
             "topic": f"/{self.resolved_name}",

@@ -1,0 +1,110 @@
+"""The frames of the network: transforms from `/tf` and `/tf_static`, waited for, and sent."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.clock import current_clock
+from actionlib_core.interfaces.tf2_msgs.msg import TFMessage
+from actionlib_core.node import get_node
+from actionlib_core.pubsub.topic import Publisher, Subscriber
+from actionlib_core.shutdown import on_shutdown
+from smachpy.ros1.frames import FrameError, Frames, Transform
+from smachpy.ros1.session import session
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from actionlib_core.interfaces.geometry_msgs.msg import TransformStamped
+
+
+class Listener:
+    """Frames that are kept up to date.
+
+    Threads: messages arrive in the subscribers' threads; every method may be called from any.
+    """
+
+    def __init__(self, frames: Frames) -> None:
+        self.frames = frames
+        self._clock = current_clock()
+        self._changed: list[Any] = []
+        self._subscribers = [
+            Subscriber("/tf", TFMessage, lambda message: self._take(message, static=False)),
+            Subscriber("/tf_static", TFMessage, lambda message: self._take(message, static=True)),
+        ]
+
+    def close(self) -> None:
+        """Stop listening."""
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+
+    def _take(self, message: TFMessage, *, static: bool) -> None:
+        for stamped in message.transforms:
+            try:
+                add(self.frames, stamped, static=static)
+            except FrameError as error:
+                from smachpy.ros1.names.rospy.core import logwarn_throttle
+
+                logwarn_throttle(10.0, "%s", error)
+        self.changed()
+
+    def changed(self) -> None:
+        """Let those who wait look again."""
+        for event in tuple(self._changed):
+            event.set()
+
+    def wait(self, ready: Callable[[], bool], timeout: float) -> bool:
+        """Wait until `ready`, looking again with each message.
+
+        Blocks: until then, `timeout` [s] at most, or until the program is to end.
+        """
+        deadline = self._clock.now() + timeout
+        event = self._clock.event("a transform")
+        self._changed.append(event)
+        forget = on_shutdown(event.set)
+        try:
+            while not ready():
+                left = deadline - self._clock.now()
+                if left <= 0 or session().is_shutdown():
+                    return False
+                event.wait(left)
+                event.clear()
+            return True
+        finally:
+            forget()
+            self._changed.remove(event)
+
+
+def add(frames: Frames, stamped: TransformStamped, *, static: bool) -> None:
+    """Take a message over."""
+    move, turn = stamped.transform.translation, stamped.transform.rotation
+    transform = Transform(move.x, move.y, move.z, turn.x, turn.y, turn.z, turn.w)
+    parent, child = stamped.header.frame_id, stamped.child_frame_id
+    frames.add(parent, child, stamped.header.stamp.to_nsec(), transform, static=static)
+
+
+class Broadcaster:
+    """Sends transforms.
+
+    Args:
+        static: On `/tf_static`, all that were sent so far, latched.
+    """
+
+    def __init__(self, *, static: bool = False) -> None:
+        self._static = static
+        self._sent: dict[str, TransformStamped] = {}
+        topic = "/tf_static" if static else "/tf"
+        node = get_node()
+        self._publisher = node.shared(
+            ("broadcaster", topic), lambda: Publisher(topic, TFMessage, latch=static)
+        )
+
+    def send(self, transforms: Iterable[TransformStamped]) -> None:
+        """Send them in one message."""
+        given = list(transforms)
+        if session().dry:
+            return
+        if self._static:
+            self._sent |= {one.child_frame_id: one for one in given}
+            given = list(self._sent.values())
+        self._publisher.publish(TFMessage(given))

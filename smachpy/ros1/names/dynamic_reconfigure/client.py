@@ -1,0 +1,123 @@
+"""dynamic_reconfigure.client: change the parameters of another node while it runs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.interfaces import define_message, define_service
+from smachpy.ros1.names.dynamic_reconfigure import DynamicReconfigureParameterException
+from smachpy.ros1.names.rospy.exceptions import ROSException
+from smachpy.ros1.names.rospy.service import ServiceProxy
+from smachpy.ros1.names.rospy.topics import Subscriber
+from smachpy.ros1.session import session
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+for _name, _type in (("Bool", "bool"), ("Int", "int32"), ("Str", "string"), ("Double", "float64")):
+    define_message(f"dynamic_reconfigure/{_name}Parameter", f"string name\n{_type} value\n")
+define_message(
+    "dynamic_reconfigure/GroupState", "string name\nbool state\nint32 id\nint32 parent\n"
+)
+Config: Any = define_message(
+    "dynamic_reconfigure/Config",
+    "BoolParameter[] bools\nIntParameter[] ints\nStrParameter[] strs\nDoubleParameter[] doubles\n"
+    "GroupState[] groups\n",
+)
+Reconfigure: Any = define_service(
+    "dynamic_reconfigure/Reconfigure", "Config config\n---\nConfig config\n"
+)
+
+
+class Client:
+    """Changes the parameters of a node.
+
+    Args:
+        name: The node's.
+        timeout: How long to wait for it, seconds or `Duration`; None waits until the program is to
+            end.
+        config_callback: Called with the configuration whenever it changes.
+        description_callback: As ROS takes it; descriptions are not read.
+
+    Raises:
+        ROSException: it is not there in time.
+
+    Blocks: see `timeout`.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        timeout: Any = None,
+        config_callback: Callable[[dict[str, Any]], object] | None = None,
+        description_callback: Callable[..., object] | None = None,
+    ) -> None:
+        del description_callback
+        self.name = name
+        self._config: dict[str, Any] | None = None
+        self._callback = config_callback
+        self._proxy = ServiceProxy(f"{name}/set_parameters", Reconfigure)
+        if not session().dry:
+            self._proxy.wait_for_service(timeout)
+        self._updates = Subscriber(f"{name}/parameter_updates", Config, self._on_config)
+        self.closed = False
+
+    def get_configuration(self, timeout: Any = None) -> dict[str, Any]:
+        """Return what was heard last; asks for it when nothing was."""
+        del timeout
+        if self._config is None:
+            self._config = _read(self._proxy(Config()).config)
+        return dict(self._config)
+
+    def update_configuration(self, changes: dict[str, Any]) -> dict[str, Any]:
+        """Change parameters, and return the configuration as the node has it then.
+
+        Raises:
+            DynamicReconfigureParameterException: a value is no bool, number or text.
+            ServiceException: the node did not answer.
+
+        Blocks: until the answer.
+        """
+        self._config = _read(self._proxy(_write(changes)).config)
+        return dict(self._config)
+
+    def set_config_callback(self, value: Callable[[dict[str, Any]], object] | None) -> None:
+        """Set the callback."""
+        self._callback = value
+
+    def close(self) -> None:
+        """Leave the node."""
+        self.closed = True
+        self._updates.unregister()
+        self._proxy.close()
+
+    def _on_config(self, message: Any) -> None:
+        self._config = _read(message)
+        if self._callback is not None:
+            self._callback(dict(self._config))
+
+
+def _read(config: Any) -> dict[str, Any]:
+    parts = (*config.bools, *config.ints, *config.strs, *config.doubles)
+    return {part.name: part.value for part in parts}
+
+
+def _write(changes: dict[str, Any]) -> Any:
+    config = Config()
+    for name, value in changes.items():
+        if isinstance(value, bool):
+            config.bools = [*config.bools, {"name": name, "value": value}]
+        elif isinstance(value, int):
+            config.ints = [*config.ints, {"name": name, "value": value}]
+        elif isinstance(value, float):
+            config.doubles = [*config.doubles, {"name": name, "value": value}]
+        elif isinstance(value, str):
+            config.strs = [*config.strs, {"name": name, "value": value}]
+        else:
+            raise DynamicReconfigureParameterException(
+                f"{name}: got {value!r}; expected a bool, a number or a text."
+            )
+    return config
+
+
+__all__ = ["Client", "ROSException"]

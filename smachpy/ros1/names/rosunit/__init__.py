@@ -1,0 +1,3 @@
+"""rosunit: run a test case."""
+
+from smachpy.ros1.names.rostest import unitrun

@@ -1,0 +1,3 @@
+"""tf's module of that name."""
+
+from smachpy.ros1.names.tf import Transformer, TransformerROS, TransformListener
