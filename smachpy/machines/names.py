@@ -28,5 +28,8 @@ def unique_names(names: Iterable[str], what: str = "names") -> tuple[str, ...]:
         raise InvalidStateError(f"{what}: got {names!r}; expected strings, in a list.") from error
     bad = [name for name in found if not isinstance(name, str)]
     if bad:
-        raise InvalidStateError(f"{what}: got {bad}; expected strings.")
+        problem = f"{what}: got {bad}; expected strings."
+        if not accepts(problem):
+            raise InvalidStateError(problem)
+        found = [str(name) for name in found]
     return tuple(dict.fromkeys(found))

@@ -10,7 +10,7 @@ import ast
 import difflib
 import re
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from actionlib_core.exceptions import ActionlibError
 
@@ -28,6 +28,7 @@ _NAMES: Final = (
 _GONE: Final = re.compile(
     r"\b(basestring|execfile|getcwdu|has_key|iteritems|iterkeys|itervalues|raw_input|unicode"
     r"|xrange|unichr|viewitems|viewkeys|viewvalues|StandardError|izip|imap|ifilter"
+    r"|string\.(atof|atoi|atol|find|rfind|join|lower|replace|split|strip|upper)"
     r"|Queue|ConfigParser|cPickle|StringIO|urllib2|Tkinter|tkMessageBox|thread|commands)\b"
     r"|(?<!\.)\b(long|reduce|reload)\s*\(|\.next\(\)"
 )
@@ -55,18 +56,20 @@ def to_code(source: bytes, filename: str) -> CodeType:
         SyntaxError: it is Python in neither version; of the version that it looks like.
         MissingExtraError: it is Python 2, and what converts it is not installed.
     """
+    code: CodeType = compile(to_tree(source, filename), filename, "exec", dont_inherit=True)
+    return code
+
+
+def to_tree(source: bytes, filename: str) -> ast.Module:
+    """Parse a source; as `to_code`."""
     text = read(source)
     try:
         tree = ast.parse(text, filename)
     except SyntaxError as error:
-        tree = _convert(_straight(text), filename, error)
-    else:
-        if _GONE.search(text):
-            converted = convert(text, _NAMES)
-            if converted != text:
-                tree = _parse_as(text, converted, filename)
-    code: CodeType = compile(tree, filename, "exec", dont_inherit=True)
-    return code
+        return _convert(_straight(text), filename, error)
+    if _GONE.search(text):
+        return _parse_as(text, convert(text, _NAMES), filename)
+    return tree
 
 
 def read(source: bytes) -> str:
@@ -141,6 +144,8 @@ def _tool(names: tuple[str, ...] | None) -> tuple[Any, type[Exception]]:
 def _parse_as(text: str, converted: str, filename: str) -> ast.Module:
     """Parse the converted source, with the lines of the original in every node."""
     tree = ast.parse(converted, filename)
+    if "string" in text:
+        tree = _StringFunctions().visit(tree)
     before, after = text.splitlines(), converted.splitlines()
     if len(before) != len(after):
         lines = _line_map(before, after)
@@ -151,6 +156,35 @@ def _parse_as(text: str, converted: str, filename: str) -> ast.Module:
                 if getattr(place, "end_lineno", None):
                     place.end_lineno = max(lines[place.end_lineno], place.lineno)
     return tree
+
+
+class _StringFunctions(ast.NodeTransformer):
+    """Calls methods of text in place of the functions that the module `string` had."""
+
+    _METHODS = frozenset({
+        *("capitalize", "center", "count", "expandtabs", "find", "index", "ljust", "lower"),
+        *("lstrip", "replace", "rfind", "rindex", "rjust", "rstrip", "split", "strip"),
+        *("swapcase", "translate", "upper", "zfill"),
+    })  # fmt: skip
+    _CONVERSIONS: ClassVar = {"atof": "float", "atoi": "int", "atol": "int"}
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        self.generic_visit(node)
+        function: Any = node.func
+        if not (isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name)):
+            return node
+        if function.value.id != "string" or not node.args:
+            return node
+        if function.attr in self._METHODS:
+            function.value, *node.args = node.args
+        elif function.attr in self._CONVERSIONS:
+            name = ast.Name(self._CONVERSIONS[function.attr], ast.Load())
+            node.func = ast.copy_location(name, function)
+        elif function.attr in {"join", "joinfields"}:
+            space = ast.copy_location(ast.Constant(" "), function)
+            function.value = node.args[1] if len(node.args) > 1 else space
+            function.attr, node.args = "join", node.args[:1]
+        return node
 
 
 def _line_map(before: list[str], after: list[str]) -> dict[int, int]:

@@ -6,9 +6,12 @@ explored; they do nothing.
 
 from __future__ import annotations
 
+import ast
+import builtins
 import sys
 import types
 from dis import opname
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.interfaces import (
@@ -17,6 +20,7 @@ from actionlib_core.interfaces import (
     define_message,
     define_service,
 )
+from smachpy.ros1.python2 import to_tree
 from smachpy.ros1.session import session
 
 if TYPE_CHECKING:
@@ -84,6 +88,9 @@ class Anything:
     def __repr__(self) -> str:
         return f"<stand-in {self._stub_name}>"
 
+    def __str__(self) -> str:
+        return str(self._stub_name.rpartition(".")[2])
+
     def __float__(self) -> float:
         return 0.0
 
@@ -107,6 +114,29 @@ class Anything:
         return (Anything,)
 
 
+def unbound_names(frame: FrameType | None) -> list[str]:
+    """Return the names that the importing file reads and nothing in it binds."""
+    while frame is not None and "importlib" in frame.f_code.co_filename:
+        frame = frame.f_back
+    if frame is None:
+        return []
+    try:
+        tree = to_tree(Path(frame.f_code.co_filename).read_bytes(), frame.f_code.co_filename)
+    except (OSError, SyntaxError):
+        return []
+    read = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
+            read.discard(node.id)
+        elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+            read.discard(node.name)
+        elif isinstance(node, ast.arg):
+            read.discard(node.arg)
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            read -= {(name.asname or name.name).partition(".")[0] for name in node.names}
+    return sorted(read - set(frame.f_globals) - set(dir(builtins)))
+
+
 def _wanted_items(frame: FrameType) -> int:
     """Return how many values the code unpacks from a stand-in; 0 when it loops over it."""
     code = frame.f_code.co_code
@@ -116,8 +146,9 @@ def _wanted_items(frame: FrameType) -> int:
 
 
 def _number(name: str) -> Callable[..., Any]:
-    def operate(self: Anything, *_others: Any) -> Any:
-        del self
+    def operate(self: Anything, *others: Any) -> Any:
+        if others and isinstance(others[0], str | list | tuple):
+            return others[0] if name != "mod" else str(self)
         return 0.0
 
     operate.__name__ = name
@@ -141,9 +172,10 @@ class StubModule(types.ModuleType):
         super().__init__(name, "A stand-in for a module that is missing.")
         self.__path__: list[str] = []
         self.__file__ = None
-        self.__all__: list[str] = []
 
     def __getattr__(self, name: str) -> Any:
+        if name == "__all__":
+            return unbound_names(sys._getframe(1))  # noqa: SLF001  who says `import *`
         if name.startswith("__") and name.endswith("__"):
             raise AttributeError(name)
         value = stand_in_class(name) if name[:1].isupper() else Anything(name)
