@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from actionlib_core.ros1 import Ros1Bridge
 
 EXIT_ENDED = 1
-MASTER_S = 5.0  # so long a master may take before it is said that it is waited for
 
 
 def register(subparsers: Any) -> None:
@@ -88,7 +87,7 @@ def _run(args: argparse.Namespace) -> int:
         )
         with bridge:
             forget = ending.on_shutdown(bridge.close)
-            if bridge.wait_for_master(MASTER_S):
+            if bridge.wait_for_master():
                 print(_ready(bridge, args.namespace), flush=True)
             bridge.wait()
             forget()

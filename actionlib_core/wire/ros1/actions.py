@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import logging
 import threading
 from functools import partial
 from typing import TYPE_CHECKING
 
-from actionlib_core.exceptions import ActionlibError, Ros1Error
+from actionlib_core.exceptions import ActionlibError, Ros1Error, TransportError
 from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from actionlib_core.wire.action_messages import (
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("actionlib_core")
 
 OVERTAKEN_S = 0.05
+STATUS_S = 0.005  # changes within so long are one list, and leave the way to a result that follows
 ACKNOWLEDGE_S = 5.0  # results: clients in ROS 1 take a goal that is no longer listed for lost
 GOAL_ID = Typed(GoalID._type, GoalID._md5sum)
 STATUS_ARRAY = Typed(GoalStatusArray._type, GoalStatusArray._md5sum)
@@ -318,6 +320,7 @@ class _Shown:
         self._types = parts
         self._to_server = goals, cancels
         self._lock = threading.Lock()
+        self._latest: bytes | None = None  # status list that is about to be sent
         self._goals = GoalsOfServer()
         keys = action_keys(self._name)
         transport = sides.node.transport
@@ -347,9 +350,18 @@ class _Shown:
         """Take a status list; an idle server's is not passed on, again and again."""
         entries = unpack_statuses(payload)
         with self._lock:
-            news = self._goals.on_statuses(entries)
-        if news:
-            self._status.put(payload)
+            if not self._goals.on_statuses(entries):
+                return
+            waits, self._latest = self._latest, payload
+        if waits is None:
+            self._clock.call_later(STATUS_S, self._send_status)
+
+    def _send_status(self) -> None:
+        with self._lock:
+            payload, self._latest = self._latest, None
+        if payload is not None:
+            with contextlib.suppress(TransportError):  # hidden meanwhile
+                self._status.put(payload)
 
     def on_feedback(self, payload: bytes) -> None:
         """Take feedback."""

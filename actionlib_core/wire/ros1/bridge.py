@@ -7,6 +7,7 @@ import os
 import threading
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from actionlib_core.clock._serial import report_thread_exception
 from actionlib_core.exceptions import ActionlibError, Ros1Error
 from actionlib_core.shutdown import current_shutdown
 from actionlib_core.wire.presence import parse_token, token_pattern
@@ -91,6 +92,7 @@ class Ros1Bridge:
         self._changed = node.clock.event("a change on the bridge's networks")
         self._looked = node.clock.event("the bridge's first look at the master")
         self._over = node.clock.event("the end of the bridge")
+        self._answered = False
         self._is_there = True
         self._closing = False
         self._forget = current_shutdown().at_exit(self.close)
@@ -112,12 +114,13 @@ class Ros1Bridge:
         """Why the bridge has ended by itself; "" while it has not."""
         return self._ros.ended
 
-    def wait_for_master(self, timeout: float) -> bool:
+    def wait_for_master(self, timeout: float | None = None) -> bool:
         """Wait until the master has answered once; return whether it has.
 
-        Blocks: `timeout` [s] at most.
+        Blocks: `timeout` [s] at most; None: until then, or until the bridge is closed.
         """
-        return self._looked.wait(timeout)
+        self._looked.wait(timeout)
+        return self._answered
 
     def wait(self, timeout: float | None = None) -> bool:
         """Wait until the bridge has ended, by itself or closed; return whether it has.
@@ -155,6 +158,7 @@ class Ros1Bridge:
             self._closing = True
         self._forget()
         self._changed.set()
+        self._looked.set()
         self._task.join(CLOSE_S)
         for part in self._parts:
             part.close()
@@ -233,6 +237,8 @@ class Ros1Bridge:
                 self._look(state, types)
             except ActionlibError as error:  # our own network has been left
                 self._ros.report("bridge", error)
+            except Exception:  # noqa: BLE001  a border: reported, and looked at again
+                report_thread_exception()
             self._changed.wait(LOOK_S)
         if self.ended:
             log.error("ROS 1 bridge %s: %s", self.name, self.ended)
@@ -246,6 +252,7 @@ class Ros1Bridge:
             if not self._is_there:
                 log.warning("ROS 1 bridge %s: the master answers again", self.name)
             self._ros.forget_report("master")
+            self._answered = True
             self._looked.set()
         self._is_there = error is None
 

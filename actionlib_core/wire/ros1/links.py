@@ -41,6 +41,7 @@ CONNECT_S = 3.0  # longest wait for a connection
 HEADER_S = 5.0  # longest wait for the other side's connection header
 BUFFER = 16 << 20  # bytes that wait for a subscriber; beyond, the oldest messages are dropped
 FULL_S = 0.1
+MOST_CONNECTIONS = 2000  # each has a thread
 READ_SIZE = 1 << 16
 LARGEST_READ = 1 << 20
 # A peer whose computer has gone is noticed after 11 s: 5 s of silence, then three questions.
@@ -319,7 +320,15 @@ class Listener:
                     self._clock.sleep(FULL_S)
                 continue
             with self._lock:
-                self._open.add(sock)
+                full = len(self._open) >= MOST_CONNECTIONS
+                if not full:
+                    self._open.add(sock)
+            if full:
+                log.error(
+                    "%s: %s: refused, as there are %d others", self._name, address, MOST_CONNECTIONS
+                )
+                sock.close()
+                continue
             if self._is_closed():
                 sock.shutdown(socket.SHUT_RDWR)
             self._clock.spawn(lambda s=sock, a=address: self._run(s, a), name=self._name)  # type: ignore[misc]  # mypy: lambda defaults

@@ -16,6 +16,7 @@ import socket
 import threading
 from typing import TYPE_CHECKING, Any, Protocol
 
+from actionlib_core.clock._serial import report_thread_exception
 from actionlib_core.exceptions import ActionlibError, Ros1Error
 from actionlib_core.wire.ros1.answers import (
     Names,
@@ -156,6 +157,8 @@ class _Link:
                 pause = RETRY_FIRST_S
             except ActionlibError as error:
                 self._node.report(about, error)
+            except Exception:  # noqa: BLE001  a border: reported, and the publisher is tried again
+                report_thread_exception()
             if self._subscription.leave(self):
                 break
             self.wake.wait(pause)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import threading
 from functools import partial
 from typing import TYPE_CHECKING
 
-from actionlib_core.exceptions import Ros1Error, TypeMismatchError
+from actionlib_core.exceptions import Ros1Error, ServiceBusyError, TypeMismatchError
 from actionlib_core.wire.encoding import check_encoding
 from actionlib_core.wire.presence import Kind
 from actionlib_core.wire.ros1.node import RETRY_FIRST_S, RETRY_LONGEST_S
@@ -20,6 +21,10 @@ if TYPE_CHECKING:
     from actionlib_core.wire.ros1.links import Connection
     from actionlib_core.wire.ros1.node import Offer
     from actionlib_core.wire.ros1.sides import Sides
+
+
+CALLS_AT_ONCE = 500  # of one service; each has a thread, as in our own services
+_BUSY = f"{CALLS_AT_ONCE} calls are under way; expected fewer. Try ending calls sooner."
 
 
 class ServiceBridge:
@@ -82,6 +87,8 @@ class _FromRos:
         self._timeout = timeout
         self._closed = sides.node.clock.event(f"the end of the bridge of {name}")
         self._connection: Connection | None = None
+        self._lock = threading.Lock()
+        self._calls = 0
         sides.ros.spawn(self._follow, f"ros1-service{name}")
 
     def close(self) -> None:
@@ -124,6 +131,12 @@ class _FromRos:
         except TypeMismatchError as error:
             _refuse(query, error)
             return
+        with self._lock:
+            busy = self._calls >= CALLS_AT_ONCE
+            self._calls += not busy
+        if busy:
+            _refuse(query, ServiceBusyError(self._key, _BUSY))
+            return
         call = partial(self._call, typed, query)
         self._sides.ros.spawn(call, f"ros1-call{self._name}")
 
@@ -135,6 +148,9 @@ class _FromRos:
             query.finish()
         except Ros1Error as error:
             _refuse(query, error)
+        finally:
+            with self._lock:
+                self._calls -= 1
 
 
 def _refuse(query: Query, error: Exception) -> None:

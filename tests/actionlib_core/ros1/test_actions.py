@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import signal
+import subprocess
+import sys
 
 import pytest
 
@@ -128,3 +130,52 @@ def test_our_server_comes_goes_and_its_goals_are_lost_for_a_client_in_ros(ros, b
     while client.ask("server?") != "True":
         pass
     assert client.ask("4") == f"{GoalStatus.SUCCEEDED} 8 done here"
+
+
+SERVER = """
+import sys
+from actionlib_core import SimpleActionServer
+from actionlib_core.interfaces.actionlib.msg import TestAction, TestFeedback
+
+def execute(goal):
+    server.publish_feedback(TestFeedback(goal.goal))
+    server.wait_preempt(60.0)
+
+server = SimpleActionServer("killed", TestAction, execute)
+print("ready", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_our_killed_server_loses_the_goals_of_clients_in_ros(ros, bridge):
+    with subprocess.Popen(
+        [sys.executable, "-c", SERVER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as server:
+        try:
+            assert server.stdout.readline() == "ready\n"
+            bridge(used=True)
+            client = ros.start("action_client", "killed")
+            assert client.ask("-5") == "sent"
+            assert client.ask("begun?") == "begun"
+        finally:
+            server.kill()
+    assert client.ask("wait").startswith(f"{GoalStatus.LOST} None")
+
+
+def test_a_killed_client_in_ros_has_its_goals_cancelled_where_that_is_asked_for(ros, bridge, node):
+    begun, ended = node.clock.event(), node.clock.event()
+
+    def execute(goal):
+        begun.set()
+        if server.wait_preempt(WAIT_S):
+            ended.set()
+        server.set_preempted()
+
+    server = SimpleActionServer("caring", msg.TestAction, execute, on_client_lost="cancel")
+    bridge(actions=["caring"])
+    client = ros.start("action_client", "caring")
+    assert client.ask("-5") == "sent"
+    assert begun.wait(WAIT_S)
+    client.send_signal(signal.SIGKILL)
+    assert ended.wait(WAIT_S)
+    server.stop()

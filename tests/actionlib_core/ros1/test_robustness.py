@@ -52,6 +52,7 @@ def test_a_restarted_master_hears_of_the_bridge_again(own_ros, bridge, node):
     topics.ask("advertise /after plain")
     subscriber, heard = listen(node, "after")
     assert subscriber.wait_for_connections(1, WAIT_S)
+    assert topics.ask("connections /after") == "1"  # rospy counts it after it has said so
     topics.ask("publish /after text")
     assert heard.wait(WAIT_S)
     assert "/after" in own_ros.names_of(made.name)

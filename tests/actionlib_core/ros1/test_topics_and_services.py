@@ -45,6 +45,7 @@ def test_a_topic_of_ros_arrives_here_in_order(ros, bridge, node):
     assert heard.subscriber.wait_for_connections(1, WAIT_S)
     (end,) = (e for e in list_endpoints(node.transport) if e.kind is Kind.PUBLISHER)
     assert (end.node, end.type, end.md5) == ("robot_1/talker", String._type, String._md5sum)
+    assert topics.ask("connections /chatter") == "1"  # rospy counts it after it has said so
     for number in range(100):
         topics.ask(f"publish /chatter {number}")
     assert heard.wait() == [str(number) for number in range(100)]

@@ -1,15 +1,17 @@
-"""An action client of ROS 1: `NAME`. Each line of standard input is a goal, or `cancel`, or `wait`.
+"""An action client of ROS 1: `NAME`. Each line of standard input is a goal, or a command.
 
 Answers each goal that has ended with `STATE RESULT TEXT`, but one below 0 only when `wait` is said.
 """
 
 import sys
+import threading
 
 import actionlib
 import rospy
 from actionlib.msg import TestAction, TestGoal
 
 rospy.init_node("ros_client")
+begun = threading.Event()
 client = actionlib.SimpleActionClient(sys.argv[1], TestAction)
 print("ready" if client.wait_for_server(rospy.Duration(30)) else "no server", flush=True)
 for line in sys.stdin:
@@ -19,8 +21,11 @@ for line in sys.stdin:
     elif word == "server?":
         print(client.wait_for_server(rospy.Duration(0.5)), flush=True)
         continue
+    elif word == "begun?":
+        print("begun" if begun.wait(30) else "not begun", flush=True)
+        continue
     elif word != "wait":
-        client.send_goal(TestGoal(int(word)))
+        client.send_goal(TestGoal(int(word)), active_cb=begun.set)
         if int(word) < 0:
             print("sent", flush=True)
             continue

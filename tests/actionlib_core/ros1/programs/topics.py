@@ -36,7 +36,7 @@ for line in sys.stdin:
         subscribers[name] = rospy.Subscriber(name, String, hear, name)
     elif word == "connections":
         (name,) = arguments
-        end = subscribers.get(name) or publishers.get(name)
+        end = publishers[name]
         deadline = rospy.get_time() + 20
         while not end.get_num_connections() and rospy.get_time() < deadline:
             rospy.sleep(0.01)

@@ -1,0 +1,203 @@
+"""Goals over the bridge to ROS 1, beside those from ROS 1 to ROS 1, in one run.
+
+    .ci/ros1; python benchmarks/ros1_bridge.py [--json] [--goals 200]
+
+Client and server are on rospy's actionlib or on ours, each in a process of its own, the bridge in a
+third. The four pairs take turns, so that a busy computer slows all; look at the ratios. A goal is
+accepted and ended in the server's callback; the client waits 10 ms between two goals.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import socket
+import statistics
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+ROS_PYTHON = "/usr/bin/python3"
+BATCH = 50
+PAUSE_S = 0.01
+
+ROS_SERVER = """
+import actionlib, rospy
+from actionlib.msg import TestAction, TestResult
+rospy.init_node("bench_ros_server")
+
+def on_goal(handle):
+    handle.set_accepted()
+    handle.set_succeeded(TestResult(handle.get_goal().goal))
+
+server = actionlib.ActionServer("in_ros", TestAction, on_goal, auto_start=False)
+server.start()
+print("ready", flush=True)
+rospy.spin()
+"""
+
+ROS_CLIENT = """
+import json, sys, threading, time
+import actionlib, rospy
+from actionlib.msg import TestAction, TestGoal
+rospy.init_node("bench_ros_client")
+clients = {}
+print("ready", flush=True)
+for line in sys.stdin:
+    name, count = line.split()
+    if name not in clients:
+        clients[name] = actionlib.ActionClient(name, TestAction)
+        clients[name].wait_for_server()
+    times = []
+    for number in range(int(count)):
+        time.sleep(0.01)
+        done = threading.Event()
+        start = time.perf_counter()
+        handle = clients[name].send_goal(
+            TestGoal(number),
+            lambda handle: handle.get_comm_state() == actionlib.CommState.DONE and done.set(),
+        )
+        assert done.wait(10)
+        times.append(time.perf_counter() - start)
+    print(json.dumps(times), flush=True)
+"""
+
+
+def serve() -> None:
+    """Run our server until standard input ends."""
+    from actionlib_core import ActionServer
+    from actionlib_core.interfaces.actionlib.msg import TestAction, TestResult
+
+    def on_goal(handle) -> None:
+        handle.set_accepted()
+        handle.set_succeeded(TestResult(handle.get_goal().goal))
+
+    server = ActionServer("here", TestAction, on_goal, auto_start=False)
+    server.start()
+    print("ready", flush=True)
+    sys.stdin.read()
+
+
+def send(client, count: int) -> list[float]:
+    """Send goals one after another; return how long each took [s]."""
+    from actionlib_core import CommState
+    from actionlib_core.interfaces.actionlib.msg import TestGoal
+
+    times = []
+    for number in range(count):
+        time.sleep(PAUSE_S)
+        done = threading.Event()
+
+        def on_change(handle, done=done) -> None:
+            if handle.get_comm_state() == CommState.DONE:
+                done.set()
+
+        start = time.perf_counter()
+        handle = client.send_goal(TestGoal(number), on_change)
+        assert done.wait(10)
+        times.append(time.perf_counter() - start)
+        del handle
+    return times
+
+
+class Processes:
+    """The children of a run."""
+
+    def __init__(self) -> None:
+        with socket.create_server(("127.0.0.1", 0)) as probe:
+            port = probe.getsockname()[1]
+        self.master = f"http://127.0.0.1:{port}"
+        self._environment = {
+            **{k: v for k, v in os.environ.items() if not k.startswith("PYTHON")},
+            "ROS_MASTER_URI": self.master,
+            "ROS_IP": "127.0.0.1",
+        }
+        self._children: list[subprocess.Popen] = []
+        self.start(["rosmaster", "--core", "-p", str(port)], ready=False)
+
+    def start(self, command: list[str], *, ready: bool = True) -> subprocess.Popen:
+        child = subprocess.Popen(
+            command,
+            env=self._environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE if ready else subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+        self._children.append(child)
+        if ready:
+            assert "ready" in child.stdout.readline()
+        return child
+
+    def end(self) -> None:
+        for child in reversed(self._children):
+            child.terminate()
+        for child in self._children:
+            child.communicate()
+
+
+def measure(goals: int) -> dict[str, list[float]]:
+    from actionlib_core import ActionClient
+    from actionlib_core.interfaces.actionlib.msg import TestAction
+
+    processes = Processes()
+    try:
+        smachpy = str(Path(sys.executable).parent / "smachpy")
+        names = ["--action", "in_ros", "--action", "here"]
+        processes.start([smachpy, "bridge", "ros1", "--master", processes.master, *names])
+        processes.start([ROS_PYTHON, "-c", ROS_SERVER])
+        processes.start([sys.executable, __file__, "--serve"])
+        in_ros = processes.start([ROS_PYTHON, "-c", ROS_CLIENT])
+        ours = {name: ActionClient(name, TestAction) for name in ("in_ros", "here")}
+        for client in ours.values():
+            assert client.wait_for_server(20.0)
+
+        def from_ros(name: str, count: int) -> list[float]:
+            in_ros.stdin.write(f"{name} {count}\n")
+            in_ros.stdin.flush()
+            return json.loads(in_ros.stdout.readline())
+
+        pairs = {
+            "ROS 1 to ROS 1": lambda count: from_ros("in_ros", count),
+            "ours to ROS 1": lambda count: send(ours["in_ros"], count),
+            "ROS 1 to ours": lambda count: from_ros("here", count),
+            "ours to ours": lambda count: send(ours["here"], count),
+        }
+        times: dict[str, list[float]] = {name: [] for name in pairs}
+        for exchange in pairs.values():
+            exchange(BATCH)
+        while len(times["ours to ours"]) < goals:
+            for name, exchange in pairs.items():
+                times[name] += exchange(BATCH)
+        return times
+    finally:
+        processes.end()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--goals", type=int, default=200)
+    parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
+    args = parser.parse_args()
+    if args.serve:
+        serve()
+        return
+    figures = {}
+    for name, times in measure(args.goals).items():
+        cuts = statistics.quantiles(times, n=100)
+        figures[name] = {"p50_ms": cuts[49] * 1e3, "p99_ms": cuts[98] * 1e3}
+    if args.json:
+        print(json.dumps(figures))
+        return
+    base = figures["ROS 1 to ROS 1"]["p50_ms"]
+    for name, each in figures.items():
+        p50, p99 = each["p50_ms"], each["p99_ms"]
+        print(f"{name:16} p50 {p50:6.2f} ms  p99 {p99:7.2f} ms  {p50 / base:5.2f} x ROS 1")
+
+
+if __name__ == "__main__":
+    main()
