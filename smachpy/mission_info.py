@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar, overload
 
 from smachpy.machines.problems import Problems
 
@@ -34,19 +34,36 @@ class MissionInfo:
     robots: bool | str = False
 
 
+@overload
+def mission(function: F, /) -> F: ...
+
+
+@overload
 def mission(
     *,
     serves: Iterable[str] = (),
     world: str | os.PathLike[str] | None = None,
     real_time: str = "",
     robots: bool | str = False,
-) -> Callable[[F], F]:
+) -> Callable[[F], F]: ...
+
+
+def mission(
+    function: F | None = None,
+    /,
+    *,
+    serves: Iterable[str] = (),
+    world: str | os.PathLike[str] | None = None,
+    real_time: str = "",
+    robots: bool | str = False,
+) -> F | Callable[[F], F]:
     """Tell `smachpy run` what the mission that a function makes needs.
 
         @smachpy.mission(serves=["turn"], world="doors.yaml")
         def deliver(to: str = "lab") -> StateMachine: ...
 
     Args:
+        function: The function, where nothing else is told.
         serves: Names of actions that the mission serves itself: nobody waits for them before it
             starts.
         world: The world file to simulate when the run starts the robot and names no other.
@@ -55,7 +72,8 @@ def mission(
             with `--start-robot` does. Or the name of the function's parameter that says so.
 
     Returns:
-        A decorator, which returns the function itself.
+        A decorator, which returns the function itself; without arguments, as `@smachpy.mission`,
+        the function.
 
     Raises:
         InvalidStateError: `serves` is no list of names.
@@ -69,7 +87,7 @@ def mission(
         setattr(function, _ATTRIBUTE, info)
         return function
 
-    return mark
+    return mark if function is None else mark(function)
 
 
 def mission_info(thing: object) -> MissionInfo:

@@ -37,3 +37,12 @@ def test_the_imported_decorator_is_not_taken_for_the_mission_of_a_file(tmp_path,
     file = tmp_path / "fetch_with_decorator.py"
     file.write_text(f"{line}\nimport smachpy\nsm = smachpy.StateMachine(['done'])\n")
     assert isinstance(load_target(str(file)).build(), smachpy.StateMachine)
+
+
+def test_the_decorator_needs_no_arguments():
+    @smachpy.mission
+    def patrol(rounds=1):
+        return rounds
+
+    assert patrol(2) == 2
+    assert mission_info(patrol) == MissionInfo()
