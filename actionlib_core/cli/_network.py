@@ -8,6 +8,7 @@ from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from actionlib_core.cli import UsageError
+from actionlib_core.cli._ros2 import class_of, is_ros2, merged, typed, watching
 from actionlib_core.exceptions import InterfaceError
 from actionlib_core.output import tell
 from actionlib_core.suggest import did_you_mean
@@ -88,9 +89,8 @@ def list_names(node: Node, kinds: Collection[Kind]) -> dict[str, list[Endpoint]]
     Blocks: until the network has answered, a second at most.
     """
     found: dict[str, list[Endpoint]] = {}
-    for end in list_endpoints(node.transport):
-        if end.kind in kinds:
-            found.setdefault(end.name, []).append(end)
+    for end in merged(list_endpoints(node.transport), node, kinds):
+        found.setdefault(end.name, []).append(end)
     return dict(sorted(found.items()))
 
 
@@ -104,21 +104,27 @@ def find_by_name(
     late: list[Endpoint] = []
     came = node.clock.event()
 
-    def on_presence(presence: Presence) -> None:
-        end = parse_token(presence.key)
-        if end is not None and presence.alive and end.kind in kinds:
+    def on_end(end: Endpoint) -> None:
+        if end.name == full and end.kind in kinds:
             late.append(end)
             came.set()
 
+    def on_presence(presence: Presence) -> None:
+        end = parse_token(presence.key)
+        if end is not None and presence.alive:
+            on_end(end)
+
     def there() -> list[Endpoint]:
-        return [end for end in list_endpoints(node.transport, name=full) if end.kind in kinds]
+        ends = merged(list_endpoints(node.transport, name=full), node, kinds)
+        return [end for end in ends if end.name == full]
 
     found = there()
     if found:
         return found
     watch = node.transport.watch_alive(token_pattern(None, full), on_presence)
     try:
-        came.wait(timeout)
+        with watching(node, on_end):
+            came.wait(timeout)
     finally:
         watch.close()
     return there() or late
@@ -170,6 +176,8 @@ def which_there_are(wanted: str, names: Iterable[str]) -> str:
 
 def show_type(kind: Kind, type_name: str) -> str:
     """Return a type as ROS tools show it: `pkg/msg/Name`, `pkg/action/Name`."""
+    if is_ros2(type_name):
+        return type_name
     package, _, name = type_name.partition("/")
     section = _WORDS[kind][1]
     return f"{package}/{section}/{name.removesuffix('Action') if section == 'action' else name}"
@@ -228,15 +236,36 @@ def known(get: Callable[[str], T], name: str) -> T:
         return get(name)
 
 
-def action_class(type_name: str) -> Any:
-    """Return the class of an action.
+def class_of_end(node: Node, end: Endpoint) -> Any:
+    """Return the class of the type of an end, of ROS 1 or of ROS 2.
+
+    Raises:
+        InterfaceError: its definition is not known here.
+        UsageError: a ROS 2 robot has another definition of it.
+    """
+    if is_ros2(end.type):
+        load_packages()
+        return class_of(node, end)
+    from actionlib_core.interfaces import get_action, get_message, get_service
+
+    get: dict[str, Callable[[str], Any]] = {
+        "action": get_action,
+        "msg": get_message,
+        "srv": get_service,
+    }
+    return known(get[_WORDS[end.kind][1]], end.type)
+
+
+def typed_class(node: Node, kind: Literal["action", "message", "service"], name: str) -> Any:
+    """Return the class of a type that was typed: of ROS 2 where a robot of it is in use.
 
     Raises:
         InterfaceError: its definition is not known here.
     """
-    from actionlib_core.interfaces import get_action
+    from actionlib_core import interfaces
 
-    return known(get_action, type_name)
+    found = typed(node, kind, name)
+    return found if found is not None else known(getattr(interfaces, f"get_{kind}"), name)
 
 
 # -- goals -----------------------------------------------------------------------------------------

@@ -9,11 +9,11 @@ from actionlib_core.cli._command import add_command
 from actionlib_core.cli._listing import add_list, add_type
 from actionlib_core.cli._network import (
     ACTION_KINDS,
-    action_class,
     find_ends,
     list_names,
     open_node,
     show_type,
+    typed_class,
     types_of,
 )
 from actionlib_core.wire.presence import Kind
@@ -60,8 +60,8 @@ def _info(args: argparse.Namespace) -> int:
 
 
 def _find(args: argparse.Namespace) -> int:
-    wanted = show_type(Kind.ACTION_SERVER, action_class(args.type)._type)
     with open_node(args) as node:
+        wanted = show_type(Kind.ACTION_SERVER, typed_class(node, "action", args.type)._type)
         actions = list_names(node, ACTION_KINDS)
     names = [f"/{name}" for name, ends in actions.items() if wanted in types_of(ends)]
     if args.json:

@@ -10,12 +10,15 @@ from typing import TYPE_CHECKING, Any
 from actionlib_core.cli import EXIT_FAILED
 from actionlib_core.cli._command import add_command, count, print_json, print_message, seconds
 from actionlib_core.cli._feed import Feed
-from actionlib_core.cli._network import action_class, find_server, open_node
+from actionlib_core.cli._network import class_of_end, find_server, open_node
+from actionlib_core.cli._ros2 import RemoteAction, is_ros2
 
 if TYPE_CHECKING:
     import argparse
 
-    from actionlib_core.transport import Sample
+    from actionlib_core.node import Node
+    from actionlib_core.transport import Closable, Sample
+    from actionlib_core.wire.presence import Endpoint
 
 
 def register(subparsers: Any) -> None:
@@ -35,7 +38,9 @@ def run(args: argparse.Namespace) -> int:
 
     with open_node(args, settle=0.0) as node:
         server = find_server(node, args.name, args.timeout)
-        example = action_class(server.type)()
+        if is_ros2(server.type):
+            return _echo_ros2(node, server, args)
+        example = class_of_end(node, server)()
         keys = action_keys(server.name)
         classes = {
             keys.goal: type(example.action_goal),
@@ -50,16 +55,36 @@ def run(args: argparse.Namespace) -> int:
             node.transport.subscribe(key, partial(_put, feed, message_class))
             for key, message_class in classes.items()
         ]
-        deadline = None if args.timeout is None else node.clock.now() + args.timeout
-        limit = 1 if args.once else args.count
-        try:
-            for _ in itertools.count() if limit is None else range(limit):
-                _show(feed.next(deadline), as_json=args.json)
-        except TimeoutError:
-            return 0 if limit is None else _too_few(args)
-        finally:
-            for subscription in subscriptions:
-                subscription.close()
+        return _show_all(node, feed, subscriptions, args)
+
+
+def _echo_ros2(node: Node, server: Endpoint, args: argparse.Namespace) -> int:
+    """Print feedback, and statuses: goals and results are between a client and its server there."""
+    action, feed = RemoteAction(node, server), Feed(node.clock)
+
+    def subscribe(part: str) -> Closable:
+        message_class = getattr(action.parts, part).message
+        return action.subscribe(
+            part, lambda sample: feed.put((part, message_class, sample.payload))
+        )
+
+    subscriptions = [subscribe(part) for part in ("feedback", "status")[: 1 + args.status]]
+    return _show_all(node, feed, subscriptions, args)
+
+
+def _show_all(
+    node: Node, feed: Feed, subscriptions: list[Closable], args: argparse.Namespace
+) -> int:
+    deadline = None if args.timeout is None else node.clock.now() + args.timeout
+    limit = 1 if args.once else args.count
+    try:
+        for _ in itertools.count() if limit is None else range(limit):
+            _show(feed.next(deadline), as_json=args.json)
+    except TimeoutError:
+        return 0 if limit is None else _too_few(args)
+    finally:
+        for subscription in subscriptions:
+            subscription.close()
     return 0
 
 

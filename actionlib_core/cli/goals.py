@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.cli import EXIT_FAILED, UsageError
 from actionlib_core.cli._command import add_command, print_message
-from actionlib_core.cli._network import action_class, ask, find_server, open_node
+from actionlib_core.cli._network import ask, class_of_end, find_server, open_node
+from actionlib_core.cli._ros2 import RemoteAction, is_ros2
 
 if TYPE_CHECKING:
     import argparse
 
     from actionlib_core.goal.ports import StatusEntry
     from actionlib_core.node import Node
+    from actionlib_core.wire.presence import Endpoint
+    from actionlib_core.wire.ros2.action_messages import GoalState
 
 NS = 1_000_000_000
 
@@ -78,8 +81,9 @@ def _describe(entry: StatusEntry) -> dict[str, Any]:
 
 def _list(args: argparse.Namespace) -> int:
     with open_node(args) as node:
-        find_server(node, args.name)
-        goals = [_describe(entry) for entry in _goals(node, args.name)]
+        server = find_server(node, args.name)
+        entries = _ros2_goals(node, server) if is_ros2(server.type) else _goals(node, args.name)
+        goals = [_describe(entry) for entry in entries]
     if args.json:
         print(json.dumps(goals))
     elif args.count:
@@ -96,9 +100,14 @@ def _info(args: argparse.Namespace) -> int:
             "goal info: ID: got ''; expected a goal's id. Try 'actionlib goal list NAME'."
         )
     with open_node(args) as node:
-        spec = action_class(find_server(node, args.name).type)
-        entry, result = _status(node, args, spec)
-        goal = None if args.status_only or args.result_only else _goal(node, args, spec)
+        server = find_server(node, args.name)
+        goal = None  # which ROS 2 does not tell
+        if is_ros2(server.type):
+            entry, result = _ros2_status(node, server, args.id)
+        else:
+            spec = class_of_end(node, server)
+            entry, result = _status(node, args, spec)
+            goal = None if args.status_only or args.result_only else _goal(node, args, spec)
     if args.goal_only and goal is None:
         return _not_there(entry, "goal", args)
     if args.result_only and result is None:
@@ -174,7 +183,10 @@ def _cancel(args: argparse.Namespace) -> int:
     from actionlib_core.wire.encoding import encoding_of
 
     with open_node(args) as node:
-        name = find_server(node, args.name).name
+        server = find_server(node, args.name)
+        if is_ros2(server.type):
+            return _cancel_ros2(node, server, args, stamp_ns)
+        name = server.name
         goals = [entry for entry in _goals(node, f"/{name}") if entry.status not in TERMINAL]
         asked = [
             entry.id
@@ -216,3 +228,60 @@ def _stamp(text: str | None) -> int:
             f"cancel: --before: got {text!r}; expected seconds since the epoch, 1700000000.5 "
             "for example."
         ) from error
+
+
+# -- ROS 2 -----------------------------------------------------------------------------------------
+
+
+def _entry(state: GoalState) -> StatusEntry:
+    from actionlib_core.goal.ports import StatusEntry
+    from actionlib_core.wire.ros2.goal_states import to_status
+    from actionlib_core.wire.ros2.names import goal_id_text
+
+    status = to_status(state.code, was_active=True)
+    return StatusEntry(goal_id_text(state.uuid), state.stamp_ns, status, "")
+
+
+def _ros2_goals(node: Node, server: Endpoint) -> list[StatusEntry]:
+    return [_entry(state) for state in RemoteAction(node, server).states()]
+
+
+def _ros2_status(node: Node, server: Endpoint, goal_id: str) -> tuple[StatusEntry, Any]:
+    """Return the status of a goal and its result, None when it has none."""
+    from actionlib_core.goal.states import TERMINAL
+    from actionlib_core.wire.ros2.action_messages import GoalState
+    from actionlib_core.wire.ros2.names import goal_uuid
+
+    action, uuid = RemoteAction(node, server), goal_uuid(goal_id)
+    known = {state.uuid: state for state in action.states()}
+    state = known.get(uuid)
+    if state is not None and _entry(state).status not in TERMINAL:
+        return _entry(state)._replace(id=goal_id), None  # the result would be waited for
+    code, result = action.result(uuid)
+    stamp_ns = state.stamp_ns if state is not None else 0
+    entry = _entry(GoalState(uuid, stamp_ns, code))._replace(id=goal_id)
+    return entry, result if code else None
+
+
+def _cancel_ros2(node: Node, server: Endpoint, args: argparse.Namespace, stamp_ns: int) -> int:
+    from actionlib_core.wire.ros2.goal_states import CancelCode
+    from actionlib_core.wire.ros2.names import NO_GOAL, goal_id_text, goal_uuid
+
+    uuid = goal_uuid(args.id) if args.id else NO_GOAL
+    answer = RemoteAction(node, server).cancel(uuid, stamp_ns)
+    asked = [goal_id_text(goal) for goal, _ in answer.goals]
+    missed = bool(args.id) and uuid not in {goal for goal, _ in answer.goals}
+    if args.json:
+        print(json.dumps({"cancelled": asked}))
+        return EXIT_FAILED if missed else 0
+    for goal_id in asked:
+        print(f"Cancel requested for goal {goal_id}")
+    if missed:
+        why = {
+            CancelCode.UNKNOWN_GOAL: "the server does not know it",
+            CancelCode.GOAL_TERMINATED: "it has ended, or is canceling already",
+        }.get(CancelCode(answer.code), "the server refused to cancel it")
+        print(f"actionlib: cancel: goal {args.id}: {why}.", file=sys.stderr)
+    elif not asked:
+        print("No running goal is meant.")
+    return EXIT_FAILED if missed else 0

@@ -15,7 +15,7 @@ from actionlib_core.cli._command import (
     seconds,
     while_read,
 )
-from actionlib_core.cli._network import action_class, find_server, open_node
+from actionlib_core.cli._network import class_of_end, find_server, open_node, typed_class
 from actionlib_core.output import discard_output
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def _run(args: argparse.Namespace) -> int:
         print_progress(args, "Waiting for an action server to become available...")
         started = node.clock.now()
         server = find_server(node, args.name, args.timeout)
-        spec = action_class(type_name or server.type)
+        spec = typed_class(node, "action", type_name) if type_name else class_of_end(node, server)
         from actionlib_core.action.client import ActionClient
 
         client: ActionClient[Any] = ActionClient(args.name, spec, node=node)

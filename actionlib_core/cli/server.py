@@ -7,7 +7,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.cli._command import add_command, print_json, print_message, print_progress
-from actionlib_core.cli._network import action_class, open_node
+from actionlib_core.cli._network import open_node, typed_class
 from actionlib_core.exceptions import ActionlibError
 from actionlib_core.output import tell
 
@@ -40,8 +40,8 @@ def run(args: argparse.Namespace) -> int:
     """Serve until the input ends."""
     from actionlib_core.action.server import ActionServer
 
-    spec = action_class(args.type)
     with open_node(args) as node:
+        spec = typed_class(node, "action", args.type)
         operator = Operator(args)
         server = ActionServer(args.name, spec, operator.on_goal, operator.on_cancel, node=node)
         operator.types = server.types

@@ -12,10 +12,11 @@ from actionlib_core.cli._listing import add_list, add_type
 from actionlib_core.cli._network import (
     SERVICE_KINDS,
     SETTLE_S,
+    class_of_end,
     find_ends,
-    known,
     only_type,
     open_node,
+    typed_class,
     types_of,
 )
 from actionlib_core.exceptions import ServiceException
@@ -50,14 +51,16 @@ def register(subparsers: Any) -> None:
 
 
 def _call(args: argparse.Namespace) -> int:
-    from actionlib_core.interfaces import get_service
     from actionlib_core.pubsub.service_proxy import ServiceProxy
 
     type_name, text = _words(args)
     with open_node(args, settle=0.0 if type_name else SETTLE_S) as node:
-        if not type_name:
-            type_name = only_type(find_ends(node, args.name, SERVICE_KINDS), args.name)
-        service = known(get_service, type_name)
+        if type_name:
+            service = typed_class(node, "service", type_name)
+        else:
+            ends = find_ends(node, args.name, SERVICE_KINDS)
+            only_type(ends, args.name)
+            service = class_of_end(node, ends[0])
         request = service._request_class.from_yaml(text)
         proxy = ServiceProxy(args.name, service, timeout=args.timeout, node=node)
         print_progress(args, "waiting for service to become available...")

@@ -22,11 +22,12 @@ from actionlib_core.cli._filter import Filter
 from actionlib_core.cli._listing import add_list, add_type
 from actionlib_core.cli._network import (
     TOPIC_KINDS,
+    class_of_end,
     find_ends,
-    known,
     list_names,
     only_type,
     open_node,
+    typed_class,
     types_of,
 )
 from actionlib_core.wire.presence import Kind
@@ -151,15 +152,14 @@ def _info(args: argparse.Namespace) -> int:
 def _message_class(node: Node, args: argparse.Namespace) -> type[Message]:
     """Return the class of a topic's messages; one that is not known here may come with it."""
     from actionlib_core.exceptions import InterfaceError
-    from actionlib_core.interfaces import get_message
     from actionlib_core.wire.definitions import ask_definition, define
 
     if args.type:
-        return known(get_message, args.type)
+        return typed_class(node, "message", args.type)  # type: ignore[no-any-return] # a message
     ends = find_ends(node, args.name, TOPIC_KINDS)
     type_name = only_type(ends, args.name)
     try:
-        return known(get_message, type_name)
+        return class_of_end(node, ends[0])  # type: ignore[no-any-return] # as above
     except InterfaceError:
         text = ask_definition(node, type_name, ends[0].md5)
         if text is None:
@@ -209,16 +209,15 @@ def _nothing(args: argparse.Namespace) -> int:
 
 
 def _pub(args: argparse.Namespace) -> int:
-    from actionlib_core.interfaces import get_message
     from actionlib_core.pubsub.topic import Publisher
 
-    message_class = known(get_message, args.type)
     times = 1 if args.once else args.times
     wanted = args.wait_matching_subscriptions
     if wanted is None:
         wanted = 1 if times or args.stdin else 0
-    message = message_class.from_yaml(args.values)
     with open_node(args, settle=0.0) as node:
+        message_class = typed_class(node, "message", args.type)
+        message = message_class.from_yaml(args.values)
         publisher = Publisher(args.name, message_class, latch=args.latch, node=node)
         if publisher.get_num_connections() < wanted:
             print_progress(args, f"Waiting for at least {wanted} matching subscription(s)...")

@@ -44,6 +44,7 @@ __all__ = [
     "get_action",
     "get_message",
     "get_service",
+    "hash_of",
     "set_default_distro",
 ]
 
@@ -72,6 +73,15 @@ def get_action(name: str, distro: str | None = None) -> type[Ros2Action]:
     """Return an action class, with its `Goal`, `Result` and `Feedback`; as `get_message`."""
     found: type[Ros2Action] = ros2_registry(distro).action(name)
     return found
+
+
+def hash_of(name: str, distro: str | None = None) -> str:
+    """Return the type hash of a type as keys and tokens name it; see `distros_of`.
+
+    Raises:
+        InterfaceError: The distribution does not define it.
+    """
+    return ros2_registry(distro).hash(name)
 
 
 def distros_of(name: str, type_hash: str) -> list[str]:

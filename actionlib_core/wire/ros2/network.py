@@ -68,6 +68,14 @@ def name_there(network: Ros2, name: str) -> str:
     return f"{namespace}/{name}"
 
 
+def name_here(network: Ros2, name: str) -> str:
+    """Return what we call the full name `name` of a network; the inverse of `name_there`."""
+    robot, namespace = clean_namespace(network.robot), clean_namespace(network.namespace)
+    if namespace:
+        name = name.removeprefix(f"{namespace}/")
+    return f"{robot}/{name}" if robot else name
+
+
 class RosNetwork:
     """A network of ROS 2 as one node of ours uses it.
 
@@ -132,7 +140,11 @@ def ros_network(node: Node, name: str) -> RosNetwork:
 
     Blocks: the first time, until the network is joined: `Config.connect_timeout` at most.
     """
-    settings = choose_network(node.config.ros2, name)
+    return network_of(node, choose_network(node.config.ros2, name))
+
+
+def network_of(node: Node, settings: Ros2) -> RosNetwork:
+    """Return the network with these settings; raises and blocks as `ros_network`."""
     return node.shared(("ros2", settings), lambda: RosNetwork(node, settings))
 
 

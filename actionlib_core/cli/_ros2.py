@@ -1,0 +1,310 @@
+"""The names, types and goals of ROS 2 robots, for the commands: from tokens, and by asking."""
+
+from __future__ import annotations
+
+import contextlib
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.cli import UsageError
+from actionlib_core.exceptions import InterfaceError
+from actionlib_core.wire.presence import Endpoint, Kind
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterator
+
+    from actionlib_core.interfaces.ros2 import ServiceParts
+    from actionlib_core.node import Node
+    from actionlib_core.transport import Closable, Sample
+    from actionlib_core.wire.ros2.action_messages import Canceling, GoalState
+    from actionlib_core.wire.ros2.names import Token
+    from actionlib_core.wire.ros2.network import RosNetwork
+
+ASK_S = 2.0
+STATUS_S = 1.0  # the last status comes within this from a server that has had a goal
+
+_FEEDBACK = "_FeedbackMessage"
+
+
+def is_ros2(type_name: str) -> bool:
+    """Tell whether a type that a token names is one of ROS 2: "pkg/kind/Name"."""
+    return type_name.count("/") > 1
+
+
+# -- who is there ----------------------------------------------------------------------------------
+
+
+def networks(node: Node) -> Iterator[RosNetwork]:
+    """Yield the networks of ROS 2 that the configuration names, joined.
+
+    Raises:
+        TransportError: one cannot be joined.
+
+    Blocks: the first time, until they are.
+    """
+    if not node.config.ros2:
+        return
+    from actionlib_core.wire.ros2.network import network_of
+
+    for settings in node.config.ros2:
+        yield network_of(node, settings)
+
+
+def list_ros2_ends(node: Node) -> list[Endpoint]:
+    """Return the ends there are on networks of ROS 2, by their names here; hidden ones are not.
+
+    Blocks: until the networks have answered, a second each at most.
+    """
+    found = []
+    for network in networks(node):
+        for token in network.ros.list():
+            end = end_of(network, token)
+            if end is not None:
+                found.append(end)
+    return found
+
+
+def end_of(network: RosNetwork, token: Token) -> Endpoint | None:
+    """Return what a token shows as an end of ours; None for a node and what tools hide.
+
+    Those of an action are its servers and clients, told by its feedback. The checksum is the hash.
+    """
+    from actionlib_core.wire.ros2.names import Kind as RosKind
+    from actionlib_core.wire.ros2.names import action_of
+    from actionlib_core.wire.ros2.network import name_here
+
+    action = action_of(token.name)
+    name, type_name = token.name, token.type
+    if action is not None:
+        kinds = {
+            RosKind.PUBLISHER: Kind.ACTION_SERVER,
+            RosKind.SUBSCRIPTION: Kind.ACTION_CLIENT,
+        }
+        if not (name.endswith("/feedback") and type_name.endswith(_FEEDBACK)):
+            return None
+        name, type_name = action, type_name.removesuffix(_FEEDBACK)
+    else:
+        kinds = {
+            RosKind.PUBLISHER: Kind.PUBLISHER,
+            RosKind.SUBSCRIPTION: Kind.SUBSCRIBER,
+            RosKind.SERVICE: Kind.SERVICE,
+        }
+    if token.kind not in kinds or any(word.startswith("_") for word in name.split("/")):
+        return None
+    return Endpoint(
+        kinds[token.kind],
+        name_here(network.settings, name),
+        type_name,
+        token.type_hash,
+        token.session,
+        token.full_node,
+        token.entity_id,
+    )
+
+
+@contextlib.contextmanager
+def watching(node: Node, on_end: Callable[[Endpoint], object]) -> Iterator[None]:
+    """Tell of every end that is there or comes, on the networks' threads."""
+    with contextlib.ExitStack() as stack:
+        for network in networks(node):
+
+            def on_token(
+                token: Token, _key: str, alive: bool, network: RosNetwork = network
+            ) -> None:
+                end = end_of(network, token) if alive else None
+                if end is not None:
+                    on_end(end)
+
+            stack.callback(network.ros.watch(on_token).close)
+        yield
+
+
+# -- types -----------------------------------------------------------------------------------------
+
+
+def class_of(node: Node, end: Endpoint) -> Any:
+    """Return the class of the type of an end, by the definition that its hash is of.
+
+    Raises:
+        UsageError: our definition is another one.
+        InterfaceError: there is none.
+    """
+    from actionlib_core.interfaces import ros2
+    from actionlib_core.wire.ros2.network import choose_network
+
+    network = choose_network(node.config.ros2, end.name)
+    get: Callable[[str, str], Any] = ros2.get_message
+    hashed = end.type
+    if end.kind in {Kind.ACTION_SERVER, Kind.ACTION_CLIENT}:
+        get, hashed = ros2.get_action, f"{end.type}{_FEEDBACK}"
+    elif end.kind is Kind.SERVICE:
+        get = ros2.get_service
+    found = get(end.type, network.distro)
+    own = ros2.hash_of(hashed, network.distro)
+    if own != end.md5:
+        raise UsageError(
+            f"'/{end.name}': {mismatch_text(end.type, hashed, (network.distro, own), end.md5)}"
+        )
+    return found
+
+
+def mismatch_text(type_name: str, hashed: str, own: tuple[str, str], found: str) -> str:
+    """Return what to say about a type whose hash there is another than ours.
+
+    Args:
+        type_name: The type.
+        hashed: The type that the hash is of.
+        own: Our distribution, and the hash of its definition.
+        found: The hash there.
+    """
+    from actionlib_core.interfaces import ros2
+
+    if found == ros2.NO_HASH:
+        fitting = ["humble"]
+    else:
+        fitting = [d for d in ros2.distros_of(hashed, found) if d != "humble"]
+    way_out = (
+        f"Try --distro {fitting[0]}."
+        if fitting
+        else ("Try the definition of the robot's own workspace in SMACHPY_INTERFACE_PATH.")
+    )
+    whose = f"It is that of {', '.join(fitting)}. " if fitting else ""
+    return (
+        f"{type_name}: got the type hash {found}; expected {own[1]}, that of {own[0]}. "
+        f"{whose}{way_out}"
+    )
+
+
+def typed(node: Node, kind: str, name: str) -> Any:
+    """Return the ROS 2 class of a type that the user has typed; None when it is not for ROS 2.
+
+    Args:
+        node: Its configuration counts.
+        kind: "message", "service" or "action".
+        name: "pkg/Name" or "pkg/msg/Name".
+    """
+    if not node.config.ros2:
+        return None
+    from actionlib_core.interfaces import ros2
+
+    get: Any = getattr(ros2, f"get_{kind}")
+    with contextlib.suppress(InterfaceError):
+        return get(name, node.config.ros2[0].distro)
+    return None
+
+
+# -- goals -----------------------------------------------------------------------------------------
+
+
+class RemoteAction:
+    """An action of a robot, asked by a command.
+
+    Args:
+        node: Asks.
+        server: What `find_server` has found.
+
+    Raises:
+        UsageError: our definition of the action is another one.
+    """
+
+    def __init__(self, node: Node, server: Endpoint) -> None:
+        from actionlib_core.interfaces import ros2_action
+        from actionlib_core.wire.ros2.names import action_names
+        from actionlib_core.wire.ros2.network import ros_network
+
+        self._node = node
+        self._network = ros_network(node, server.name)
+        self.parts = ros2_action(class_of(node, server))
+        self.name = server.name
+        self._names = action_names(self._network.name(server.name))
+
+    def key(self, part: str) -> str:
+        """Return the key of "feedback" or "status"."""
+        from actionlib_core.wire.ros2.names import data_key
+
+        topic = getattr(self.parts, part)
+        ros_type = self._network.type(topic.type, topic.hash)
+        name = getattr(self._names, part)
+        return data_key(self._network.settings.domain, name, ros_type.name, ros_type.hash)
+
+    def subscribe(self, part: str, callback: Callable[[Sample], None]) -> Closable:
+        """Receive "feedback" or "status"; of the latter the last one first."""
+        return self._network.transport.subscribe(
+            self.key(part), callback, history=False, cached=int(part == "status")
+        )
+
+    def states(self) -> list[GoalState]:
+        """Return the goals that the server knows.
+
+        Blocks: until its last status has come, `STATUS_S` at most: a server that never had a goal
+            has sent none.
+        """
+        from actionlib_core.wire.ros2.action_messages import unpack_statuses
+
+        samples: list[Sample] = []
+        came = self._node.clock.event()
+
+        def on_status(sample: Sample) -> None:
+            samples.append(sample)
+            came.set()
+
+        subscription = self.subscribe("status", on_status)
+        came.wait(STATUS_S)
+        subscription.close()
+        return unpack_statuses(samples[-1].payload) if samples else []
+
+    def cancel(self, uuid: bytes, stamp_ns: int) -> Canceling:
+        """Ask the server to cancel; see `Asked`.
+
+        Raises:
+            UsageError: no answer came.
+
+        Blocks: `ASK_S` at most.
+        """
+        from actionlib_core.wire.ros2.action_messages import Asked, pack_cancel, unpack_canceling
+
+        request = pack_cancel(Asked(uuid, stamp_ns))
+        return unpack_canceling(self._ask("cancel_goal", self.parts.cancel_goal, request))
+
+    def result(self, uuid: bytes) -> tuple[int, Any]:
+        """Return state and result of a goal that has ended; state 0 when it is not known.
+
+        Raises, blocks: as `cancel`.
+        """
+        from actionlib_core.wire.ros2.action_messages import pack_id
+
+        answer = self._ask("get_result", self.parts.get_result, pack_id(uuid))
+        response: Any = self.parts.get_result.response.from_cdr(answer)
+        return response.status, response.result
+
+    def _ask(self, part: str, service: ServiceParts, request: bytes) -> bytes:
+        from actionlib_core.wire.ros2.names import Kind as RosKind
+
+        ros_type = self._network.type(service.type, service.hash)
+        end = self._network.ros.end(RosKind.CLIENT, getattr(self._names, part), ros_type)
+        replies: list[Any] = []
+        done = self._node.clock.event()
+        query = self._network.transport.query(
+            end.key,
+            request,
+            attachment=end.attachment(),
+            best=True,
+            timeout=ASK_S,
+            on_reply=replies.append,
+            on_done=done.set,
+        )
+        done.wait(ASK_S + 1.0)
+        query.close()
+        for reply in replies:
+            if not reply.error:
+                payload: bytes = reply.payload
+                return payload
+        raise UsageError(
+            f"action '/{self.name}': got no answer to {part} within {ASK_S:g} s; expected one. Try "
+            "again, as a ROS 2 server drops requests when many come at once, or 'smachpy doctor "
+            "--ros2'."
+        )
+
+
+def merged(own: list[Endpoint], node: Node, kinds: Collection[Kind]) -> list[Endpoint]:
+    """Return the ends of our own network and of those of ROS 2, of some kinds."""
+    return [end for end in (*own, *list_ros2_ends(node)) if end.kind in kinds]

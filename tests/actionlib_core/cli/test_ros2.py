@@ -1,0 +1,157 @@
+"""The commands at a ROS 2 robot, on a network in memory."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from actionlib_core.cli import main
+from actionlib_core.config import Config, Ros2
+from actionlib_core.interfaces.ros2.test_msgs.action import Fibonacci
+from actionlib_core.node import Node
+from actionlib_core.wire.ros2.graph import RosNode, RosType
+from actionlib_core.wire.ros2.names import Kind
+from tests.ros2_server import Ros2Server
+
+ID = "0123456789abcdef0123456789abcdef"
+UUID = bytes.fromhex(ID)
+
+
+class Robot:
+    """A robot with an action `fib`, and commands beside it."""
+
+    def __init__(self, clock, network, capsys):
+        self.clock, self._network, self._capsys = clock, network, capsys
+        self.session = network.session()
+        self.action = Ros2Server(self.session, clock, "arm/fib", Fibonacci, domain=42)
+
+    def __call__(self, *argv, code=0, **settings):
+        config = Config(ros2=(Ros2(domain=42, **settings),))
+        session = self._network.session()
+        node = Node("shell", transport=session, clock=self.clock, config=config)
+        self._capsys.readouterr()
+        with node:
+            assert main(argv, node=node) == code
+        session.close()
+        out, err = self._capsys.readouterr()
+        return out if not code else out + err
+
+    def json(self, *argv, code=0, **settings):
+        return json.loads(self(*argv, "--json", code=code, **settings))
+
+
+@pytest.fixture
+def robot(clock, network, capsys):
+    made = Robot(clock, network, capsys)
+    yield made
+    assert made.action.problems == []
+    made.action.close()
+    made.session.close()
+
+
+def test_what_is_there(robot):
+    node = RosNode(robot.session, robot.clock, domain=42, full_name="base/driver")
+    ends = [
+        node.end(kind, name, RosType(type_name, "RIHS01_" + "0" * 64))
+        for kind, name, type_name in (
+            (Kind.PUBLISHER, "odom", "nav_msgs/msg/Odometry"),
+            (Kind.SUBSCRIPTION, "cmd_vel", "geometry_msgs/msg/Twist"),
+            (Kind.SERVICE, "reset", "std_srvs/srv/Empty"),
+            (Kind.SERVICE, "_hidden", "std_srvs/srv/Empty"),
+        )
+    ]
+    for end in ends:
+        end.show()
+    assert robot("list", "-t") == "/arm/fib [test_msgs/action/Fibonacci]\n"
+    assert robot("type", "arm/fib") == "test_msgs/action/Fibonacci\n"
+    assert robot("find", "test_msgs/Fibonacci") == "/arm/fib\n"
+    assert [end["node"] for end in robot.json("info", "arm/fib")["servers"]] == ["/robot"]
+    assert robot("topic", "list", "-t").splitlines() == [
+        "/cmd_vel [geometry_msgs/msg/Twist]",
+        "/odom [nav_msgs/msg/Odometry]",
+    ]
+    assert robot("service", "list", "-t") == "/reset [std_srvs/srv/Empty]\n"
+    assert "/driver" in robot("topic", "info", "odom", "-v")
+    assert robot("list", namespace="arm") == "/fib\n"
+    assert robot("list", robot="robot1") == "/robot1/arm/fib\n"
+    for end in ends:
+        end.close()
+
+
+def test_a_goal_and_its_result(robot):
+    def on_goal(query, uuid):
+        robot.action.accept(query, uuid)
+        robot.action.set_state(uuid, 2)
+
+    def on_result(query, uuid):
+        robot.action.park(query, uuid)
+        robot.action.publish_feedback(uuid, Fibonacci.Feedback(sequence=[0, 1]))
+        robot.action.end(uuid, 4, Fibonacci.Result(sequence=[0, 1, 1]))
+
+    robot.action.on_goal, robot.action.on_result = on_goal, on_result
+    printed = robot("send_goal", "arm/fib", "{order: 3}", "-f")
+    assert "sequence: [0, 1, 1]" in printed
+    assert "SUCCEEDED" in printed
+    assert [goal.order for goal in robot.action.goals.values()] == [3]
+    assert robot("send_goal", "arm/fib", "{oder: 3}", code=2).count("order") > 0
+    robot.action.on_goal = robot.action.refuse
+    assert "rejected" in robot("send_goal", "arm/fib", "test_msgs/Fibonacci", "{}", code=1)
+
+
+def test_goals_of_a_server(robot):
+    assert robot.json("goal", "list", "arm/fib") == []
+    robot.action.set_state(UUID, 2)
+    (goal,) = robot.json("goal", "list", "arm/fib")
+    assert (goal["id"], goal["status"]) == (ID, "ACTIVE")
+    assert robot.json("goal", "info", "arm/fib", ID)["result"] is None
+    robot.action.set_state(UUID, 4)
+    robot.action.on_result = lambda query, _uuid: robot.action.answer_result(
+        query, 4, Fibonacci.Result(sequence=[1])
+    )
+    assert robot.json("goal", "info", "arm/fib", ID)["result"] == {"sequence": [1]}
+    robot.action.on_result = lambda query, _uuid: robot.action.answer_result(query, 0)
+    assert robot.json("goal", "info", "arm/fib", "5" * 32, code=1)["status"] == "LOST"
+
+
+def test_cancel_tells_the_truth(robot):
+    robot.action.set_state(UUID, 2)
+    assert robot("cancel", "arm/fib", ID) == f"Cancel requested for goal {ID}\n"
+    robot.action.on_cancel = robot.action.refuse_cancel
+    assert "refused" in robot("cancel", "arm/fib", ID, code=1)
+    robot.action.on_cancel = robot.action.let_cancel
+    assert "does not know" in robot("cancel", "arm/fib", "5" * 32, code=1)
+    assert robot.json("cancel", "arm/fib", "--all") == {"cancelled": [ID]}
+    assert robot.action.cancels[-1] == (bytes(16), 0)
+    robot.action.on_cancel = lambda query, _uuid: query.finish()
+    assert "no answer" in robot("cancel", "arm/fib", ID, code=2)
+
+
+def test_echo(robot):
+    robot.action.set_state(UUID, 2)
+    message = robot.json("echo", "arm/fib", "-s", "--once")
+    assert message["topic"] == "status"
+    assert message["message"]["status_list"][0]["status"] == 2
+
+
+@pytest.mark.parametrize("distro", ["humble", "kilted"])
+def test_another_definition_is_named_with_the_distribution_that_fits(robot, distro):
+    if distro == "kilted":  # the same definition
+        assert robot("goal", "list", "arm/fib", "-c", distro=distro) == "0\n"
+        return
+    text = robot("goal", "list", "arm/fib", code=2, distro=distro)
+    assert "TypeHashNotSupported" in text
+    assert "--distro jazzy" in text
+
+
+def test_a_name_that_is_not_there(robot):
+    text = robot("goal", "list", "arm/fab", code=2)
+    assert "/arm/fib" in text
+
+
+def test_options_of_a_robot_without_its_router(capsys, monkeypatch):
+    monkeypatch.delenv("SMACHPY_ROS2", raising=False)
+    assert main(["--domain", "3", "list"]) == 2
+    assert "--ros2" in capsys.readouterr().err
+    assert main(["--ros2", "nonsense", "list"]) == 2
+    assert "nonsense" in capsys.readouterr().err
