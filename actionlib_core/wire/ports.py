@@ -49,13 +49,9 @@ def make_client_port(
 def make_server_port(node: Node, name: str, types: ActionTypes) -> ServerPort:
     """Return the server's end of the action with the full name `name`.
 
-    Raises:
-        ConfigError: the action is one of ROS 2, and no network of ROS 2 has the name.
-        TransportError: that network cannot be joined.
-
-    Blocks: the first time on a network of ROS 2, until it is joined.
+    Raises and blocks: as `make_client_port`.
     """
-    if getattr(types.action, "_wire", "") == "ros2":
+    if _is_on_ros2(node, name, types):
         from actionlib_core.wire.ros2.server_port import RosServerPort
 
         return RosServerPort(node, name, types)

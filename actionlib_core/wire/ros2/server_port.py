@@ -37,6 +37,7 @@ from actionlib_core.wire.ros2.action_messages import (
 )
 from actionlib_core.wire.ros2.attachment import answer_to, unpack_attachment
 from actionlib_core.wire.ros2.goal_states import ENDED, CancelCode, GoalCode, to_code
+from actionlib_core.wire.ros2.mapping import action_on_ros2
 from actionlib_core.wire.ros2.names import (
     DEFAULT,
     LATCHED,
@@ -94,7 +95,7 @@ class RosServerPort:
         types: Its message classes.
 
     Raises:
-        ConfigError: no network of ROS 2 has the name.
+        ConfigError: no network of ROS 2 has the name, or the action has no counterpart there.
         TransportError: the network cannot be joined.
 
     Threads: any. The listener is called on the network's threads.
@@ -102,13 +103,14 @@ class RosServerPort:
 
     def __init__(self, node: Node, name: str, types: ActionTypes) -> None:
         network = ros_network(node, name)
-        parts = ros2_action(types.action)
+        self._on_ros2 = action = action_on_ros2(network.settings, name, types)
+        parts = ros2_action(action.action)
         self._ros = network.ros
         self._clock = node.clock
         self._name = name
-        self._goal_class = types.goal
+        self._goal_class = action.action.Goal
         self._response_class = parts.get_result.response
-        self._there = network.name(name)
+        self._there = network.name(action.name)
         self._names = names = action_names(self._there)
         self._types = {
             names.send_goal: network.type(parts.send_goal.type, parts.send_goal.hash),
@@ -203,11 +205,12 @@ class RosServerPort:
 
     def pack_result(self, result: Any) -> bytes:
         """Return the whole response, with a status that is put in when it is sent."""
+        result = self._on_ros2.to_result(result)
         response: bytes = self._response_class(status=0, result=result).to_cdr()
         return response
 
     def pack_feedback(self, feedback: Any) -> bytes:
-        body: bytes = feedback.to_cdr()
+        body: bytes = self._on_ros2.to_feedback(feedback).to_cdr()
         return body
 
     def send_accepted(self, entry: StatusEntry) -> None:
@@ -263,7 +266,7 @@ class RosServerPort:
             return
         try:
             uuid, body = unpack_with_id(query.payload)
-            content = self._goal_class.from_cdr(body)
+            content = self._on_ros2.from_goal(self._goal_class.from_cdr(body))
         except (ValueError, ActionlibError) as error:
             self._refuse_unreadable("a goal", asker, error)
             return

@@ -10,9 +10,12 @@ import pytest
 from actionlib_core.action.decorated import GoalContext, Reject, server
 from actionlib_core.action.server import ActionServer, ServerGoalHandle
 from actionlib_core.action.simple_server import SimpleActionServer
+from actionlib_core.config import Config, Ros2
 from actionlib_core.exceptions import ServerConflictError, TransportError
 from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.goal.states import Status
+from actionlib_core.interfaces import ros2
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseFeedback
 from actionlib_core.interfaces.ros2.test_msgs.action import Fibonacci
 from actionlib_core.node import Node
 from actionlib_core.transport.memory import MemoryNetwork
@@ -453,6 +456,38 @@ def test_a_client_with_another_hash_is_told_of(world: World, caplog: Any) -> Non
     (record,) = [r for r in caplog.records if "types differ" in r.message]
     assert "RIHS01_1" in record.message
     assert client.parts.send_goal.hash in record.message
+
+
+def test_a_server_of_a_ros_1_type_where_the_configuration_says_ros_2(clock: VirtualClock) -> None:
+    network = MemoryNetwork(clock)
+    config = Config(ros2=(Ros2(domain=3, distro="kilted", names=("move_base",)),))
+    node = Node("robot", transport=network.session(), clock=clock, config=config)
+    heard: list[Any] = []
+
+    def drive(goal: Any) -> None:
+        heard.append(goal)
+        there = MoveBaseFeedback()
+        there.base_position.pose.position.x = 2.0
+        simple.publish_feedback(there)
+        simple.set_succeeded()
+
+    simple = SimpleActionServer("move_base", MoveBaseAction, drive, auto_start=True, node=node)
+    session = network.session()
+    spec = ros2.get_action("nav2_msgs/NavigateToPose", "kilted")
+    client = Ros2Client(session, clock, "navigate_to_pose", spec, domain=3)
+    assert client.ready.wait(5.0)
+    goal, uuid = spec.Goal(), new_id()
+    goal.pose.header.frame_id, goal.pose.pose.position.x = "map", 1.5
+    assert client.accepted(uuid, goal) is not None
+    assert client.end_of(client.result(uuid)) == (4, spec.Result())
+    clock.sleep(0.1)
+    assert heard[0].target_pose.header.frame_id == "map"
+    assert heard[0].target_pose.pose.position.x == 1.5
+    assert client.feedback[0][1].current_pose.pose.position.x == 2.0
+    assert client.problems == []
+    client.close()
+    for closing in (session, node, node.transport):
+        closing.close()
 
 
 def test_which_goals_a_cancel_is_about() -> None:
