@@ -123,7 +123,7 @@ class RosServerPort:
         self._readable = Readable(log)
         self._lock = threading.Lock()
         self._feedback_lock = threading.Lock()
-        self._status_lock = threading.Lock()  # never taken with the one above
+        self._status_due = self._status_busy = False
         self._ends: dict[str, End] = {}
         self._declared: list[Closable] = []
         self._feedback: PublisherPort | None = None
@@ -219,19 +219,37 @@ class RosServerPort:
     def send_status(self, entries: Iterable[StatusEntry]) -> None:  # noqa: ARG002  see below
         """Send the list of all goals, if anything in it has changed.
 
-        The list is made here, under a lock: one that another thread has made may be older than what
-        was sent last, and late subscribers would see it for ever.
+        One thread at a time makes the list and sends it, once more when it was asked meanwhile: a
+        list made by another thread may be older than what was sent last, and late subscribers would
+        see it for ever. No lock is held meanwhile, as the caller may hold the server's.
         """
-        with self._status_lock:
-            listed = self._listener.list_goals()
-            states = [
-                GoalState(goal_uuid(entry.id), entry.stamp_ns, self._code(entry))
-                for entry in listed
-            ]
-            states = [state for state in states if state.code != GoalCode.UNKNOWN]
-            if states != self._shown:
-                self._put(self._status, self._names.status, pack_statuses(states))
-                self._shown = states
+        with self._lock:
+            self._status_due = True
+            if self._status_busy:
+                return
+            self._status_busy = True
+        try:
+            while self._takes_up_status():
+                self._publish_status(self._listener.list_goals())
+        except BaseException:
+            self._status_busy = False
+            raise
+
+    def _takes_up_status(self) -> bool:
+        """Return whether there is something to say; if not, the thread is done with it."""
+        with self._lock:
+            due, self._status_due = self._status_due, False
+            self._status_busy = due
+            return due
+
+    def _publish_status(self, listed: list[StatusEntry]) -> None:
+        states = [
+            GoalState(goal_uuid(entry.id), entry.stamp_ns, self._code(entry)) for entry in listed
+        ]
+        states = [state for state in states if state.code != GoalCode.UNKNOWN]
+        if states != self._shown:
+            self._put(self._status, self._names.status, pack_statuses(states))
+            self._shown = states
         self._answer_forgotten({entry.id for entry in listed})
 
     def send_result(self, entry: StatusEntry, body: bytes, *, wait: bool = True) -> None:  # noqa: ARG002  replies never wait

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import threading
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -139,6 +140,32 @@ def test_statuses_are_sent_when_something_changes_and_not_again(world: World) ->
     world.goals[0].set_succeeded()
     world.settle()
     assert len(client.statuses) == before + 1
+
+
+def test_statuses_while_the_servers_lock_is_held(world: World) -> None:
+    """One thread holds the server's lock and changes a goal, another sends the list meanwhile."""
+    action_server = world.serve()
+    client = world.client()
+    uuid = world.send(client)
+    port, list_goals = action_server.keeper.port, action_server.keeper.list_goals
+    listing, ended = threading.Event(), threading.Event()
+
+    def slow_list() -> list[StatusEntry]:
+        listing.set()
+        ended.wait(20.0)
+        return list_goals()
+
+    action_server.keeper.list_goals = slow_list
+    other = threading.Thread(target=port.send_status, args=((),))
+    with action_server.lock:
+        other.start()
+        assert listing.wait(20.0)
+        world.goals[0].set_succeeded()
+        port.send_status(())
+        ended.set()
+    other.join()
+    world.settle()
+    assert codes(client) == {uuid: 4}
 
 
 def test_a_late_client_gets_the_last_list(world: World) -> None:
