@@ -145,6 +145,7 @@ interface StateNode {
   total: number;
   name: string;
   shown: string;
+  isRepeated: boolean; // several states have its name
   links: Link[];
   joins: Join[];
   wired: string[];

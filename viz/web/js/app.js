@@ -46,6 +46,13 @@ function TimeTools() {
   </div>`;
 }
 
+function ZoomButtons() {
+  return html`<span class="zoom">
+    <button title="smaller (-)" aria-label="zoom out" onClick=${() => page.view.zoom(0.8)}>\u2212</button>
+    <button title="larger (+)" aria-label="zoom in" onClick=${() => page.view.zoom(1.25)}>+</button>
+    <button title="show everything (f)" onClick=${() => page.refit()}>Fit</button></span>`;
+}
+
 function App() {
   const paused = store.facts.value?.control?.paused && store.cursor.value === null;
   useEffect(() => {
@@ -53,7 +60,13 @@ function App() {
       store.failure.value = `The viewer could not start: ${messageOf(error)}`;
     });
   }, []);
-  return html`<div class=${`app ${paused ? "paused" : ""}`}>
+  const classes = [
+    "app",
+    paused && "paused",
+    store.cursor.value !== null && "past",
+    store.treeOpen.value && "with-tree",
+  ];
+  return html`<div class=${classes.filter(Boolean).join(" ")}>
     <${TopBar} page=${page} />
     <${Tree} page=${page} />
     <main class="stage">
@@ -61,7 +74,7 @@ function App() {
       <${Overlay} page=${page} />
       <${Laying} />
       <${Mounted} element=${minimap} />
-      <${Legend} />
+      <div class="strip"><${Legend} /><${ZoomButtons} /></div>
     </main>
     <footer class="timeline"><${Mounted} element=${canvas} /><${TimeTools} /></footer>
     <${Inspector} page=${page} />

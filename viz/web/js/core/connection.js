@@ -268,6 +268,10 @@ export const askAction = (data) => post("/api/action", data);
 
 /** Give the machine shown a command. @param {string} name @param {Record<string, unknown>} [more] */
 export async function command(name, more = {}) {
+  if (store.whyDisarmed.value) {
+    store.notify(store.whyDisarmed.value, "error");
+    return false;
+  }
   const result = await post(link("control"), { command: name, ...more });
   if (result.ok) store.notify(`${name}${more.path ? ` ${more.path}` : ""}: done`);
   else store.notify(`${name}: ${result.text ?? "refused"}`, "error");

@@ -39,6 +39,9 @@ export class Model {
     this.keys = payload.keys;
     this.root = implicit ? payload.implicit : payload.explicit;
     this.#index(this.root, null, 0);
+    const counts = new Map();
+    for (const { name } of this.order) counts.set(name, (counts.get(name) ?? 0) + 1);
+    for (const node of this.order) node.isRepeated = counts.get(node.name) > 1;
   }
 
   /** @param {StateNode} node @param {StateNode | null} parent @param {number} depth */

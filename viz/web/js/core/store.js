@@ -3,6 +3,7 @@ import { batch, computed, signal } from "@preact/signals";
 import { emptyState, ms } from "#core/fold.js";
 import { Model } from "#core/model.js";
 import { Run } from "#core/run.js";
+import { shorten } from "#core/text.js";
 
 /** @template T @typedef {import("@preact/signals").Signal<T>} Signal */
 
@@ -63,6 +64,7 @@ export const theme = signal(saved("theme", "system"));
 /** @type {Signal<Set<string>>} */
 export const opened = signal(new Set()); // paths of containers
 export const help = signal(false);
+export const treeOpen = signal(false); // on small screens, where it lies over the page
 export const overview = signal(false); // so many states are open that they are tiles, without arrows
 /** @type {Signal<{ done: number, all: number } | null>} */
 export const laidOut = signal(null); // so many states, while it takes a while
@@ -189,6 +191,21 @@ export function nowMs() {
   return ended ? (run.last() ?? robot) : Math.max(robot, run.last() ?? 0);
 }
 
+/** An instant as time since the run began, such as 00:32.0. @param {number} t [ms] */
+export function instantText(t) {
+  const seconds = (t - (ms(shown().started) ?? run.first() ?? t)) / 1000;
+  const tenths = Math.round(Math.abs(seconds) * 10);
+  const two = (/** @type {number} */ n) => String(Math.floor(n)).padStart(2, "0");
+  const hours = Math.floor(tenths / 36_000);
+  const minutes = `${two((tenths % 36_000) / 600)}:${two((tenths % 600) / 10)}.${tenths % 10}`;
+  return `${seconds <= -0.05 ? "-" : ""}${hours ? `${hours}:` : ""}${minutes}`;
+}
+
+/** Why nothing can be commanded; null when it can. */
+export const whyDisarmed = computed(() =>
+  cursor.value === null ? null : "You look at the past: back to live first (l)",
+);
+
 // -- what follows from it -----------------------------------------------------------------------
 
 export const activePaths = computed(() => {
@@ -202,6 +219,29 @@ export const activeLeaves = computed(() => {
   return all.filter((path) => !all.some((other) => other.startsWith(`${path}/`)));
 });
 
+/** Where a run that has ended has ended: the innermost state that was left last; else what is active. */
+export const lastLeaves = computed(() => {
+  if (activeLeaves.value.length) return activeLeaves.value;
+  const left = Object.entries(shown().states).filter(([, state]) => state.left != null);
+  if (!left.length) return [];
+  const depth = (/** @type {string} */ path) => path.split("/").length;
+  // Its containers were left at the same instant, or moments later.
+  const [last] = left.reduce((a, b) => ((b[1].left ?? 0) > (a[1].left ?? 0) ? b : a));
+  const inside = left.filter(([path, state]) => path.startsWith(last) && (state.left ?? 0) >= entered(last));
+  const end = inside.filter(([path]) => !inside.some(([other]) => other.startsWith(`${path}/`)));
+  const newest = end.reduce((a, b) => {
+    const later = (b[1].left ?? 0) - (a[1].left ?? 0);
+    return later > 0 || (later === 0 && depth(b[0]) > depth(a[0])) ? b : a;
+  });
+  return [newest[0]];
+});
+
+/** When a state was entered last [ns]. @param {string} path */
+function entered(path) {
+  const span = run.spans.findLast((one) => one.path === path);
+  return span ? span.from * 1e6 : 0;
+}
+
 export const runStatus = computed(() => {
   tick.value;
   const data = shown();
@@ -213,11 +253,30 @@ export const runStatus = computed(() => {
   if (about.stale != null && data.ended == null) return { word: "stale", kind: "waiting" };
   if (connection.value === "lost") return { word: "reconnecting", kind: "waiting" };
   if (data.ended != null) return { word: `ended: ${data.outcome}`, kind: "done" };
-  if (about.control?.paused) return { word: "paused", kind: "waiting" };
+  if (about.control?.paused) return { word: pausedText(data), kind: "waiting" };
   if (data.states[model.value?.root.path ?? ""]?.preempt) return { word: "preempting", kind: "preempted" };
   if (data.started == null) return { word: "not started", kind: "other" };
   return { word: about.recorded ? "recording ends here" : "running", kind: "active" };
 });
+
+/** What is held back, and why, in words. @param {RunState} data */
+function pausedText(data) {
+  const held = Object.entries(data.states).filter(([, state]) => state.waits != null);
+  if (!held.length) return "paused";
+  const [path, state] = held[0];
+  const why = state.waits === "pause" ? "" : ` (${state.waits})`;
+  return `paused before ${nameOf(path)}${held.length > 1 ? ` and ${held.length - 1} more` : ""}${why}`;
+}
+
+/**
+ * The name of a state, with that of its container where several have it.
+ * @param {string} path
+ */
+export function nameOf(path) {
+  const node = model.value?.get(path);
+  if (!node) return shorten(path.slice(path.lastIndexOf("/") + 1));
+  return node.isRepeated && node.parent?.parent ? `${node.parent.name} \u203a ${node.name}` : node.name;
+}
 
 // Names of the actions that have a server and of those that had one, as JSON, so that equal lists
 // are equal; null before the server has looked.

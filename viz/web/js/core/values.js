@@ -1,5 +1,7 @@
 // Values of userdata and fields of messages as text.
 
+import { rounded } from "#core/repr.js";
+
 const MOST = 20_000; // characters that are written out
 
 /** A message without its type. @param {string} _key @param {any} value */
@@ -11,7 +13,7 @@ export const pretty = (value) =>
 
 /** On one line. @param {any} value */
 export function brief(value) {
-  if (typeof value === "string") return value;
+  if (typeof value === "string") return rounded(value);
   const plain = value?.$msg ? { [value.$msg]: value.fields } : value;
   const shortened = (/** @type {string} */ key, /** @type {any} */ one) =>
     typeof one === "number" && !Number.isInteger(one) ? Number(one.toPrecision(6)) : withoutType(key, one);

@@ -15,6 +15,8 @@ const SEP = "\u0001";
 const FLASH_MS = 380;
 const FADE_MS = 5000;
 const BRIEF_MS = 400; // a state that has run for less shows no clock
+const MINIMAP_BELOW = 0.6; // the part of the machine in view from which there is no minimap
+const CORNERS = ["bottom-right", "bottom-left", "top-right", "top-left"];
 const CLASSES = ["success", "failure", "preempted", "other"];
 /** @type {Record<string, string>} */
 const TAGS = { concurrence: "concurrent", iterator: "repeats", sequence: "sequence" };
@@ -292,11 +294,32 @@ export class Diagram {
     for (const [name, value] of Object.entries(place)) this.window.setAttribute(name, String(value));
     const { w, h } = this.size;
     this.window.style.strokeWidth = `${Math.max(w, h) / 70}px`;
-    const all = x >= -1 && y >= -1 && x + w * k <= width + 1 && y + h * k <= height + 1;
-    this.minimap.classList.toggle("idle", all);
+    const seen = (/** @type {number} */ from, /** @type {number} */ size, /** @type {number} */ room) =>
+      Math.max(0, Math.min(room, from + size * k) - Math.max(0, from)) / (size * k);
+    const isIdle = seen(x, w, width) * seen(y, h, height) > MINIMAP_BELOW;
+    this.minimap.classList.toggle("idle", isIdle);
+    if (!isIdle) this.minimap.setAttribute("data-corner", this.#freeCorner(view));
     this.svg.classList.toggle("far", k < 0.6);
     this.svg.classList.toggle("farther", k < 0.35);
     this.svg.style.setProperty("--title", `${Math.max(11, Math.min(11 / k, 44)).toFixed(1)}px`);
+  }
+
+  /** The corner of the view where the minimap covers the fewest states. @param {Viewport} view */
+  #freeCorner({ x, y, k, width, height }) {
+    const [w, h] = [this.minimap.clientWidth + 20, this.minimap.clientHeight + 20];
+    const covered = Object.fromEntries(CORNERS.map((corner) => [corner, 0]));
+    for (const [path, box] of this.boxes) {
+      if (this.states.get(path)?.group.classList.contains("box")) continue;
+      const [left, top] = [box.x * k + x, box.y * k + y];
+      const [right, bottom] = [left + box.w * k, top + box.h * k];
+      for (const corner of CORNERS) {
+        const atX = corner.endsWith("right") ? right > width - w && left < width : left < w && right > 0;
+        const atY = corner.startsWith("bottom") ? bottom > height - h && top < height : top < h && bottom > 0;
+        if (atX && atY) covered[corner] += 1;
+      }
+    }
+    const now = this.minimap.getAttribute("data-corner") ?? CORNERS[0];
+    return CORNERS.reduce((best, one) => (covered[one] < covered[best] ? one : best), now);
   }
 
   // -- restyling --------------------------------------------------------------------------------

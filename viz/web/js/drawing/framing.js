@@ -17,8 +17,9 @@ export function containersToOpen(now) {
   if (!model || moment - rearrangedAt < PAUSE_MS) return null;
   const states = store.shown().states;
   const open = new Set([model.root.path]);
-  for (const path of store.activePaths.value) {
-    const since = states[path]?.since;
+  const ended = store.activePaths.value.length === 0; // then where it ended is open
+  for (const path of ended ? store.lastLeaves.value.flatMap(around) : store.activePaths.value) {
+    const since = ended ? 0 : states[path]?.since;
     if (model.get(path)?.children.length && since != null && now - since / 1e6 > SETTLED_MS) open.add(path);
   }
   const key = [...open].sort().join("\n");
@@ -27,6 +28,9 @@ export function containersToOpen(now) {
   rearrangedAt = moment;
   return open;
 }
+
+/** The containers around a state. @param {string} path */
+const around = (path) => store.model.value?.ancestors(path).map((node) => node.path) ?? [];
 
 /** Forget what was open, so that the next answer is given at once. */
 export function restart() {
@@ -40,7 +44,7 @@ export function restart() {
  * @returns {Box | null}
  */
 function boxOfActive(boxes) {
-  const found = store.activeLeaves.value.flatMap((path) => {
+  const found = store.lastLeaves.value.flatMap((path) => {
     let at = path;
     while (at && !boxes.has(at)) at = at.slice(0, Math.max(0, at.lastIndexOf("/")));
     return boxes.get(at) ?? [];
@@ -74,12 +78,11 @@ export function oneLevelLess(open) {
  * @param {Box} whole the whole diagram
  */
 export function boxToFrame(diagram, view, whole) {
-  const leaves = store.activeLeaves.value;
+  const leaves = store.lastLeaves.value;
   const model = store.model.value;
   const active = boxOfActive(diagram.boxes);
   if (!active || !model) return whole;
-  const around = model.ancestors(leaves[0]);
-  const shared = around.filter((node) => leaves.every((leaf) => leaf.startsWith(`${node.path}/`)));
+  const shared = model.ancestors(leaves[0]).filter((node) => leaves.every((leaf) => leaf.startsWith(`${node.path}/`)));
   for (const { path } of shared) {
     const box = diagram.boxOf(path);
     if (box && view.scaleFor(box) >= READABLE) return atLeast(box, view);

@@ -4,7 +4,6 @@ import { connect, isFile, makeLayoutWorker, messageOf } from "#core/connection.j
 import { containerOf } from "#core/fold.js";
 import { numbersFor } from "#core/statistics.js";
 import * as store from "#core/store.js";
-import { shorten } from "#core/text.js";
 import { Diagram } from "#drawing/diagram.js";
 import * as framing from "#drawing/framing.js";
 import { boxesOf, Layout } from "#drawing/layout.js";
@@ -188,7 +187,7 @@ export class Page {
   #announce(moment) {
     const region = document.getElementById("announced");
     if (!region || moment - this.announcedAt < ANNOUNCE_MS) return;
-    const names = store.activeLeaves.value.slice(0, 6).map(nameOf).join(", ");
+    const names = store.activeLeaves.value.slice(0, 6).map(store.nameOf).join(", ");
     const text = `${store.runStatus.value.word}: ${names}`;
     if (region.textContent === text) return;
     region.textContent = text;
@@ -332,6 +331,11 @@ export class Page {
     this.relayout({ frame: "follow" });
   }
 
+  /** Show everything, laid out for the view as it is now. */
+  refit() {
+    this.relayout({ frame: true });
+  }
+
   fit({ animate = true } = {}) {
     if (this.diagram.size) this.fitted = this.view.frame(this.diagram.size, { animate, most: 1.5 });
   }
@@ -446,6 +450,3 @@ export class Page {
 /** @param {MouseEvent} e */
 const pathOf = (e) =>
   e.target instanceof Element ? (e.target.closest("[data-path]")?.getAttribute("data-path") ?? null) : null;
-
-/** @param {string} path */
-export const nameOf = (path) => store.model.value?.get(path)?.name ?? shorten(path.slice(path.lastIndexOf("/") + 1));

@@ -9,7 +9,7 @@ import { drag } from "#drawing/viewport.js";
 const NAMES = 168; // for the names of the lanes
 const NAMES_NARROW = 84; // on a narrow page
 const RIGHT = 14;
-const FOOT = 18;
+const FOOT = 26; // the axis, with the buttons at its left
 const LANE = 19;
 const ROW = 13;
 const MOST_ROWS = 6; // of a concurrence that are given room
@@ -42,6 +42,8 @@ export class Timeline {
   hits = [];
   /** @type {Map<string, string>} */
   #colours = new Map();
+  /** @type {number | null} */
+  #pointer = null; // where the pointer is [px]
 
   /** @param {HTMLCanvasElement} canvas @param {{ onPick: (path: string) => void }} handlers */
   constructor(canvas, { onPick }) {
@@ -53,7 +55,9 @@ export class Timeline {
     canvas.addEventListener("pointermove", (e) => {
       const span = this.#spanAt(e);
       canvas.title = span ? describe(span) : "";
+      this.#hover(e.offsetX);
     });
+    canvas.addEventListener("pointerleave", () => this.#hover(null));
     canvas.addEventListener("keydown", (e) => this.#key(e));
   }
 
@@ -262,7 +266,7 @@ export class Timeline {
     const kind = ended ? outcomeClass(span.outcome) : asked !== null ? "preempted" : "active";
     g.fillStyle = this.#colour(`${kind}-fill`);
     g.strokeStyle = this.#colour(kind);
-    g.lineWidth = store.selected.value === span.path ? 2.2 : 1.1;
+    g.lineWidth = 1.1;
     g.beginPath();
     g.roundRect(left, top, wide, tall, Math.min(4, tall / 2, wide / 2));
     g.fill();
@@ -276,6 +280,11 @@ export class Timeline {
       g.restore();
     }
     g.stroke();
+    if (store.selected.value === span.path) {
+      g.strokeStyle = this.#colour("ink"); // as in the diagram: not what running looks like
+      g.lineWidth = 2;
+      g.strokeRect(left - 1, top - 1, wide + 2, tall + 2);
+    }
     this.#mark(span.serviced, "preempted", x, now, { right, top, tall });
     this.#mark(span.abandoned, "failure", x, now, { right, top, tall });
     if (wide <= 26 || tall <= 8) return;
@@ -307,24 +316,42 @@ export class Timeline {
     g.fillRect(px - 0.75, top, 1.5, tall);
   }
 
-  /** @param {(t: number) => number} x @param {number} height */
+  /** @param {number | null} px */
+  #hover(px) {
+    const before = this.#pointer;
+    this.#pointer = px !== null && px >= this.names ? px : null;
+    if (before !== this.#pointer) this.draw();
+  }
+
+  /** The instant at the pointer, and the one that is shown. @param {(t: number) => number} x @param {number} height */
   #cursor(x, height) {
     const at = store.cursor.value;
+    if (this.#pointer !== null) this.#flag(this.#pointer, this.#timeAt(this.#pointer), height, "muted", 1);
     if (at === null) return;
+    const last = this.canvas.clientWidth - RIGHT;
+    const px = Math.max(this.names, Math.min(last, x(at))); // beside what is shown it stays at the edge
+    this.#flag(px, at, height, "active", 2);
+  }
+
+  /**
+   * A line through the lanes with its instant at the axis.
+   * @param {number} px @param {number} t @param {number} height @param {string} colour @param {number} wide
+   */
+  #flag(px, t, height, colour, wide) {
     const g = this.context;
-    const px = x(at);
-    g.strokeStyle = this.#colour("active");
-    g.fillStyle = this.#colour("active");
-    g.lineWidth = 2;
+    const text = store.instantText(t);
+    g.font = "600 11px 'JetBrains Mono', ui-monospace, monospace";
+    const half = g.measureText(text).width / 2 + 5;
+    const middle = Math.max(this.names + half, Math.min(this.canvas.clientWidth - half, px));
+    g.fillStyle = this.#colour(colour);
+    g.fillRect(px - wide / 2, 0, wide, height - FOOT);
     g.beginPath();
-    g.moveTo(px, 0);
-    g.lineTo(px, height - FOOT);
-    g.stroke();
-    g.beginPath();
-    g.moveTo(px - 6, 0);
-    g.lineTo(px + 6, 0);
-    g.lineTo(px, 8);
+    g.roundRect(middle - half, height - FOOT + 3, 2 * half, FOOT - 6, 4);
     g.fill();
+    g.fillStyle = this.#colour("background");
+    g.textAlign = "center";
+    g.fillText(text, middle, height - FOOT / 2 + 0.5);
+    g.font = "11px Inter, Arial, sans-serif";
   }
 
   /** @param {PointerEvent} e */

@@ -2,8 +2,7 @@
 
 const LEAST_SCALE = 0.04;
 const MOST_SCALE = 4;
-const FOOT = 22; // [px] that the legend covers
-const HEAD = 18; // and a banner
+const HEAD = 18; // [px] that a banner covers
 
 /** @typedef {{ x: number, y: number, k: number }} View translation [px] and scale */
 
@@ -13,6 +12,8 @@ export class Viewport {
   k = 1;
   moved = false; // whether the last press of the pointer moved the view
   #animation = 0;
+  /** @type {Map<number, Point>} */
+  #pointers = new Map(); // that are down, by their number
 
   /** @param {SVGSVGElement} svg @param {SVGElement} world @param {() => void} onChange */
   constructor(svg, world, onChange) {
@@ -45,7 +46,7 @@ export class Viewport {
    * @returns {View}
    */
   frame(box, { margin = 28, most = 1.6, animate = true } = {}) {
-    const room = this.height - FOOT - HEAD;
+    const room = this.height - HEAD;
     const k = Math.min(most, (this.width - 2 * margin) / box.w, (room - 2 * margin) / box.h);
     const x = (this.width - box.w * k) / 2 - box.x * k;
     const y = HEAD + (room - box.h * k) / 2 - box.y * k;
@@ -74,7 +75,7 @@ export class Viewport {
     const from = { x: this.x, y: this.y, k: this.k };
     const begun = performance.now();
     const step = (/** @type {number} */ now) => {
-      const part = Math.min(1, (now - begun) / time);
+      const part = Math.max(0, Math.min(1, (now - begun) / time)); // a frame may have begun before
       const ease = 1 - (1 - part) ** 3;
       this.set(from.x + (x - from.x) * ease, from.y + (y - from.y) * ease, from.k + (k - from.k) * ease);
       if (part < 1) this.#animation = requestAnimationFrame(step);
@@ -108,21 +109,39 @@ export class Viewport {
     this.zoom(Math.exp(-pixels * 0.0016), e.clientX - box.left, e.clientY - box.top);
   }
 
-  /** @param {PointerEvent} e */
+  /** One pointer moves the view, two zoom it as well. @param {PointerEvent} e */
   #down(e) {
     if (e.button !== 0) return;
-    let { clientX: x, clientY: y } = e;
-    this.moved = false;
+    this.#pointers.set(e.pointerId, { x: e.clientX, y: e.clientY });
+    if (this.#pointers.size === 1) this.moved = false;
+    const begun = { x: e.clientX, y: e.clientY };
+    const isMine = (/** @type {PointerEvent} */ m) => m.pointerId === e.pointerId;
     drag(
       (m) => {
-        if (!this.moved && Math.hypot(m.clientX - x, m.clientY - y) < 4) return;
+        if (!isMine(m)) return;
+        if (!this.moved && Math.hypot(m.clientX - begun.x, m.clientY - begun.y) < 4) return;
         this.moved = true;
         this.svg.classList.add("grabbed");
-        this.pan(m.clientX - x, m.clientY - y);
-        ({ clientX: x, clientY: y } = m);
+        const before = this.#grip();
+        this.#pointers.set(e.pointerId, { x: m.clientX, y: m.clientY });
+        const after = this.#grip();
+        this.pan(after.x - before.x, after.y - before.y);
+        const box = this.svg.getBoundingClientRect();
+        if (before.wide && after.wide) this.zoom(after.wide / before.wide, after.x - box.left, after.y - box.top);
       },
-      () => this.svg.classList.remove("grabbed"),
+      () => {
+        this.#pointers.delete(e.pointerId);
+        if (!this.#pointers.size) this.svg.classList.remove("grabbed");
+      },
+      isMine,
     );
+  }
+
+  /** The middle between the pointers, and how far they are from each other. */
+  #grip() {
+    const [a, b] = this.#pointers.values();
+    if (!b) return { ...a, wide: 0 };
+    return { x: (a.x + b.x) / 2, y: (a.y + b.y) / 2, wide: Math.hypot(a.x - b.x, a.y - b.y) };
   }
 }
 
@@ -130,9 +149,11 @@ export class Viewport {
  * Follow the pointer until it is let go, or taken away.
  * @param {(e: PointerEvent) => void} onMove
  * @param {(e: PointerEvent) => void} [onEnd]
+ * @param {(e: PointerEvent) => boolean} [isMine] of several pointers
  */
-export function drag(onMove, onEnd) {
+export function drag(onMove, onEnd, isMine = () => true) {
   const end = (/** @type {PointerEvent} */ e) => {
+    if (!isMine(e)) return;
     removeEventListener("pointermove", onMove);
     removeEventListener("pointerup", end);
     removeEventListener("pointercancel", end);

@@ -5,6 +5,17 @@ import * as store from "#core/store.js";
 import { fieldValue, html } from "#panels/html.js";
 
 /**
+ * A button that commands: while the past is shown it is there, says why it does nothing, and does nothing.
+ * @param {{ onClick: () => unknown, children?: any, title?: string, [attribute: string]: any }} props
+ */
+function Command({ onClick, children, title, ...more }) {
+  const why = store.whyDisarmed.value;
+  const refuse = () => store.notify(why ?? "", "error");
+  return html`<button ...${more} title=${why ?? title} aria-disabled=${why !== null}
+    onClick=${why === null ? onClick : refuse}>${children}</button>`;
+}
+
+/**
  * A button that asks once more before it does something that cannot be taken back.
  * @param {{
  *   text: string, question: string, onConfirm: () => unknown, className?: string, id?: string, title?: string,
@@ -16,8 +27,8 @@ function Confirm({ text, question, onConfirm, className = "", id, title }) {
     setAsked(false);
     onConfirm();
   };
-  if (!asked)
-    return html`<button id=${id} title=${title} class=${className} onClick=${() => setAsked(true)}>${text}</button>`;
+  if (!asked || store.whyDisarmed.value !== null)
+    return html`<${Command} id=${id} title=${title} class=${className} onClick=${() => setAsked(true)}>${text}<//>`;
   return html`<span class="confirm" role="alertdialog" aria-label=${question}>${question}
     <button class="warn" onClick=${confirm}>Yes</button>
     <button onClick=${() => setAsked(false)}>No</button></span>`;
@@ -28,8 +39,8 @@ export function Controls() {
   if (paused === undefined) return null;
   const title = paused ? "continue (Space)" : "pause before the next state (Space)";
   return html`<span class="controls">
-    <button id="pause" title=${title} onClick=${() => command(paused ? "resume" : "pause")}>
-      ${paused ? "Resume" : "Pause"}</button>
+    <${Command} id="pause" title=${title} onClick=${() => command(paused ? "resume" : "pause")}>
+      ${paused ? "Resume" : "Pause"}<//>
     ${
       !paused &&
       html`<${Confirm} text="Pause now" id="pause-now"
@@ -37,8 +48,8 @@ export function Controls() {
         title="preempt what runs instead of waiting for its end"
         onConfirm=${() => command("pause", { running: "cancel" })} />`
     }
-    <button id="step" disabled=${!paused} title="run one state, then pause again (s)"
-      onClick=${() => command("step")}>Step</button>
+    <${Command} id="step" disabled=${!paused} title="run one state, then pause again (s)"
+      onClick=${() => command("step")}>Step<//>
     <${Confirm} text="Preempt" question="Preempt the mission?" className="warn"
       onConfirm=${() => command("preempt", { path: store.model.value?.root.path })} />
   </span>`;
@@ -49,9 +60,9 @@ export function OutcomeBreakpoint({ node, outcome }) {
   const breakpoints = control()?.breakpoints;
   if (!breakpoints || !node.parent) return null;
   const on = breakpoints.some(([path, after]) => path === node.path && after === outcome);
-  return html`<button class=${`stop-after ${on ? "on" : ""}`} aria-pressed=${on}
+  return html`<${Command} class=${`stop-after ${on ? "on" : ""}`} aria-pressed=${on}
     aria-label=${`breakpoint after ${outcome}`} title=${`${on ? "do not pause" : "pause"} after ${outcome}`}
-    onClick=${() => command(on ? "unbreak" : "break", { path: node.path, outcome })}>\u25cf</button>`;
+    onClick=${() => command(on ? "unbreak" : "break", { path: node.path, outcome })}>\u25cf<//>`;
 }
 
 /** @param {{ node: StateNode, state: StateRun | undefined }} props */
@@ -65,15 +76,15 @@ export function StateControls({ node, state }) {
   const chosen = node.outcomes.includes(outcome) ? outcome : node.outcomes[0];
   const canJump = parent && parent.kind !== "concurrence";
   return html`<div class="actions">
-    <button class=${stops ? "on" : ""} aria-pressed=${stops}
+    <${Command} class=${stops ? "on" : ""} aria-pressed=${stops}
       onClick=${() => command(stops ? "unbreak" : "break", { path })}>
-      ${stops ? "Remove breakpoint" : "Breakpoint"}</button>
+      ${stops ? "Remove breakpoint" : "Breakpoint"}<//>
     ${
       canJump &&
       html`<${Confirm} text="Jump here" question=${`Continue at ${node.name}?`}
         onConfirm=${() => command("jump", { path })} />
-      <button title="the next run of the container starts with this state"
-        onClick=${() => command("initial", { path: parent.path, states: [node.label] })}>Start here</button>`
+      <${Command} title="the next run of the container starts with this state"
+        onClick=${() => command("initial", { path: parent.path, states: [node.label] })}>Start here<//>`
     }
     ${
       active &&

@@ -1,6 +1,5 @@
 // The goals that the machine has sent.
 import { useState } from "preact/hooks";
-import { ms } from "#core/fold.js";
 import { outcomeClass } from "#core/outcomes.js";
 import * as store from "#core/store.js";
 import { duration } from "#core/text.js";
@@ -10,34 +9,59 @@ import { html, Pill, Section, StateLink } from "#panels/html.js";
 /** @typedef {import("#drawing/page.js").Page} Page */
 
 const RECENT_MS = 60_000; // a goal that has ended is shown so long
-const MOST = 6;
+const MOST = 6; // that run
+const MOST_ENDED = 3;
+/** @type {Record<string, string>} */
+const MARKS = { success: "\u2713", failure: "\u2715", preempted: "\u25a0", other: "\u2022" };
 
 /** @param {{ page: Page, data: RunState, now: number }} props */
 export function Goals({ page, data, now }) {
-  const goals = Object.entries(data.goals)
-    .filter(([, goal]) => goal.ended == null || now - goal.ended / 1e6 < RECENT_MS)
-    .sort(([, a], [, b]) => (b.ended ?? Infinity) - (a.ended ?? Infinity) || b.since - a.since)
-    .slice(0, MOST);
+  const [all, setAll] = useState(false);
+  const goals = Object.entries(data.goals).sort(([, a], [, b]) => (b.ended ?? b.since) - (a.ended ?? a.since));
+  const running = goals.filter(([, goal]) => goal.ended == null).slice(0, MOST);
+  const ended = goals.filter(([, goal]) => goal.ended != null && (all || now - goal.ended / 1e6 < RECENT_MS));
+  const shown = all ? ended : ended.slice(0, MOST_ENDED);
+  const left = goals.filter(([, goal]) => goal.ended != null).length - shown.length;
   return html`<${Section} title="Goals">
     ${!goals.length && html`<p class="hint">none</p>`}
-    ${goals.map(([id, goal]) => html`<${Goal} key=${id} id=${id} goal=${goal} now=${now} page=${page} />`)}
+    ${running.map(([id, goal]) => html`<${Goal} key=${id} id=${id} goal=${goal} now=${now} page=${page} />`)}
+    ${shown.map(([id, goal]) => html`<${EndedGoal} key=${id} id=${id} goal=${goal} page=${page} />`)}
+    ${left > 0 && html`<button class="small" onClick=${() => setAll(true)}>${left} earlier</button>`}
   <//>`;
+}
+
+/** On one line, until it is opened. @param {{ id: string, goal: GoalRun, page: Page }} props */
+function EndedGoal({ id, goal, page }) {
+  const [open, setOpen] = useState(false);
+  const kind = outcomeClass(goal.status);
+  const took = duration(((goal.ended ?? goal.since) - goal.since) / 1e9);
+  const status = goal.status.toLowerCase();
+  const onToggle = (/** @type {Event} */ e) => setOpen(/** @type {HTMLDetailsElement} */ (e.target).open);
+  const title = [`${status}: ${goal.action}`, goal.text, id].filter(Boolean).join("\n");
+  return html`<details class=${`ended-goal ${kind}`} open=${open} onToggle=${onToggle}>
+    <summary title=${title}><span class=${`ended ${kind}`} aria-label=${status}>${MARKS[kind]}</span>
+      <${StateLink} path=${goal.path} page=${page} /><span class="what">${goal.text || status}</span>
+      <span class="times">${took}</span></summary>
+    ${
+      open &&
+      html`<p class="hint">${goal.action}: ${status}${goal.attempt > 1 ? `, attempt ${goal.attempt}` : ""}</p>
+      <pre>${pretty({ goal: goal.goal, result: goal.result })}</pre>`
+    }</details>`;
 }
 
 /** @param {{ id: string, goal: GoalRun, now: number, page: Page }} props */
 function Goal({ id, goal, now, page }) {
-  const ended = goal.ended != null;
   const waits = store.hasNoServer(goal);
-  const kind = ended ? outcomeClass(goal.status) : waits ? "waiting" : "active";
-  const status = ended ? goal.status.toLowerCase() : waits ? "no server seen" : "active";
-  const part = goal.status === "SUCCEEDED" ? 1 : (goal.progress?.fraction ?? null);
-  const took = duration(((ms(goal.ended) ?? now) - goal.since / 1e6) / 1000);
+  const kind = waits ? "waiting" : "active";
+  const part = goal.progress?.fraction ?? null;
+  const took = duration((now - goal.since / 1e6) / 1000);
   return html`<div class=${`goal ${kind}`} title=${id}>
     <div class="head"><${StateLink} path=${goal.path} page=${page} /><span class="action">${goal.action}</span>
       <span class="times">${goal.attempt > 1 ? `attempt ${goal.attempt} \u00b7 ` : ""}${took}</span></div>
-    <${ProgressBar} part=${part} ended=${ended} />
-    <div class="text"><${Pill} kind=${kind}>${status}<//>${" "}${goal.text || progressText(goal.progress)}
-      ${part !== null && !ended && html`<span class="times">${Math.round(part * 100)} %</span>`}</div>
+    <${ProgressBar} part=${part} ended=${false} />
+    <div class="text"><${Pill} kind=${kind}>${waits ? "no server seen" : "active"}<//>${" "}
+      ${goal.text || progressText(goal.progress)}
+      ${part !== null && html`<span class="times">${Math.round(part * 100)} %</span>`}</div>
     <${Foldable} label="goal" value=${goal.goal} /></div>`;
 }
 

@@ -1,8 +1,8 @@
 // Templates, and the small parts that several panels are made of.
 import htm from "htm";
 import { h } from "preact";
+import { nameOf } from "#core/store.js";
 import { shorten } from "#core/text.js";
-import { nameOf } from "#drawing/page.js";
 
 /** @typedef {import("#drawing/page.js").Page} Page */
 

@@ -16,8 +16,11 @@ export function listenToKeys(page) {
   /** @type {Record<string, () => unknown>} */
   const actions = {
     "/": () => document.getElementById("search")?.focus(),
-    f: () => page.fit(),
-    F: () => page.fit(),
+    f: () => page.refit(),
+    F: () => page.refit(),
+    t: () => {
+      store.treeOpen.value = !store.treeOpen.value;
+    },
     o: () => page.setFollow(!store.follow.value),
     "+": () => page.view.zoom(1.25),
     "=": () => page.view.zoom(1.25),
@@ -35,11 +38,17 @@ export function listenToKeys(page) {
     Escape: () => {
       if (store.help.value) store.help.value = false;
       else if (store.actionsOpen.value) showActions(false);
+      else if (store.treeOpen.value) store.treeOpen.value = false;
       else page.select(null);
     },
     " ": () => control() && command(control()?.paused ? "resume" : "pause"),
     s: () => control() && command("step"),
   };
+  // A button that was clicked is not pressed by a later Space, which pauses; one that Tab has reached is.
+  document.addEventListener("click", (e) => {
+    const pressed = e.target instanceof Element ? e.target.closest("button") : null;
+    if (e.detail > 0 && pressed === document.activeElement) pressed?.blur();
+  });
   document.addEventListener("keydown", (e) => {
     const target = /** @type {HTMLElement} */ (e.target);
     if (e.ctrlKey || e.metaKey || e.altKey) return;

@@ -2,7 +2,7 @@
 import { choose, isFile } from "#core/connection.js";
 import { CHANGE_SIGNS } from "#core/model.js";
 import * as store from "#core/store.js";
-import { askerText, holdText, shorten } from "#core/text.js";
+import { askerText, duration, holdText, shorten } from "#core/text.js";
 import { html, StateLink } from "#panels/html.js";
 
 /** @typedef {import("#drawing/page.js").Page} Page */
@@ -28,6 +28,7 @@ const KEYS = [
   [", .", "one event back or forward"],
   ["l", "back to now"],
   ["1 \u2026 9", "levels to open"],
+  ["t", "states, on a small screen"],
   ["i", "implicit transitions"],
   ["a", "actions"],
   ["d", "dark or light"],
@@ -48,9 +49,12 @@ export function Overlay({ page }) {
     return html`<div class="banner waiting">The viewer's server does not answer. You see the last known state; this page
       keeps trying.</div>`;
   if (store.cursor.value !== null) {
-    const end = store.facts.value?.recorded || isFile() ? "the end" : "now";
-    return html`<div class="banner preempted">You see an earlier instant.
-      <button onClick=${() => page.timeline.live()}>Back to ${end}</button></div>`;
+    const isOver = store.facts.value?.recorded || isFile();
+    const ago = ((store.run.last() ?? store.cursor.value) - store.cursor.value) / 1000;
+    const when = isOver ? "before the end" : "ago";
+    return html`<div class="banner past">Viewing <b>${store.instantText(store.cursor.value)}</b>,${" "}
+      ${duration(ago)} ${when}
+      <button onClick=${() => page.timeline.live()}>Back to ${isOver ? "the end" : "live"}</button></div>`;
   }
   const after = store.facts.value?.after;
   if (after)

@@ -7,13 +7,21 @@ import { html, Section, StateLink } from "#panels/html.js";
 /** @typedef {import("#drawing/page.js").Page} Page */
 
 const RECENT_MS = 30_000; // a preempt that is over is shown so long while the mission runs
+const ORDINARY_MS = 1000;
 const MOST_ROWS = 24;
+
+/** Whether it is how a concurrence ends: asked by it, and soon over. @param {Preempt} found */
+const isOrdinary = ({ from, to, rows }) =>
+  to !== null &&
+  to - from < ORDINARY_MS &&
+  rows.every((row) => row.asked?.source === "concurrence" && row.abandoned === null);
 
 /** @param {{ page: Page, data: RunState, now: number }} props */
 export function Preempts({ page, data, now }) {
   const found = store.run.preemptAt(now);
   if (!found || found.from < (ms(data.started) ?? 0)) return null;
   if (found.to !== null && data.ended == null && now - found.to > RECENT_MS) return null;
+  if (isOrdinary(found)) return null;
   const askers = [...new Set(found.rows.map((row) => askerText(row.asked) ?? "not recorded"))];
   const depth = (/** @type {Span} */ row) => row.path.split("/").length;
   const rows = [...found.rows].sort((a, b) => depth(a) - depth(b) || a.preempt - b.preempt).slice(0, MOST_ROWS);

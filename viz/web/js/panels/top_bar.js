@@ -23,6 +23,8 @@ export function TopBar({ page }) {
   const status = store.runStatus.value;
   const problems = store.problems.value.length;
   return html`<header class="top">
+    <button class="states-button" aria-expanded=${store.treeOpen.value} title="the states as a tree (t)"
+      onClick=${toggleTree}>States</button>
     <${Chooser} />
     <span class=${`status ${status.kind}`} role="status" data-testid="status">${status.word}</span>
     ${
@@ -40,6 +42,10 @@ export function TopBar({ page }) {
     <${Controls} />
   </header>`;
 }
+
+const toggleTree = () => {
+  store.treeOpen.value = !store.treeOpen.value;
+};
 
 function Chooser() {
   const facts = store.facts.value;

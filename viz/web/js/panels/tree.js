@@ -49,6 +49,7 @@ export function Tree({ page }) {
   const goTo = (/** @type {StateNode} */ node) => {
     setChosen(node.path);
     page.goTo(node.path);
+    store.treeOpen.value = false;
   };
   const choose = (/** @type {number} */ row) => {
     const to = Math.max(0, Math.min(row, rows.length - 1));

@@ -3,6 +3,7 @@ import { signal } from "@preact/signals";
 import { useState } from "preact/hooks";
 import { ask, encoded, isFile, link } from "#core/connection.js";
 import { containerOf, ms, own } from "#core/fold.js";
+import { parseRepr, rounded } from "#core/repr.js";
 import * as store from "#core/store.js";
 import { shorten } from "#core/text.js";
 import { brief, pretty, wasShortened } from "#core/values.js";
@@ -15,6 +16,10 @@ const MOST_VALUES = 60;
 const MOST_CHANGES = 8;
 const SHORT = 160; // characters; the browser takes minutes to break lines of thousands
 const CHANGE = 60;
+const MOST_ITEMS = 100; // of a list
+const LONGEST = 2000; // characters
+/** @type {Record<string, string>} */
+const BRACKETS = { "[": "list", "(": "tuple", "{": "dict" };
 const RUNS = 1e20; // later than any time [ns]
 
 /** @param {{ page: Page, data: RunState, now: number }} props */
@@ -69,10 +74,28 @@ function Row({ entry, open, onClick, data, now, page }) {
   return html`<tr class=${isFresh ? "fresh" : ""} tabindex="0" aria-expanded=${open} onClick=${onClick}
     onKeyDown=${pressAsClick}>
     <th scope="row" title=${shorten(entry.container, 400)}>${shorten(entry.key, 80)}</th>
-    <td><code>${open ? html`<pre>${pretty(entry.value)}</pre>` : short}</code>
+    <td><code>${open ? html`<${Whole} value=${entry.value} />` : short}</code>
       ${open && wasShortened(text) && html`<${WholeValue} entry=${entry} />`}
       <small>by <${StateLink} path=${entry.writer} page=${page} /> at ${at.toFixed(at < 100 ? 2 : 0)} s</small>
     </td></tr>`;
+}
+
+/** A value in full: a repr as a tree. @param {{ value: any }} props */
+function Whole({ value }) {
+  const tree = typeof value === "string" ? parseRepr(value) : null;
+  return tree ? html`<${Branch} tree=${tree} />` : html`<pre>${pretty(value)}</pre>`;
+}
+
+/** @param {{ tree: import("#core/repr.js").Branch }} props @returns {any} */
+function Branch({ tree }) {
+  const item = (/** @type {[string | null, import("#core/repr.js").Tree]} */ [name, value]) =>
+    html`<li>${name !== null && html`<b>${shorten(name, 80)}</b> `}${
+      typeof value === "string" ? rounded(value).slice(0, LONGEST) : html`<${Branch} tree=${value} />`
+    }</li>`;
+  const left = tree.items.length - MOST_ITEMS;
+  return html`<span>${tree.name in BRACKETS ? BRACKETS[tree.name] : tree.name}</span>
+    <ul class="value-tree">${tree.items.slice(0, MOST_ITEMS).map(item)}
+      ${left > 0 && html`<li>and ${left} more</li>`}</ul>`;
 }
 
 /** Enter and Space on a row do what a click does. @param {KeyboardEvent} e */
