@@ -228,6 +228,8 @@ class Ros1Bridge:
             self._changed.clear()
             try:
                 state = self._ros.state()
+                if not self._answered:
+                    self._ros.clean(state, BRIDGE)
                 types = self._ros.types()
                 self._look(state, types)
                 self._ros.register(state)

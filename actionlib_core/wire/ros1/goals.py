@@ -60,8 +60,8 @@ class GoalsOfServer:
     def on_result(self, entry: StatusEntry, payload: bytes, now: float) -> None:
         """Take a result; `payload` is the whole message."""
         self._hear(entry)
-        for goal_id in [key for key, (until, _) in self._results.items() if until <= now]:
-            del self._results[goal_id]
+        while self._results and next(iter(self._results.values()))[0] <= now:
+            del self._results[next(iter(self._results))]
         self._results[entry.id] = now + KEPT_S, payload
 
     def on_acknowledged(self, goal_ids: Iterable[str]) -> None:

@@ -44,6 +44,7 @@ RETRY_FIRST_S = 0.2  # a publisher that cannot be reached is tried again, twice 
 RETRY_LONGEST_S = 10.0
 UNREGISTER_S = 1.0  # longest silence of a master when a node leaves it
 CLOSE_S = 1.0
+PROBE_S = 0.5
 ANY = "*"
 PORT = 11311  # a master's by custom
 
@@ -459,6 +460,35 @@ class Ros1Node:
         for name in sorted(names.served):
             self.ask("unregisterService", name, self._rosrpc, timeout=timeout)
 
+    def clean(self, state: SystemState, prefix: str) -> None:
+        """Unregister nodes of our kind that were killed: subscribers would try them for ever.
+
+        Args:
+            state: What the master knows.
+            prefix: How the names of such nodes begin.
+
+        Source:
+            `rosnode cleanup`, which does so for all nodes.
+        """
+        parts = state.publishers, state.subscribers, state.services
+        nodes = {node for part in parts for there in part.values() for node in there}
+        for node in sorted(nodes - {self.name}):
+            if node.startswith(prefix):
+                try:
+                    uri = str(self.ask("lookupNode", node))
+                    if not _is_dead(uri):
+                        continue
+                    names = registered(state, node)
+                    for topic in names.published:
+                        call(self.master, "unregisterPublisher", node, topic, uri)
+                    for topic in names.subscribed:
+                        call(self.master, "unregisterSubscriber", node, topic, uri)
+                    for name in names.served:
+                        where = self.ask("lookupService", name)
+                        call(self.master, "unregisterService", node, name, where)
+                except Ros1Error as error:
+                    self.report(f"cleaning {node}", error)
+
     @property
     def _rosrpc(self) -> str:
         host, port = self._address
@@ -619,6 +649,17 @@ class Ros1Node:
         deadline = self.clock.now() + CLOSE_S
         for task in tasks:
             task.join(max(0.0, deadline - self.clock.now()))
+
+
+def _is_dead(uri: str) -> bool:
+    """Tell whether nobody listens where a node was, on a computer that is there."""
+    try:
+        socket.create_connection(split_address(uri, uri, "http"), PROBE_S).close()
+    except ConnectionRefusedError:
+        return True
+    except OSError:
+        return False
+    return False
 
 
 MOST_TOLD = 1000  # what was logged; beyond, the oldest is forgotten

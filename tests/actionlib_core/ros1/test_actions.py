@@ -87,6 +87,14 @@ def test_a_server_in_ros_that_hangs_is_lost_and_comes_back(ros, bridge, node):
     assert send(client, 4) == (GoalStatus.SUCCEEDED, 8)
 
 
+def test_a_result_message_that_is_lost_is_told(ros, bridge):
+    ros.start("action_server", "muted", "muted_worker", "mute")
+    bridge(actions=["muted"])
+    client = client_of("muted")
+    assert send(client, 4) == (GoalStatus.SUCCEEDED, None)
+    assert "the result message itself was lost" in client.get_goal_status_text()
+
+
 @pytest.fixture
 def serve(node):
     servers = []

@@ -63,6 +63,27 @@ def test_latched_messages_arrive_late_both_ways(ros, bridge, node):
         assert topics.ask("heard /plan 1") == "there"
 
 
+def test_each_of_several_latched_publishers_is_heard_late(ros, bridge, node):
+    for number in (1, 2):
+        topics = ros.start("topics", f"static_{number}")
+        topics.ask("advertise /tf_static latch")
+        topics.ask(f"publish /tf_static {number}")
+    bridge(topics=["/tf_static"])
+    with Subscriber("tf_static", String, lambda message: None) as first:
+        assert first.wait_for_connections(2, WAIT_S)
+    assert sorted(Heard("tf_static", node, 2).wait()) == ["1", "2"]
+
+
+def test_two_robots_are_two_name_spaces(ros, own_ros, bridge, node):
+    for number, system in ((1, ros), (2, own_ros)):
+        topics = system.start("topics", "lidar")
+        topics.ask("advertise /scan latch")
+        topics.ask(f"publish /scan {number}")
+        bridge(master=system.uri, topics=["/scan"], namespace=f"robot_{number}")
+    assert Heard("robot_1/scan", node, 1).wait() == ["1"]
+    assert Heard("robot_2/scan", node, 1).wait() == ["2"]
+
+
 def test_what_is_used_here_is_carried_and_ros_subscribers_are_counted(ros, bridge, node):
     topics = ros.start("topics", "driver")
     topics.ask("subscribe /cmd")
@@ -143,3 +164,4 @@ def test_our_services_answer_in_ros_and_raise_there(ros, bridge, node):
         answer = program.ask("/our_switch False")
         assert answer.startswith("error")
         assert "no, thanks" in answer
+        assert program.ask("/our_switch persistent") == "True by us True by us"

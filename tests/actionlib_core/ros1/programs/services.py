@@ -1,4 +1,5 @@
-"""Services of ROS 1: serves `NAME`; each line of standard input `SERVICE BOOL` is a call."""
+"""Services of ROS 1: serves `NAME`; each line of standard input `SERVICE BOOL` is a call,
+`SERVICE persistent` two on one connection."""
 
 import sys
 
@@ -20,6 +21,11 @@ for line in sys.stdin:
     name, value = line.split()
     try:
         rospy.wait_for_service(name, 20)
+        if value == "persistent":
+            proxy = rospy.ServiceProxy(name, SetBool, persistent=True)
+            first, second = proxy(True), proxy(True)
+            print(first.success, first.message, second.success, second.message, flush=True)
+            continue
         answer = rospy.ServiceProxy(name, SetBool)(value == "True")
         print(answer.success, answer.message, flush=True)
     except (rospy.ServiceException, rospy.ROSException) as error:
