@@ -50,6 +50,7 @@ Kind: TypeAlias = Literal[
     "sequence",
     "concurrence",
     "iterator",
+    "plan",
 ]
 KINDS: frozenset[str] = frozenset(get_args(Kind))
 
@@ -90,6 +91,59 @@ class RuleRecord:
 
 
 @dataclass(frozen=True, slots=True)
+class PlaceRecord:
+    """A place of a plan.
+
+    Attributes:
+        id: Its id.
+        name: Its label.
+        tokens: Its tokens in the initial marking.
+        child: Label of the child that runs while the place is marked, or "".
+        role: What it is to the plan.
+    """
+
+    id: str
+    name: str
+    tokens: int = 0
+    child: str = ""
+    role: Literal["place", "goal", "fail"] = "place"
+
+
+@dataclass(frozen=True, slots=True)
+class NetTransitionRecord:
+    """A transition of a plan.
+
+    Attributes:
+        id: Its id.
+        name: Its label.
+        guard: What has to hold, as text, or "".
+        calls: Pairs (label of a child, what happens to it: "start", "end", "interrupt", ...).
+        inputs: Pairs (id of a place, weight) that it takes from.
+        outputs: Pairs (id of a place, weight) that it gives to.
+    """
+
+    id: str
+    name: str
+    guard: str = ""
+    calls: tuple[tuple[str, str], ...] = ()
+    inputs: tuple[tuple[str, int], ...] = ()
+    outputs: tuple[tuple[str, int], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class NetRecord:
+    """The Petri net of a plan.
+
+    Attributes:
+        places: In the order of the document.
+        transitions: Likewise.
+    """
+
+    places: tuple[PlaceRecord, ...] = ()
+    transitions: tuple[NetTransitionRecord, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class StateRecord:
     """One state, with everything below it.
 
@@ -109,6 +163,7 @@ class StateRecord:
         transitions: Edges between the children and to the outcomes.
         rules: Outcome rules of a concurrence, loop rules of an iterator.
         default_outcome: Outcome of a concurrence when no rule holds.
+        net: The net of a plan.
     """
 
     path: str
@@ -126,11 +181,12 @@ class StateRecord:
     transitions: tuple[TransitionRecord, ...] = ()
     rules: tuple[RuleRecord, ...] = ()
     default_outcome: str | None = None
+    net: NetRecord | None = None
 
     @property
     def is_container(self) -> bool:
         """Whether it is of a kind that has children."""
-        return self.kind in {"machine", "sequence", "concurrence", "iterator"}
+        return self.kind in {"machine", "sequence", "concurrence", "iterator", "plan"}
 
     def walk(self) -> Iterator[StateRecord]:
         """Yield this record and all below it, parents first."""
@@ -179,6 +235,7 @@ class Structure:
     rules: tuple[RuleRecord, ...] = ()
     default_outcome: str | None = None
     details: tuple[tuple[str, str], ...] = field(default=())
+    net: NetRecord | None = None
 
 
 def describe(machine: Described, *, name: str | None = None) -> StateRecord:
@@ -218,6 +275,7 @@ def _describe(
         transitions=structure.transitions,
         rules=structure.rules,
         default_outcome=structure.default_outcome,
+        net=structure.net,
     )
 
 
@@ -232,6 +290,8 @@ def _first_paragraph(state: Described) -> str:
 def _rebuilt(kind: Any, data: Any, where: str) -> Any:
     """Return the value of the annotated type `kind` that JSON gave back as `data`."""
     arguments = get_args(kind)
+    if NetRecord in arguments and data is not None:  # "or None"
+        kind = NetRecord
     if is_dataclass(kind):
         return _record(kind, data, where)
     if get_origin(kind) is tuple:
@@ -249,7 +309,7 @@ def _rebuilt(kind: Any, data: Any, where: str) -> Any:
     elif isinstance(data, kind):  # a class, or a union of some
         return data
     else:
-        expected = "a text" if kind is not bool else "true or false"
+        expected = {bool: "true or false", int: "a number"}.get(kind, "a text")
     raise ValueError(f"{where}: got {data!r}; expected {expected}.")
 
 

@@ -216,6 +216,36 @@ class OutcomeForced(NamedTuple):
     outcome: str
 
 
+class Fired(NamedTuple):
+    """A transition of the plan at `path` fired.
+
+    Attributes:
+        transition: Its id.
+        marking: Ids of the places that hold tokens afterwards, a place with two tokens twice.
+    """
+
+    path: str
+    t: float
+    stamp_ns: int
+    transition: str
+    marking: tuple[str, ...] = ()
+
+
+class HeldBack(NamedTuple):
+    """The plan at `path` waits: these transitions have their tokens, and their guards are false.
+
+    Attributes:
+        transitions: Ids.
+        guards: Their guards, in the same order, as text.
+    """
+
+    path: str
+    t: float
+    stamp_ns: int
+    transitions: tuple[str, ...]
+    guards: tuple[str, ...]
+
+
 class GoalSent(NamedTuple):
     """An action state sent a goal."""
 
@@ -270,6 +300,8 @@ Event: TypeAlias = (
     | Resumed
     | Jumped
     | OutcomeForced
+    | Fired
+    | HeldBack
     | GoalSent
     | GoalFeedback
     | GoalDone
@@ -283,6 +315,7 @@ SOURCES: dict[str, str] = {
     "operator": "operator",
     "timeout": "timeout of",
     "concurrence": "concurrence, after",
+    "plan": "plan, which",
     "action": "action",
     "state": "state",
     "test": "test",
@@ -292,7 +325,8 @@ SOURCES: dict[str, str] = {
 
 signal: a signal, Ctrl-C too. shutdown: `actionlib_core.shutdown` or the shutdown check. operator:
 `machine.control`, here or over the network. timeout: the state's, or that of a state around it.
-concurrence: the end of a child. action: a client's cancel, a newer goal or the server's stop, by
+concurrence: the end of a child. plan: the firing of a transition.
+action: a client's cancel, a newer goal or the server's stop, by
 `ActionServerWrapper`. state: code that a state or callback ran. test: the test kit. program: all
 else; `by` is the thread, or what `request_preempt(by=...)` said.
 """

@@ -10,9 +10,18 @@ for problem in pnp.check_plan(plan):
 
 from __future__ import annotations
 
+from smachpy.pnp.actions import Call as Call
+from smachpy.pnp.actions import Function as Function
+from smachpy.pnp.actions import Goal as Goal
+from smachpy.pnp.actions import Made as Made
 from smachpy.pnp.check import check_plan as check_plan
 from smachpy.pnp.conditions import Condition as Condition
 from smachpy.pnp.conditions import ConditionError as ConditionError
+from smachpy.pnp.container import PetriNetPlan as PetriNetPlan
+from smachpy.pnp.container import load as load
+from smachpy.pnp.knowledge import Expression as Expression
+from smachpy.pnp.knowledge import Polled as Polled
+from smachpy.pnp.knowledge import TopicCondition as TopicCondition
 from smachpy.pnp.net import Arc as Arc
 from smachpy.pnp.net import Net as Net
 from smachpy.pnp.net import Place as Place

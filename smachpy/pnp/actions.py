@@ -1,0 +1,486 @@
+"""What the names of a plan's actions run: states, functions, goals, sub-plans."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+
+from smachpy.exceptions import InvalidStateError, did_you_mean
+from smachpy.machines.problems import Problems
+from smachpy.machines.state import State
+from smachpy.run.child import on_preempt
+from smachpy.run.frame import clock_of_run
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+    from smachpy.pnp.knowledge import Knowledge
+
+OUTCOMES: Final = ("succeeded", "aborted", "preempted")
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """An executable's name, taken apart: `[ROBOT#]ACTION[_P1[_P2...]]`.
+
+    Attributes:
+        name: The whole name.
+        robot: The robot, or "".
+        action: The action; of names that hold a `_`, the one that is registered.
+        parameters: What follows; "@VAR" stands for the userdata key VAR.
+    """
+
+    name: str
+    robot: str
+    action: str
+    parameters: tuple[str, ...]
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """Userdata keys that the parameters stand for."""
+        return tuple(dict.fromkeys(p[1:] for p in self.parameters if p.startswith("@")))
+
+    def values(self, userdata: Any) -> tuple[str, ...]:
+        """Return the parameters with the values of their variables."""
+        return tuple(str(userdata[p[1:]]) if p.startswith("@") else p for p in self.parameters)
+
+
+def take_apart(name: str, actions: Iterable[str] = ()) -> Call:
+    """Return what an executable's name says; `actions` are those that are known."""
+    robot, hash_, rest = name.partition("#")
+    if not hash_:
+        robot, rest = "", name
+    if rest in set(actions):
+        return Call(name, robot, rest, ())
+    parts = rest.split("_")
+    known = set(actions)
+    for count in range(len(parts) - 1, 0, -1):
+        action = "_".join(parts[:count])
+        if action in known:
+            return Call(name, robot, action, tuple(parts[count:]))
+    return Call(name, robot, parts[0], tuple(parts[1:]))
+
+
+# -- what can be registered ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """An action whose state a function makes.
+
+    Attributes:
+        make: Called with the `Call`, once for each name, when the plan is built; returns a state.
+    """
+
+    make: Callable[[Call], State]
+
+
+@dataclass(frozen=True, slots=True)
+class Function:
+    """An action that a function does, `function(userdata, *parameters)`.
+
+    It may be `async`; a preempt cancels it then. None and true end with 'succeeded', false with
+    'aborted', a text is the outcome. A parameter of the function that is called `robot` gets the
+    robot's name.
+
+    Attributes:
+        function: The function.
+        outcomes: Outcomes beside 'succeeded', 'aborted' and 'preempted'.
+        input_keys: Userdata keys that it reads.
+        output_keys: Userdata keys that it writes.
+        options: See `smachpy.machines.state.StateOptions`.
+    """
+
+    function: Callable[..., Any]
+    outcomes: tuple[str, ...] = ()
+    input_keys: tuple[str, ...] = ()
+    output_keys: tuple[str, ...] = ()
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """An action that a goal at an action server does.
+
+    Attributes:
+        action: Name of the action; of a robot's, below the robot's name.
+        spec: Its class (XAction).
+        goal: Field of the goal, with dots ("target_pose.pose.position.x"), -> value. In a text
+            "{1}" stands for the first parameter of the plan's name, "{robot}" for the robot and
+            "{NAME}" for a userdata key; the field's type says what it becomes.
+        cases: First parameter -> more of such fields ("kitchen" -> where that is).
+        options: See `smachpy.SimpleActionState`.
+    """
+
+    action: str
+    spec: Any
+    goal: Mapping[str, Any] = field(default_factory=dict)
+    cases: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+
+class Unbound(State):
+    """Stands for an action that nothing is registered for; a plan with one does not run."""
+
+    def __init__(self, call: Call) -> None:
+        super().__init__(OUTCOMES)
+        self.call = call
+
+    def execute(self, ud: Any) -> str:
+        """Refuse.
+
+        Raises:
+            InvalidStateError: always.
+        """
+        del ud
+        raise InvalidStateError(f"{self.call.name}: no action is registered for it.")
+
+
+class FunctionAction(State):
+    """Runs a `Function`."""
+
+    _smachpy_kind = "callback"
+
+    def __init__(self, call: Call, function: Function) -> None:
+        super().__init__(
+            (*OUTCOMES, *function.outcomes),
+            (*call.variables, *function.input_keys),
+            function.output_keys,
+            **function.options,
+        )
+        from smachpy.actions.interface import adopt_interface
+
+        adopt_interface(self, function.function)
+        self._call = call
+        self._function = function.function
+        self._kwargs = {"robot": call.robot} if _takes_robot(function.function) else {}
+
+    def execute(self, ud: Any) -> str:
+        """Call the function.
+
+        Blocks: as long as it does.
+        """
+        return self._outcome(self._function(ud, *self._call.values(ud), **self._kwargs))
+
+    @staticmethod
+    def _outcome(result: Any) -> str:
+        if result is None or isinstance(result, bool):
+            return "aborted" if result is False else "succeeded"
+        outcome: str = result
+        return outcome
+
+
+class AsyncFunctionAction(FunctionAction):
+    """Runs an `async` `Function`; a preempt cancels it."""
+
+    async def execute(self, ud: Any) -> str:  # type: ignore[override]
+        """Await the function."""
+        return self._outcome(await self._function(ud, *self._call.values(ud), **self._kwargs))
+
+
+# -- built in --------------------------------------------------------------------------------------
+
+
+class Wait(State):
+    """`wait_N`: lets N seconds pass. Outcomes: 'succeeded', 'preempted'."""
+
+    def __init__(self, call: Call) -> None:
+        super().__init__(("succeeded", "preempted"), call.variables)
+        self._call = call
+        (text,) = call.parameters
+        if not text.startswith("@"):
+            _seconds(call.name, text)
+
+    def execute(self, ud: Any) -> str:
+        """Wait."""
+        (text,) = self._call.values(ud)
+        return "preempted" if self.sleep(_seconds(self._call.name, text)) else "succeeded"
+
+    def describe_details(self) -> Any:
+        """Add the time."""
+        kind, details = super().describe_details()
+        return kind, (("waits", f"{self._call.parameters[0]} s"), *details)
+
+
+def _seconds(name: str, text: str) -> float:
+    if not re.fullmatch(r"\d{1,9}(\.\d{1,9})?", text):
+        raise InvalidStateError(f"{name}: got {text!r}; expected seconds, as in wait_5.")
+    return float(text)
+
+
+class WaitFor(State):
+    """`waitfor_C`: waits until a condition holds; `waitfor_not_C` until it does not."""
+
+    def __init__(self, call: Call, knowledge: Knowledge) -> None:
+        super().__init__(("succeeded", "preempted"), call.variables)
+        parameters = call.parameters
+        self._negated = parameters[0] == "not" and len(parameters) > 1
+        self._name = "_".join(parameters[1:] if self._negated else parameters)
+        self._knowledge = knowledge
+
+    def execute(self, ud: Any) -> str:
+        """Wait.
+
+        Blocks: until then, or a preempt.
+        """
+        del ud
+        clock, knowledge = clock_of_run(), self._knowledge
+        wake = clock.event(f"condition {self._name}")
+        forget = [knowledge.subscribe(wake.set), on_preempt(self, wake.set)]
+        try:
+            while not self.preempt_requested():
+                wake.clear()
+                if knowledge.value(self._name, self._name, clock.now()) is not self._negated:
+                    return "succeeded"
+                if not self.preempt_requested():
+                    wake.wait(knowledge.every(self._name))
+        finally:
+            for each in forget:
+                each()
+        return "preempted"
+
+
+class SetVariable(State):
+    """`setvar_@V_value`: writes the userdata key V. `unknownvar_@V` forgets it."""
+
+    def __init__(self, call: Call, forget: Callable[[str], None] | None = None) -> None:
+        self._key, *rest = call.parameters
+        self._key = self._key.removeprefix("@")
+        super().__init__(("succeeded",), (), [self._key])
+        self._value = "_".join(rest)
+        self._forget = forget
+
+    def execute(self, ud: Any) -> str:
+        """Write it."""
+        if self._forget is not None:
+            self._forget(self._key)
+        else:
+            ud[self._key] = self._value
+        return "succeeded"
+
+
+class Order(State):
+    """`restartcurrentplan` and `stopcurrentplan`."""
+
+    def __init__(self, give: Callable[[], object]) -> None:
+        super().__init__(("succeeded",))
+        self._give = give
+
+    def execute(self, ud: Any) -> str:
+        """Give the order."""
+        del ud
+        self._give()
+        return "succeeded"
+
+
+# -- from names to states --------------------------------------------------------------------------
+
+
+class Binder:
+    """Makes the states of a plan's executables.
+
+    Args:
+        actions: Name of an action, or a whole name, -> what does it: a state (for one name), a
+            class of states (called with the parameters), a function (called with the userdata and
+            the parameters), `Function`, `Goal`, or `Made`.
+        built_in: Name -> function that makes the state from the call.
+    """
+
+    def __init__(
+        self, actions: Mapping[str, Any] | None, built_in: Mapping[str, Callable[[Call], State]]
+    ) -> None:
+        problems = Problems("actions")
+        holds = "name -> state, class of states, function, Function, Goal or Made"
+        self._actions = problems.mapping("actions", actions, holds)
+        for name, given in self._actions.items():
+            fits = isinstance(given, (State, Function, Goal, Made)) or callable(given)
+            if not (isinstance(name, str) and name and fits):
+                problems.add(f"got {name!r}: {given!r}; expected {holds}.")
+        problems.raise_all()
+        self._built_in = built_in
+        self._taken: dict[int, str] = {}
+
+    def has(self, name: str) -> bool:
+        """Tell whether this very name is registered, as it stands in the plan."""
+        return name in self._actions
+
+    def bind(self, name: str) -> tuple[State, str]:
+        """Return the state of an executable, and what is wrong with it or ""."""
+        known = {*self._actions, *self._built_in}
+        call = take_apart(name, known)
+        given = self._actions.get(name, self._actions.get(call.action))
+        if name in self._actions:
+            call = Call(name, call.robot, name, ())
+        try:
+            if given is None and call.action in self._built_in:
+                return self._built_in[call.action](call), ""
+            if given is None:
+                return Unbound(call), _unknown(call, known)
+            return self._made(call, given), ""
+        except InvalidStateError as error:
+            return Unbound(call), error.message
+        except Exception as error:  # noqa: BLE001  the user's constructor; told with the others
+            text = f"{name}: making its state raised {type(error).__name__}: {error}"
+            return Unbound(call), text
+
+    def _made(self, call: Call, given: Any) -> State:
+        if isinstance(given, State):
+            other = self._taken.setdefault(id(given), call.name)
+            if other != call.name:
+                raise InvalidStateError(
+                    f"{call.name}: got the state that does {other!r}, too; expected one of its "
+                    "own. Try its class, or pnp.Made(function)."
+                )
+            return given
+        if isinstance(given, Goal):
+            return _goal_state(call, given)
+        if isinstance(given, type) and issubclass(given, State):
+            if call.variables:
+                raise InvalidStateError(
+                    f"{call.name}: got a class of states; expected a function, because "
+                    f"{['@' + v for v in call.variables]} are known only when it runs."
+                )
+            return _checked(call, given(*call.parameters))
+        if isinstance(given, Made):
+            return _checked(call, given.make(call))
+        function = given if isinstance(given, Function) else Function(given)
+        is_async = inspect.iscoroutinefunction(function.function)
+        count = 1 + len(call.parameters)
+        problems = Problems(call.name)
+        shown = ", ".join(["userdata", *(f"parameter {n}" for n in range(1, count))])
+        kwargs = {"robot": ""} if _takes_robot(function.function) else None
+        problems.function(
+            "function", function.function, f"function({shown})", count, kwargs, plain=False
+        )
+        problems.raise_all()
+        return (AsyncFunctionAction if is_async else FunctionAction)(call, function)
+
+
+def _takes_robot(function: Any) -> bool:
+    try:
+        return "robot" in inspect.signature(function).parameters
+    except (TypeError, ValueError):
+        return False
+
+
+def _checked(call: Call, made: Any) -> State:
+    if not isinstance(made, State):
+        raise InvalidStateError(f"{call.name}: got {made!r}; expected a state.")
+    return made
+
+
+def _unknown(call: Call, known: Iterable[str]) -> str:
+    known = sorted(known)
+    return (
+        f"{call.name}: no action is registered for it: got {call.action!r}; expected one of "
+        f"{known}.{did_you_mean(call.action, known)}"
+    )
+
+
+def _goal_state(call: Call, goal: Goal) -> State:
+    """Return the state that sends a goal, its fields checked now as far as they are known."""
+    from smachpy.actions.simple_action_state import SimpleActionState
+
+    fields = {**goal.goal}
+    if goal.cases:
+        case = call.parameters[0] if call.parameters else ""
+        if not case.startswith("@") and case not in goal.cases:
+            raise InvalidStateError(
+                f"{call.name}: cases: got {case!r}; expected one of {sorted(goal.cases)}."
+                f"{did_you_mean(case, goal.cases)}"
+            )
+    keys = {
+        key
+        for text in (*fields.values(), *(v for c in goal.cases.values() for v in c.values()))
+        if isinstance(text, str)
+        for key in re.findall(r"{([A-Za-z]\w*)}", text)
+        if key != "robot"
+    }
+    action = f"{call.robot}/{goal.action}" if call.robot else goal.action
+
+    def fill(ud: Any, made: Any) -> None:
+        parameters = call.values(ud)
+        case = goal.cases.get(parameters[0] if parameters else "", {}) if goal.cases else {}
+        for path, value in {**fields, **case}.items():
+            _set_field(call, made, path, _filled(call, value, parameters, ud))
+
+    state = SimpleActionState(
+        action,
+        goal.spec,
+        goal_cb=fill,
+        input_keys=(*call.variables, *sorted(keys)),
+        **goal.options,
+    )
+    if not (call.variables or keys):
+        spec: Any = goal.spec
+        fill({}, spec().action_goal.goal)  # a wrong field is told now, not when it runs
+    return state
+
+
+def _filled(call: Call, value: Any, parameters: tuple[str, ...], ud: Any) -> Any:
+    if not isinstance(value, str):
+        return value
+
+    def one(match: re.Match[str]) -> str:
+        word = match[1]
+        if word == "robot":
+            return call.robot
+        if not word.isdecimal():
+            return str(ud[word])
+        if not 0 < int(word) <= len(parameters):
+            raise InvalidStateError(
+                f"{call.name}: got {{{word}}}; expected one of its {len(parameters)} parameters."
+            )
+        return parameters[int(word) - 1]
+
+    return re.sub(r"{(\w+)}", one, value)
+
+
+def _set_field(call: Call, message: Any, path: str, value: Any) -> None:
+    """Set a field of a message, a text as what the field holds.
+
+    Raises:
+        InvalidStateError: there is no such field, or the value is none for it.
+    """
+    *outer, last = path.split(".")
+    for name in outer:
+        message = _field(call, message, name, path)
+    before = _field(call, message, last, path)
+    kind = type(before)
+    if isinstance(value, str) and kind is not str:
+        try:
+            value = _read(kind, value)
+        except ValueError as error:
+            raise InvalidStateError(
+                f"{call.name}: goal: {path}: got {value!r}; expected {kind.__name__}."
+            ) from error
+    try:
+        setattr(message, last, value)
+    except (TypeError, ValueError, AttributeError) as error:
+        raise InvalidStateError(f"{call.name}: goal: {path}: {error}") from error
+
+
+def _truth(text: str) -> bool:
+    if text.lower() not in {"true", "false", "1", "0"}:
+        raise ValueError(text)
+    return text.lower() in {"true", "1"}
+
+
+def _read(kind: type, text: str) -> Any:
+    if kind is bool:
+        return _truth(text)
+    if kind not in {int, float}:
+        raise ValueError(text)
+    return kind(text)
+
+
+def _field(call: Call, message: Any, name: str, path: str) -> Any:
+    known = list(getattr(message, "__slots__", ()))
+    if name not in known:
+        raise InvalidStateError(
+            f"{call.name}: goal: {path}: got {name!r}; expected one of {known}."
+            f"{did_you_mean(name, known)}"
+        )
+    return getattr(message, name)

@@ -1,0 +1,482 @@
+"""`PetriNetPlan`: a plan as a container, and how one is loaded from files."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+
+from smachpy import log
+from smachpy.events import Fired, HeldBack
+from smachpy.exceptions import InconsistentMachineError, InvalidStateError, did_you_mean
+from smachpy.introspection import NetRecord, NetTransitionRecord, PlaceRecord, Structure
+from smachpy.machines.container import Container, below
+from smachpy.machines.problems import Problems
+from smachpy.pnp.actions import Binder, Order, SetVariable, Wait, WaitFor
+from smachpy.pnp.execution import Execution
+from smachpy.pnp.firing import Table
+from smachpy.pnp.knowledge import EVENT_LIFE_S, Knowledge
+from smachpy.pnp.net import Net
+from smachpy.pnp.plan import Plan, understand
+from smachpy.pnp.pnml import read_pnml
+from smachpy.pnp.problems import PlanError, PlanProblem, raise_errors
+from smachpy.run.visit import End
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from typing import Unpack
+
+    from smachpy.introspection import Kind
+    from smachpy.machines.state import StateOptions
+    from smachpy.pnp.firing import Jump, Moment
+    from smachpy.pnp.knowledge import Events
+    from smachpy.run.frame import Frame
+    from smachpy.run.step import Step
+    from smachpy.userdata.user_data import UserData
+
+__all__ = ["PetriNetPlan", "load"]
+
+OUTCOMES = ("goal", "fail", "preempted")
+
+
+class _Compiled:
+    """A plan, compiled: its children, and the table of what fires."""
+
+    __slots__ = ("epoch", "steps", "table", "userdata")
+
+    def __init__(self, machine: PetriNetPlan, steps: dict[str, Step]) -> None:
+        self.epoch = 0
+        self.userdata = machine.userdata
+        self.steps = steps
+        for step in steps.values():
+            step.next = {outcome: End(outcome) for outcome in step.state._smachpy.outcomes}
+        self.table = Table(
+            machine.plan,
+            {name: label for label, name in machine.names.items()},
+            {label: step.state._smachpy.outcomes for label, step in steps.items()},
+            lambda name: machine.knowledge.source_of(name) is not None,
+        )
+
+    def is_stale(self) -> bool:
+        return any(step.is_stale() for step in self.steps.values())
+
+
+class _Noting(dict[str, Any]):
+    """The values of userdata; who asked is told of each write."""
+
+    def __init__(self, values: Mapping[str, Any]) -> None:
+        self.on_write: Any = None
+        super().__init__(values)
+
+    def __setitem__(self, key: str, value: Any) -> None:
+        super().__setitem__(key, value)
+        if self.on_write is not None:
+            self.on_write()
+
+
+class Parameters(NamedTuple):
+    """How a plan and its sub-plans run; see `PetriNetPlan`."""
+
+    actions: Mapping[str, Any]
+    conditions: Mapping[str, Any]
+    strict: bool
+    events: Events
+    event_life: float
+
+
+class PetriNetPlan(Container):
+    """A container that runs a Petri Net Plan. Outcomes: 'goal', 'fail', 'preempted'.
+
+    Each child is an action of the plan, under the name that the plan calls it by (a '/' in it
+    becomes a ':'). A transition `A.start` lets A begin, `A.end` and `A.interrupt` let it stop if it
+    still runs: the token goes on at once, the plan's end waits for all of them. A has finished when
+    its outcome is no failure and no preempt (`smachpy.outcome_classes`), and has failed when it is
+    one: `A.end` without a condition waits for the first, `A.fail` for the second. An outcome of A
+    is a condition for the transitions behind A, true once A has ended with it.
+
+    The plan ends with 'goal' when all goal places hold exactly their tokens, with 'fail' when all
+    fail places do, or when nothing can fire any more: it says so in the log.
+
+    Args:
+        plan: The plan, or its net.
+        actions: Name of an action, or a whole name ("goto_kitchen"), -> what does it: a state (for
+            one name), a class of states, called with the parameters of the name, a function, called
+            with the userdata and the parameters, or `Function`, `Goal`, `Made`.
+        conditions: Name -> function of the userdata (and of the parameters behind the name),
+            `Expression`, `TopicCondition`, `Polled`, or a truth value. Others are events: `post`.
+        strict: A guarded end waits for the end of its action, too; only for a net.
+        events: "once": an event is used up by the first guard that reads it; "lasting": it holds
+            until "not_" and its name is posted.
+        event_life: An event that nobody has read is forgotten after so long [s]; with "once".
+        sub_plans: Name of an action -> the plan that does it.
+        input_keys: Keys copied from the parent's userdata when it starts.
+        output_keys: Keys copied to the parent's userdata when it ends.
+        name: Name when it is the root; default: the net's.
+        userdata_type: As for any container.
+        **options: See `StateOptions`.
+
+    Raises:
+        InvalidStateError: an argument is wrong; all problems at once.
+
+    Threads: an action that nothing but its own end can follow runs in the plan's thread, others in
+        threads of their own. Conditions are asked in the plan's thread.
+
+    Source of the rules of firing: the executor of PetriNetPlans 1.4; docs/petri_net_plans.md says
+    what differs.
+    """
+
+    _smachpy_kind: ClassVar[Kind] = "plan"
+
+    def __init__(
+        self,
+        plan: Plan | Net,
+        actions: Mapping[str, Any] | None = None,
+        conditions: Mapping[str, Any] | None = None,
+        *,
+        strict: bool = False,
+        events: Events = "once",
+        event_life: float = EVENT_LIFE_S,
+        sub_plans: Mapping[str, PetriNetPlan] | None = None,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        name: str | None = None,
+        userdata_type: type | None = None,
+        **options: Unpack[StateOptions],
+    ) -> None:
+        if isinstance(plan, Net):
+            plan = understand(plan, strict=strict)
+        if not isinstance(plan, Plan):
+            raise InvalidStateError(f"plan: got {plan!r}; expected a net or a plan.")
+        raise_errors(plan.problems)
+        super().__init__(
+            OUTCOMES,
+            input_keys,
+            output_keys,
+            name=(plan.net.name or "plan") if name is None else name,
+            userdata_type=userdata_type,
+            **options,
+        )
+        self.plan = plan
+        self.problems: tuple[PlanProblem, ...] = plan.problems
+        self.names: dict[str, str] = {}
+        self._execution: Execution | None = None
+        data = self.userdata._data  # noqa: SLF001  one machinery
+        if userdata_type is None:
+            data = _Noting(data)
+            object.__setattr__(self.userdata, "_data", data)
+        self.knowledge = Knowledge(
+            conditions, lambda: self.userdata, events=events, life=event_life
+        )
+        self._asks_userdata = any(callable(s) for s in self.knowledge.sources.values())
+        if isinstance(data, _Noting) and self._asks_userdata:
+            data.on_write = self.knowledge.changed
+        problems = Problems(type(self).__name__)
+        subs = problems.mapping("sub_plans", sub_plans, "name -> plan")
+        given = problems.mapping("actions", actions, "name -> what does it")
+        problems.raise_all()
+        self._unbound: list[str] = []
+        self._bind(Binder({**subs, **given}, self._built_in()))
+
+    def _built_in(self) -> dict[str, Any]:
+        return {
+            "wait": Wait,
+            "waitfor": lambda call: WaitFor(call, self.knowledge),
+            "setvar": SetVariable,
+            "unknownvar": lambda call: SetVariable(call, self._forget_variable),
+            "restartcurrentplan": lambda _call: Order(partial(self._order, "restart")),
+            "stopcurrentplan": lambda _call: Order(partial(self._order, "stop")),
+        }
+
+    def _bind(self, binder: Binder) -> None:
+        """Make the states of all actions, and note what is wrong with them."""
+        for name, known in self.plan.executables.items():
+            label = name.replace("/", ":")
+            while label in self._states:
+                label += "'"
+            state, problem = binder.bind(name)
+            if problem:
+                node = self.plan.net.places[known.places[0]] if known.places else None
+                file = self.plan.net.file
+                where = f"{file}:{node.line}: " if node is not None and file else ""
+                self._unbound.append(f"{where}{problem}")
+            self._store_child(label, state, None)
+            self.names[label] = name
+
+    # -- structure -----------------------------------------------------------------------------
+
+    def name_of(self, label: str) -> str:
+        """Return the plan's name for a child."""
+        return self.names[label]
+
+    def get_initial_states(self) -> list[str]:
+        """Return no labels: what begins first, the net says."""
+        return []
+
+    def get_active_states(self) -> list[str]:
+        """Return the labels of the actions that run now."""
+        execution = self._execution
+        return [] if execution is None else list(execution.active())
+
+    def set_initial_state(
+        self, initial_states: Sequence[str], userdata: UserData | None = None
+    ) -> None:
+        """Add to the userdata; the net says where the plan begins.
+
+        Raises:
+            InvalidStateError: labels are given.
+        """
+        if initial_states:
+            raise InvalidStateError(
+                f"initial states: got {list(initial_states)}; expected none: the tokens of the net "
+                "say where a plan begins."
+            )
+        if userdata is not None:
+            self.userdata.update(userdata)
+
+    def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
+        """Return (label of a transition, label of a child, label of the next), by the net."""
+        net = self.plan.net
+        label_of = {name: label for label, name in self.names.items()}
+        child = {p: label_of[name] for name, e in self.plan.executables.items() for p in e.places}
+        return [
+            (net.transition_name(number), child[source], child[target])
+            for number in range(len(net.transitions))
+            for source, _ in net.inputs[number]
+            if source in child
+            for target, _ in net.outputs[number]
+            if target in child
+        ]
+
+    def find_problems(self, where: str) -> tuple[str, ...]:
+        """Return what keeps the plan from running: actions without anything that does them."""
+        return (*(f"{where}: {problem}" for problem in self._unbound), *self._shared_states(where))
+
+    def _shared_states(self, where: str) -> Iterator[str]:
+        label_of: dict[int, str] = {}
+        for label, child in self._states.items():
+            for state in {id(state): state for state in below(child)}.values():
+                other = label_of.setdefault(id(state), label)
+                if other != label:
+                    yield (
+                        f"{where}: one state for two actions: got one {type(state).__name__} below "
+                        f"both {other!r} and {label!r}; expected an instance for each."
+                    )
+
+    def describe_structure(self) -> Structure:
+        """Return the children and the net."""
+        children = tuple(
+            (label, state, tuple(self._remappings[label].items()))
+            for label, state in self._states.items()
+        )
+        details = (("strict", "an end waits for its action"),) if self.plan.strict else ()
+        return Structure(children, net=self._net_record(), details=details)
+
+    def _net_record(self) -> NetRecord:
+        plan, net = self.plan, self.plan.net
+        label_of = {name: label for label, name in self.names.items()}
+        child = {p: label_of[name] for name, e in plan.executables.items() for p in e.places}
+        places = tuple(
+            PlaceRecord(
+                place.id,
+                place.name.strip(),
+                place.tokens,
+                child.get(number, ""),
+                "goal" if number in plan.goals else "fail" if number in plan.fails else "place",
+            )
+            for number, place in enumerate(net.places)
+        )
+        transitions = tuple(
+            NetTransitionRecord(
+                transition.id,
+                transition.name.strip(),
+                "" if plan.conditions[number] is None else str(plan.conditions[number]),
+                tuple((label_of[name], function) for name, function in plan.calls[number]),
+                tuple((net.places[p].id, weight) for p, weight in net.inputs[number]),
+                tuple((net.places[p].id, weight) for p, weight in net.outputs[number]),
+            )
+            for number, transition in enumerate(net.transitions)
+        )
+        return NetRecord(places, transitions)
+
+    # -- running -------------------------------------------------------------------------------
+
+    def _compile(self, frame: Frame) -> _Compiled:
+        problems = self.find_problems(frame.path)
+        if problems:
+            raise InconsistentMachineError(f"{type(self).__name__} {frame.path!r}", problems)
+        return _Compiled(self, {label: self._make_step(label) for label in self._states})
+
+    def _run_children(self, frame: Frame, plan: _Compiled) -> str:
+        if self._start_cbs:
+            self.call_start_cbs()
+        self._execution = execution = Execution(self, frame, plan.steps, plan.table)
+        try:
+            outcome = execution.run()
+        finally:
+            self._execution = None
+        if self._termination_cbs:
+            self.call_termination_cbs(list(self._states), outcome)
+        return outcome
+
+    def marking(self) -> dict[str, int]:
+        """Return the ids of the places that hold tokens now -> how many; when idle, at the start.
+
+        Threads: any.
+        """
+        execution = self._execution
+        marking = self.plan.net.initial if execution is None else execution.moment.marking
+        places = self.plan.net.places
+        return {places[p].id: marking.count(p) for p in dict.fromkeys(marking)}
+
+    def post(self, event: str) -> None:
+        """Tell the plan, and its sub-plans, that something happened: an event for its guards.
+
+        Args:
+            event: Its name; "not_NAME" and "!NAME" say that NAME is false from now on.
+
+        Threads: any; does not wait.
+        """
+        frame = self._smachpy.frame
+        self.knowledge.post(event, None if frame is None else frame.run.clock)
+        for child in self._states.values():
+            if isinstance(child, PetriNetPlan):
+                child.post(event)
+
+    def set_condition(self, name: str, value: bool | None) -> None:
+        """Say what a condition is from now on; None forgets it. A registered one has its own say.
+
+        Threads: any; does not wait.
+        """
+        self.knowledge.set(name, value)
+
+    def fire(self, transition: str) -> None:
+        """Let a transition fire now whatever its guard says, if its places hold their tokens.
+
+        An action that it ends, or that alone was waited for, is asked to stop.
+
+        Args:
+            transition: Its id.
+
+        Raises:
+            InvalidStateError: there is no such transition, or the plan does not run.
+
+        Threads: any; does not wait.
+        """
+        known = self.plan.net.transition_numbers
+        if transition not in known:
+            raise InvalidStateError(
+                f"fire: got {transition!r}; expected the id of a transition, of {sorted(known)}."
+                f"{did_you_mean(transition, known)}"
+            )
+        self._order("fire", transition)
+
+    def _order(self, what: str, which: str = "") -> None:
+        execution = self._execution
+        if execution is None:
+            raise InvalidStateError(f"{self.name}: {what}: the plan does not run.")
+        execution.order(what, which)
+
+    def _forget_variable(self, key: str) -> None:
+        if key in self.userdata:
+            del self.userdata[key]
+
+    def tell_fired(self, frame: Frame, jump: Jump) -> None:
+        """Publish and log what has just fired."""
+        net = self.plan.net
+        places = net.places
+        marking = tuple(places[p].id for p in jump.moment.marking)
+        for number in jump.fired:
+            frame.emit_own(Fired, net.transitions[number].id, marking)
+        if frame.run.logged:
+            fired = ", ".join(net.transition_name(number) for number in jump.fired)
+            log.loginfo(f"{frame.path}: {fired} -> {net.words(jump.moment.marking)}")
+
+    def tell_waiting(self, frame: Frame, moment: Moment) -> None:
+        """Publish and log which guards are false where the plan waits."""
+        net, guards = self.plan.net, self.plan.guards
+        texts = tuple(str(guards[number]) for number in moment.candidates)
+        frame.emit_own(HeldBack, tuple(net.transitions[n].id for n in moment.candidates), texts)
+        if frame.run.logged:
+            false = ", ".join(
+                f"{net.transition_name(number)!r}: [{text}] is false"
+                for number, text in zip(moment.candidates, texts, strict=True)
+            )
+            log.loginfo(f"{frame.path}: waits in {net.words(moment.marking)}; {false or 'ends'}")
+
+
+# -- loading ---------------------------------------------------------------------------------------
+
+
+def load(
+    file: Path | str,
+    actions: Mapping[str, Any] | None = None,
+    conditions: Mapping[str, Any] | None = None,
+    *,
+    strict: bool = False,
+    events: Events = "once",
+    event_life: float = EVENT_LIFE_S,
+    **options: Any,
+) -> PetriNetPlan:
+    """Load a plan from a PNML file.
+
+    An action that is not registered under its whole name and for which there is a file NAME.pnml
+    beside `file` is that plan.
+
+    Args:
+        file: The file.
+        actions: See `PetriNetPlan`; for sub-plans, too.
+        conditions: Likewise.
+        strict: Likewise.
+        events: Likewise.
+        event_life: Likewise.
+        **options: Likewise.
+
+    Raises:
+        PlanError: it cannot be read, or has errors; all problems at once, its sub-plans' too.
+        InvalidStateError: an argument is wrong.
+    """
+    parameters = Parameters(actions or {}, conditions or {}, strict, events, event_life)
+    return _load(Path(file), parameters, (), options)
+
+
+_DEEPEST = 20
+
+
+def _load(
+    file: Path, parameters: Parameters, above: tuple[Path, ...], options: Mapping[str, Any]
+) -> PetriNetPlan:
+    net, problems = read_pnml(file)
+    plan = understand(net, strict=parameters.strict, problems=problems)
+    found = list(plan.problems)
+    stack = (*above, file.resolve())
+    subs: dict[str, PetriNetPlan] = {}
+    for name, known in plan.executables.items():
+        part = file.parent / f"{name}.pnml"
+        if name in parameters.actions or "/" in name or not _is_file(part):
+            continue
+        if part.resolve() in stack or len(stack) > _DEEPEST:
+            line = net.places[known.places[0]].line if known.places else 0
+            text = f"{name!r} is the plan {str(part)!r}, which is run to run it; expected another."
+            found.append(PlanProblem("recursion", "error", text, "", net.file, line))
+            continue
+        try:
+            subs[name] = _load(part, parameters, stack, {})
+        except PlanError as error:
+            found += error.found
+    raise_errors(found)
+    return PetriNetPlan(
+        plan,
+        parameters.actions,
+        parameters.conditions,
+        events=parameters.events,
+        event_life=parameters.event_life,
+        sub_plans=subs,
+        **options,
+    )
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False

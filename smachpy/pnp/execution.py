@@ -1,0 +1,443 @@
+"""One run of a plan: what fires, which actions run, what it waits for."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING, Any
+
+from smachpy import log
+from smachpy.events import Preempted
+from smachpy.exceptions import SmachError
+from smachpy.pnp.actions import take_apart
+from smachpy.run.branches import ChildBranch, Group
+from smachpy.run.child import on_preempt
+from smachpy.run.grace import ask_child
+from smachpy.run.interrupt import Interruption
+from smachpy.run.origin import asking
+from smachpy.run.runner import end_visit, run_watched, unknown_outcome, user_error
+from smachpy.run.visit import Why
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from smachpy.pnp.container import PetriNetPlan
+    from smachpy.pnp.firing import Jump, Moment, Table
+    from smachpy.run.frame import Frame
+    from smachpy.run.step import Step
+
+_TIMEOUT = "timeout_"
+
+
+class Branches(Group):
+    """The actions that run: those in threads of their own, and the one in the plan's thread."""
+
+    def __init__(self, frame: Frame) -> None:
+        super().__init__(frame, [], each=True)
+
+    def begin(self, step: Step) -> ChildBranch:
+        """Start a child in a thread of its own."""
+        branch = ChildBranch(self, step)
+        with self.frame.run.lock:
+            self.branches.append(branch)
+            self._left += 1
+        container = self.frame.container
+        if container._preempt_requested:  # asked before it was there to be told
+            self.ask([branch])
+        self.frame.run.clock.spawn(branch.work, name=branch.here())
+        return branch
+
+    def running(self) -> list[Any]:
+        """Return the frames in which children run."""
+        own = [] if self.frame.step is None else [self.frame]
+        return [*own, *super().running()]
+
+    def threads(self) -> list[ChildBranch]:
+        """Return the branches that have not ended."""
+        return super().running()
+
+    def forget(self, branch: ChildBranch) -> None:
+        """Keep a branch that has ended well no longer."""
+        with self.frame.run.lock:
+            self.branches.remove(branch)
+
+    def notice(self) -> None:
+        """Wake the plan's thread."""
+        self._wake.set()
+
+    def wait_for_news(self, timeout: float | None) -> None:
+        """Wait until a child ends, `notice` is called, or the time [s] is over.
+
+        What comes before the next call is not lost: it ends that at once.
+        """
+        if not self.reports:
+            self._wake.wait(timeout)
+        self._wake.clear()
+
+
+class Execution:
+    """A run of a plan.
+
+    Args:
+        machine: The plan.
+        frame: Its frame.
+        steps: Label -> child.
+        table: What fires.
+    """
+
+    def __init__(
+        self, machine: PetriNetPlan, frame: Frame, steps: dict[str, Step], table: Table
+    ) -> None:
+        self._machine = machine
+        self._frame = frame
+        self._steps = steps
+        self._table = table
+        self._net = table.plan.net
+        self._ended: dict[str, str] = {}
+        self._running: dict[str, ChildBranch] = {}
+        self._since: dict[str, float] = {}
+        self._begin_again: set[str] = set()
+        self._told: object = None
+        self.moment = table.moment(self._net.initial)
+        self.branches = Branches(frame)
+        self.orders: deque[tuple[str, str]] = deque()
+
+    def run(self) -> str:
+        """Run to the end and return the outcome."""
+        machine, frame = self._machine, self._frame
+        frame.group = self.branches
+        forget = [
+            on_preempt(machine, self.branches.notice),
+            machine.knowledge.subscribe(self.branches.notice),
+        ]
+        try:
+            with machine.knowledge.listening():
+                outcome = self._go()
+            self._stop_all("the plan has ended")
+            self.branches.raise_errors(None)
+        except BaseException as error:
+            with asking("plan", frame.path, f"raised {type(error).__name__}"):
+                self.branches.ask(self.branches.threads())
+            if isinstance(error, Exception):
+                self._await_all()
+            raise
+        finally:
+            for each in forget:
+                each()
+            frame.step = frame.group = None
+        return outcome
+
+    def _go(self) -> str:
+        machine, moment = self._machine, self.moment
+        jump: Jump | None
+        while True:
+            if moment.end is not None:
+                return moment.end
+            if machine._preempt_requested:
+                return self._preempted()
+            if self.orders:
+                outcome = self._obey(*self.orders.popleft())
+                if outcome is not None:
+                    return outcome
+                moment = self.moment
+                continue
+            jump = moment.free
+            if jump is None:
+                jump = self._chosen(moment)
+            if jump is not None:
+                moment = self._take(jump)
+            elif self._may_change(moment):
+                self._wait(moment)
+            else:
+                return self._stuck(moment)
+
+    # -- firing --------------------------------------------------------------------------------
+
+    def _chosen(self, moment: Moment) -> Jump | None:
+        """Return what the guards let happen now."""
+        if not moment.candidates:
+            return None
+        if moment.only is not None:
+            key: object = self._ended.get(moment.only)
+        else:
+            key = self._truths(moment)
+        try:
+            return moment.jumps[key]
+        except KeyError:
+            truths = self._truths(moment) if moment.only is not None else key
+            assert isinstance(truths, tuple)
+            true = [t for t, holds in zip(moment.candidates, truths, strict=True) if holds]
+            return self._table.jump(moment, key, true)
+
+    def _truths(self, moment: Moment) -> tuple[bool, ...]:
+        """Return what each guard says; a name is asked once, for all of them."""
+        values: dict[str, bool] = {}
+
+        def value(name: str) -> bool:
+            if name not in values:
+                values[name] = self._value(name)
+            return values[name]
+
+        return tuple([guard is None or guard.holds(value) for guard in moment.guards])
+
+    def _value(self, name: str) -> bool:
+        asks = self._table.asks.get(name)
+        if asks is not None:
+            return asks.holds(self._ended.get(asks.label))
+        now = self._frame.run.clock.now()
+        due = self._due(name)
+        if due is not None:
+            return now >= due
+        return self._machine.knowledge.value(name, self._frame.path, now)
+
+    def _due(self, name: str) -> float | None:
+        """Return when a `timeout_ACTION_SECONDS` comes true; None for other names."""
+        if not name.startswith(_TIMEOUT) or self._machine.knowledge.source_of(name) is not None:
+            return None
+        action, _, seconds = name.removeprefix(_TIMEOUT).rpartition("_")
+        try:
+            limit = float(seconds)
+        except ValueError:
+            return None
+        begun = [
+            since
+            for label, since in self._since.items()
+            if action in {label, take_apart(self._machine.name_of(label), [action]).action}
+        ]
+        return min(begun) + limit if begun and limit >= 0 else None
+
+    def _take(self, jump: Jump) -> Moment:
+        """Fire, begin and end actions; return what follows."""
+        run = self._frame.run
+        self.moment = moment = jump.moment
+        self._told = None
+        if run.watched:
+            self._machine.tell_fired(self._frame, jump)
+        begun = self._call(jump) if jump.calls else ()
+        if begun:
+            if len(begun) == 1 and moment.only == begun[0] and not self.branches.branches:
+                self._run_here(self._steps[begun[0]])
+            else:
+                for label in begun:
+                    self._begin(label)
+        if self._machine._transition_cbs:  # noqa: SLF001  one machinery
+            self._machine.call_transition_cbs()
+        return moment
+
+    def _call(self, jump: Jump) -> list[str]:
+        """End actions, and return the labels of those that begin."""
+        begun: list[str] = []
+        for label, begins in jump.calls:
+            if not begins:
+                self._ended.pop(label, None)
+                self._begin_again.discard(label)
+                if label in begun:
+                    begun.remove(label)
+                if label in self._running:
+                    self._end(label, jump)
+            elif label not in self._running and label not in begun:
+                self._ended.pop(label, None)
+                begun.append(label)
+        return begun
+
+    # -- actions -------------------------------------------------------------------------------
+
+    def _begin(self, label: str) -> None:
+        if any(branch.step.label == label for branch in self.branches.threads()):
+            self._begin_again.add(label)  # it still stops
+            return
+        self._since[label] = self._frame.run.clock.now()
+        self._running[label] = self.branches.begin(self._steps[label])
+
+    def _end(self, label: str, jump: Jump) -> None:
+        branch = self._running.pop(label)
+        self._since.pop(label, None)
+        if not branch.ended:
+            names = ", ".join(self._net.transition_name(t) for t in jump.fired)
+            with asking("plan", self._frame.path, f"fired {names}"):
+                self.branches.ask([branch])
+
+    def _run_here(self, step: Step) -> None:
+        """Run a child in this thread: nothing can happen before it ends."""
+        frame, machine = self._frame, self._machine
+        outcome: str | None = None
+        while outcome is None:
+            frame.step = step  # first the mark, then the look: see `smachpy.run.grace.ask`
+            if machine._preempt_requested:
+                frame.step = None
+                return
+            try:
+                outcome = self._followed(frame, step, self._once(frame, step))
+            except Interruption:
+                if frame.dead:
+                    raise
+                outcome = self._followed(frame, step, "preempted")
+            except SmachError:
+                raise
+            except Exception as error:
+                raise user_error(step.path_in(frame), step.state, error) from error
+        frame.step = None
+        self._ended[step.label] = outcome
+        if frame.run.pending:
+            frame.run.flush()
+
+    def _followed(self, frame: Frame, step: Step, outcome: Any) -> str | None:
+        """Return how the child in this thread has ended; None when it is to run again."""
+        if (
+            self._machine._preempt_requested
+            or frame.visit is not None
+            or step.state._preempt_requested
+        ):
+            decision = end_visit(frame, outcome)
+            if decision.why is Why.JUMPED:
+                return None
+            found: str = decision.target.outcome
+            return found
+        if not (isinstance(outcome, str) and outcome in step.next):
+            outcomes = step.state._smachpy.outcomes
+            raise unknown_outcome(step.path_in(frame), outcomes, outcome)
+        return outcome
+
+    @staticmethod
+    def _once(frame: Frame, step: Step) -> Any:
+        run = frame.run
+        if run.control is not None:
+            run.control.pass_gate(frame, step)
+            visit = frame.visit
+            if frame.container._preempt_requested or (visit is not None and visit.is_asked()):
+                return "preempted"
+        return run_watched(frame, step) if run.watched else step.execute(step.userdata)
+
+    def _see_reports(self) -> bool:
+        """Take note of the children that have ended; tell whether one raised."""
+        raised = False
+        while self.branches.reports:
+            branch = self.branches.reports.popleft()
+            label = branch.step.label
+            if branch.error is not None:
+                raised = True
+                continue
+            self.branches.forget(branch)
+            if self._running.get(label) is branch:
+                del self._running[label]
+                self._since.pop(label, None)
+                assert branch.outcome is not None
+                self._ended[label] = branch.outcome
+            elif label in self._begin_again:
+                self._begin_again.discard(label)
+                self._begin(label)
+        return raised
+
+    # -- waiting and ending --------------------------------------------------------------------
+
+    def _may_change(self, moment: Moment) -> bool:
+        """Tell whether anything can still make a transition fire."""
+        return bool(self.branches.branches or self.branches.reports or moment.asks_world)
+
+    def _wait(self, moment: Moment) -> None:
+        """Wait for the end of a child or for other news.
+
+        Blocks: until then.
+        """
+        self._tell_waiting(moment)
+        if not self.branches.reports:
+            self.branches.wait_for_news(self._longest_wait(moment))
+        if self._see_reports():
+            with asking("plan", self._frame.path, "an action raised"):
+                self.branches.ask(self.branches.threads())
+            self._await_all()
+            self.branches.raise_errors(None)
+
+    def _longest_wait(self, moment: Moment) -> float | None:
+        """Return how long nothing tells of a change that may come [s]; None for ever."""
+        waits = [self._machine.knowledge.every(name) for name in moment.asks_world]
+        dues = [self._due(name) for name in moment.asks_world]
+        now = self._frame.run.clock.now()
+        waits += [max(0.0, due - now) for due in dues if due is not None and due > now]
+        return min((wait for wait in waits if wait is not None), default=None)
+
+    def _tell_waiting(self, moment: Moment) -> None:
+        """Say which guards hold the plan up, once for each place where it waits."""
+        run = self._frame.run
+        if run.watched and self._told is not moment:
+            self._told = moment
+            self._machine.tell_waiting(self._frame, moment)
+
+    def _await_all(self) -> None:
+        """Wait until no child runs; all were asked to stop, and each has its grace."""
+        while self.branches.threads() or self.branches.reports:
+            if not self.branches.reports:
+                self.branches.wait_for_news(None)
+            self._begin_again.clear()
+            self._see_reports()
+
+    def _stop_all(self, why: str) -> None:
+        """End all children that run, and wait for them."""
+        threads = self.branches.threads()
+        if threads:
+            with asking("plan", self._frame.path, why):
+                self.branches.ask(threads)
+        self._await_all()
+        self._running.clear()
+        self._since.clear()
+
+    def _preempted(self) -> str:
+        """End because of a preempt, once all children have; finished work stands."""
+        frame = self._frame
+        self._await_all()
+        self.branches.raise_errors(None)
+        moment = self.moment
+        for _ in range(len(self._net.transitions)):
+            if moment.end is not None:
+                return moment.end
+            truths = self._truths(moment)
+            true = [t for t, holds in zip(moment.candidates, truths, strict=True) if holds]
+            jump = self._table.jump_without_begins(moment, true)
+            if jump is None:
+                break
+            moment = self._take(jump)
+        if moment.end is not None:
+            return moment.end
+        frame.answered = True
+        frame.emit_own(Preempted, "")
+        return "preempted"
+
+    def _stuck(self, moment: Moment) -> str:
+        """End where nothing can fire any more."""
+        path = self._frame.path
+        ended = ", ".join(f"{name} ended with {how!r}" for name, how in self._ended.items())
+        text = f"{path}: nothing can fire any more in {self._net.words(moment.marking)}, "
+        text += "which is no goal." if self._table.plan.goals else "and there is no goal place."
+        log.logwarn(f"{text} {ended}".rstrip())
+        return "fail"
+
+    # -- orders --------------------------------------------------------------------------------
+
+    def order(self, what: str, which: str = "") -> None:
+        """Give an order that is obeyed before the next firing; any thread."""
+        self.orders.append((what, which))
+        self.branches.notice()
+        step = self._frame.step
+        if what != "fire" or step is None:
+            return
+        with asking("operator", "", f"fire {which}"):
+            ask_child(self._frame, step)
+
+    def _obey(self, what: str, which: str) -> str | None:
+        if what == "stop":
+            return "fail"
+        if what == "restart":
+            self._stop_all("the plan starts again")
+            self._ended.clear()
+            self.moment = self._table.moment(self._net.initial)
+            return None
+        number = self._net.transition_numbers[which]
+        if self._net.has_tokens(self.moment.marking, number):
+            jump = self._table.forced(self.moment, number)
+            self._take(jump)
+        else:
+            log.logwarn(f"{self._frame.path}: fire {which!r}: its places hold too few tokens now.")
+        return None
+
+    def active(self) -> Sequence[str]:
+        """Return the labels of the actions that run."""
+        return [frame.step.label for frame in self.branches.running() if frame.step is not None]

@@ -1,0 +1,330 @@
+"""What a plan's guards ask the world: conditions, events and variables.
+
+A name is answered by the first of these that knows it: a condition registered under it, or under
+its beginning up to a `_`, called with the rest; `timeout_ACTION_SECONDS`; `equal_A_B`; an event;
+what `set` said last; `true`. Anything else is false. Source: PNPActionServer of PetriNetPlans 1.4.
+"""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import math
+import operator
+import threading
+from collections import deque
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
+
+from smachpy.exceptions import InvalidUserCodeError
+from smachpy.machines.problems import Problems
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from actionlib_core.clock import Clock
+
+EVENT_LIFE_S: Final = 2.0
+Events: TypeAlias = Literal["once", "lasting"]
+_MOST_EVENTS: Final = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class TopicCondition:
+    """A condition that the newest message of a topic answers; false before the first one.
+
+    Attributes:
+        topic: Name of the topic.
+        msg_type: Class of its messages.
+        when: Called with the message, in the thread that runs the plan; true or false.
+    """
+
+    topic: str
+    msg_type: Any
+    when: Callable[[Any], object]
+
+
+@dataclass(frozen=True, slots=True)
+class Polled:
+    """A condition that nothing tells of, so that it is asked again and again.
+
+    Attributes:
+        function: Called with the plan's userdata; true or false.
+        every: Time between two questions while the plan waits for it [s].
+    """
+
+    function: Callable[..., object]
+    every: float
+
+
+class Expression:
+    """A condition on the userdata, as text: "battery < 20 and not charging".
+
+    Numbers, texts, comparisons, `and`, `or`, `not`, `in`, `+ - * / %` and keys of the userdata;
+    nothing is called. It is false while a key has no value.
+
+    Args:
+        text: The expression.
+
+    Raises:
+        ValueError: it is none.
+    """
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        try:
+            self._tree = ast.parse(text, mode="eval").body
+        except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
+            raise ValueError(f"got {text!r}; expected an expression on userdata keys.") from error
+        for node in ast.walk(self._tree):
+            if not isinstance(node, _ALLOWED):
+                raise ValueError(  # noqa: TRY004  the text is wrong, not its type
+                    f"got {text!r} with {type(node).__name__} in it; expected numbers, texts, "
+                    "comparisons, and, or, not, in, + - * / % and userdata keys."
+                )
+
+    def __call__(self, userdata: Any) -> bool:
+        """Tell whether it holds."""
+        try:
+            return bool(_value(self._tree, userdata))
+        except KeyError:
+            return False
+
+    def __repr__(self) -> str:
+        return f"Expression({self.text!r})"
+
+
+_OPERATORS: Final[dict[type[ast.AST], Callable[..., Any]]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Mod: operator.mod,
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+    ast.In: lambda one, other: one in other,
+    ast.NotIn: lambda one, other: one not in other,
+    ast.Not: operator.not_,
+    ast.USub: operator.neg,
+}
+_ALLOWED = (
+    ast.BoolOp, ast.BinOp, ast.UnaryOp, ast.Compare, ast.Constant, ast.Name, ast.Load, ast.Tuple,
+    ast.List, ast.And, ast.Or, *_OPERATORS,
+)  # fmt: skip
+
+
+def _value(node: ast.expr, userdata: Any) -> Any:  # noqa: PLR0911  one for each kind of node
+    match node:
+        case ast.Constant(value=value):
+            return value
+        case ast.Name(id=name):
+            return userdata[name]
+        case ast.Tuple(elts=parts) | ast.List(elts=parts):
+            return [_value(part, userdata) for part in parts]
+        case ast.BoolOp(op=ast.And(), values=parts):
+            return all(_value(part, userdata) for part in parts)
+        case ast.BoolOp(values=parts):
+            return any(_value(part, userdata) for part in parts)
+        case ast.UnaryOp(op=op, operand=part):
+            return _OPERATORS[type(op)](_value(part, userdata))
+        case ast.BinOp(left=left, op=op, right=right):
+            return _OPERATORS[type(op)](_value(left, userdata), _value(right, userdata))
+        case ast.Compare(left=left, ops=ops, comparators=rest):
+            values = [_value(part, userdata) for part in (left, *rest)]
+            pairs = zip(ops, values, values[1:], strict=False)
+            return all(_OPERATORS[type(op)](one, other) for op, one, other in pairs)
+    raise ValueError(f"got {ast.dump(node)}")  # __init__ lets no other through
+
+
+class Knowledge:
+    """What guards ask, of one plan.
+
+    Args:
+        conditions: Name -> function of the userdata (and of the name's parameters), `Expression`,
+            `TopicCondition`, `Polled`, or a truth value.
+        userdata: Gives the plan's userdata.
+        events: "once": an event is used up by the first guard that reads it, and forgotten after
+            `life`, as in PNP. "lasting": it holds until its opposite is posted.
+        life: [s].
+
+    Raises:
+        InvalidStateError: an argument is wrong; all problems at once.
+
+    Threads: `post`, `set` and `subscribe` from any thread; `value` from the plan's and from those
+        of its actions.
+    """
+
+    def __init__(
+        self,
+        conditions: Mapping[str, Any] | None,
+        userdata: Callable[[], Any],
+        *,
+        events: Events = "once",
+        life: float = EVENT_LIFE_S,
+    ) -> None:
+        problems = Problems("conditions")
+        holds = "name -> function, Expression, TopicCondition, Polled, or true or false"
+        self.sources = problems.mapping("conditions", conditions, holds)
+        for name, source in self.sources.items():
+            known = callable(source) or isinstance(source, (TopicCondition, Polled, bool))
+            if not (isinstance(name, str) and name and known):
+                problems.add(f"got {name!r}: {source!r}; expected {holds}.")
+            if isinstance(source, Polled):
+                problems.seconds(f"{name}: every", source.every, optional=False)
+                if source.every == 0:
+                    problems.add(f"{name}: every: got 0; expected more.")
+        if events not in {"once", "lasting"}:
+            problems.add(f"events: got {events!r}; expected 'once' or 'lasting'.")
+        self._life = problems.seconds("event_life", life) or math.inf
+        problems.raise_all()
+        self._events = events
+        self._userdata = userdata
+        self._lock = threading.Lock()
+        self._posted: deque[tuple[str, float | None]] = deque(maxlen=_MOST_EVENTS)
+        self._set: dict[str, bool] = {}
+        self._newest: dict[str, Any] = {}
+        self._listeners: tuple[Callable[[], object], ...] = ()
+
+    # -- from outside --------------------------------------------------------------------------
+
+    def post(self, event: str, clock: Clock | None = None) -> None:
+        """Note that something happened; "not_NAME" and "!NAME" say that NAME is false.
+
+        Args:
+            event: Its name.
+            clock: Of the run, when there is one: the event's life begins now. Without, it begins
+                when the plan first looks.
+        """
+        problems = Problems("post")
+        event = problems.word("event", event)
+        problems.raise_all()
+        name = event[1:] if event.startswith("!") else event.removeprefix("not_")
+        if name != event:
+            self.set(name, value=False)
+            return
+        if self._events == "lasting":
+            self.set(name, value=True)
+            return
+        with self._lock:
+            self._posted.append((name, None if clock is None else clock.now()))
+        self.changed()
+
+    def set(self, name: str, value: bool | None) -> None:
+        """Say what a condition is from now on, unless one is registered; None forgets it."""
+        with self._lock:
+            self._posted = deque(
+                (pair for pair in self._posted if pair[0] != name), maxlen=_MOST_EVENTS
+            )
+            if value is None:
+                self._set.pop(name, None)
+            else:
+                self._set[name] = bool(value)
+        self.changed()
+
+    def changed(self) -> None:
+        """Say that conditions may have changed: a plan that waits looks again."""
+        for listener in self._listeners:
+            listener()
+
+    def subscribe(self, listener: Callable[[], object]) -> Callable[[], None]:
+        """Call `listener` at each change, in the thread of the change; returns what ends that."""
+        with self._lock:
+            self._listeners = (*self._listeners, listener)
+
+        def forget() -> None:
+            with self._lock:
+                self._listeners = tuple(one for one in self._listeners if one is not listener)
+
+        return forget
+
+    @contextlib.contextmanager
+    def listening(self) -> Any:
+        """Listen to the topics of the conditions while this lasts."""
+        topics = {n: s for n, s in self.sources.items() if isinstance(s, TopicCondition)}
+        with contextlib.ExitStack() as stack:
+            if topics:
+                from actionlib_core.pubsub.topic import NotingSubscriber
+
+                for name, source in topics.items():
+                    self._newest.pop(name, None)
+                    stack.enter_context(
+                        NotingSubscriber(source.topic, source.msg_type, self._noting(name))
+                    )
+            yield
+
+    def _noting(self, name: str) -> Callable[[Any], None]:
+        def note(message: Any) -> None:
+            self._newest[name] = message
+            self.changed()
+
+        return note
+
+    # -- for guards ----------------------------------------------------------------------------
+
+    def source_of(self, name: str) -> tuple[Any, tuple[str, ...]] | None:
+        """Return what is registered for a name, and the parameters in the name; None if nothing."""
+        if name in self.sources:
+            return self.sources[name], ()
+        parts = name.split("_")
+        for count in range(len(parts) - 1, 0, -1):
+            source = self.sources.get("_".join(parts[:count]))
+            if source is not None and callable(source):
+                return source, tuple(parts[count:])
+        return None
+
+    def every(self, name: str) -> float | None:
+        """Return how often a name is to be asked for [s]; None when its changes are told."""
+        found = self.source_of(name)
+        return found[0].every if found is not None and isinstance(found[0], Polled) else None
+
+    def value(self, name: str, path: str, now: float) -> bool:
+        """Return what a name is worth now; an event is used up by it.
+
+        Raises:
+            InvalidUserCodeError: the condition raised.
+        """
+        found = self.source_of(name)
+        if found is not None:
+            try:
+                return self._ask(name, *found)
+            except Exception as error:
+                text = f"{path}: condition {name!r} raised {type(error).__name__}: {error}"
+                raise InvalidUserCodeError(text, path=path) from error
+        if name.startswith(("equal_", "equals_")):
+            _, _, rest = name.partition("_")
+            one, _, other = rest.partition("_")
+            return self.text(one) == self.text(other)
+        return self._happened(name, now) or self._set.get(name, name == "true")
+
+    def _ask(self, name: str, source: Any, parameters: tuple[str, ...]) -> bool:
+        if isinstance(source, bool):
+            return source
+        if isinstance(source, TopicCondition):
+            return name in self._newest and bool(source.when(self._newest[name]))
+        function = source.function if isinstance(source, Polled) else source
+        return bool(function(self._userdata(), *map(self.text, parameters)))
+
+    def _happened(self, name: str, now: float) -> bool:
+        with self._lock:
+            kept: deque[tuple[str, float | None]] = deque(maxlen=_MOST_EVENTS)
+            hit = False
+            for event, since in reversed(self._posted):
+                if since is not None and now - since > self._life:
+                    continue
+                if event == name and not hit:
+                    hit = True  # the newest one, used up
+                    continue
+                kept.appendleft((event, now if since is None else since))
+            self._posted = kept
+            return hit
+
+    def text(self, parameter: str) -> str:
+        """Return a parameter; "@NAME" stands for the userdata key NAME."""
+        if not parameter.startswith("@"):
+            return parameter
+        data = self._userdata()
+        return str(data[parameter[1:]]) if parameter[1:] in data else parameter
