@@ -37,7 +37,7 @@ def register_render(
     parser.add_argument(
         "target",
         metavar="TARGET",
-        help="a mission's name, module:factory, path.py[:factory], or a record written as .json",
+        help="a mission's name, module:factory, path.py[:factory], plan.pnml, or a record as .json",
     )
     parser.add_argument(
         "-o", "--output", metavar="FILE", help=f"the ending names the format: {FORMATS}; - is svg"

@@ -86,7 +86,11 @@ def check(
     subject = facts.collect(machine, record)
     wanted = [properties_of_runs.parse(p) if isinstance(p, str) else p for p in properties]
     problems = list(facts.find_problems(machine, record.path))
-    if not problems:
+    if any(state.net is not None for state in record.walk()):
+        from smachpy.checks import plans  # most machines have none
+
+        problems += plans.find(machine, record.path)
+    if not any(problem.rule in facts.HOLDS_BACK for problem in problems):
         moments = graph.build(subject)
         problems += structure.find(subject, moments)
         problems += userdata.find(subject, moments)

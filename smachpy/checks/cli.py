@@ -25,7 +25,10 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     """Add the command."""
     parser = subparsers.add_parser("check", help="find what is wrong with a machine, without a run")
     parser.add_argument(
-        "targets", nargs="+", metavar="TARGET", help="mission, module:factory or path.py[:factory]"
+        "targets",
+        nargs="+",
+        metavar="TARGET",
+        help="mission, module:factory, path.py[:factory] or plan.pnml",
     )
     parser.add_argument("--format", choices=sorted(FORMATS), default="text", help="of the report")
     parser.add_argument(

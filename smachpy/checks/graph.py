@@ -212,7 +212,11 @@ class _Builder:
         part = _Part(enter, {o: self._node(record, o) for o in record.outcomes})
         for outcome in self._subject.facts_of(record).made & set(part.ends):
             self._edge(enter, part.ends[outcome])
-        add = {"concurrence": self._concurrence, "iterator": self._iterator}
+        add = {
+            "concurrence": self._concurrence,
+            "iterator": self._iterator,
+            "plan": self._plan,
+        }
         add.get(record.kind, self._machine)(record, part)
         return part
 
@@ -257,6 +261,18 @@ class _Builder:
         if facts.empty or not record.children:
             for node in exhausted:
                 self._edge(part.enter, node)
+
+    def _plan(self, record: StateRecord, part: _Part) -> None:
+        """The actions of a plan, in any order: what its net allows is checked on the net."""
+        for child_record in record.children:
+            child = self.state(child_record)
+            self._edge(part.enter, child.enter)
+            for node in child.ends.values():
+                self._edge(node, part.enter)
+            self._preempted(part, child)
+        for outcome, node in part.ends.items():
+            preempt = outcome == PREEMPTED
+            self._edge(part.enter, node, preempt=preempt, framework=preempt)
 
     def _concurrence(self, record: StateRecord, part: _Part) -> None:
         for child_record in record.children:  # alone, before the others did anything

@@ -49,6 +49,17 @@ RULES: dict[str, Rule] = {
         Rule("ambiguous-map", "warning", "two rules of an outcome map hold and ask equally"),
         Rule("preempt-outcome", "warning", "a preempt leaves a container by the wrong outcome"),
         Rule("property", "error", "a property that does not hold"),
+        Rule("net-file", "error", "a plan that cannot be read: no file, no XML, a wrong element"),
+        Rule("net-label", "error", "a label, a condition or a name of a plan that looks wrong"),
+        Rule("net-unmatched", "warning", "a plan starts or ends an action without its exec place"),
+        Rule("net-unbound", "error", "a plan names an action that nothing does"),
+        Rule("net-condition", "warning", "a guard asks for what nobody is known to say"),
+        Rule("net-bound", "error", "a place of a plan can hold any number of tokens"),
+        Rule("net-deadlock", "error", "a plan gets stuck outside its goal"),
+        Rule("net-goal", "error", "the goal of a plan cannot be reached, or there is none"),
+        Rule("net-dead", "warning", "a transition that never fires, a place that is never marked"),
+        Rule("net-race", "warning", "nothing decides which of two ends of an action fires"),
+        Rule("net-shared", "warning", "two tokens share one run of an action"),
     )
 }
 
@@ -145,6 +156,7 @@ class Problem:
         place: Line of the code, when known.
         moments: A run that shows it: pairs (path, outcome), the outcome None where the state
             begins.
+        firings: A run of a plan: labels of its transitions.
     """
 
     rule: str
@@ -154,6 +166,7 @@ class Problem:
     hint: str = ""
     place: Place | None = None
     moments: Moments = ()
+    firings: tuple[str, ...] = ()
 
     @property
     def steps(self) -> tuple[str, ...]:

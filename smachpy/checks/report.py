@@ -90,6 +90,8 @@ def as_text(reports: Iterable[Report]) -> str:
             )
             if problem.steps:
                 lines.append("    run: " + " ".join(problem.steps))
+            if problem.firings:
+                lines.append("    fired: " + ", ".join(problem.firings))
             if problem.hint:
                 lines.append(f"    {problem.hint}")
         lines += [f"ignored: {p.path}: {p.rule}: {reason}" for p, reason in report.ignored]

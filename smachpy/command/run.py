@@ -58,7 +58,9 @@ def register(subparsers: Any) -> None:
         "-h", "--help", action=_Help, nargs=0, help="show this, and the mission's arguments"
     )
     parser.add_argument(
-        "target", metavar="MISSION", help="a name of `smachpy list`, module:factory, or a .py file"
+        "target",
+        metavar="MISSION",
+        help="a name of `smachpy list`, module:factory, a .py file, or a plan as .pnml",
     )
     parser.add_argument(
         "--input",

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 GROUP = "smachpy.missions"
 DEFAULT_NAMES = ("mission", "machine", "sm")
+PLANS = (".pnml",)
 
 
 class TargetError(SmachError):
@@ -122,11 +123,15 @@ def load_target(text: str) -> Target:
 
     Args:
         text: A mission's name (`patrol`), `module:factory`, or `path.py[:factory]`. Without
-            `:factory` a file's `mission`, `machine` or `sm` is taken, else its only machine.
+            `:factory` a file's `mission`, `machine` or `sm` is taken, else its only machine. Or a
+            Petri net plan, `path.pnml`; STEM.actions.yaml or actions.yaml beside it says what its
+            actions and conditions are.
 
     Raises:
         TargetError: there is no such thing; names the nearest ones.
     """
+    if text.endswith(PLANS):
+        return _plan_target(text)
     place, _, attribute = text.partition(":")
     if place.endswith(".py") or "/" in place:
         return _from_module(text, _import_file(text, Path(place)), attribute, Path(place).stem)
@@ -135,6 +140,22 @@ def load_target(text: str) -> Target:
     if place in _mission_names():
         return _load_mission(place)
     raise TargetError(text, f"no such mission; {_suggest(place, _mission_names())}")
+
+
+def _plan_target(text: str) -> Target:
+    from smachpy.pnp.files import load_plan
+
+    path = Path(text)
+    if not path.is_file():
+        near = [str(p) for p in path.parent.iterdir()] if path.parent.is_dir() else []
+        near = [name for name in near if name.endswith(PLANS)]
+        raise TargetError(text, f"no file {text!r}; {_suggest(text, near)}")
+
+    def plan() -> Container:
+        """Run a Petri net plan."""
+        return load_plan(path)
+
+    return Target(path.name.partition(".")[0], text, "a Petri net plan", plan)
 
 
 def _mission_names() -> list[str]:

@@ -315,7 +315,7 @@ SOURCES: dict[str, str] = {
     "operator": "operator",
     "timeout": "timeout of",
     "concurrence": "concurrence, after",
-    "plan": "plan, which",
+    "plan": "plan",
     "action": "action",
     "state": "state",
     "test": "test",

@@ -12,12 +12,12 @@ from smachpy.exceptions import InconsistentMachineError, InvalidStateError, did_
 from smachpy.introspection import NetRecord, NetTransitionRecord, PlaceRecord, Structure
 from smachpy.machines.container import Container, below
 from smachpy.machines.problems import Problems
-from smachpy.pnp.actions import Binder, Order, SetVariable, Wait, WaitFor
+from smachpy.pnp.actions import Binder, Order, SetVariable, Unbound, Wait, WaitFor
 from smachpy.pnp.execution import Execution
 from smachpy.pnp.firing import Table
 from smachpy.pnp.knowledge import EVENT_LIFE_S, Knowledge
 from smachpy.pnp.net import Net
-from smachpy.pnp.plan import Plan, understand
+from smachpy.pnp.plan import Plan, problem_of, understand
 from smachpy.pnp.pnml import read_pnml
 from smachpy.pnp.problems import PlanError, PlanProblem, raise_errors
 from smachpy.run.visit import End
@@ -82,6 +82,10 @@ class Parameters(NamedTuple):
     strict: bool
     events: Events
     event_life: float
+
+
+def _is_built_in(name: str) -> bool:
+    return name == "true" or name.startswith(("timeout_", "equal_", "equals_"))
 
 
 class PetriNetPlan(Container):
@@ -174,7 +178,7 @@ class PetriNetPlan(Container):
         subs = problems.mapping("sub_plans", sub_plans, "name -> plan")
         given = problems.mapping("actions", actions, "name -> what does it")
         problems.raise_all()
-        self._unbound: list[str] = []
+        self._unbound: dict[str, PlanProblem] = {}
         self._bind(Binder({**subs, **given}, self._built_in()))
 
     def _built_in(self) -> dict[str, Any]:
@@ -195,10 +199,10 @@ class PetriNetPlan(Container):
                 label += "'"
             state, problem = binder.bind(name)
             if problem:
-                node = self.plan.net.places[known.places[0]] if known.places else None
-                file = self.plan.net.file
-                where = f"{file}:{node.line}: " if node is not None and file else ""
-                self._unbound.append(f"{where}{problem}")
+                place = known.places[0] if known.places else -1
+                self._unbound[label] = problem_of(
+                    self.plan.net, "unbound", "error", problem, place=place
+                )
             self._store_child(label, state, None)
             self.names[label] = name
 
@@ -249,7 +253,42 @@ class PetriNetPlan(Container):
 
     def find_problems(self, where: str) -> tuple[str, ...]:
         """Return what keeps the plan from running: actions without anything that does them."""
-        return (*(f"{where}: {problem}" for problem in self._unbound), *self._shared_states(where))
+        unbound = [str(problem) for problem in self._unbound_now()]
+        return (*(f"{where}: {problem}" for problem in unbound), *self._shared_states(where))
+
+    def _unbound_now(self) -> list[PlanProblem]:
+        """Return the problems of actions that nothing does, not even a double."""
+        return [p for label, p in self._unbound.items() if isinstance(self._states[label], Unbound)]
+
+    def binding_problems(self) -> tuple[PlanProblem, ...]:
+        """Return the actions and conditions that nothing is registered for."""
+        plan = self.plan
+        found = self._unbound_now()
+        table = _Compiled(self, {label: self._make_step(label) for label in self._states}).table
+        asked = {
+            name: number
+            for number, guard in reversed(tuple(enumerate(table.guards)))
+            if guard is not None
+            for name in guard.atoms()
+            if name not in table.asks
+        }
+        if not self.knowledge.sources:
+            names = sorted(asked)
+            if names:
+                text = f"waits for events that the program has to post: {', '.join(names)}."
+                found.append(problem_of(plan.net, "unknown-condition", "note", text))
+            return tuple(found)
+        for name, number in asked.items():
+            if self.knowledge.source_of(name) is None and not _is_built_in(name):
+                text = (
+                    f"asks for {name!r}, which is no condition; expected one of "
+                    f"{sorted(self.knowledge.sources)}, or an event that the program posts."
+                    f"{did_you_mean(name, self.knowledge.sources)}"
+                )
+                found.append(
+                    problem_of(plan.net, "unknown-condition", "note", text, transition=number)
+                )
+        return tuple(found)
 
     def _shared_states(self, where: str) -> Iterator[str]:
         label_of: dict[int, str] = {}

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 from smachpy.exceptions import SmachError
 from smachpy.outcome_classes import is_good
-from viz.model.machine import MISSING, Edge, Node, Pill, Rule
+from viz.model.machine import MISSING, PLACE, TRANSITION, Edge, Node, Pill, Rule
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
 
-    from smachpy.introspection import StateRecord, TransitionRecord
+    from smachpy.introspection import NetTransitionRecord, StateRecord, TransitionRecord
 
 READABLE = 60
 """Most states a picture shows when nobody asks for a depth."""
@@ -75,6 +75,8 @@ def extract(record: StateRecord, *, depth: int | None = None, show_implicit: boo
 
 
 def _node(record: StateRecord, levels: int, wired: frozenset[str], *, show_implicit: bool) -> Node:
+    if record.net is not None and levels > 0:
+        return _net_node(record, levels, show_implicit=show_implicit)
     if levels <= 0 or not record.children:
         return _closed(record)
     labels = {child.label for child in record.children}
@@ -104,6 +106,86 @@ def _node(record: StateRecord, levels: int, wired: frozenset[str], *, show_impli
         default_outcome=record.default_outcome,
         pills=_pills(record, edges, wired),
     )
+
+
+def _net_node(record: StateRecord, levels: int, *, show_implicit: bool) -> Node:
+    """Return a plan as its net: an exec place is the box of its action, or a copy of that."""
+    net = record.net
+    assert net is not None
+    made = {
+        child.label: _node(child, levels - 1, frozenset(), show_implicit=show_implicit)
+        for child in record.children
+    }
+    names: dict[str, str] = {}
+    nodes: list[Node] = []
+    taken = set(made)
+    for place in net.places:
+        child = made.pop(place.child, None)
+        if child is not None:
+            names[place.id] = child.label
+            nodes.append(child)
+            continue
+        names[place.id] = label = _free(place.id, taken)
+        closed = next((c for c in record.children if c.label == place.child), None)
+        if closed is not None:  # the same action, once more
+            nodes.append(replace(_closed(closed), label=label, caption=closed.label))
+        else:
+            kind = PLACE if place.role == "place" else f"{place.role} place"
+            path = f"{record.path}/{label}"
+            details = (("tokens", str(place.tokens)),) if place.tokens else ()
+            nodes.append(
+                Node(path, label, kind, details=details, caption=place.name, tokens=place.tokens)
+            )
+    nodes += made.values()  # actions without a place
+    arrows: list[tuple[str, str, str]] = []
+    for transition in net.transitions:
+        label = _free(transition.id, taken)
+        caption = _transition_caption(transition)
+        shown = transition.name or transition.id
+        nodes.append(Node(f"{record.path}/{label}", label, TRANSITION, caption=shown))
+        inward = [_weight(weight) for _, weight in transition.inputs]
+        if inward:  # what is written beside the transition stands at its first arrow
+            inward[0] = " ".join(text for text in (caption, inward[0]) if text)
+        into = zip(transition.inputs, inward, strict=True)
+        arrows += [(names[place], label, text) for (place, _), text in into]
+        arrows += [(label, names[p], _weight(weight)) for p, weight in transition.outputs]
+    starts = [names[place.id] for place in net.places if place.tokens]
+    order = [*starts, *(node.label for node in nodes)]
+    backward = _backward(order, [(source, target) for source, target, _ in arrows])
+    return Node(
+        path=record.path,
+        label=record.label,
+        kind=record.kind,
+        type_name=record.type_name,
+        doc=record.doc,
+        details=record.details,
+        outcomes=record.outcomes,
+        children=tuple(nodes),
+        edges=tuple(
+            Edge(source, target, False, (text,), back=(source, target) in backward)  # noqa: FBT003
+            for source, target, text in arrows
+        ),
+    )
+
+
+def _free(name: str, taken: set[str]) -> str:
+    """Return `name`, with signs behind it if a state or another node has it already."""
+    while name in taken:
+        name += "\u2032"
+    taken.add(name)
+    return name
+
+
+def _weight(weight: int) -> str:
+    return "" if weight == 1 else str(weight)
+
+
+def _transition_caption(transition: NetTransitionRecord) -> str:
+    """Return what is written beside a transition: what it does but start and end, its guard."""
+    words = [] if transition.calls else [transition.name.partition("[")[0].strip()]
+    words += [what for _, what in transition.calls if what not in {"start", "end"}]
+    guard = f"[{transition.guard}]" if transition.guard else ""
+    return " ".join(word for word in (*words, guard) if word)
 
 
 def _checked(
@@ -151,21 +233,24 @@ def _edges(record: StateRecord, transitions: Iterable[TransitionRecord]) -> tupl
     for t in transitions:
         key = (t.source, t.target, t.target_is_outcome, t.implicit)
         merged.setdefault(key, []).append(t.outcome)
-    backward = _backward(record, [(s, t) for s, t, is_outcome, _ in merged if not is_outcome])
+    order = (*record.initial, *(child.label for child in record.children))
+    backward = _backward(order, [(s, t) for s, t, is_outcome, _ in merged if not is_outcome])
     return tuple(
         Edge(source, target, to_outcome, tuple(outcomes), implicit, (source, target) in backward)
         for (source, target, to_outcome, implicit), outcomes in merged.items()
     )
 
 
-def _backward(record: StateRecord, arrows: Sequence[tuple[str, str]]) -> frozenset[tuple[str, str]]:
-    """Arrows that close a loop when one reads from the initial states in declared order."""
+def _backward(
+    order: Iterable[str], arrows: Sequence[tuple[str, str]]
+) -> frozenset[tuple[str, str]]:
+    """Arrows that close a loop when one reads from the first of `order`, then from the next."""
     following: dict[str, list[str]] = {}
     for tail, head in arrows:
         following.setdefault(tail, []).append(head)
     found: set[tuple[str, str]] = set()
     done: set[str] = set()
-    for start in (*record.initial, *(child.label for child in record.children)):
+    for start in order:
         if start in done:
             continue
         trail = {start}

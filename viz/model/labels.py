@@ -13,6 +13,7 @@ GLYPHS = {"action": "\u25ba", "service": "\u2194", "monitor": "\u25cf", "conditi
 KIND_WORDS = {
     "concurrence": "concurrent",
     "iterator": "repeats",
+    "plan": "Petri net plan",
     "sequence": "sequence",
     "missing": "missing",
 }

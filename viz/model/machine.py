@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 MISSING = "missing"
 """Kind of a state that a machine speaks of and does not have."""
 
+PLACE, TRANSITION = "place", "transition"
+"""Kinds of what a plan's net has beside its actions; places with a role are "goal place", ..."""
+
 
 @dataclass(frozen=True, slots=True)
 class Edge:
@@ -83,6 +86,8 @@ class Node:
         pills: Outcomes drawn on the border of an open container.
         change: `added`, `removed` or `changed`, where two versions are compared.
         note: Numbers, for a second line of its label.
+        caption: What is written in place of the label, which is an id then; of a net only.
+        tokens: Of a place.
     """
 
     path: str
@@ -101,6 +106,8 @@ class Node:
     pills: tuple[Pill, ...] = ()
     change: str = ""
     note: str = ""
+    caption: str = ""
+    tokens: int = 0
 
     @property
     def is_open(self) -> bool:

@@ -13,6 +13,10 @@ if TYPE_CHECKING:
 
 STANDS = "\u25b8"
 """Marks a state that is running."""
+DOT = "\u25cf"
+"""Stands for a token of a place."""
+
+MOST_DOTS = 3
 
 
 def outline_text(diagram: Diagram) -> str:
@@ -52,7 +56,8 @@ def _title(node: Node, marks: Marks, *, first: bool) -> str:
         STANDS if node.path in marks.active else "",
         "*" if first else "",
         glyph,
-        shorten(node.label),
+        shorten(node.caption or node.label),
+        DOT * min(node.tokens, MOST_DOTS),
         f"({word})" if word else "",
         f"(+{node.hidden} states)" if node.hidden else "",
         f"\u00d7{count}" if count > 1 else "",
@@ -62,8 +67,10 @@ def _title(node: Node, marks: Marks, *, first: bool) -> str:
 
 
 def _exits(parent: Node, label: str) -> str:
-    return ", ".join(
-        f"{shorten('/'.join(edge.outcomes))} \u2192 {shorten(edge.target)}"
+    names = {child.label: child.caption or child.label for child in parent.children}
+    exits = [
+        ("/".join(edge.outcomes), names.get(edge.target, edge.target))
         for edge in parent.edges
         if edge.source == label
-    )
+    ]
+    return ", ".join(f"{shorten(by)} \u2192 {shorten(to)}".lstrip() for by, to in exits)

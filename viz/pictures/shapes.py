@@ -128,12 +128,13 @@ class _Interior:
         self._decisions()
         node, theme = self._node, self._theme
         visited = node.path in self._marks.visits
+        entry = style.entry(theme, touched=visited or not self._marks.has_run)
+        if node.kind == "plan":  # its tokens say where it begins
+            entry["style"] = "invis"
         return Box(
             self._name,
             style.container(node, self._depth, self._diagram, theme),
-            Vertex(
-                f"{self._name}_in", style.entry(theme, touched=visited or not self._marks.has_run)
-            ),
+            Vertex(f"{self._name}_in", entry),
             tuple(self._pill(pill) for pill in node.pills),
             tuple(self._joins),
             tuple(self._boxes.values()),
@@ -168,7 +169,7 @@ class _Interior:
                 self._theme,
                 self._marks,
                 counts={o: self._marks.taken.get((path, o), 0) for o in outcomes},
-                labelled=source.entry is None and not same_name,
+                labelled=source.entry is None and not same_name and any(outcomes),
                 implicit=edge.implicit,
                 change=edge.change if self._diagram.compared else None,
                 remark=edge.note or self._share(path, outcomes),

@@ -15,7 +15,7 @@ import graphviz
 
 from smachpy.outcome_classes import outcome_class
 from viz.model.labels import ENDINGS, GLYPHS, KIND_WORDS, shorten
-from viz.model.machine import MISSING
+from viz.model.machine import MISSING, PLACE, TRANSITION
 from viz.pictures.theme import FONT
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     Attributes = dict[str, str]
 
 TOOLTIP_LENGTH = 600
+MOST_DOTS = 3  # tokens; more are a number
 SIGNS = {"added": "+", "removed": "\u2212", "changed": "\u2260"}
 """What stands before the name of what has changed: never its colour alone."""
 
@@ -111,6 +112,10 @@ def edge_defaults(theme: Theme) -> Attributes:
 def state(node: Node, diagram: Diagram, theme: Theme) -> Attributes:
     """A plain state, or a container that is closed."""
     marks = diagram.marks
+    if node.kind == TRANSITION:
+        return {**_identity(node, diagram), **_net_transition(node, theme)}
+    if node.kind.endswith(PLACE):
+        return {**_identity(node, diagram), **_place(node, theme)}
     attributes = {**_identity(node, diagram), "label": _state_label(node, marks, theme)}
     if node.hidden:
         attributes["peripheries"] = "2"
@@ -118,6 +123,34 @@ def state(node: Node, diagram: Diagram, theme: Theme) -> Attributes:
         return attributes | _compared(node, theme)
     swatch, extra = _status(node, marks, theme)
     return attributes | _swatch(swatch) | extra | _heated(node, marks, theme)
+
+
+def _place(node: Node, theme: Theme) -> Attributes:
+    """A place of a net: its name and tokens; that of an end has the end's colours."""
+    swatch = {
+        "goal place": theme.outcome("success"),
+        "fail place": theme.outcome("failure"),
+    }.get(node.kind, theme.inactive)
+    dots = "\u25cf" * node.tokens if node.tokens <= MOST_DOTS else f"\u25cf{node.tokens}"
+    text = "&#160;".join(
+        part for part in (markup(node.caption) if node.caption else "", dots) if part
+    )
+    return {
+        "fontsize": "9",
+        "height": "0.25",
+        "label": f"<{text or ' '}>",
+        "margin": "0.04,0.02",
+        "penwidth": "1.2",
+        "peripheries": "1" if node.kind == PLACE else "2",
+        "shape": "ellipse",
+        "style": "filled",
+        "width": "0.25",
+    } | _swatch(swatch)
+
+
+def _net_transition(node: Node, theme: Theme) -> Attributes:
+    """A transition of a net: a bar."""
+    return {**join(node.caption, theme), "height": "0.07"}
 
 
 def container(node: Node, depth: int, diagram: Diagram, theme: Theme) -> Attributes:
@@ -394,7 +427,7 @@ def _identity(node: Node, diagram: Diagram) -> dict[str, str]:
 
 def _state_label(node: Node, marks: Marks, theme: Theme) -> str:
     glyph = GLYPHS.get(node.kind, "")
-    name = markup(node.label)
+    name = markup(node.caption or node.label)
     text = f'<font color="{theme.muted}" point-size="10">{glyph}&#160;</font>' if glyph else ""
     text = _sign(node, theme) + text
     text += f"<b>{name}</b>" if node.path in marks.active or node.hidden else name

@@ -45,8 +45,12 @@ def plan_of(text, log=None, seconds=None, **options):
     seconds = seconds or {}
     actions = options.pop("actions", {})
     net = net_of(text)
-    names = {w.rpartition(".")[0] for p in net.places for w in p.name.split() if w.endswith(".exec")}
-    made = {name: Timed(log, name, *seconds.get(name, (1.0,))) for name in names if name not in actions}
+    names = {
+        w.rpartition(".")[0] for p in net.places for w in p.name.split() if w.endswith(".exec")
+    }
+    made = {
+        name: Timed(log, name, *seconds.get(name, (1.0,))) for name in names if name not in actions
+    }
     return PetriNetPlan(net, {**made, **actions}, **options)
 
 
@@ -245,7 +249,8 @@ def test_conditions_on_userdata_are_looked_at_when_it_is_written():
 def test_a_polled_condition():
     with virtual_time() as clock:
         plan = PetriNetPlan(
-            net_of("init* -> goal : [late]"), conditions={"late": Polled(lambda ud: clock.now() > 3, 1.0)}
+            net_of("init* -> goal : [late]"),
+            conditions={"late": Polled(lambda ud: clock.now() > 3, 1.0)},
         )
         assert plan.execute() == "goal"
         assert clock.now() == pytest.approx(4.0)
@@ -457,7 +462,7 @@ def test_an_operator_fires_a_transition_and_forces_an_outcome():
         clock.call_later(3.0, lambda: control.force_outcome("/plan/B", "succeeded"))
         assert plan.execute() == "goal"
         assert clock.now() == pytest.approx(3.0)
-    with pytest.raises(InvalidStateError, match="Did you mean|expected"):
+    with pytest.raises(InvalidStateError, match="expected the id"):
         plan.fire("t99")
 
 

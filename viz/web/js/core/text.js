@@ -37,6 +37,7 @@ const SOURCES = {
   operator: "operator",
   timeout: "timeout of",
   concurrence: "concurrence, after",
+  plan: "plan",
   action: "action",
   state: "state",
   test: "test",

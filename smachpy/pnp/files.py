@@ -1,0 +1,35 @@
+"""Plans as files: a plan with what belongs to it, whatever form it has."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from smachpy import log
+from smachpy.pnp.container import load
+from smachpy.pnp.mapping import Registered, mapping_beside, read_mapping
+
+if TYPE_CHECKING:
+    from smachpy.pnp.container import PetriNetPlan
+
+
+def load_plan(file: Path | str, mapping: Path | str | None = None) -> PetriNetPlan:
+    """Load a plan, with the actions and conditions that its mapping file names.
+
+    What is doubtful about it goes to the log.
+
+    Args:
+        file: The plan.
+        mapping: The mapping file (`smachpy.pnp.mapping`); None looks for one beside the plan.
+
+    Raises:
+        PlanError: one of the files is wrong; all problems at once.
+    """
+    path = Path(file)
+    beside = mapping_beside(path) if mapping is None else Path(mapping)
+    given = Registered() if beside is None else read_mapping(beside)
+    plan = load(path, given.actions, given.conditions, **given.options)
+    for problem in plan.problems:
+        if problem.severity == "warning":
+            log.logwarn(str(problem))
+    return plan

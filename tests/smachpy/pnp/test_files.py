@@ -1,0 +1,158 @@
+"""Plans on the command line: loaded with what belongs to them, checked, run, drawn; bad ones refused."""
+
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+import smachpy
+from smachpy.command import main
+from smachpy.pnp import PlanError, load, load_plan, write_pnml
+from smachpy.pnp.mapping import read_mapping
+from tests.smachpy.pnp.nets import net_of
+
+FETCH = """
+init* -> goto_kitchen.exec : goto_kitchen.start
+goto_kitchen.exec -> there : goto_kitchen.end
+goto_kitchen.exec -> blocked : goto_kitchen.interrupt [obstacle]
+blocked -> wait_5.exec : wait_5.start
+wait_5.exec -> init : wait_5.end
+there -> goal : done
+"""
+
+MAPPING = """
+actions:
+  goto:
+    action: move_base
+    type: move_base_msgs/MoveBase
+    goal: {target_pose.header.frame_id: map}
+    cases:
+      kitchen: {target_pose.pose.position.x: "4"}
+conditions:
+  obstacle: false
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_pnml(net_of(FETCH, "fetch"), "fetch.pnml")
+    Path("actions.yaml").write_text(MAPPING)
+    return tmp_path
+
+
+def test_check_run_and_render(folder, capsys):
+    Path("actions.yaml").write_text("actions:\n  goto: {run: 'fetch_robot:goto'}\n")
+    Path("fetch_robot.py").write_text("def goto(ud, place): print('to', place)\n")
+    assert main(["check", "fetch.pnml"]) == 0
+    assert main(["run", "fetch.pnml", "--time", "virtual", "--plain"]) == 0
+    assert "to kitchen" in capsys.readouterr().out
+    for name in ("fetch.txt", "fetch.mmd", "fetch.dot", "fetch.json"):
+        assert main(["render", "fetch.pnml", "-o", name]) == 0
+    assert "goto_kitchen" in Path("fetch.txt").read_text()
+
+
+def test_the_picture_is_the_net(folder):
+    assert main(["render", "fetch.pnml", "-o", "fetch.svg"]) == 0
+    ids = {e.get("id") for e in ET.parse("fetch.svg").iter() if e.get("id")}
+    assert {"/fetch/goto_kitchen", "/fetch/p0", "/fetch/t2"} <= ids
+
+
+def test_goals_are_typed_by_their_fields(folder):
+    plan = load_plan("fetch.pnml")
+    state = plan["goto_kitchen"]
+    assert plan.find_problems("") == ()
+    assert dict(state.describe_details()[1])["action"] == "move_base"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text", "line"),
+    [
+        ("kitchen:", "bedroom:", "kitchen", 0),
+        ('"4"', '"four"', "expected float", 0),
+        ("position.x", "position.xx", "xx", 0),
+        ("move_base_msgs/MoveBase", "move_base_msgs/Move", "type", 5),
+        ("cases:", "case:", "Did you mean", 7),
+        ("obstacle: false", "obstacle: {userdata: 'f(x)'}", "with Call in it", 10),
+        ("obstacle: false", "obstacle: {}", "expected true, false", 10),
+        ("actions:", "action:", "Did you mean", 2),
+        ("obstacle: false", "obstacle: {run: 'nowhere_x:f'}", "nowhere_x", 10),
+        ("obstacle: false", "obstacle: [", "YAML", 0),
+    ],
+)  # fmt: skip
+def test_a_wrong_mapping_is_told_and_nothing_runs(folder, capsys, old, new, text, line):
+    assert old in MAPPING
+    Path("actions.yaml").write_text(MAPPING.replace(old, new))
+    assert main(["run", "fetch.pnml"]) == 2
+    err = capsys.readouterr().err
+    assert text in err
+    assert "Traceback" not in err
+    if line:
+        with pytest.raises(PlanError) as caught:
+            read_mapping("actions.yaml")
+        assert line in {problem.line for problem in caught.value.found}
+
+
+@pytest.mark.parametrize("data", [b"", b"<pnml>", b"\xff\xfe", b"<pnml/>", b"actions"])
+@pytest.mark.parametrize("command", [["check"], ["run"], ["render", "-o", "x.svg"]])
+def test_bad_files_end_with_2(folder, capsys, data, command):
+    Path("fetch.pnml").write_bytes(data)
+    assert main([command[0], "fetch.pnml", *command[1:]]) == 2
+    err = capsys.readouterr().err
+    assert "fetch.pnml" in err
+    assert "Traceback" not in err
+    assert not Path("x.svg").exists()
+
+
+def test_no_such_file(folder, capsys):
+    assert main(["check", "fetsh.pnml"]) == 2
+    assert "Did you mean 'fetch.pnml'" in capsys.readouterr().err
+
+
+def test_an_unknown_action_is_told_with_its_line(folder, capsys):
+    Path("actions.yaml").write_text("actions:\n  goto_: {run: 'os:getcwd'}\n")
+    assert main(["check", "fetch.pnml"]) == 1
+    out = capsys.readouterr().out
+    assert "fetch.pnml:" in out
+    assert "net-unbound" in out
+    assert main(["run", "fetch.pnml"]) == 2
+
+
+def test_sub_plans(folder):
+    ran = []
+    write_pnml(
+        net_of("init* -> goto_a.exec : start\ngoto_a.exec -> goal : end", "sub"), "tour.pnml"
+    )
+    write_pnml(
+        net_of("init* -> tour.exec : tour.start\ntour.exec -> goal : tour.end", "main"), "main.pnml"
+    )
+    plan = load("main.pnml", {"goto": lambda ud, place: ran.append(place)})
+    assert plan.execute() == "goal"
+    assert ran == ["a"]
+    assert [s.path for s in smachpy.describe(plan).walk()] == [
+        "/main",
+        "/main/tour",
+        "/main/tour/goto_a",
+    ]
+
+
+def test_recursion_is_an_error(folder, capsys):
+    for one, other in (("a", "b"), ("b", "a")):
+        write_pnml(
+            net_of(f"init* -> {other}.exec : start\n{other}.exec -> goal : end", one), f"{one}.pnml"
+        )
+    with pytest.raises(PlanError) as caught:
+        load("a.pnml")
+    assert [problem.rule for problem in caught.value.found] == ["recursion"]
+    assert caught.value.found[0].line > 0
+    assert main(["check", "a.pnml"]) == 2
+
+
+def test_a_plan_is_loaded_without_the_network():
+    code = (
+        "import sys; from smachpy import pnp; "
+        "assert not {'zenoh', 'numpy', 'rosbags'} & set(sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
