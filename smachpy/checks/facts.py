@@ -30,7 +30,7 @@ _LIMITS = {
 }
 
 
-HOLDS_BACK = frozenset({"inconsistent", "unmapped-outcome", "wrong-signature", "net-file"})
+HOLDS_BACK = frozenset({"inconsistent", "unmapped-outcome", "wrong-signature"})
 """Rules of `find_problems`: a machine with such a problem would not run."""
 
 

@@ -49,7 +49,6 @@ RULES: dict[str, Rule] = {
         Rule("ambiguous-map", "warning", "two rules of an outcome map hold and ask equally"),
         Rule("preempt-outcome", "warning", "a preempt leaves a container by the wrong outcome"),
         Rule("property", "error", "a property that does not hold"),
-        Rule("net-file", "error", "a plan that cannot be read: no file, no XML, a wrong element"),
         Rule("net-label", "error", "a label, a condition or a name of a plan that looks wrong"),
         Rule("net-unmatched", "warning", "a plan starts or ends an action without its exec place"),
         Rule("net-unbound", "error", "a plan names an action that nothing does"),

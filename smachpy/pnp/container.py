@@ -6,12 +6,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-from smachpy import log
-from smachpy.events import Fired, HeldBack
 from smachpy.exceptions import InconsistentMachineError, InvalidStateError, did_you_mean
 from smachpy.introspection import NetRecord, NetTransitionRecord, PlaceRecord, Structure
 from smachpy.machines.container import Container, below
 from smachpy.machines.problems import Problems
+from smachpy.machines.state import DataOf, Shown
 from smachpy.pnp.actions import Binder, Order, SetVariable, Unbound, Wait, WaitFor
 from smachpy.pnp.execution import Execution
 from smachpy.pnp.firing import Table
@@ -20,6 +19,7 @@ from smachpy.pnp.net import Net
 from smachpy.pnp.plan import Plan, problem_of, understand
 from smachpy.pnp.pnml import read_pnml
 from smachpy.pnp.problems import PlanError, PlanProblem, raise_errors
+from smachpy.run.child import ContainerData
 from smachpy.run.visit import End
 
 if TYPE_CHECKING:
@@ -28,10 +28,8 @@ if TYPE_CHECKING:
 
     from smachpy.introspection import Kind
     from smachpy.machines.state import StateOptions
-    from smachpy.pnp.firing import Jump, Moment
     from smachpy.pnp.knowledge import Events
     from smachpy.run.frame import Frame
-    from smachpy.run.step import Step
     from smachpy.userdata.user_data import UserData
 
 __all__ = ["PetriNetPlan", "load"]
@@ -39,22 +37,50 @@ __all__ = ["PetriNetPlan", "load"]
 OUTCOMES = ("goal", "fail", "preempted")
 
 
+class PlanData(ContainerData):
+    """What the library knows of one plan.
+
+    Attributes:
+        net_plan: The plan itself.
+        names: Label of a child -> the plan's name for it.
+        knowledge: What its guards ask.
+        unbound: Label -> why nothing does that action.
+        execution: Its run, while there is one.
+    """
+
+    __slots__ = ("execution", "knowledge", "names", "net_plan", "unbound")
+    _kept = ("knowledge", "names", "net_plan", "unbound")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.net_plan: Any = None
+        self.names: dict[str, str] = {}
+        self.knowledge: Any = None
+        self.unbound: dict[str, PlanProblem] = {}
+        self.execution: Execution | None = None
+
+    def labels(self) -> dict[str, str]:
+        """Return the plan's name for a child -> its label."""
+        return {name: label for label, name in self.names.items()}
+
+
 class _Compiled:
     """A plan, compiled: its children, and the table of what fires."""
 
     __slots__ = ("epoch", "steps", "table", "userdata")
 
-    def __init__(self, machine: PetriNetPlan, steps: dict[str, Step]) -> None:
+    def __init__(self, machine: PetriNetPlan) -> None:
+        data = machine._smachpy
         self.epoch = 0
         self.userdata = machine.userdata
-        self.steps = steps
-        for step in steps.values():
+        self.steps = {label: machine._smachpy_make_step(label) for label in data.children}
+        for step in self.steps.values():
             step.next = {outcome: End(outcome) for outcome in step.state._smachpy.outcomes}
         self.table = Table(
-            machine.plan,
-            {name: label for label, name in machine.names.items()},
-            {label: step.state._smachpy.outcomes for label, step in steps.items()},
-            lambda name: machine.knowledge.source_of(name) is not None,
+            data.net_plan,
+            data.labels(),
+            {label: step.state._smachpy.outcomes for label, step in self.steps.items()},
+            lambda name: data.knowledge.source_of(name) is not None,
         )
 
     def is_stale(self) -> bool:
@@ -129,7 +155,11 @@ class PetriNetPlan(Container):
     what differs.
     """
 
+    _smachpy: DataOf[PlanData] = DataOf(PlanData)
     _smachpy_kind: ClassVar[Kind] = "plan"
+
+    plan: Shown[Plan] = Shown(lambda self: self._smachpy.net_plan)
+    problems: Shown[tuple[PlanProblem, ...]] = Shown(lambda self: self._smachpy.net_plan.problems)
 
     def __init__(
         self,
@@ -160,57 +190,50 @@ class PetriNetPlan(Container):
             userdata_type=userdata_type,
             **options,
         )
-        self.plan = plan
-        self.problems: tuple[PlanProblem, ...] = plan.problems
-        self.names: dict[str, str] = {}
-        self._execution: Execution | None = None
-        data = self.userdata._data  # noqa: SLF001  one machinery
+        data = self._smachpy
+        data.net_plan = plan
+        values = self.userdata._data  # noqa: SLF001  one machinery
         if userdata_type is None:
-            data = _Noting(data)
-            object.__setattr__(self.userdata, "_data", data)
-        self.knowledge = Knowledge(
+            values = _Noting(values)
+            object.__setattr__(self.userdata, "_data", values)
+        data.knowledge = Knowledge(
             conditions, lambda: self.userdata, events=events, life=event_life
         )
-        self._asks_userdata = any(callable(s) for s in self.knowledge.sources.values())
-        if isinstance(data, _Noting) and self._asks_userdata:
-            data.on_write = self.knowledge.changed
+        if isinstance(values, _Noting) and any(map(callable, data.knowledge.sources.values())):
+            values.on_write = data.knowledge.changed
         problems = Problems(type(self).__name__)
         subs = problems.mapping("sub_plans", sub_plans, "name -> plan")
         given = problems.mapping("actions", actions, "name -> what does it")
         problems.raise_all()
-        self._unbound: dict[str, PlanProblem] = {}
-        self._bind(Binder({**subs, **given}, self._built_in()))
+        self.__bind(Binder({**subs, **given}, self.__built_in()))
 
-    def _built_in(self) -> dict[str, Any]:
+    def __built_in(self) -> dict[str, Any]:
         return {
             "wait": Wait,
-            "waitfor": lambda call: WaitFor(call, self.knowledge),
+            "waitfor": lambda call: WaitFor(call, self._smachpy.knowledge),
             "setvar": SetVariable,
-            "unknownvar": lambda call: SetVariable(call, self._forget_variable),
-            "restartcurrentplan": lambda _call: Order(partial(self._order, "restart")),
-            "stopcurrentplan": lambda _call: Order(partial(self._order, "stop")),
+            "unknownvar": lambda call: SetVariable(call, self.__forget_variable),
+            "restartcurrentplan": lambda _call: Order(partial(self.__order, "restart")),
+            "stopcurrentplan": lambda _call: Order(partial(self.__order, "stop")),
         }
 
-    def _bind(self, binder: Binder) -> None:
+    def __bind(self, binder: Binder) -> None:
         """Make the states of all actions, and note what is wrong with them."""
-        for name, known in self.plan.executables.items():
+        data = self._smachpy
+        for name, known in data.net_plan.executables.items():
             label = name.replace("/", ":")
-            while label in self._states:
+            while label in data.children:
                 label += "'"
             state, problem = binder.bind(name)
             if problem:
                 place = known.places[0] if known.places else -1
-                self._unbound[label] = problem_of(
-                    self.plan.net, "unbound", "error", problem, place=place
+                data.unbound[label] = problem_of(
+                    data.net_plan.net, "unbound", "error", problem, place=place
                 )
-            self._store_child(label, state, None)
-            self.names[label] = name
+            self._smachpy_store_child(label, state, None)
+            data.names[label] = name
 
     # -- structure -----------------------------------------------------------------------------
-
-    def name_of(self, label: str) -> str:
-        """Return the plan's name for a child."""
-        return self.names[label]
 
     def get_initial_states(self) -> list[str]:
         """Return no labels: what begins first, the net says."""
@@ -218,7 +241,7 @@ class PetriNetPlan(Container):
 
     def get_active_states(self) -> list[str]:
         """Return the labels of the actions that run now."""
-        execution = self._execution
+        execution = self._smachpy.execution
         return [] if execution is None else list(execution.active())
 
     def set_initial_state(
@@ -239,9 +262,7 @@ class PetriNetPlan(Container):
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
         """Return (label of a transition, label of a child, label of the next), by the net."""
-        net = self.plan.net
-        label_of = {name: label for label, name in self.names.items()}
-        child = {p: label_of[name] for name, e in self.plan.executables.items() for p in e.places}
+        net, child = self._smachpy.net_plan.net, self.__children_of_places()
         return [
             (net.transition_name(number), child[source], child[target])
             for number in range(len(net.transitions))
@@ -251,20 +272,27 @@ class PetriNetPlan(Container):
             if target in child
         ]
 
+    def __children_of_places(self) -> dict[int, str]:
+        """Return the number of an exec place -> label of the child that runs there."""
+        labels = self._smachpy.labels()
+        executables = self._smachpy.net_plan.executables
+        return {p: labels[name] for name, known in executables.items() for p in known.places}
+
     def find_problems(self, where: str) -> tuple[str, ...]:
         """Return what keeps the plan from running: actions without anything that does them."""
-        unbound = [str(problem) for problem in self._unbound_now()]
-        return (*(f"{where}: {problem}" for problem in unbound), *self._shared_states(where))
+        unbound = [str(problem) for problem in self.__unbound()]
+        return (*(f"{where}: {problem}" for problem in unbound), *self.__shared_states(where))
 
-    def _unbound_now(self) -> list[PlanProblem]:
+    def __unbound(self) -> list[PlanProblem]:
         """Return the problems of actions that nothing does, not even a double."""
-        return [p for label, p in self._unbound.items() if isinstance(self._states[label], Unbound)]
+        data = self._smachpy
+        return [p for label, p in data.unbound.items() if isinstance(data.children[label], Unbound)]
 
     def binding_problems(self) -> tuple[PlanProblem, ...]:
         """Return the actions and conditions that nothing is registered for."""
-        plan = self.plan
-        found = self._unbound_now()
-        table = _Compiled(self, {label: self._make_step(label) for label in self._states}).table
+        plan, knowledge = self._smachpy.net_plan, self._smachpy.knowledge
+        found = self.__unbound()
+        table = _Compiled(self).table
         asked = {
             name: number
             for number, guard in reversed(tuple(enumerate(table.guards)))
@@ -272,27 +300,27 @@ class PetriNetPlan(Container):
             for name in guard.atoms()
             if name not in table.asks
         }
-        if not self.knowledge.sources:
+        if not knowledge.sources:
             names = sorted(asked)
             if names:
                 text = f"waits for events that the program has to post: {', '.join(names)}."
                 found.append(problem_of(plan.net, "unknown-condition", "note", text))
             return tuple(found)
         for name, number in asked.items():
-            if self.knowledge.source_of(name) is None and not _is_built_in(name):
+            if knowledge.source_of(name) is None and not _is_built_in(name):
                 text = (
                     f"asks for {name!r}, which is no condition; expected one of "
-                    f"{sorted(self.knowledge.sources)}, or an event that the program posts."
-                    f"{did_you_mean(name, self.knowledge.sources)}"
+                    f"{sorted(knowledge.sources)}, or an event that the program posts."
+                    f"{did_you_mean(name, knowledge.sources)}"
                 )
                 found.append(
                     problem_of(plan.net, "unknown-condition", "note", text, transition=number)
                 )
         return tuple(found)
 
-    def _shared_states(self, where: str) -> Iterator[str]:
+    def __shared_states(self, where: str) -> Iterator[str]:
         label_of: dict[int, str] = {}
-        for label, child in self._states.items():
+        for label, child in self._smachpy.children.items():
             for state in {id(state): state for state in below(child)}.values():
                 other = label_of.setdefault(id(state), label)
                 if other != label:
@@ -304,16 +332,17 @@ class PetriNetPlan(Container):
     def describe_structure(self) -> Structure:
         """Return the children and the net."""
         children = tuple(
-            (label, state, tuple(self._remappings[label].items()))
-            for label, state in self._states.items()
+            (label, state, tuple(self._smachpy.remappings[label].items()))
+            for label, state in self._smachpy.children.items()
         )
-        details = (("strict", "an end waits for its action"),) if self.plan.strict else ()
-        return Structure(children, net=self._net_record(), details=details)
+        details = (
+            (("strict", "an end waits for its action"),) if self._smachpy.net_plan.strict else ()
+        )
+        return Structure(children, net=self.__net_record(), details=details)
 
-    def _net_record(self) -> NetRecord:
-        plan, net = self.plan, self.plan.net
-        label_of = {name: label for label, name in self.names.items()}
-        child = {p: label_of[name] for name, e in plan.executables.items() for p in e.places}
+    def __net_record(self) -> NetRecord:
+        plan: Plan = self._smachpy.net_plan
+        net, label_of, child = plan.net, self._smachpy.labels(), self.__children_of_places()
         places = tuple(
             PlaceRecord(
                 place.id,
@@ -339,32 +368,33 @@ class PetriNetPlan(Container):
 
     # -- running -------------------------------------------------------------------------------
 
-    def _compile(self, frame: Frame) -> _Compiled:
+    def _smachpy_compile(self, frame: Frame) -> _Compiled:
         problems = self.find_problems(frame.path)
         if problems:
             raise InconsistentMachineError(f"{type(self).__name__} {frame.path!r}", problems)
-        return _Compiled(self, {label: self._make_step(label) for label in self._states})
+        return _Compiled(self)
 
-    def _run_children(self, frame: Frame, plan: _Compiled) -> str:
-        if self._start_cbs:
+    def _smachpy_run_children(self, frame: Frame, plan: _Compiled) -> str:
+        data = self._smachpy
+        if data.start_cbs:
             self.call_start_cbs()
-        self._execution = execution = Execution(self, frame, plan.steps, plan.table)
+        data.execution = execution = Execution(self, frame, plan.steps, plan.table)
         try:
-            outcome = execution.run()
+            return execution.run()
         finally:
-            self._execution = None
-        if self._termination_cbs:
-            self.call_termination_cbs(list(self._states), outcome)
-        return outcome
+            data.execution = None
+
+    def _smachpy_terminal_labels(self, frame: Frame) -> list[str]:  # noqa: ARG002  of any container
+        return list(self._smachpy.children)
 
     def marking(self) -> dict[str, int]:
         """Return the ids of the places that hold tokens now -> how many; when idle, at the start.
 
         Threads: any.
         """
-        execution = self._execution
-        marking = self.plan.net.initial if execution is None else execution.moment.marking
-        places = self.plan.net.places
+        execution, net = self._smachpy.execution, self._smachpy.net_plan.net
+        marking = net.initial if execution is None else execution.moment.marking
+        places = net.places
         return {places[p].id: marking.count(p) for p in dict.fromkeys(marking)}
 
     def post(self, event: str) -> None:
@@ -376,7 +406,7 @@ class PetriNetPlan(Container):
         Threads: any; does not wait.
         """
         frame = self._smachpy.frame
-        self.knowledge.post(event, None if frame is None else frame.run.clock)
+        self._smachpy.knowledge.post(event, None if frame is None else frame.run.clock)
         for child in self._states.values():
             if isinstance(child, PetriNetPlan):
                 child.post(event)
@@ -386,7 +416,7 @@ class PetriNetPlan(Container):
 
         Threads: any; does not wait.
         """
-        self.knowledge.set(name, value)
+        self._smachpy.knowledge.set(name, value)
 
     def fire(self, transition: str) -> None:
         """Let a transition fire now whatever its guard says, if its places hold their tokens.
@@ -401,46 +431,23 @@ class PetriNetPlan(Container):
 
         Threads: any; does not wait.
         """
-        known = self.plan.net.transition_numbers
+        known = self._smachpy.net_plan.net.transition_numbers
         if transition not in known:
             raise InvalidStateError(
                 f"fire: got {transition!r}; expected the id of a transition, of {sorted(known)}."
                 f"{did_you_mean(transition, known)}"
             )
-        self._order("fire", transition)
+        self.__order("fire", transition)
 
-    def _order(self, what: str, which: str = "") -> None:
-        execution = self._execution
+    def __order(self, what: str, which: str = "") -> None:
+        execution = self._smachpy.execution
         if execution is None:
             raise InvalidStateError(f"{self.name}: {what}: the plan does not run.")
         execution.order(what, which)
 
-    def _forget_variable(self, key: str) -> None:
+    def __forget_variable(self, key: str) -> None:
         if key in self.userdata:
             del self.userdata[key]
-
-    def tell_fired(self, frame: Frame, jump: Jump) -> None:
-        """Publish and log what has just fired."""
-        net = self.plan.net
-        places = net.places
-        marking = tuple(places[p].id for p in jump.moment.marking)
-        for number in jump.fired:
-            frame.emit_own(Fired, net.transitions[number].id, marking)
-        if frame.run.logged:
-            fired = ", ".join(net.transition_name(number) for number in jump.fired)
-            log.loginfo(f"{frame.path}: {fired} -> {net.words(jump.moment.marking)}")
-
-    def tell_waiting(self, frame: Frame, moment: Moment) -> None:
-        """Publish and log which guards are false where the plan waits."""
-        net, guards = self.plan.net, self.plan.guards
-        texts = tuple(str(guards[number]) for number in moment.candidates)
-        frame.emit_own(HeldBack, tuple(net.transitions[n].id for n in moment.candidates), texts)
-        if frame.run.logged:
-            false = ", ".join(
-                f"{net.transition_name(number)!r}: [{text}] is false"
-                for number, text in zip(moment.candidates, texts, strict=True)
-            )
-            log.loginfo(f"{frame.path}: waits in {net.words(moment.marking)}; {false or 'ends'}")
 
 
 # -- loading ---------------------------------------------------------------------------------------

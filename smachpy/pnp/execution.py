@@ -6,7 +6,7 @@ from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from smachpy import log
-from smachpy.events import Preempted
+from smachpy.events import Fired, HeldBack, Preempted
 from smachpy.exceptions import SmachError
 from smachpy.pnp.actions import take_apart
 from smachpy.run.branches import ChildBranch, Group
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from smachpy.pnp.container import PetriNetPlan
     from smachpy.pnp.firing import Jump, Moment, Table
+    from smachpy.pnp.knowledge import Knowledge
     from smachpy.run.frame import Frame
     from smachpy.run.step import Step
 
@@ -43,7 +44,10 @@ class Branches(Group):
         container = self.frame.container
         if container._preempt_requested:  # asked before it was there to be told
             self.ask([branch])
-        self.frame.run.clock.spawn(branch.work, name=branch.here())
+        try:
+            self.frame.run.clock.spawn(branch.work, name=branch.here())
+        except RuntimeError as error:  # the system gives no more threads
+            branch.end(None, error)
         return branch
 
     def running(self) -> list[Any]:
@@ -92,6 +96,7 @@ class Execution:
         self._steps = steps
         self._table = table
         self._net = table.plan.net
+        self._knowledge: Knowledge = machine._smachpy.knowledge
         self._ended: dict[str, str] = {}
         self._running: dict[str, ChildBranch] = {}
         self._since: dict[str, float] = {}
@@ -107,17 +112,17 @@ class Execution:
         frame.group = self.branches
         forget = [
             on_preempt(machine, self.branches.notice),
-            machine.knowledge.subscribe(self.branches.notice),
+            self._knowledge.subscribe(self.branches.notice),
         ]
         try:
-            with machine.knowledge.listening():
+            with self._knowledge.listening():
                 outcome = self._go()
             self._stop_all("the plan has ended")
             self.branches.raise_errors(None)
         except BaseException as error:
             with asking("plan", frame.path, f"raised {type(error).__name__}"):
                 self.branches.ask(self.branches.threads())
-            if isinstance(error, Exception):
+            if isinstance(error, (Exception, Interruption)) and not frame.dead:
                 self._await_all()
             raise
         finally:
@@ -187,11 +192,11 @@ class Execution:
         due = self._due(name)
         if due is not None:
             return now >= due
-        return self._machine.knowledge.value(name, self._frame.path, now)
+        return self._knowledge.value(name, self._frame.path, now)
 
     def _due(self, name: str) -> float | None:
         """Return when a `timeout_ACTION_SECONDS` comes true; None for other names."""
-        if not name.startswith(_TIMEOUT) or self._machine.knowledge.source_of(name) is not None:
+        if not name.startswith(_TIMEOUT) or self._knowledge.source_of(name) is not None:
             return None
         action, _, seconds = name.removeprefix(_TIMEOUT).rpartition("_")
         try:
@@ -201,7 +206,7 @@ class Execution:
         begun = [
             since
             for label, since in self._since.items()
-            if action in {label, take_apart(self._machine.name_of(label), [action]).action}
+            if action in {label, take_apart(self._machine._smachpy.names[label], [action]).action}
         ]
         return min(begun) + limit if begun and limit >= 0 else None
 
@@ -211,7 +216,7 @@ class Execution:
         self.moment = moment = jump.moment
         self._told = None
         if run.watched:
-            self._machine.tell_fired(self._frame, jump)
+            self._tell_fired(jump)
         begun = self._call(jump) if jump.calls else ()
         if begun:
             if len(begun) == 1 and moment.only == begun[0] and not self.branches.branches:
@@ -219,7 +224,7 @@ class Execution:
             else:
                 for label in begun:
                     self._begin(label)
-        if self._machine._transition_cbs:  # noqa: SLF001  one machinery
+        if self._machine._smachpy.transition_cbs:
             self._machine.call_transition_cbs()
         return moment
 
@@ -349,7 +354,7 @@ class Execution:
 
     def _longest_wait(self, moment: Moment) -> float | None:
         """Return how long nothing tells of a change that may come [s]; None for ever."""
-        waits = [self._machine.knowledge.every(name) for name in moment.asks_world]
+        waits = [self._knowledge.every(name) for name in moment.asks_world]
         dues = [self._due(name) for name in moment.asks_world]
         now = self._frame.run.clock.now()
         waits += [max(0.0, due - now) for due in dues if due is not None and due > now]
@@ -360,7 +365,29 @@ class Execution:
         run = self._frame.run
         if run.watched and self._told is not moment:
             self._told = moment
-            self._machine.tell_waiting(self._frame, moment)
+            self._tell_held_back(moment)
+
+    def _tell_fired(self, jump: Jump) -> None:
+        """Publish and log what has just fired."""
+        net, frame = self._net, self._frame
+        marking = tuple(net.places[p].id for p in jump.moment.marking)
+        for number in jump.fired:
+            frame.emit_own(Fired, net.transitions[number].id, marking)
+        if frame.run.logged:
+            fired = ", ".join(net.transition_name(number) for number in jump.fired)
+            log.loginfo(f"{frame.path}: {fired} -> {net.words(jump.moment.marking)}")
+
+    def _tell_held_back(self, moment: Moment) -> None:
+        """Publish and log which guards are false where the plan waits."""
+        net, frame, guards = self._net, self._frame, self._table.plan.guards
+        texts = tuple(str(guards[number]) for number in moment.candidates)
+        frame.emit_own(HeldBack, tuple(net.transitions[n].id for n in moment.candidates), texts)
+        if frame.run.logged:
+            false = ", ".join(
+                f"{net.transition_name(number)!r}: [{text}] is false"
+                for number, text in zip(moment.candidates, texts, strict=True)
+            )
+            log.loginfo(f"{frame.path}: waits in {net.words(moment.marking)}; {false or 'ends'}")
 
     def _await_all(self) -> None:
         """Wait until no child runs; all were asked to stop, and each has its grace."""

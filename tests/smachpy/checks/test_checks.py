@@ -32,6 +32,8 @@ from smachpy.checks import (
     never,
 )
 from smachpy.checks.report import FORMATS
+from smachpy.pnp import PetriNetPlan
+from tests.smachpy.pnp.nets import net_of
 
 
 class Leaf(State):
@@ -527,6 +529,39 @@ def test_always_reaches_finds_a_run_that_never_ends():
 def test_properties_that_make_no_sense(wanted):
     with pytest.raises(PropertyError, match="expected"):
         check(patrol(), properties=[wanted])
+
+
+# -- plans -----------------------------------------------------------------------------------------
+
+RUN = "init* -> A.exec : A.start\nA.exec -> goal : A.end\n"
+FORK = "init* -> A.exec A.exec~ : A.start\nA.exec A.exec~ -> goal : A.end"
+
+
+@pytest.mark.parametrize(
+    ("text", "rule"),
+    [
+        (RUN.replace("goal", "Goal"), "net-label"),
+        (RUN.replace(": A.start", ": B.start"), "net-unmatched"),
+        (RUN.replace("A.", "B."), "net-unbound"),
+        (RUN.replace("A.end", "A.end [c]"), "net-condition"),
+        ("init* -> init more : t", "net-bound"),
+        (RUN + "init -> x : t", "net-deadlock"),
+        ("init* -> x : t", "net-goal"),
+        (RUN + "x -> goal : t", "net-dead"),
+        (RUN + "A.exec -> goal : A.end [c]", "net-race"),
+        (FORK, "net-shared"),
+    ],
+)
+def test_plans(text, rule):
+    plan = PetriNetPlan(net_of(text), {"A": lambda ud: None})
+    assert rule in [problem.rule for problem in check(machine(("P", plan, {})))]
+
+
+def test_the_run_to_a_deadlock_of_a_plan_is_shown():
+    plan = PetriNetPlan(net_of(RUN + "init -> x : t"), {"A": lambda ud: None})
+    (problem,) = [p for p in check(plan) if p.rule == "net-deadlock"]
+    assert problem.firings == ("t",)
+    assert "fired: t" in str(check(plan))
 
 
 # -- switching off, formats ------------------------------------------------------------------------
