@@ -52,7 +52,7 @@ def accepts(problem: str) -> bool:
     """
     if not _accepting[0]:
         return False
-    frame = _program_frame(sys._getframe(1))  # noqa: SLF001  as `warnings` looks for its caller
+    frame = _program_frame(sys._getframe(1))  # as `warnings` looks for its caller
     file, line = (frame.f_code.co_filename, frame.f_lineno) if frame else ("smachpy", 0)
     warnings.warn_explicit(
         f"{problem} SMACH went on with it, and so does this run.",

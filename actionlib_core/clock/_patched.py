@@ -48,7 +48,7 @@ REAL_TIME = (
 # Packages whose locks guard a few lines that never wait.
 SHORT_LOCKS = ("actionlib_core", "smachpy", "viz", "logging")
 
-_getframe = sys._getframe  # noqa: SLF001  what is replaced depends on the caller
+_getframe = sys._getframe  # what is replaced depends on the caller
 _sleep, _allocate = time.sleep, threading.Lock
 _localtime, _asctime = time.localtime, time.asctime
 _thread_start, _thread_join = threading.Thread.start, threading.Thread.join

@@ -217,7 +217,7 @@ def name_waits(
 ) -> dict[str, str]:
     """Say who waits for what, and where if that has no name; names that come twice get numbers."""
     threads = {participant: ident for ident, participant in idents.items()}
-    frames = sys._current_frames()  # noqa: SLF001  the documented way
+    frames = sys._current_frames()
     named: dict[str, str] = {}
     for participant in waits:
         name, number = participant.name, 1

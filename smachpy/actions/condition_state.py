@@ -5,8 +5,9 @@ from __future__ import annotations
 import contextlib
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from smachpy.actions.interface import adopt_interface, name_of
+from smachpy.actions.interface import adopt_interface
 from smachpy.actions.wakeup import Wakeup
+from smachpy.machines.names import name_of
 from smachpy.machines.problems import Problems
 from smachpy.machines.state import State
 

@@ -36,9 +36,3 @@ def adopt_interface(state: State, callback: object, *, outcomes: bool = True) ->
         state.register_output_keys(interface.get_registered_output_keys())
         if outcomes:
             state.register_outcomes(interface.get_registered_outcomes())
-
-
-def name_of(callback: object) -> str:
-    """Return what to call `callback` in texts."""
-    found = getattr(callback, "__qualname__", None) or getattr(callback, "__name__", None)
-    return str(found or type(callback).__name__)

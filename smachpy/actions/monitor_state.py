@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from actionlib_core.pubsub.topic import NotingSubscriber
 from smachpy import log
-from smachpy.actions.interface import adopt_interface, name_of
+from smachpy.actions.interface import adopt_interface
 from smachpy.actions.wakeup import Wakeup
 from smachpy.events import CallbackFailed
+from smachpy.machines.names import name_of
 from smachpy.machines.problems import Problems
 from smachpy.machines.state import State
 from smachpy.run.frame import current_scope

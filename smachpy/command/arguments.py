@@ -11,7 +11,6 @@ The annotations say what fits; the first line and the `Args:` of the docstring a
 
 from __future__ import annotations
 
-import difflib
 import enum
 import inspect
 import math
@@ -32,6 +31,7 @@ from typing import (
     get_type_hints,
 )
 
+from actionlib_core.suggest import nearest
 from actionlib_core.yaml_text import YamlTextError, load_yaml
 from smachpy.machines.container import Container
 from smachpy.sim.exceptions import MissionError
@@ -404,7 +404,7 @@ class _Reader:
         return parameter if parameter and bool in _alternatives(parameter.hint) else None
 
     def _known(self, name: str) -> str:
-        near = difflib.get_close_matches(name, self._parameters, n=1, cutoff=0.5)
+        near = nearest(name, self._parameters)
         names = sorted(self._parameters)
         hint = f" Did you mean '--{near[0]}'?" if near else ""
         return f"expected {f'one of {names}' if names else 'none'}.{hint}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import difflib
 import re
 from dataclasses import dataclass
 from functools import partial
@@ -14,6 +13,7 @@ from actionlib_core.clock import current_clock, use_clock
 from actionlib_core.exceptions import NodeError
 from actionlib_core.node import Node, get_node, init, use_node
 from actionlib_core.output import tell
+from actionlib_core.suggest import nearest
 from actionlib_core.wire.ports import watch_for_server
 from actionlib_core.wire.presence import Kind, list_endpoints
 from smachpy.sim.exceptions import MissionError
@@ -430,7 +430,7 @@ def _close_names(name: str, there: Collection[str]) -> list[str]:
     """Return the names that somebody who said `name` may have meant: another robot's, or alike."""
     word = name.rpartition("/")[2]
     same = sorted(other for other in there if other.rpartition("/")[2] == word)
-    return same[:MOST_NAMED] or difflib.get_close_matches(name, there, n=1)
+    return same[:MOST_NAMED] or nearest(name, there)
 
 
 # -- virtual time ----------------------------------------------------------------------------------

@@ -17,6 +17,7 @@ from smachpy.exceptions import (
 from smachpy.introspection import RuleRecord, Structure
 from smachpy.machines.construction import construction_method
 from smachpy.machines.container import Container, below
+from smachpy.machines.names import name_of
 from smachpy.machines.old_states import as_state
 from smachpy.machines.problems import Problems
 from smachpy.machines.rules import Rule, all_of, any_of, as_rules, decide, n_of
@@ -276,7 +277,7 @@ class Concurrence(Container):
             (),
             tuple(rules),
             self._smachpy.default_outcome or None,
-            (("outcome callback", _name_of(self._smachpy.outcome_cb)),)
+            (("outcome callback", name_of(self._smachpy.outcome_cb)),)
             if self._smachpy.outcome_cb
             else (),
         )
@@ -440,7 +441,3 @@ class Concurrence(Container):
             f"{frame.path}: outcome_cb: got {answer!r}; expected one of {sorted(known)}."
             f"{did_you_mean(answer, known)}"
         )
-
-
-def _name_of(function: object) -> str:
-    return getattr(function, "__qualname__", None) or repr(function)

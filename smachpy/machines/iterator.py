@@ -15,6 +15,7 @@ from smachpy.exceptions import (
 from smachpy.introspection import RuleRecord, Structure, TransitionRecord
 from smachpy.machines.construction import construction_method
 from smachpy.machines.container import Container
+from smachpy.machines.names import name_of
 from smachpy.machines.old_states import as_state
 from smachpy.machines.problems import Problems
 from smachpy.machines.spec import ChildSpec, LoopSpec
@@ -397,7 +398,7 @@ class Iterator(Container):
 
 def _describe_items(items: Any) -> str:
     if callable(items):
-        return f"{getattr(items, '__qualname__', repr(items))}()"
+        return f"{name_of(items)}()"
     if isinstance(items, range):
         return str(items)
     try:

@@ -1,7 +1,8 @@
-"""Lists of names (outcomes, keys) as users give them."""
+"""Lists of names (outcomes, keys) as users give them; names of their functions."""
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING
 
 from smachpy.exceptions import InvalidStateError
@@ -9,6 +10,17 @@ from smachpy.slips import accepts
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+
+def name_of(function: object) -> str:
+    """Return what to call a function of the user's in texts: its name, without an address.
+
+    A `functools.partial` has that of its function, another object to call that of its class.
+    """
+    while isinstance(function, functools.partial):
+        function = function.func
+    name = getattr(function, "__qualname__", None) or getattr(function, "__name__", None)
+    return str(name or type(function).__name__)
 
 
 def unique_names(names: Iterable[str], what: str = "names") -> tuple[str, ...]:

@@ -20,7 +20,7 @@ from typing import (
 from smachpy.context import current_path
 from smachpy.exceptions import InvalidStateError
 from smachpy.introspection import Structure
-from smachpy.machines.names import unique_names
+from smachpy.machines.names import name_of, unique_names
 from smachpy.machines.problems import Problems, as_number, unknown_arguments
 from smachpy.run.child import StateData, mark_preempt, on_preempt
 from smachpy.run.frame import clock_of_run, current_scope
@@ -495,7 +495,4 @@ class CBState(State):
     def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
         """Add the function's name."""
         kind, details = super().describe_details()
-        name = getattr(self._smachpy.code[0], "__qualname__", None) or getattr(
-            self._smachpy.code[0], "__name__", ""
-        )
-        return kind, (*details, ("callback", name)) if name else details
+        return kind, (*details, ("callback", name_of(self._smachpy.code[0])))

@@ -299,7 +299,7 @@ def _lies_in(folder: Path, name: str) -> bool:
 
 def _importer() -> tuple[str, int] | None:
     """Return file and line of the code that imports."""
-    frame: FrameType | None = sys._getframe(1)  # noqa: SLF001  who imports
+    frame: FrameType | None = sys._getframe(1)  # who imports
     while frame is not None:
         file = frame.f_code.co_filename
         if file != __file__ and "importlib" not in file:

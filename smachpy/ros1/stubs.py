@@ -61,7 +61,7 @@ class Anything:
         pass
 
     def __iter__(self) -> Iterator[Any]:
-        count = _wanted_items(sys._getframe(1))  # noqa: SLF001  `a, b = stub` wants two
+        count = _wanted_items(sys._getframe(1))
         return iter([Anything(f"{self._stub_name}[...]") for _ in range(count)])
 
     def __len__(self) -> int:
@@ -175,7 +175,7 @@ class StubModule(types.ModuleType):
 
     def __getattr__(self, name: str) -> Any:
         if name == "__all__":
-            return unbound_names(sys._getframe(1))  # noqa: SLF001  who says `import *`
+            return unbound_names(sys._getframe(1))
         if name.startswith("__") and name.endswith("__"):
             raise AttributeError(name)
         value = stand_in_class(name) if name[:1].isupper() else Anything(name)

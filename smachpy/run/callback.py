@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from smachpy.machines.names import name_of
 from smachpy.run.child import StateData
 from smachpy.run.frame import Frame
 from smachpy.run.grace import ask, forget_visit
@@ -56,8 +57,7 @@ class CallbackFrame(Frame):
         above = parent.step
         self._is_hook = above is not None and above.state is container  # called around its run
         self._path = parent.here() if self._is_hook else parent.path
-        name = getattr(function, "__qualname__", None) or repr(function)
-        self.step = Step(name, _Code(function), None, function)
+        self.step = Step(name_of(function), _Code(function), None, function)
 
     def here(self) -> str:
         """Return the container's path."""

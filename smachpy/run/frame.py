@@ -16,6 +16,7 @@ from actionlib_core.clock._serial import report_thread_exception
 from smachpy import log
 from smachpy.context import current_frame
 from smachpy.events import CallbackFailed
+from smachpy.machines.names import name_of
 from smachpy.util import has_shutdown_check
 
 if TYPE_CHECKING:
@@ -322,20 +323,20 @@ class Frame:
 
     def note_failure(self, path: str, callback: object, error: BaseException) -> None:
         """Note that a callback of the state at `path` raised."""
-        name = getattr(callback, "__qualname__", None) or repr(callback)
+        name = name_of(callback)
         text = f"{type(error).__name__}: {error}"
         self.note(path, CallbackFailed, name, text)
         self.run.note_log(f"{path}: {name} raised {text}")
 
     def callback_failed(self, callback: object, error: BaseException) -> None:
         """Report a raising callback: to the log and to the listeners."""
-        name = getattr(callback, "__qualname__", None) or repr(callback)
+        name = name_of(callback)
         text = f"{type(error).__name__}: {error}"
         log.log_exception(f"{self.path}: callback {name} raised {text}", error)
         self.emit_own(CallbackFailed, name, text)
 
     def _listener_failed(self, listener: object, error: BaseException, event: Event) -> None:
-        name = getattr(listener, "__qualname__", None) or repr(listener)
+        name = name_of(listener)
         path = self.path or self.here()
         log.log_exception(f"{path}: listener {name} raised {error!r} on {event!r}", error)
 

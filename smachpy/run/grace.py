@@ -537,7 +537,7 @@ def _up_to(frame: Frame, first: Frame) -> list[Frame]:
 
 def lines_of(ident: int) -> list[tuple[str, int, str]]:
     """Return where the thread `ident` is: file, line and function, the innermost last."""
-    top = sys._current_frames().get(ident)  # noqa: SLF001  the documented way
+    top = sys._current_frames().get(ident)
     lines = []
     while top is not None:
         lines.append((top.f_code.co_filename, top.f_lineno or 0, top.f_code.co_name))

@@ -91,7 +91,7 @@ def signal_being_handled() -> str:
         code = _code_of(handler)
         if code is not None:
             handlers[code] = number
-    frame: FrameType | None = sys._getframe(1)  # noqa: SLF001  the documented way
+    frame: FrameType | None = sys._getframe(1)
     while frame is not None:
         found = handlers.get(frame.f_code)
         if found is None and frame.f_back is not None:

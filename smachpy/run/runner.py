@@ -12,6 +12,7 @@ from smachpy.exceptions import (
     InvalidUserCodeError,
     did_you_mean,
 )
+from smachpy.machines.names import name_of
 from smachpy.run.callback import call_bounded
 from smachpy.run.child import on_preempt
 from smachpy.run.frame import SUBSCRIPTIONS, clock_of_run
@@ -155,7 +156,7 @@ def _call_hook(frame: Frame, state: Any, hook: Callable[..., object], *arguments
             hook(*arguments)
     except Exception as error:
         where = frame.here()
-        name = getattr(hook, "__name__", repr(hook))
+        name = name_of(hook)
         raise InvalidUserCodeError(
             f"{where}: hook {name} raised {type(error).__name__}: {error}", path=where
         ) from error

@@ -112,10 +112,8 @@ class _WatchedRemapper(Remapper):
 
     def __init__(self, original: Remapper, frame: Frame, path: str) -> None:
         set_slot = object.__setattr__
-        set_slot(self, "_data", original._data)  # noqa: SLF001  one class
-        set_slot(self, "_views", original._views)  # noqa: SLF001  one class
-        set_slot(self, "_input", original._input)  # noqa: SLF001  one class
-        set_slot(self, "_output", original._output)  # noqa: SLF001  one class
+        for name in Remapper.__slots__:
+            set_slot(self, name, getattr(original, name))
         set_slot(self, "_scope_of", (frame, path))
 
     def __setitem__(self, key: str, item: Any) -> None:

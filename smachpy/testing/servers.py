@@ -12,6 +12,7 @@ from actionlib_core.node import Node
 from actionlib_core.pubsub.service import Service
 from actionlib_core.pubsub.topic import Publisher, Subscriber
 from actionlib_core.transport.faulty import DELIVERED, DROPPED, FaultyTransport
+from smachpy.machines.names import name_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterable
@@ -181,7 +182,7 @@ class ScriptedEnd:
 
     def note_raised(self, function: object, error: BaseException) -> str:
         """Note what a function of the test raised, and return it as a text."""
-        name = getattr(function, "__qualname__", None) or repr(function)
+        name = name_of(function)
         text = f"{self.name}: {name} of the test raised {type(error).__name__}: {error}"
         self.errors.append(text)
         self.causes.append(error)

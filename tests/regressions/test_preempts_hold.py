@@ -462,6 +462,9 @@ def test_no_timer_waits_for_whoever_hears_of_an_overdue_state(who):
             super().__init__(["done"])
 
         def execute(self, userdata):
+            clock.call_later(
+                0.05, machine.request_preempt
+            )  # not before it runs: it would not begin
             free.wait(LONG_S)
             return "done"
 
@@ -477,7 +480,6 @@ def test_no_timer_waits_for_whoever_hears_of_an_overdue_state(who):
 
     machine = both(Deaf(), Work(60.0), preempt_timeout=0.05)
     machine.subscribe(lambda e: block() if isinstance(e, Abandoned) and who == "listener" else None)
-    machine.register_start_cb(lambda *_: clock.call_later(0.05, machine.request_preempt))
     runner = threading.Thread(target=run)
     try:
         runner.start()

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from collections import Counter
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from actionlib_core.suggest import nearest
 from smachpy.exceptions import SmachError
 from smachpy.outcome_classes import is_good
 from viz.model.machine import MISSING, PLACE, TRANSITION, Edge, Node, Pill, Rule
@@ -29,7 +29,7 @@ class UnknownPathError(SmachError):
 
     def __init__(self, path: str, paths: Sequence[str]) -> None:
         self.path = path
-        near = difflib.get_close_matches(path, paths, n=3, cutoff=0.5) or list(paths[:5])
+        near = nearest(path, paths, 3) or list(paths[:5])
         super().__init__(
             f"picture: no state {path!r}; expected a path such as {', '.join(map(repr, near))}."
         )

@@ -135,7 +135,7 @@ class EventLines:
 
     def _duration(self, event: ev.Event) -> Text:
         since = self._history.since(event.path)
-        return Text("" if since is None else f"  {event.t - since:.1f} s", "dim")
+        return Text("" if since is None else f"  {max(0.0, event.t - since):.1f} s", "dim")
 
     def _line(self, event: ev.Event, words: Text) -> Text:
         started = self._history.started
