@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from actionlib_core.node import get_node
 from actionlib_core.shutdown import current_shutdown
-from actionlib_core.wire.presence import Endpoint, Kind, find_mismatch, parse_token, token_pattern
+from actionlib_core.wire.end_port import make_end_port
+from actionlib_core.wire.presence import Endpoint, Kind, find_mismatch
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
@@ -18,7 +19,8 @@ if TYPE_CHECKING:
     from actionlib_core.exceptions import TypeMismatchError
     from actionlib_core.interfaces import Message, ServiceType
     from actionlib_core.node import Node
-    from actionlib_core.transport import Closable, Presence
+    from actionlib_core.transport import Closable
+    from actionlib_core.wire.end_port import EndPort
 
 logger = logging.getLogger("actionlib_core")
 
@@ -41,9 +43,12 @@ class End:
         self.resolved_name = self.node.resolve(name, f"{self._what} name")
         self.type = interface._type
         self.md5sum = interface._md5sum
-        self._own = self.node.endpoint(self._kind, self.resolved_name, self.type, self.md5sum)
+        self._end = self._make_end(interface)
         self._parts: list[Closable] = []
         self._closed = False
+
+    def _make_end(self, interface: type[Message | ServiceType]) -> EndPort:
+        return make_end_port(self.node, self._kind, self.resolved_name, interface)
 
     @property
     def mismatches(self) -> list[TypeMismatchError]:
@@ -79,7 +84,7 @@ class NameWatch:
 
     Args:
         node: Where we are.
-        own: Our own end; it is not counted.
+        end: Our own end; it is not counted.
         kinds: Which ends concern us.
         any_type: Another type than our own is no error.
         on_new: Gets each end that appears, on the network's thread.
@@ -90,15 +95,14 @@ class NameWatch:
     def __init__(
         self,
         node: Node,
-        own: Endpoint,
+        end: EndPort,
         kinds: Collection[Kind],
         *,
         any_type: bool = False,
         on_new: Callable[[Endpoint], object] | None = None,
     ) -> None:
         self._node = node
-        self._own = own
-        self._kinds = frozenset(kinds)
+        self._end = end
         self._any_type = any_type
         self._on_new = on_new
         self._lock = threading.Lock()
@@ -106,12 +110,10 @@ class NameWatch:
         self._mismatches: dict[Endpoint, TypeMismatchError] = {}
         self._waiters: list[Event] = []
         self._closed = False
-        kind = next(iter(self._kinds)) if len(self._kinds) == 1 else None
         self._watch: Closable | None = None
         self._forget = node.on_close(self.close)
         try:
-            pattern = token_pattern(kind, own.name)
-            self._watch = node.transport.watch_alive(pattern, self._on_presence)
+            self._watch = end.watch(frozenset(kinds), self._on_end)
         except BaseException:
             self._forget()
             raise
@@ -120,7 +122,7 @@ class NameWatch:
         """Return the ends there are now: of `kind` or all, of our type or any."""
         with self._lock:
             ends = list(self._ends.values())
-        wanted = self._own.type, self._own.md5
+        wanted = self._end.own.type, self._end.own.md5
         return [
             end
             for end in ends
@@ -139,7 +141,7 @@ class NameWatch:
             if end in self._mismatches:
                 return
             self._mismatches[end] = error
-        logger.error("%s %s", self._own.kind.value, error)
+        logger.error("%s %s", self._end.own.kind.value, error)
         self.wake()
 
     def wait(
@@ -193,23 +195,22 @@ class NameWatch:
             self._watch.close()
         self.wake()
 
-    def _on_presence(self, presence: Presence) -> None:
-        end = parse_token(presence.key)
-        if end is None or end.kind not in self._kinds or end == self._own:
+    def _on_end(self, key: str, end: Endpoint, alive: bool) -> None:
+        if end == self._end.own:
             return
         with self._lock:
-            if presence.alive:
-                self._ends[presence.key] = end
+            if alive:
+                self._ends[key] = end
             else:
-                self._ends.pop(presence.key, None)
+                self._ends.pop(key, None)
                 self._mismatches.pop(end, None)
-        error = self._find_mismatch(end) if presence.alive else None
+        error = self._find_mismatch(end) if alive else None
         if error is not None:
             self.note(error, end)
         else:
             self.wake()
-        if presence.alive and self._on_new is not None:
+        if alive and self._on_new is not None:
             self._on_new(end)
 
     def _find_mismatch(self, end: Endpoint) -> TypeMismatchError | None:
-        return None if self._any_type else find_mismatch([end], self._own)
+        return None if self._any_type else find_mismatch([end], self._end.own)

@@ -27,14 +27,12 @@ from actionlib_core.exceptions import (
 )
 from actionlib_core.pubsub._ends import NameWatch
 from actionlib_core.pubsub.service_proxy import ServiceEnd, handler_raised, is_from
-from actionlib_core.wire.encoding import check_encoding, encoding_of, parse_encoding
+from actionlib_core.wire.encoding import parse_encoding
 from actionlib_core.wire.presence import (
     Endpoint,
     Kind,
     in_conflict,
     is_younger,
-    list_endpoints,
-    token_key,
     with_age,
 )
 
@@ -90,7 +88,8 @@ class Service(ServiceEnd):
     ) -> None:
         check_function(f"service {name!r}", "handler", handler)
         super().__init__(name, service_class, node)
-        self._own = with_age(self._own, self.node.clock.time_ns())
+        if self._end.ages:
+            self._end.own = with_age(self._end.own, self.node.clock.time_ns())
         self.handler = handler
         self.error: ServiceConflictError | None = None
         self._alone = alone
@@ -103,10 +102,9 @@ class Service(ServiceEnd):
         self._parts.append(self._ends)
         self._forget = self.node.on_close(self.close)
         self._calls = CallbackQueue(self.node, f"service /{self.resolved_name}")
-        transport = self.node.transport
         try:
-            self._parts.append(transport.queryable(self.resolved_name, self._on_query))
-            self._parts.append(transport.declare_alive(token_key(self._own)))
+            self._parts.append(self._end.answer(self._on_query))
+            self._parts.append(self._end.show())
             self._meet_servers()
         except BaseException:
             self.close()
@@ -140,12 +138,12 @@ class Service(ServiceEnd):
     # -- other servers -------------------------------------------------------------------------
 
     def _watch(self) -> NameWatch:
-        return NameWatch(self.node, self._own, {Kind.SERVICE}, on_new=self._on_server)
+        return NameWatch(self.node, self._end, {Kind.SERVICE}, on_new=self._on_server)
 
     def _refuse_second(self) -> None:
         if not self._alone:
             return
-        there = list_endpoints(self.node.transport, kind=Kind.SERVICE, name=self.resolved_name)
+        there = self._end.list_services()
         if there:
             raise self._conflict(there[0])
 
@@ -159,9 +157,9 @@ class Service(ServiceEnd):
 
     def _on_server(self, other: Endpoint) -> None:
         """Stop when `other` is older: a session that has just been opened hears of it late."""
-        if not (self._alone and self._shown) or self._closed:
+        if not (self._alone and self._shown and self._end.ages) or self._closed:
             return
-        if not is_younger(self._own, other):
+        if not is_younger(self._end.own, other):
             logger.error("%s", self._conflict(other, stays=True))
             return
         self.error = self._conflict(other)
@@ -169,16 +167,22 @@ class Service(ServiceEnd):
         self.close()
 
     def _conflict(self, other: Endpoint, *, stays: bool = False) -> ServiceConflictError:
-        return ServiceConflictError(self.resolved_name, *in_conflict(self._own, other, stays=stays))
+        return ServiceConflictError(
+            self.resolved_name, *in_conflict(self._end.own, other, stays=stays)
+        )
 
     # -- calls ---------------------------------------------------------------------------------
 
     def _on_query(self, query: Query) -> None:
         try:
-            check_encoding(query.encoding, self.service_class, name=self.resolved_name)
+            self._end.check(query)
         except TypeMismatchError as error:
             self._ends.note(error, _caller_of(query))
             _fail(query, error)
+            return
+        except ValueError as error:
+            logger.warning("service /%s: dropped a request: %s", self.resolved_name, error)
+            query.finish()
             return
         if not self._begin_call():
             # Without an end, handlers that call themselves would take all threads there are.
@@ -232,8 +236,8 @@ class Service(ServiceEnd):
 
     def _reply(self, query: Query) -> None:
         try:
-            response = self._respond(self.handler(self.request_class.from_bytes(query.payload)))
-            query.reply(response.to_bytes(), encoding_of(self.service_class))
+            response = self._respond(self.handler(self._end.read_request(query)))
+            self._end.reply(query, response)
         except BaseException as error:  # sys.exit() too: the caller waits for an answer
             busy = _find_busy(error)
             if busy:

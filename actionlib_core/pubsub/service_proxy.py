@@ -7,6 +7,7 @@ Source:
 from __future__ import annotations
 
 import json
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core._arguments import check_class, check_delay, check_limit
@@ -24,7 +25,7 @@ from actionlib_core.exceptions import (
 from actionlib_core.node import get_node
 from actionlib_core.pubsub._ends import End, NameWatch
 from actionlib_core.shutdown import requested
-from actionlib_core.wire.encoding import check_encoding, encoding_of
+from actionlib_core.wire.end_port import make_end_port
 from actionlib_core.wire.presence import Kind
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from actionlib_core.node import Node
     from actionlib_core.time import Duration
     from actionlib_core.transport import Reply
+    from actionlib_core.wire.end_port import EndPort
 
 CALL_TIMEOUT_S = 60.0  # default limit of a call
 APPEAR_S = 2.0  # how much of it a call gives a server to appear
@@ -58,7 +60,7 @@ class ServiceEnd(End):
         self.response_class = service_class._response_class
 
     def _watch(self) -> NameWatch:
-        return NameWatch(self.node, self._own, {Kind.SERVICE})
+        return NameWatch(self.node, self._end, {Kind.SERVICE})
 
 
 def is_from(name: str, text: str) -> bool:
@@ -110,9 +112,15 @@ class ServiceProxy(ServiceEnd):
         self.persistent = persistent
         self.headers = headers
         self.timeout = check_limit(f"service {name!r}", "timeout", timeout)
-        # Programs make proxies as they need them and never close them, so they share what lasts.
-        key = ("service", self.resolved_name, self.type, self.md5sum)
-        self._ends = self.node.shared(key, self._watch)
+        self._ends = self.node.shared(("service", *self._shared_key()), self._watch)
+
+    def _make_end(self, interface: type[Message | ServiceType]) -> EndPort:
+        make = partial(make_end_port, self.node, Kind.SERVICE, self.resolved_name, interface)
+        return self.node.shared(("caller", *self._shared_key()), partial(make, calls=True))
+
+    def _shared_key(self) -> tuple[str, str, str]:
+        """Return what proxies share what lasts by: programs make many and never close them."""
+        return self.resolved_name, self.type, self.md5sum
 
     def close(self) -> None:
         """Make later calls fail, and those under way at once; a second call does nothing."""
@@ -150,7 +158,7 @@ class ServiceProxy(ServiceEnd):
         start = clock.now()
         self._find_server()
         left = None if self.timeout is None else max(self.timeout - (clock.now() - start), 0.0)
-        return self._read(self._ask(request.to_bytes(), left))
+        return self._read(self._ask(request, left))
 
     def wait_for_service(self, timeout: float | Duration | None = None) -> None:
         """Wait until there is a server.
@@ -196,7 +204,7 @@ class ServiceProxy(ServiceEnd):
                 "starting it, or wait_for_service() first.",
             )
 
-    def _ask(self, payload: bytes, timeout: float | None) -> Reply:
+    def _ask(self, request: Message, timeout: float | None) -> Reply:
         """Return the first reply.
 
         Blocks: until the first, or until none can come any more.
@@ -213,14 +221,8 @@ class ServiceProxy(ServiceEnd):
             done.append(True)
             news.set()
 
-        query = self.node.transport.query(
-            self.resolved_name,
-            payload,
-            encoding=encoding_of(self.service_class),
-            timeout=FOREVER_S if timeout is None else timeout + MARGIN_S,
-            on_reply=on_reply,
-            on_done=on_done,
-        )
+        longest = FOREVER_S if timeout is None else timeout + MARGIN_S
+        query = self._end.ask(request, longest, on_reply, on_done)
 
         def settled() -> bool:
             return bool(replies or done or self._closed)
@@ -276,8 +278,8 @@ class ServiceProxy(ServiceEnd):
 
     def _read(self, reply: Reply) -> Message:
         if not reply.error:
-            check_encoding(reply.encoding, self.service_class, name=self.resolved_name)
-            return self.response_class.from_bytes(reply.payload)
+            response: Message = self._end.read_response(reply)
+            return response
         text = reply.payload.decode(errors="replace")
         try:
             told = json.loads(text)
@@ -324,7 +326,7 @@ def wait_for_service(
     node = get_node() if node is None else node
     name = node.resolve(service, "service name")
     seconds = check_delay(f"service {service!r}", "timeout", timeout)
-    anybody = node.endpoint(Kind.SERVICE, name, "", "")
+    anybody = make_end_port(node, Kind.SERVICE, name, None)
     watch = NameWatch(node, anybody, {Kind.SERVICE}, any_type=True)
     try:
         if watch.wait(lambda: bool(watch.ends(any_type=True)), seconds):

@@ -22,9 +22,7 @@ from actionlib_core.exceptions import NodeError, TypeMismatchError, WaitTimeoutE
 from actionlib_core.goal.backlog import MESSAGES, Backlog
 from actionlib_core.pubsub._ends import End, NameWatch, close_all
 from actionlib_core.shutdown import requested
-from actionlib_core.transport import Quality
-from actionlib_core.wire.encoding import check_encoding, encoding_of, parse_encoding
-from actionlib_core.wire.presence import Endpoint, Kind, token_key
+from actionlib_core.wire.presence import Kind
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,7 +30,8 @@ if TYPE_CHECKING:
     from actionlib_core.interfaces import Message
     from actionlib_core.node import Node
     from actionlib_core.time import Duration
-    from actionlib_core.transport import Closable, PublisherPort, Sample
+    from actionlib_core.transport import Closable, Sample
+    from actionlib_core.wire.end_port import Sender
 
 M = TypeVar("M", bound="Message")
 
@@ -49,7 +48,7 @@ class _TopicEnd(End):
         check_class(f"topic {name!r}", data_class, "from_bytes", "message class, such as String")
         super().__init__(name, data_class, node)
         self.data_class = data_class
-        self._ends = NameWatch(self.node, self._own, {Kind.PUBLISHER, Kind.SUBSCRIBER})
+        self._ends = NameWatch(self.node, self._end, {Kind.PUBLISHER, Kind.SUBSCRIBER})
         self._parts.append(self._ends)
         self._forget = self._leave_with_node()
 
@@ -93,10 +92,10 @@ class _TopicEnd(End):
         self._leave()
 
     def _join(self, declare: Callable[[], Closable]) -> None:
-        """Declare our end and show its token; all of it, or nothing and the error."""
+        """Declare our end and show it; all of it, or nothing and the error."""
         try:
             self._parts.append(declare())
-            self._parts.append(self.node.transport.declare_alive(token_key(self._own)))
+            self._parts.append(self._end.show())
         except BaseException:
             self.unregister()
             raise
@@ -138,7 +137,7 @@ class Publisher(_TopicEnd):
         self.queue_size = queue_size
         self.latch = latch
         super().__init__(name, data_class, node)
-        self._port: PublisherPort
+        self._sender: Sender
         self._join(self._declare)
 
     def _leave_with_node(self) -> Callable[[], None]:
@@ -155,11 +154,9 @@ class Publisher(_TopicEnd):
 
         return leave_now
 
-    def _declare(self) -> PublisherPort:
-        quality = Quality(express=True, latch=self.latch)
-        encoding = encoding_of(self.data_class)
-        self._port = self.node.transport.publisher(self.resolved_name, encoding, quality)
-        return self._port
+    def _declare(self) -> Sender:
+        self._sender = self._end.send(latch=self.latch)
+        return self._sender
 
     def publish(self, *args: Any, **kwargs: Any) -> None:
         """Send a message, or one made from the arguments: `publish("hello")`, `publish(data=1)`.
@@ -175,7 +172,7 @@ class Publisher(_TopicEnd):
             message = args[0]
         else:
             message = self.data_class(*args, **kwargs)
-        self._port.put(message.to_bytes())
+        self._sender.put(message)
         if self._ends.mismatches:
             self._raise_if_nobody_fits()
 
@@ -228,11 +225,10 @@ class Subscriber(_TopicEnd, Generic[M]):
         self.callback = callback
         self.callback_args = callback_args
         self.queue_size = queue_size
-        self._read = data_class.from_bytes
         self._lock = threading.Lock()
         self._waiting: Backlog[Sample] = Backlog(queue_size or MESSAGES)
         self._call = self._caller()
-        self._join(lambda: self.node.transport.subscribe(self.resolved_name, self._on_sample))
+        self._join(lambda: self._end.receive(self._on_sample))
 
     def _caller(self) -> Callable[[Callable[[], None]], object]:
         return CallbackQueue(self.node, f"topic {self.name}").call
@@ -262,11 +258,11 @@ class Subscriber(_TopicEnd, Generic[M]):
         if sample is None or self._closed or self.callback is None:  # None: a drop was its end
             return
         try:
-            check_encoding(sample.encoding, self.data_class, name=self.resolved_name)
+            message = self._end.read(sample)
         except TypeMismatchError as error:
-            self._ends.note(error, _sender_of(sample))
+            self._ends.note(error, self._end.sender_of(sample))
             return
-        self._call_back(self._read(sample.payload))
+        self._call_back(message)
 
     def _call_back(self, message: M) -> None:
         if self._closed or self.callback is None:  # it may have left while the message was read
@@ -286,12 +282,6 @@ class NotingSubscriber(Subscriber[M]):
 
     def _caller(self) -> Callable[[Callable[[], None]], object]:
         return lambda deliver: deliver()
-
-
-def _sender_of(sample: Sample) -> Endpoint:
-    """Return the end that a message without a token of its type came from."""
-    encoding = parse_encoding(sample.encoding)
-    return Endpoint(Kind.PUBLISHER, sample.key, encoding.type, encoding.md5, sample.source, "", 0)
 
 
 def wait_for_message(

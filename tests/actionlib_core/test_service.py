@@ -374,7 +374,7 @@ def test_a_call_that_no_thread_is_left_for_is_answered(nodes, clock, caplog, mon
 def test_answer_of_a_foreign_server_with_a_plain_error(nodes, clock):
     server, caller = nodes
     Service("grip", SetBool, print, node=server).close()
-    server.announce(ServiceProxy("grip", SetBool, node=server)._own.kind, "grip", "std_srvs/SetBool",
+    server.announce(ServiceProxy("grip", SetBool, node=server)._end.own.kind, "grip", "std_srvs/SetBool",
                     SetBool._md5sum)  # fmt: skip
     server.transport.queryable("grip", lambda q: (q.reply_error("plain words"), q.finish()))
     with pytest.raises(ServiceException, match="plain words") as caught:

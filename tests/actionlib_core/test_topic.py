@@ -164,14 +164,14 @@ def test_message_that_is_being_read_at_the_end_does_not_start_a_callback(nodes, 
     talker, listener = nodes
     heard = []
     subscriber = Subscriber("chatter", String, heard.append, node=listener)
-    read = subscriber._read
+    read = subscriber._end.read
 
-    def slow(payload):
-        message = read(payload)
+    def slow(sample):
+        message = read(sample)
         clock.sleep(1.0)
         return message
 
-    subscriber._read = slow
+    subscriber._end.read = slow
     Publisher("chatter", String, node=talker).publish("late")
     clock.sleep(0.5)
     subscriber.unregister()

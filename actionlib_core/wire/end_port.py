@@ -1,0 +1,241 @@
+"""One end of a topic or service on the wire that its type, or the configuration of its name, says.
+
+Publishers, subscribers, services and proxies speak through an `EndPort` and know neither keys nor
+encodings nor tokens.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol
+
+from actionlib_core.transport import Quality
+from actionlib_core.wire.encoding import check_encoding, encoding_of, parse_encoding
+from actionlib_core.wire.presence import (
+    Endpoint,
+    Kind,
+    list_endpoints,
+    parse_token,
+    token_key,
+    token_pattern,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection
+
+    from actionlib_core.node import Node
+    from actionlib_core.transport import (
+        Closable,
+        Presence,
+        PublisherPort,
+        Query,
+        Reply,
+        Sample,
+        Transport,
+    )
+
+    OnEnd = Callable[[str, Endpoint, bool], None]
+
+
+class Sender(Protocol):
+    """The sending end of a topic."""
+
+    def put(self, message: Any) -> None:
+        """Send a message.
+
+        Raises:
+            FieldError: a value does not fit its field.
+            TransportError: the transport is closed.
+
+        Blocks: while the network has no room.
+        """
+
+    def close(self) -> None:
+        """Leave the topic."""
+
+
+class EndPort(Protocol):
+    """One end of a topic or service; its methods raise TransportError when the session is closed.
+
+    Attributes:
+        own: The end, as others see it.
+        ages: Whether its `age` tells which of two ends came first.
+    """
+
+    own: Endpoint
+    ages: bool
+
+    def show(self) -> Closable:
+        """Show that the end is there."""
+
+    def watch(self, kinds: Collection[Kind], callback: OnEnd) -> Closable:
+        """Hear of the ends of the name: of those that are there, then of every change.
+
+        The callback gets what tells an end from others, the end, and whether it is there.
+        """
+
+    def list_services(self) -> list[Endpoint]:
+        """Return the servers of the name. Blocks: until the network has answered, 1 s at most."""
+
+    def send(self, *, latch: bool) -> Sender:
+        """Declare that messages are sent."""
+
+    def receive(self, callback: Callable[[Sample], None]) -> Closable:
+        """Receive messages, with the last one of each publisher that latches."""
+
+    def read(self, sample: Sample) -> Any:
+        """Return a message.
+
+        Raises:
+            TypeMismatchError: it is of another type.
+            DeserializationError: it cannot be read.
+        """
+
+    def sender_of(self, sample: Sample) -> Endpoint:
+        """Return the end that a message of another type came from."""
+
+    def answer(self, callback: Callable[[Query], None]) -> Closable:
+        """Answer requests."""
+
+    def check(self, query: Query) -> None:
+        """Check that a request can be answered.
+
+        Raises:
+            TypeMismatchError: it is of another type.
+            ValueError: it is none.
+        """
+
+    def read_request(self, query: Query) -> Any:
+        """Return a request; raises DeserializationError."""
+
+    def reply(self, query: Query, response: Any) -> None:
+        """Send a response; the exchange goes on until the query's `finish`."""
+
+    def ask(
+        self,
+        request: Any,
+        timeout: float,
+        on_reply: Callable[[Reply], None],
+        on_done: Callable[[], None],
+    ) -> Closable:
+        """Send a request; see `Transport.query`."""
+
+    def read_response(self, reply: Reply) -> Any:
+        """Return a response; errors as `read`."""
+
+
+def make_end_port(
+    node: Node, kind: Kind, name: str, interface: Any, *, calls: bool = False
+) -> EndPort:
+    """Return a new end of the full name `name`, not yet shown to anybody.
+
+    Args:
+        node: Where it lives.
+        kind: What it does; a caller of services is of kind SERVICE, too.
+        calls: It is such a caller.
+        name: See above.
+        interface: Its message or service class; None for an end of no type, which only watches.
+
+    Raises:
+        ConfigError: it is on ROS 2, and no network of ROS 2 has the name; or its type has no
+            counterpart on the network that has it.
+        TransportError: that network cannot be joined.
+
+    Blocks: the first time on a network of ROS 2, until it is joined.
+    """
+    wire = getattr(interface, "_wire", "ros1")
+    if interface is not None and (wire == "ros2" or node.config.ros2):
+        from actionlib_core.wire.ros2.mapping import find_network
+
+        if find_network(node, name, wire) is not None:
+            from actionlib_core.wire.ros2.end_port import RosEndPort
+
+            return RosEndPort(node, kind, name, interface, calls=calls)
+    return OwnEndPort(node, kind, name, interface)
+
+
+class _OwnSender:
+    __slots__ = ("_port", "close")
+
+    def __init__(self, port: PublisherPort) -> None:
+        self._port = port
+        self.close = port.close
+
+    def put(self, message: Any) -> None:
+        self._port.put(message.to_bytes())
+
+
+class OwnEndPort:
+    """An end on our own wire: ROS 1's bytes under the name itself; see `make_end_port`."""
+
+    ages = True
+
+    def __init__(self, node: Node, kind: Kind, name: str, interface: Any) -> None:
+        self._transport: Transport = node.transport
+        self._interface = interface
+        type_name, md5 = ("", "") if interface is None else (interface._type, interface._md5sum)
+        self.own = node.endpoint(kind, name, type_name, md5)
+
+    def show(self) -> Closable:
+        return self._transport.declare_alive(token_key(self.own))
+
+    def watch(self, kinds: Collection[Kind], callback: OnEnd) -> Closable:
+        def on_presence(presence: Presence) -> None:
+            end = parse_token(presence.key)
+            if end is not None and end.kind in kinds:
+                callback(presence.key, end, presence.alive)
+
+        kind = next(iter(kinds)) if len(kinds) == 1 else None
+        return self._transport.watch_alive(token_pattern(kind, self.own.name), on_presence)
+
+    def list_services(self) -> list[Endpoint]:
+        return list_endpoints(self._transport, kind=Kind.SERVICE, name=self.own.name)
+
+    def send(self, *, latch: bool) -> Sender:
+        quality = Quality(express=True, latch=latch)
+        encoding = encoding_of(self._interface)
+        return _OwnSender(self._transport.publisher(self.own.name, encoding, quality))
+
+    def receive(self, callback: Callable[[Sample], None]) -> Closable:
+        return self._transport.subscribe(self.own.name, callback)
+
+    def read(self, sample: Sample) -> Any:
+        check_encoding(sample.encoding, self._interface, name=self.own.name)
+        return self._interface.from_bytes(sample.payload)
+
+    def sender_of(self, sample: Sample) -> Endpoint:
+        encoding = parse_encoding(sample.encoding)
+        return Endpoint(
+            Kind.PUBLISHER, sample.key, encoding.type, encoding.md5, sample.source, "", 0
+        )
+
+    def answer(self, callback: Callable[[Query], None]) -> Closable:
+        return self._transport.queryable(self.own.name, callback)
+
+    def check(self, query: Query) -> None:
+        check_encoding(query.encoding, self._interface, name=self.own.name)
+
+    def read_request(self, query: Query) -> Any:
+        return self._interface._request_class.from_bytes(query.payload)
+
+    def reply(self, query: Query, response: Any) -> None:
+        query.reply(response.to_bytes(), encoding_of(self._interface))
+
+    def ask(
+        self,
+        request: Any,
+        timeout: float,
+        on_reply: Callable[[Reply], None],
+        on_done: Callable[[], None],
+    ) -> Closable:
+        return self._transport.query(
+            self.own.name,
+            request.to_bytes(),
+            encoding=encoding_of(self._interface),
+            timeout=timeout,
+            on_reply=on_reply,
+            on_done=on_done,
+        )
+
+    def read_response(self, reply: Reply) -> Any:
+        check_encoding(reply.encoding, self._interface, name=self.own.name)
+        return self._interface._response_class.from_bytes(reply.payload)

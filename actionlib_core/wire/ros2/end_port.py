@@ -1,0 +1,152 @@
+"""One end of a topic or service of ROS 2: CDR with an attachment, under name, type and hash."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.transport import Quality
+from actionlib_core.wire.presence import Endpoint
+from actionlib_core.wire.presence import Kind as EndKind
+from actionlib_core.wire.ros2.attachment import answer_to, unpack_attachment
+from actionlib_core.wire.ros2.mapping import message_on_ros2, service_on_ros2
+from actionlib_core.wire.ros2.names import LATCHED, Kind
+from actionlib_core.wire.ros2.network import ros_network
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection
+
+    from actionlib_core.node import Node
+    from actionlib_core.transport import Closable, PublisherPort, Query, Reply, Sample
+    from actionlib_core.wire.end_port import OnEnd, Sender
+    from actionlib_core.wire.ros2.graph import End
+    from actionlib_core.wire.ros2.mapping import MessageOnRos2
+    from actionlib_core.wire.ros2.names import Token
+
+_KINDS = {
+    Kind.PUBLISHER: EndKind.PUBLISHER,
+    Kind.SUBSCRIPTION: EndKind.SUBSCRIBER,
+    Kind.SERVICE: EndKind.SERVICE,
+}
+_KINDS_THERE = {kind: there for there, kind in _KINDS.items()}
+
+
+class _RosSender:
+    def __init__(self, end: End, convert: Callable[[Any], Any], port: PublisherPort) -> None:
+        self._end = end
+        self._convert = convert
+        self._port = port
+        self.close = port.close
+
+    def put(self, message: Any) -> None:
+        self._port.put(self._convert(message).to_cdr(), self._end.attachment())
+
+
+class RosEndPort:
+    """An end on a network of ROS 2; see `make_end_port`. The end of a caller is its client's."""
+
+    ages = False  # tokens there do not tell
+
+    def __init__(
+        self, node: Node, kind: EndKind, name: str, interface: Any, *, calls: bool = False
+    ) -> None:
+        self._network = network = ros_network(node, name)
+        self._clock = node.clock
+        self._request: MessageOnRos2
+        self._response: MessageOnRos2
+        if kind is EndKind.SERVICE:
+            theirs, self._request, self._response = service_on_ros2(
+                network.settings, name, interface
+            )
+            there, type_name, type_hash = self._request.name, theirs._type, theirs._rihs01
+        else:
+            self._message = message_on_ros2(network.settings, name, interface)
+            there = self._message.name
+            type_name, type_hash = self._message.message._type, self._message.message._rihs01
+        self._name_there = network.name(there)
+        self._type = network.type(type_name, type_hash)
+        self._name = name
+        kind_there = Kind.CLIENT if calls else _KINDS_THERE[kind]
+        self._end = network.ros.end(kind_there, self._name_there, self._type)
+        self.own = self._convert(self._end.token)._replace(kind=kind)
+        if calls:
+            self._end.show()
+            node.on_close(self._end.close)
+
+    def _convert(self, token: Token) -> Endpoint:
+        """Return an end as it would be on our own wire."""
+        return Endpoint(
+            _KINDS.get(token.kind, EndKind.SERVICE),
+            self._name,
+            token.type,
+            token.type_hash,
+            token.session,
+            token.full_node,
+            token.entity_id,
+        )
+
+    def show(self) -> Closable:
+        self._end.show()
+        return self._end
+
+    def watch(self, kinds: Collection[EndKind], callback: OnEnd) -> Closable:
+        def on_token(token: Token, key: str, alive: bool) -> None:
+            if _KINDS.get(token.kind) in kinds:
+                callback(key, self._convert(token), alive)
+
+        return self._network.ros.watch(on_token, name=self._name_there)
+
+    def list_services(self) -> list[Endpoint]:
+        tokens = self._network.ros.list(kind=Kind.SERVICE, name=self._name_there)
+        return [self._convert(token) for token in tokens]
+
+    def send(self, *, latch: bool) -> Sender:
+        quality = Quality(express=True, cache=LATCHED.depth if latch else 0)
+        if latch:
+            ros = self._network.ros
+            self._end = ros.end(Kind.PUBLISHER, self._name_there, self._type, LATCHED)
+            self.own = self._convert(self._end.token)
+        port = self._network.transport.publisher(self._end.key, "", quality)
+        return _RosSender(self._end, self._message.to_ros2, port)
+
+    def receive(self, callback: Callable[[Sample], None]) -> Closable:
+        return self._network.transport.subscribe(self._end.key, callback, cached=LATCHED.depth)
+
+    def read(self, sample: Sample) -> Any:
+        return self._message.from_ros2(self._message.message.from_cdr(sample.payload))
+
+    def sender_of(self, sample: Sample) -> Endpoint:
+        return self.own._replace(kind=EndKind.PUBLISHER, session=sample.source, node="", entity=0)
+
+    def answer(self, callback: Callable[[Query], None]) -> Closable:
+        return self._network.transport.queryable(self._end.key, callback, complete=True)
+
+    def check(self, query: Query) -> None:
+        unpack_attachment(query.attachment)
+
+    def read_request(self, query: Query) -> Any:
+        return self._request.from_ros2(self._request.message.from_cdr(query.payload))
+
+    def reply(self, query: Query, response: Any) -> None:
+        asked = unpack_attachment(query.attachment)
+        payload = self._response.to_ros2(response).to_cdr()
+        query.reply(payload, attachment=answer_to(asked, self._clock.time_ns()))
+
+    def ask(
+        self,
+        request: Any,
+        timeout: float,
+        on_reply: Callable[[Reply], None],
+        on_done: Callable[[], None],
+    ) -> Closable:
+        return self._network.transport.query(
+            self._end.key,
+            self._request.to_ros2(request).to_cdr(),
+            attachment=self._end.attachment(),
+            best=True,
+            timeout=timeout,
+            on_reply=on_reply,
+            on_done=on_done,
+        )
+
+    def read_response(self, reply: Reply) -> Any:
+        return self._response.from_ros2(self._response.message.from_cdr(reply.payload))
