@@ -146,7 +146,7 @@ def make_end_port(
     if interface is not None and (wire == "ros2" or node.config.ros2):
         from actionlib_core.wire.ros2.mapping import find_network
 
-        if find_network(node, name, wire) is not None:
+        if find_network(node, name, interface) is not None:
             from actionlib_core.wire.ros2.end_port import RosEndPort
 
             return RosEndPort(node, kind, name, interface, calls=calls)
