@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from actionlib_core.config import ROS2_DISTRO_VARIABLE, ROS2_DOMAIN_VARIABLE, ROS2_VARIABLE
 from actionlib_core.exceptions import ConfigError
@@ -14,14 +14,20 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
-def add_ros2_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options to a command."""
+def add_ros2_options(parser: argparse.ArgumentParser, **endpoint: Any) -> None:
+    """Add the options to a command.
+
+    Args:
+        parser: Of the command.
+        endpoint: What else argparse is told of `--ros2`.
+    """
     group = parser.add_argument_group("a ROS 2 robot, over rmw_zenoh")
     group.add_argument(
         "--ros2",
         metavar="ENDPOINT",
         help="its Zenoh router, tcp/robot.local:7447 for example (default: SMACHPY_ROS2, or the "
         "configuration)",
+        **endpoint,
     )
     group.add_argument("--domain", metavar="N", help="its ROS_DOMAIN_ID (default: 0)")
     group.add_argument(

@@ -1,0 +1,258 @@
+"""What the tokens of a ROS 2 robot say about whether it can be used from here, and what to try.
+
+Pure: it is given what was found, and returns what to say.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from enum import StrEnum
+from typing import TYPE_CHECKING, NamedTuple
+
+from actionlib_core.exceptions import InterfaceError
+from actionlib_core.interfaces import ros2
+from actionlib_core.wire.ros2.names import (
+    HASH_NOT_SUPPORTED,
+    Kind,
+    action_names,
+    action_of,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from actionlib_core.wire.ros2.names import Token
+
+CLOCK_OFF_S = 0.1  # Nav2's usual tolerance for transforms
+SLOW_S = 0.5
+MOST_NAMED = 5
+START = "ros2 run rmw_zenoh_cpp rmw_zenohd"
+
+
+class Level(StrEnum):
+    """How good or bad a finding is."""
+
+    OK = "ok"
+    NOTE = "note"
+    PROBLEM = "problem"
+
+
+class Finding(NamedTuple):
+    """One thing that was looked at.
+
+    Attributes:
+        level: How good or bad it is.
+        what: What was looked at: "router", "nodes", "types", "actions", "qos", "answers", "clock".
+        text: What was found.
+        way_out: What to try; "" when nothing is wrong.
+    """
+
+    level: Level
+    what: str
+    text: str
+    way_out: str = ""
+
+
+def diagnose_nodes(tokens: Iterable[Token], domain: int) -> Finding:
+    """Tell whether nodes show themselves in a domain.
+
+    Args:
+        tokens: Of all domains.
+        domain: The one that is to be used.
+    """
+    by_domain: dict[int, set[str]] = {}
+    for token in tokens:
+        by_domain.setdefault(token.domain, set()).add(token.full_node)
+    nodes = by_domain.pop(domain, set())
+    if nodes:
+        return Finding(Level.OK, "nodes", f"{_named(nodes)} in domain {domain}")
+    if by_domain:
+        others = ", ".join(f"{d} ({_named(names)})" for d, names in sorted(by_domain.items()))
+        return Finding(
+            Level.PROBLEM,
+            "nodes",
+            f"none in domain {domain}, but in {others}",
+            f"Try --domain {min(by_domain)}.",
+        )
+    return Finding(
+        Level.PROBLEM,
+        "nodes",
+        "none in any domain, though the router answers",
+        "Is RMW_IMPLEMENTATION=rmw_zenoh_cpp set where they are started, and do they use this "
+        "router? A node of another middleware does not show here.",
+    )
+
+
+def diagnose_types(tokens: Iterable[Token], distro: str) -> list[Finding]:
+    """Compare the type hashes of a robot with those of the definitions here.
+
+    Args:
+        tokens: Of the robot's ends, in its domain.
+        distro: Whose definitions are to be used.
+    """
+    types = {(t.type, t.type_hash) for t in tokens if t.kind is not Kind.NODE}
+    if not types:
+        return []
+    hashes = {type_hash for _, type_hash in types}
+    if hashes == {HASH_NOT_SUPPORTED}:
+        if distro == "humble":
+            note = "Humble shows no type hashes: nobody checks that definitions are the same"
+            return [Finding(Level.NOTE, "types", note)]
+        text = f"the robot shows no type hashes, as Humble does; expected those of {distro}"
+        return [Finding(Level.PROBLEM, "types", text, "Try --distro humble.")]
+    fitting: Counter[str] = Counter()
+    wrong: list[str] = []
+    unknown: list[str] = []
+    for name, type_hash in sorted(types):
+        found = ros2.distros_of(name, type_hash)
+        fitting.update(found)
+        if distro not in found:
+            (wrong if _is_defined(name, distro) else unknown).append(name)
+    findings = []
+    if wrong:
+        best = max(ros2.DISTROS, key=lambda name: fitting[name])
+        better = fitting[best] > fitting[distro]
+        findings.append(
+            Finding(
+                Level.PROBLEM,
+                "types",
+                f"{len(wrong)} of {len(types)} have another definition than {distro}'s: "
+                f"{_listed(wrong)}",
+                f"Try --distro {best}, which {fitting[best]} fit."
+                if better
+                else "Try the definitions of the robot's workspace in SMACHPY_INTERFACE_PATH.",
+            )
+        )
+    else:
+        text = f"{len(types) - len(unknown)} have the definitions of {distro}"
+        findings.append(Finding(Level.OK, "types", text))
+    if unknown:
+        findings.append(
+            Finding(
+                Level.NOTE,
+                "types",
+                f"{len(unknown)} are not defined here: {_listed(unknown)}",
+                "To use them, name the folder of their packages in SMACHPY_INTERFACE_PATH.",
+            )
+        )
+    return findings
+
+
+def diagnose_actions(tokens: Sequence[Token]) -> list[Finding]:
+    """Tell of each action whether it has one server, with all its parts."""
+    servers: dict[str, dict[tuple[str, int], set[str]]] = {}
+    nodes: dict[tuple[str, int], str] = {}
+    for token in tokens:
+        action = action_of(token.name) if token.kind in {Kind.SERVICE, Kind.PUBLISHER} else None
+        if action is not None:
+            which = token.session, token.node_id
+            nodes[which] = token.full_node
+            servers.setdefault(action, {}).setdefault(which, set()).add(token.name)
+    findings = []
+    for action, ends in sorted(servers.items()):
+        whole = [
+            nodes[which] for which, names in ends.items() if len(names) == len(action_names(""))
+        ]
+        if len(whole) > 1:
+            findings.append(
+                Finding(
+                    Level.PROBLEM,
+                    "actions",
+                    f"/{action} has {len(whole)} servers: {_listed(sorted(whole))}",
+                    "A ROS 2 client runs a goal in all of them; stop all but one.",
+                )
+            )
+        elif whole:
+            findings.append(Finding(Level.OK, "actions", f"/{action} is served by /{whole[0]}"))
+        else:
+            findings.append(
+                Finding(
+                    Level.PROBLEM,
+                    "actions",
+                    f"/{action}: its server shows {max(map(len, ends.values()))} of 5 parts",
+                    "It is just starting, or hangs; look again, then restart that node.",
+                )
+            )
+    if not findings:
+        note = "no action has a server"
+        return [Finding(Level.NOTE, "actions", note, "Is the robot's navigation started?")]
+    return findings
+
+
+def diagnose_qos(tokens: Iterable[Token]) -> list[Finding]:
+    """Tell which topics keep messages for late subscribers, and which may drop them."""
+    topics = {
+        token.name: token.qos
+        for token in tokens
+        if token.kind is Kind.PUBLISHER and token.qos and action_of(token.name) is None
+    }
+    latched = [f"/{name}" for name, qos in sorted(topics.items()) if qos.latched]
+    sensors = [f"/{name}" for name, qos in sorted(topics.items()) if not qos.reliable]
+    findings = []
+    if latched:
+        text = f"latched: {_listed(latched)}"
+        findings.append(Finding(Level.OK, "qos", text))
+    if sensors:
+        text = f"best effort, messages may be lost: {_listed(sensors)}"
+        findings.append(Finding(Level.OK, "qos", text))
+    return findings
+
+
+def diagnose_answers(asked: str, seconds: float | None) -> Finding:
+    """Tell how fast a node answers; `seconds` is None when it does not."""
+    if seconds is None:
+        return Finding(
+            Level.PROBLEM,
+            "answers",
+            f"/{asked} does not answer, though its node is there",
+            "The node hangs or is suspended, or the link is cut: a ROS 2 node is missed only after "
+            "a minute. Try restarting it.",
+        )
+    level = Level.OK if seconds < SLOW_S else Level.NOTE
+    way_out = "" if level is Level.OK else "The link or the robot is slow."
+    return Finding(level, "answers", f"/{asked} answers in {seconds * 1e3:.0f} ms", way_out)
+
+
+def diagnose_clock(offset_s: float, doubt_s: float) -> Finding:
+    """Tell how far the robot's clock is ahead of ours [s], which is known to `doubt_s`."""
+    if abs(offset_s) <= CLOCK_OFF_S + doubt_s:
+        text = f"the same within {max(abs(offset_s), doubt_s) * 1e3:.0f} ms"
+        return Finding(Level.OK, "clock", text)
+    side = "ahead of" if offset_s > 0 else "behind"
+    return Finding(
+        Level.PROBLEM,
+        "clock",
+        f"the robot's clock is {abs(offset_s):.1f} s {side} this computer's",
+        "Stamps of goals are too old or in the future for the robot, which may wait for transforms "
+        "or refuse. Set both clocks by one time service, chrony for example.",
+    )
+
+
+def _is_defined(name: str, distro: str) -> bool:
+    try:
+        ros2.hash_of(name, distro)
+    except InterfaceError:
+        return False
+    return True
+
+
+def _named(names: Iterable[str]) -> str:
+    found = sorted(names)
+    return f"{len(found)} node{'s' if len(found) != 1 else ''}: {_listed([f'/{n}' for n in found])}"
+
+
+def _listed(names: Sequence[str]) -> str:
+    shown = ", ".join(names[:MOST_NAMED])
+    return shown if len(names) <= MOST_NAMED else f"{shown} and {len(names) - MOST_NAMED} more"
+
+
+__all__ = [
+    "Finding",
+    "Level",
+    "diagnose_actions",
+    "diagnose_answers",
+    "diagnose_clock",
+    "diagnose_nodes",
+    "diagnose_qos",
+    "diagnose_types",
+]

@@ -1,0 +1,116 @@
+"""What is said of a robot by its tokens."""
+
+from __future__ import annotations
+
+import pytest
+
+from actionlib_core.interfaces import ros2
+from actionlib_core.wire.ros2.diagnosis import (
+    Level,
+    diagnose_actions,
+    diagnose_answers,
+    diagnose_clock,
+    diagnose_nodes,
+    diagnose_qos,
+    diagnose_types,
+)
+from actionlib_core.wire.ros2.names import (
+    DEFAULT,
+    HASH_NOT_SUPPORTED,
+    LATCHED,
+    SENSOR_DATA,
+    Kind,
+    Token,
+    action_names,
+)
+
+
+def end(kind, name, type_name, type_hash="", *, node="nav", session="a1", qos=DEFAULT, domain=0):
+    return Token(domain, session, 0, 1, kind, "", "", node, name, type_name, type_hash, qos)
+
+
+def action(name="go", distro="jazzy", **more):
+    """The tokens of a server of NavigateToPose."""
+    parts = ("SendGoal", "CancelGoal", "GetResult", "FeedbackMessage", "GoalStatusArray")
+    types = [f"nav2_msgs/action/NavigateToPose_{part}" for part in parts]
+    types[1], types[4] = "action_msgs/srv/CancelGoal", "action_msgs/msg/GoalStatusArray"
+    kinds = (Kind.SERVICE,) * 3 + (Kind.PUBLISHER,) * 2
+    return [
+        end(kind, full, type_name, ros2.hash_of(type_name, distro), **more)
+        for kind, full, type_name in zip(kinds, action_names(name), types, strict=True)
+    ]
+
+
+def levels(findings):
+    return [finding.level for finding in findings]
+
+
+def test_nodes_of_another_domain_are_named():
+    assert diagnose_nodes(action(), 0).level is Level.OK
+    found = diagnose_nodes(action(domain=7), 0)
+    assert (found.level, found.way_out) == (Level.PROBLEM, "Try --domain 7.")
+    assert "rmw_zenoh" in diagnose_nodes([], 0).way_out
+
+
+def test_the_distribution_that_fits_is_named():
+    assert levels(diagnose_types(action(), "jazzy")) == [Level.OK]
+    assert levels(diagnose_types(action(), "kilted")) == [Level.OK]
+    (found,) = diagnose_types(action(distro="rolling"), "jazzy")
+    assert found.level is Level.PROBLEM
+    assert "lyrical" in found.way_out or "rolling" in found.way_out
+    (found,) = diagnose_types(action(distro="humble"), "jazzy")
+    assert found.way_out == "Try --distro humble."
+    assert levels(diagnose_types(action(distro="humble"), "humble")) == [Level.NOTE]
+    assert diagnose_types([], "jazzy") == []
+
+
+def test_own_types_that_differ_or_are_unknown_here():
+    tokens = [
+        *action(),
+        end(Kind.PUBLISHER, "odom", "nav_msgs/msg/Odometry", "RIHS01_" + "1" * 64),
+        end(Kind.PUBLISHER, "own", "own_msgs/msg/Own", "RIHS01_" + "2" * 64),
+    ]
+    wrong, unknown = diagnose_types(tokens, "jazzy")
+    assert (wrong.level, unknown.level) == (Level.PROBLEM, Level.NOTE)
+    assert "nav_msgs/msg/Odometry" in wrong.text
+    assert "SMACHPY_INTERFACE_PATH" in wrong.way_out
+    assert "own_msgs/msg/Own" in unknown.text
+
+
+def test_servers_that_are_not_whole_or_two():
+    assert levels(diagnose_actions(action())) == [Level.OK]
+    assert levels(diagnose_actions(action()[:4])) == [Level.PROBLEM]
+    (found,) = diagnose_actions([*action(), *action(session="b2", node="nav2")])
+    assert "2 servers" in found.text
+    assert levels(diagnose_actions([])) == [Level.NOTE]
+
+
+def test_latched_and_lossy_topics_are_named():
+    found = diagnose_qos(
+        [
+            end(Kind.PUBLISHER, "map", "nav_msgs/msg/OccupancyGrid", qos=LATCHED),
+            end(Kind.PUBLISHER, "scan", "sensor_msgs/msg/LaserScan", qos=SENSOR_DATA),
+            end(Kind.SUBSCRIPTION, "odom", "nav_msgs/msg/Odometry", qos=None),
+            *action(),
+        ]
+    )
+    assert ["/map" in found[0].text, "/scan" in found[1].text] == [True, True]
+    assert len(found) == 2
+
+
+@pytest.mark.parametrize(
+    ("offset", "level"),
+    [(0.01, Level.OK), (-0.05, Level.OK), (3.0, Level.PROBLEM), (-0.5, Level.PROBLEM)],
+)
+def test_clocks_that_differ(offset, level):
+    assert diagnose_clock(offset, 0.02).level is level
+
+
+def test_nodes_that_do_not_answer():
+    assert diagnose_answers("nav/get_parameters", None).level is Level.PROBLEM
+    assert diagnose_answers("nav/get_parameters", 0.01).level is Level.OK
+    assert diagnose_answers("nav/get_parameters", 2.0).level is Level.NOTE
+
+
+def test_humble_is_told_by_its_hashes():
+    assert {token.type_hash for token in action(distro="humble")} == {HASH_NOT_SUPPORTED}
