@@ -1,6 +1,6 @@
 """The robot as a Nav2 robot on a network of ROS 2: `navigate_to_pose`, `spin` and `back_up`.
 
-A stand-in for those who have no robot.
+A stand-in for those who have no robot. Its topics are those of `nav2_topics`.
 
 Source:
     https://docs.nav2.org (interfaces and error codes), nav2_behaviors (what `back_up` takes).
@@ -18,7 +18,9 @@ from actionlib_core.node import get_node
 from actionlib_core.wire.ros2.network import choose_network
 from smachpy.sim.behaviors import back_up, spin
 from smachpy.sim.exceptions import NavigationError
-from smachpy.sim.geometry import ORIGIN, Pose2D, quaternion_of, wrap_angle
+from smachpy.sim.geometry import ORIGIN, wrap_angle
+from smachpy.sim.nav2_topics import Nav2Topics, fill_pose, set_time
+from smachpy.sim.navigation import STOP
 from smachpy.sim.pilot import Pilot
 from smachpy.sim.server import MAP_FRAME, read_pose
 from smachpy.sim.stepper import Stepper
@@ -60,7 +62,7 @@ class _Behavior:
         self.server.register_preempt_callback(self.wake.set)
         self.begun = 0.0
         self.from_pose = ORIGIN
-        self.goal: Any = None
+        self.target = ORIGIN  # of navigate_to_pose
 
     def result(self, elapsed: float, code: int = 0, text: str = "") -> Any:
         """Return a result message; definitions of older distributions have fewer fields."""
@@ -107,6 +109,7 @@ class Nav2Server:
                 ("back_up", "nav2_msgs/BackUp", self._back_up),
             )
         }
+        self._topics = Nav2Topics(robot, self._stepper, self._node, network.distro, self._on_speed)
 
     @property
     def robot(self) -> Robot:
@@ -151,6 +154,7 @@ class Nav2Server:
             behavior.server.stop()
         self._stepper.remove(self)
         self._stepper.close()
+        self._topics.close()
 
     # -- goals: each on its server's thread ----------------------------------------------------
 
@@ -162,7 +166,8 @@ class Nav2Server:
         except NavigationError as error:
             self._refuse(behavior, _UNKNOWN[behavior.name], str(error))
             return
-        self._carry_out(behavior, goal, partial(self._pilot.drive, target))
+        behavior.target = target
+        self._carry_out(behavior, partial(self._pilot.drive, target))
 
     def _spin(self, goal: Any) -> None:
         behavior = self._behaviors["spin"]
@@ -171,7 +176,7 @@ class Nav2Server:
             self._refuse(behavior, _UNKNOWN["spin"], "target_yaw: got no finite number")
             return
         script = spin(self._robot, angle)
-        self._carry_out(behavior, goal, partial(self._pilot.run, script), allowance_of(goal))
+        self._carry_out(behavior, partial(self._pilot.run, script), allowance_of(goal))
 
     def _back_up(self, goal: Any) -> None:
         behavior = self._behaviors["back_up"]
@@ -184,7 +189,7 @@ class Nav2Server:
             fastest = self._robot.config.robot.max_reverse_speed
             script = back_up(self._robot, distance, min(speed, fastest))
             order = partial(self._pilot.run, script)
-            self._carry_out(behavior, goal, order, allowance_of(goal), _COLLISION_AHEAD)
+            self._carry_out(behavior, order, allowance_of(goal), _COLLISION_AHEAD)
             return
         self._refuse(behavior, _INVALID_INPUT, trouble)
 
@@ -194,7 +199,6 @@ class Nav2Server:
     def _carry_out(
         self,
         behavior: _Behavior,
-        goal: Any,
         order: Order,
         allowance: float = math.inf,
         code: int | None = None,
@@ -203,7 +207,6 @@ class Nav2Server:
 
         Args:
             behavior: Whose goal it is.
-            goal: The goal.
             order: Starts the pilot.
             allowance: It fails when it takes longer than this [s].
             code: Nav2's error code when the pilot reports trouble.
@@ -213,7 +216,7 @@ class Nav2Server:
         server, begun = behavior.server, self._clock.now()
         code = _UNKNOWN[behavior.name] if code is None else code
         try:
-            trouble = self._wait_for(behavior, goal, order, begun + allowance)
+            trouble = self._wait_for(behavior, order, begun + allowance)
         except TimeoutError:
             code, trouble = _TIMEOUT[behavior.name], f"it took longer than {allowance:g} s"
         except _Stopped:
@@ -232,7 +235,6 @@ class Nav2Server:
     def _wait_for(
         self,
         behavior: _Behavior,
-        goal: Any,
         order: Order,
         until: float,
     ) -> str:
@@ -251,7 +253,7 @@ class Nav2Server:
         with self._stepper.lock:
             before, self._busy = self._busy, behavior
             behavior.begun, behavior.from_pose = self._clock.now(), self._robot.body.pose
-            behavior.goal, self._turned, self._yaw = goal, 0.0, self._robot.body.yaw
+            self._turned, self._yaw = 0.0, self._robot.body.yaw
             order(done)
         if before is not None:
             before.wake.set()
@@ -275,21 +277,31 @@ class Nav2Server:
                         self._pilot.let_go()
         return ended[0]
 
+    def _on_speed(self, command: tuple[float, float]) -> None:
+        """Drive by hand; a speed that is no finite number stops."""
+        finite = all(math.isfinite(value) for value in command)
+        with self._stepper.lock:
+            self._pilot.override(self._clock.now(), command if finite else STOP)
+        self._stepper.wake()
+
     # -- steps: the stepper's thread -----------------------------------------------------------
 
     def is_busy(self, now: float) -> bool:
-        """Tell whether the robot moves or is to move."""
-        return self._pilot.is_busy(now)
+        """Tell whether the robot moves, is to move, or looks about for somebody."""
+        return self._pilot.is_busy(now) or self._topics.is_watched()
 
     def step(self, now: float, dt: float) -> None:
         """Drive for `dt` seconds."""
+        if not self._pilot.is_busy(now):
+            return
         self._pilot.step(now, dt)
         yaw = self._robot.body.yaw
         self._turned += abs(wrap_angle(yaw - self._yaw))
         self._yaw = yaw
 
     def report(self, now: float) -> None:
-        """Send feedback where it is due; tell what has ended."""
+        """Send feedback, odometry, transforms and scans where they are due; tell what has ended."""
+        self._topics.report(now)
         if now - self._reported > self._feedback_period - _JUST_PAST:
             self._reported = now
             self._publish_feedback(now)
@@ -309,33 +321,16 @@ class Nav2Server:
         elif behavior.name == "back_up":
             feedback.distance_traveled = behavior.from_pose.distance(body.pose)
         else:
-            self._fill_header(feedback.current_pose.header, MAP_FRAME)
+            self._topics.fill_header(feedback.current_pose.header, MAP_FRAME)
             fill_pose(feedback.current_pose.pose, body.pose)
-            target = behavior.goal.pose.pose.position
             follower = self._robot.follower
-            straight = math.hypot(target.x - body.x, target.y - body.y)
+            straight = body.pose.distance(behavior.target)
             left = follower.remaining if follower is not None else straight
             feedback.distance_remaining = left
             set_time(feedback.navigation_time, round((now - behavior.begun) * _NS))
             seconds = left / self._robot.config.robot.max_speed
             set_time(feedback.estimated_time_remaining, round(seconds * _NS))
         behavior.server.publish_feedback(feedback)
-
-    def _fill_header(self, header: Any, frame: str) -> None:
-        set_time(header.stamp, self._clock.time_ns())
-        header.frame_id = frame
-
-
-def set_time(message: Any, nanoseconds: int) -> None:
-    """Set a Time or Duration of ROS 2."""
-    message.sec, message.nanosec = divmod(nanoseconds, _NS)
-
-
-def fill_pose(message: Any, pose: Pose2D) -> None:
-    """Set a Pose of ROS 2."""
-    message.position.x, message.position.y = pose.x, pose.y
-    turn = message.orientation
-    turn.x, turn.y, turn.z, turn.w = quaternion_of(pose.yaw)
 
 
 def allowance_of(goal: Any) -> float:

@@ -13,11 +13,13 @@ import pytest
 from actionlib_core.clock import RealClock
 from actionlib_core.config import Config, Ros2
 from actionlib_core.interfaces import ros2
-from actionlib_core.node import Node
+from actionlib_core.node import Node, use_node
+from actionlib_core.pubsub.topic import Publisher, Subscriber
 from actionlib_core.transport.memory import MemoryNetwork
 from smachpy.sim.geometry import Pose2D, quaternion_of, wrap_angle
 from smachpy.sim.nav2 import Nav2Server
 from smachpy.sim.world import Robot, World
+from smachpy.states.nav2 import nav2_active
 from tests.free_port import free_port
 from tests.ros2_client import Ros2Client
 
@@ -239,6 +241,63 @@ def test_a_robot_that_closes_aborts_its_goal(nav2: Any) -> None:
     world.clock.sleep(1.0)
     world.server.close()
     assert client.end_of(pending)[0] == ABORTED
+
+
+def mission_of(world: Nav2) -> Node:
+    """Return a node of a mission on the robot's network; its end is the test's."""
+    config = Config(ros2=(Ros2(domain=DOMAIN, distro=world.distro),))
+    return Node("mission", transport=world.network.session(), clock=world.clock, config=config)
+
+
+def message(world: Nav2, name: str) -> Any:
+    return ros2.get_message(name, world.distro)
+
+
+def test_its_topics(nav2: Any, office: Any) -> None:
+    world = nav2()
+    with mission_of(world) as node:
+        heard: dict[str, list[Any]] = {name: [] for name in ("odom", "tf", "scan", "map")}
+        for name, kind in (
+            ("odom", "nav_msgs/Odometry"),
+            ("tf", "tf2_msgs/TFMessage"),
+            ("scan", "sensor_msgs/LaserScan"),
+            ("map", "nav_msgs/OccupancyGrid"),
+        ):
+            Subscriber(name, message(world, kind), heard[name].append, node=node)
+        world.clock.sleep(3.0)
+        (grid,) = heard["map"]  # published long before
+        assert (grid.info.width, grid.info.height) == (office.width, office.height)
+        assert list(grid.data) == office.cells.ravel().tolist()
+        odom, scan = heard["odom"][-1], heard["scan"][-1]
+        assert (odom.header.frame_id, odom.child_frame_id) == ("odom", "base_link")
+        pose = world.robot.body.pose
+        assert odom.pose.pose.position.x == pytest.approx(pose.x)
+        assert len(scan.ranges) == world.robot.config.scan.rays
+        assert scan.header.frame_id == "base_link"
+        links = [(t.header.frame_id, t.child_frame_id) for t in heard["tf"][-1].transforms]
+        assert links == [("map", "odom"), ("odom", "base_link")]
+        twist = message(world, "geometry_msgs/Twist")()
+        twist.angular.z = 0.5
+        by_hand = Publisher("cmd_vel", type(twist), node=node)
+        world.clock.sleep(0.5)
+        by_hand.publish(twist)
+        world.clock.sleep(0.4)
+        assert world.robot.body.turn_rate > 0.2
+        twist.angular.z = math.nan
+        by_hand.publish(twist)
+        world.clock.sleep(1.0)
+        assert world.robot.body.standing
+        node.transport.close()
+
+
+def test_a_mission_waits_until_it_is_active(nav2: Any) -> None:
+    world = nav2("jazzy")
+    with mission_of(world) as node, use_node(node):
+        assert nav2_active(timeout=10.0).execute() == "succeeded"
+        began = world.clock.now()
+        assert nav2_active(manager="nobody", timeout=10.0).execute() == "aborted"
+        assert 10.0 <= world.clock.now() - began < 13.0
+        node.transport.close()
 
 
 @pytest.mark.zenoh

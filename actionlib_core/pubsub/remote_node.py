@@ -1,0 +1,230 @@
+"""A node of a ROS 2 robot: its parameters, and the life cycle that some have.
+
+Every ROS 2 node offers services beside its topics: `<node>/get_parameters` and its like, and, if it
+is a managed one, `<node>/get_state` and `<node>/change_state`. Nav2 consists of managed nodes.
+
+Source:
+    rcl_interfaces and lifecycle_msgs; https://design.ros2.org/articles/node_lifecycle.html.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core._arguments import check_limit
+from actionlib_core.exceptions import ActionlibError
+from actionlib_core.interfaces import ros2
+from actionlib_core.node import get_node
+from actionlib_core.pubsub.service_proxy import ServiceProxy
+from actionlib_core.wire.ros2.network import choose_network
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from typing import TypeAlias
+
+    from actionlib_core.node import Node
+    from actionlib_core.time import Duration
+
+    Value: TypeAlias = (
+        bool | int | float | str | bytes | list[bool] | list[int] | list[float] | list[str]
+    )
+
+TIMEOUT_S = 10.0
+MOST = 2**63  # integers of parameters have 64 bits
+
+_FIELDS = {
+    1: "bool_value",
+    2: "integer_value",
+    3: "double_value",
+    4: "string_value",
+    5: "byte_array_value",
+    6: "bool_array_value",
+    7: "integer_array_value",
+    8: "double_array_value",
+    9: "string_array_value",
+}
+"""Where a ParameterValue has its value, by its type (rcl_interfaces/msg/ParameterType)."""
+_NUMBERS = {field: number for number, field in _FIELDS.items()}
+
+
+class RemoteNodeError(ActionlibError):
+    """A node refused what it was asked.
+
+    Attributes:
+        node: Its full name.
+        problems: What was wrong, by the name of a parameter or transition.
+    """
+
+    def __init__(self, node: str, problems: Mapping[str, str]) -> None:
+        self.node = node
+        self.problems = dict(problems)
+        super().__init__("\n".join(f"/{node}: {name}: {why}" for name, why in problems.items()))
+
+
+class RemoteNode:
+    """Asks a node of a ROS 2 robot.
+
+    Args:
+        name: The node's name, `controller_server` for example.
+        timeout: Longest time of a call [s], waiting for the node to appear included.
+        node: Where to ask from; the node in force when None.
+
+    Raises:
+        InvalidDurationError: `timeout` is no time, or negative.
+        InvalidNameError: the name breaks the ROS rules.
+        ConfigError: there are several networks of ROS 2, and none has the name.
+
+    Every method raises what a `ServiceProxy` does when the node does not answer, and blocks until
+    it has, `timeout` at most.
+
+    Threads: any number of threads may ask at the same time.
+    """
+
+    def __init__(
+        self, name: str, *, timeout: float | Duration = TIMEOUT_S, node: Node | None = None
+    ) -> None:
+        self._node = node if node is not None else get_node()
+        self.name = self._node.resolve(name, "node name")
+        self._timeout = check_limit(f"node {name!r}", "timeout", timeout)
+        self._distro = choose_network(self._node.config.ros2, self.name).distro
+
+    def get_parameters(self, *names: str) -> dict[str, Any]:
+        """Return the values of parameters by name.
+
+        Raises:
+            RemoteNodeError: the node does not have some of them; it names all of those.
+        """
+        values = self._values(names)
+        if len(values) != len(names):  # one that is not there makes rclcpp answer nothing
+            values = [(self._values((name,)) or [None])[0] for name in names]
+        found = dict(zip(names, values, strict=True))
+        missing = {
+            name: "got no such parameter; expected one that is declared and set"
+            for name, value in found.items()
+            if value is None
+        }
+        if missing:
+            raise RemoteNodeError(self.name, missing)
+        return found
+
+    def _values(self, names: tuple[str, ...]) -> list[Any]:
+        response = self._call("get_parameters", "rcl_interfaces/GetParameters", names=list(names))
+        return [value_of(value) for value in response.values]
+
+    def set_parameters(self, values: Mapping[str, Value]) -> None:
+        """Set parameters by name.
+
+        Raises:
+            RemoteNodeError: some values are none that a parameter can have, and nothing was sent;
+                or the node refused some, and has set the others. It names all of those.
+        """
+        make = ros2.get_message("rcl_interfaces/ParameterValue", self._distro)
+        make_parameter = ros2.get_message("rcl_interfaces/Parameter", self._distro)
+        parameters, problems = [], {}
+        for name, value in values.items():
+            try:
+                parameters.append(make_parameter(name=name, value=parameter_value(value, make)))
+            except ValueError as error:
+                problems[name] = str(error)
+        if problems:
+            raise RemoteNodeError(self.name, problems)
+        response = self._call(
+            "set_parameters", "rcl_interfaces/SetParameters", parameters=parameters
+        )
+        refused = {
+            name: result.reason or "the node refused it without a reason"
+            for name, result in zip(values, response.results, strict=False)
+            if not result.successful
+        }
+        refused |= dict.fromkeys(list(values)[len(response.results) :], "got no answer")
+        if refused:
+            raise RemoteNodeError(self.name, refused)
+
+    def list_parameters(self, *prefixes: str) -> list[str]:
+        """Return the names of its parameters, sorted; with prefixes, of those below them."""
+        response = self._call(
+            "list_parameters", "rcl_interfaces/ListParameters", prefixes=list(prefixes), depth=0
+        )
+        return sorted(response.result.names)
+
+    def state(self) -> str:
+        """Return the state of a managed node: "unconfigured", "inactive", "active", "finalized"."""
+        state = self._call("get_state", "lifecycle_msgs/GetState").current_state
+        return str(state.label)
+
+    def change_state(self, transition: str) -> None:
+        """Move a managed node along a transition, and wait until it has ended.
+
+        Args:
+            transition: "configure", "activate", "deactivate", "cleanup" or "shutdown".
+
+        Raises:
+            RemoteNodeError: the node is in another state, or its transition failed.
+        """
+        request = ros2.get_service("lifecycle_msgs/ChangeState", self._distro).Request()
+        request.transition.label = transition
+        request.transition.id = getattr(
+            type(request.transition), f"TRANSITION_{transition.upper()}", 0
+        )
+        if not self._call("change_state", "lifecycle_msgs/ChangeState", request).success:
+            why = f"got a refusal in state '{self.state()}'; expected a transition from there"
+            raise RemoteNodeError(self.name, {transition: why})
+
+    def _call(self, service: str, type_name: str, *args: Any, **fields: Any) -> Any:
+        service_class = ros2.get_service(type_name, self._distro)
+        proxy = ServiceProxy(
+            f"/{self.name}/{service}", service_class, timeout=self._timeout, node=self._node
+        )
+        return proxy.call(*args, **fields)
+
+
+def value_of(message: Any) -> Any:
+    """Return what a ParameterValue holds; None when it is not set, or of a type not known here."""
+    field = _FIELDS.get(message.type)
+    if field is None:
+        return None
+    value = getattr(message, field)
+    if field == "byte_array_value":
+        return bytes(value)
+    return list(value) if field.endswith("array_value") else value
+
+
+def parameter_value(value: Any, make: Callable[[], Any]) -> Any:
+    """Return a ParameterValue.
+
+    Args:
+        value: A bool, int, float, str, bytes, or a list of one of them; numbers may be mixed.
+        make: Makes an empty one.
+
+    Raises:
+        ValueError: a parameter cannot have this value.
+    """
+    message = make()
+    field = _field_of(value)
+    message.type = _NUMBERS[field]
+    if field == "double_array_value":
+        value = [float(item) for item in value]
+    setattr(message, field, value)
+    return message
+
+
+def _field_of(value: Any) -> str:
+    if isinstance(value, (list, tuple)):
+        inner = {_field_of(item) for item in value}
+        if inner == {"integer_value", "double_value"}:
+            inner = {"double_value"}
+        simple = {f"{word}_value" for word in ("bool", "integer", "double", "string")}
+        if len(inner) == 1 and inner <= simple:
+            return inner.pop().replace("_value", "_array_value")
+    kinds = ((bool, "bool"), (int, "integer"), (float, "double"), (str, "string"))
+    for kind, word in kinds:
+        if isinstance(value, kind):
+            if word == "integer" and not -MOST <= value < MOST:
+                break
+            return f"{word}_value"
+    if isinstance(value, (bytes, bytearray)):
+        return "byte_array_value"
+    raise ValueError(
+        f"got {value!r}; expected a bool, an int of 64 bits, a float, a str, bytes, or a list of "
+        "values of one such type that is not empty."
+    )

@@ -1,0 +1,163 @@
+"""What a Nav2 robot tells and hears beside its actions: `odom`, `tf`, `scan`, `map`, `cmd_vel`.
+
+And the service by which programs wait for its start-up, `lifecycle_manager_navigation/is_active`.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+
+from actionlib_core.interfaces import ros2
+from actionlib_core.pubsub.service import Service
+from actionlib_core.pubsub.topic import Publisher, Subscriber
+from smachpy.sim.geometry import ORIGIN, Pose2D, quaternion_of
+from smachpy.sim.scanner import Scanner
+from smachpy.sim.server import BASE_FRAME, MAP_FRAME, ODOM_FRAME
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib_core.node import Node
+    from smachpy.sim.stepper import Stepper
+    from smachpy.sim.world import Robot
+
+_JUST_PAST: Final = 1e-3  # [s] waited longer, as a rounding error would never pass
+_NS: Final = 1_000_000_000
+
+
+class Nav2Topics:
+    """Publishes where one robot is and what it sees.
+
+    Args:
+        robot: The robot.
+        stepper: Moves it; its lock is held while the robot is looked at.
+        node: Where it is on the network.
+        distro: Whose definitions of messages.
+        on_speed: Called with each speed and turn rate [m/s, rad/s] that is to be driven by hand, in
+            the subscriber's thread.
+
+    Threads: `report` is the stepper's; the other methods may be called from any thread.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        stepper: Stepper,
+        node: Node,
+        distro: str,
+        on_speed: Callable[[tuple[float, float]], object],
+    ) -> None:
+        self._robot = robot
+        self._stepper = stepper
+        self._clock = node.clock
+        self._scanner = Scanner(robot)
+        self._odom_period = 1.0 / robot.config.control.feedback_rate
+        self._told = self._scanned = -math.inf
+        message = partial(ros2.get_message, distro=distro)
+        self._transform = message("geometry_msgs/TransformStamped")
+        self._odom = Publisher("odom", message("nav_msgs/Odometry"), node=node)
+        self._tf = Publisher("tf", message("tf2_msgs/TFMessage"), node=node)
+        self._scan = Publisher("scan", message("sensor_msgs/LaserScan"), node=node)
+        self._map = Publisher("map", message("nav_msgs/OccupancyGrid"), latch=True, node=node)
+        self._publish_map()
+        twist = message("geometry_msgs/Twist")
+        trigger = ros2.get_service("std_srvs/Trigger", distro)
+        self._speeds = Subscriber(
+            "cmd_vel",
+            twist,
+            lambda heard: on_speed((heard.linear.x, heard.angular.z)),
+            queue_size=1,
+            node=node,
+        )
+        self._active = Service(
+            "lifecycle_manager_navigation/is_active",
+            trigger,
+            lambda _: trigger.Response(success=True),
+            node=node,
+        )
+
+    def close(self) -> None:
+        """Leave the network; a second call does nothing."""
+        for end in (self._odom, self._tf, self._scan, self._map, self._speeds):
+            end.unregister()
+        self._active.close()
+
+    def is_watched(self) -> bool:
+        """Tell whether somebody wants to know what the robot sees."""
+        return self._scan.get_num_connections() > 0
+
+    def report(self, now: float) -> None:
+        """Publish what is due by `now` [s]."""
+        if now - self._told > self._odom_period - _JUST_PAST:
+            self._told = now
+            self._publish_odometry()
+        rate = self._robot.config.scan.rate
+        if now - self._scanned > 1.0 / rate - _JUST_PAST and self.is_watched():
+            self._scanned = now
+            self._publish_scan()
+
+    def _publish_odometry(self) -> None:
+        body = self._robot.body
+        odom = self._odom.data_class()
+        self.fill_header(odom.header, ODOM_FRAME)
+        odom.child_frame_id = BASE_FRAME
+        fill_pose(odom.pose.pose, body.pose)
+        odom.twist.twist.linear.x, odom.twist.twist.angular.z = body.speed, body.turn_rate
+        self._odom.publish(odom)
+        # The odometry does not drift: its frame lies on that of the map.
+        frames = (MAP_FRAME, ODOM_FRAME, ORIGIN), (ODOM_FRAME, BASE_FRAME, body.pose)
+        transforms = []
+        for frame, child, pose in frames:
+            stamped = self._transform()
+            self.fill_header(stamped.header, frame)
+            stamped.child_frame_id = child
+            moved, turned = stamped.transform.translation, stamped.transform.rotation
+            moved.x, moved.y = pose.x, pose.y
+            turned.x, turned.y, turned.z, turned.w = quaternion_of(pose.yaw)
+            transforms.append(stamped)
+        self._tf.publish(transforms=transforms)
+
+    def _publish_scan(self) -> None:
+        config = self._robot.config.scan
+        with self._stepper.lock:
+            ranges = self._scanner.scan()
+        scan = self._scan.data_class(
+            angle_min=self._scanner.first,
+            angle_max=-self._scanner.first,
+            angle_increment=self._scanner.step,
+            scan_time=1.0 / config.rate,
+            range_min=config.range_min,
+            range_max=config.range_max,
+            ranges=ranges,
+        )
+        self.fill_header(scan.header, BASE_FRAME)
+        self._scan.publish(scan)
+
+    def _publish_map(self) -> None:
+        floor = self._robot.world.map
+        grid = self._map.data_class(data=floor.cells.ravel())
+        self.fill_header(grid.header, MAP_FRAME)
+        set_time(grid.info.map_load_time, self._clock.time_ns())
+        grid.info.resolution = floor.resolution
+        grid.info.width, grid.info.height = floor.width, floor.height
+        fill_pose(grid.info.origin, floor.origin)
+        self._map.publish(grid)
+
+    def fill_header(self, header: Any, frame: str) -> None:
+        """Set the frame and the time, which is now."""
+        set_time(header.stamp, self._clock.time_ns())
+        header.frame_id = frame
+
+
+def set_time(message: Any, nanoseconds: int) -> None:
+    """Set a Time or Duration of ROS 2."""
+    message.sec, message.nanosec = divmod(nanoseconds, _NS)
+
+
+def fill_pose(message: Any, pose: Pose2D) -> None:
+    """Set a Pose of ROS 2."""
+    message.position.x, message.position.y = pose.x, pose.y
+    turn = message.orientation
+    turn.x, turn.y, turn.z, turn.w = quaternion_of(pose.yaw)
