@@ -38,11 +38,13 @@ if TYPE_CHECKING:
     from actionlib_core.exceptions import ActionlibError as ActionlibError
     from actionlib_core.exceptions import GoalFailedError as GoalFailedError
     from actionlib_core.exceptions import GoalTimeoutError as GoalTimeoutError
+    from actionlib_core.exceptions import RemoteNodeError as RemoteNodeError
     from actionlib_core.exceptions import ServiceException as ServiceException
     from actionlib_core.node import Node as Node
     from actionlib_core.node import get_node as get_node
     from actionlib_core.node import init as init
     from actionlib_core.node import use_node as use_node
+    from actionlib_core.pubsub.remote_node import RemoteNode as RemoteNode
     from actionlib_core.pubsub.service import Service as Service
     from actionlib_core.pubsub.service_proxy import ServiceProxy as ServiceProxy
     from actionlib_core.pubsub.service_proxy import wait_for_service as wait_for_service
@@ -69,6 +71,7 @@ _NAMES = {
         "ActionlibError",
         "GoalFailedError",
         "GoalTimeoutError",
+        "RemoteNodeError",
         "ServiceException",
     ),
     "action.goal_id_generator": ("GoalIDGenerator",),
@@ -76,6 +79,7 @@ _NAMES = {
     "action.compat": ("HandleTrackerDeleter", "StatusTracker"),
     "node": ("Node", "get_node", "init", "use_node"),
     "action.sent_goal": ("SentGoal",),
+    "pubsub.remote_node": ("RemoteNode",),
     "pubsub.service": ("Service",),
     "pubsub.service_proxy": ("ServiceProxy", "wait_for_service"),
     "action.simple_client": ("SimpleActionClient", "SimpleGoalState"),

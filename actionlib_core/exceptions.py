@@ -17,6 +17,7 @@ Exception
       |    +-- ServiceLostError        the server died during the call
       |    +-- ServiceBusyError        too many calls are under way, or the handler calls itself
       |    +-- ServiceConflictError    another server has the name
+      +-- RemoteNodeError       a node of a robot refused what it was asked; all at once
       +-- TypeMismatchError     two ends of a name disagree on the type
       +-- InterfaceError        a .msg/.srv/.action file or an interface name cannot be used
       |    +-- FieldError       a value does not fit the field of a message
@@ -203,6 +204,20 @@ class TypeMismatchError(ActionlibError, TypeError):
             f"expected {expected[0]!r} (md5 {expected[1]}). Try using one type on both ends, or "
             "another name."
         )
+
+
+class RemoteNodeError(ActionlibError):
+    """A node of a ROS 2 robot refused what it was asked.
+
+    Attributes:
+        node: Its full name.
+        problems: What was wrong, by the name of a parameter or transition.
+    """
+
+    def __init__(self, node: str, problems: dict[str, str]) -> None:
+        self.node = node
+        self.problems = problems
+        super().__init__("\n".join(f"/{node}: {name}: {why}" for name, why in problems.items()))
 
 
 class InterfaceError(ActionlibError):

@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core._arguments import check_limit
-from actionlib_core.exceptions import ActionlibError
+from actionlib_core.exceptions import RemoteNodeError
 from actionlib_core.interfaces import ros2
 from actionlib_core.node import get_node
 from actionlib_core.pubsub.service_proxy import ServiceProxy
@@ -45,20 +45,6 @@ _FIELDS = {
 }
 """Where a ParameterValue has its value, by its type (rcl_interfaces/msg/ParameterType)."""
 _NUMBERS = {field: number for number, field in _FIELDS.items()}
-
-
-class RemoteNodeError(ActionlibError):
-    """A node refused what it was asked.
-
-    Attributes:
-        node: Its full name.
-        problems: What was wrong, by the name of a parameter or transition.
-    """
-
-    def __init__(self, node: str, problems: Mapping[str, str]) -> None:
-        self.node = node
-        self.problems = dict(problems)
-        super().__init__("\n".join(f"/{node}: {name}: {why}" for name, why in problems.items()))
 
 
 class RemoteNode:

@@ -1,7 +1,7 @@
 """Ready-made states for robot missions, and what they are made from.
 
 Each is a state for `sm.add(...)`, or a function that makes one: `drive_to`, `turn`, `locate`,
-`AskOperator`, `AwaitMessage`, `Wait`, `Serve`. The lessons in `missions` use them.
+`nav2_active`, `AskOperator`, `AwaitMessage`, `Wait`, `Serve`. The lessons in `missions` use them.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from smachpy.states.driving import (
     pose_of,
     turn,
 )
+from smachpy.states.nav2 import nav2_active
 from smachpy.states.progress import Progress
 from smachpy.states.serving import Serve, serve_during, serving_machine
 from smachpy.states.waiting import AwaitMessage, Wait
@@ -46,6 +47,7 @@ __all__ = [
     "goal_at",
     "load_route",
     "locate",
+    "nav2_active",
     "pose_of",
     "serve_during",
     "serving_machine",

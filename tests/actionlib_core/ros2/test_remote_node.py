@@ -9,12 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from actionlib_core.config import Config, Ros2
-from actionlib_core.exceptions import InvalidDurationError, ServiceUnavailableError
+from actionlib_core.exceptions import (
+    InvalidDurationError,
+    RemoteNodeError,
+    ServiceUnavailableError,
+)
 from actionlib_core.interfaces import ros2
 from actionlib_core.node import Node
 from actionlib_core.pubsub.remote_node import (
     RemoteNode,
-    RemoteNodeError,
     parameter_value,
     value_of,
 )
