@@ -104,8 +104,8 @@ class RemoteNode:
             RemoteNodeError: some values are none that a parameter can have, and nothing was sent;
                 or the node refused some, and has set the others. It names all of those.
         """
-        make = ros2.get_message("rcl_interfaces/ParameterValue", self._distro)
-        make_parameter = ros2.get_message("rcl_interfaces/Parameter", self._distro)
+        make: Any = ros2.get_message("rcl_interfaces/ParameterValue", self._distro)
+        make_parameter: Any = ros2.get_message("rcl_interfaces/Parameter", self._distro)
         parameters, problems = [], {}
         for name, value in values.items():
             try:
@@ -147,7 +147,8 @@ class RemoteNode:
         Raises:
             RemoteNodeError: the node is in another state, or its transition failed.
         """
-        request = ros2.get_service("lifecycle_msgs/ChangeState", self._distro).Request()
+        change_state: Any = ros2.get_service("lifecycle_msgs/ChangeState", self._distro)
+        request = change_state.Request()
         request.transition.label = transition
         request.transition.id = getattr(
             type(request.transition), f"TRANSITION_{transition.upper()}", 0
@@ -157,7 +158,7 @@ class RemoteNode:
             raise RemoteNodeError(self.name, {transition: why})
 
     def _call(self, service: str, type_name: str, *args: Any, **fields: Any) -> Any:
-        service_class = ros2.get_service(type_name, self._distro)
+        service_class: Any = ros2.get_service(type_name, self._distro)
         proxy = ServiceProxy(
             f"/{self.name}/{service}", service_class, timeout=self._timeout, node=self._node
         )
@@ -202,14 +203,11 @@ def _field_of(value: Any) -> str:
         simple = {f"{word}_value" for word in ("bool", "integer", "double", "string")}
         if len(inner) == 1 and inner <= simple:
             return inner.pop().replace("_value", "_array_value")
+    too_big = type(value) is int and not -MOST <= value < MOST
     kinds = ((bool, "bool"), (int, "integer"), (float, "double"), (str, "string"))
-    for kind, word in kinds:
-        if isinstance(value, kind):
-            if word == "integer" and not -MOST <= value < MOST:
-                break
+    for kind, word in (*kinds, (bytes, "byte_array"), (bytearray, "byte_array")):
+        if isinstance(value, kind) and not too_big:
             return f"{word}_value"
-    if isinstance(value, (bytes, bytearray)):
-        return "byte_array_value"
     raise ValueError(
         f"got {value!r}; expected a bool, an int of 64 bits, a float, a str, bytes, or a list of "
         "values of one such type that is not empty."

@@ -55,18 +55,21 @@ class Nav2Topics:
         self._scanner = Scanner(robot)
         self._odom_period = 1.0 / robot.config.control.feedback_rate
         self._told = self._scanned = -math.inf
-        message = partial(ros2.get_message, distro=distro)
+        # Chosen by the distribution while it runs, so no type checker knows their fields.
+        message: Callable[[str], Any] = partial(ros2.get_message, distro=distro)
+        trigger: Any = ros2.get_service("std_srvs/Trigger", distro)
         self._transform = message("geometry_msgs/TransformStamped")
-        self._odom = Publisher("odom", message("nav_msgs/Odometry"), node=node)
+        self._odometry = message("nav_msgs/Odometry")
+        self._laser_scan = message("sensor_msgs/LaserScan")
+        self._odom = Publisher("odom", self._odometry, node=node)
         self._tf = Publisher("tf", message("tf2_msgs/TFMessage"), node=node)
-        self._scan = Publisher("scan", message("sensor_msgs/LaserScan"), node=node)
-        self._map = Publisher("map", message("nav_msgs/OccupancyGrid"), latch=True, node=node)
-        self._publish_map()
-        twist = message("geometry_msgs/Twist")
-        trigger = ros2.get_service("std_srvs/Trigger", distro)
+        self._scan = Publisher("scan", self._laser_scan, node=node)
+        grid = message("nav_msgs/OccupancyGrid")
+        self._map = Publisher("map", grid, latch=True, node=node)
+        self._publish_map(grid())
         self._speeds = Subscriber(
             "cmd_vel",
-            twist,
+            message("geometry_msgs/Twist"),
             lambda heard: on_speed((heard.linear.x, heard.angular.z)),
             queue_size=1,
             node=node,
@@ -100,7 +103,7 @@ class Nav2Topics:
 
     def _publish_odometry(self) -> None:
         body = self._robot.body
-        odom = self._odom.data_class()
+        odom = self._odometry()
         self.fill_header(odom.header, ODOM_FRAME)
         odom.child_frame_id = BASE_FRAME
         fill_pose(odom.pose.pose, body.pose)
@@ -123,7 +126,7 @@ class Nav2Topics:
         config = self._robot.config.scan
         with self._stepper.lock:
             ranges = self._scanner.scan()
-        scan = self._scan.data_class(
+        scan = self._laser_scan(
             angle_min=self._scanner.first,
             angle_max=-self._scanner.first,
             angle_increment=self._scanner.step,
@@ -135,9 +138,9 @@ class Nav2Topics:
         self.fill_header(scan.header, BASE_FRAME)
         self._scan.publish(scan)
 
-    def _publish_map(self) -> None:
+    def _publish_map(self, grid: Any) -> None:
         floor = self._robot.world.map
-        grid = self._map.data_class(data=floor.cells.ravel())
+        grid.data = floor.cells.ravel()
         self.fill_header(grid.header, MAP_FRAME)
         set_time(grid.info.map_load_time, self._clock.time_ns())
         grid.info.resolution = floor.resolution
