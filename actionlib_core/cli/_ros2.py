@@ -118,6 +118,22 @@ def watching(node: Node, on_end: Callable[[Endpoint], object]) -> Iterator[None]
         yield
 
 
+def subscribe_to_bytes(node: Node, full: str, callback: Callable[[Sample], None]) -> list[Closable]:
+    """Receive the bytes of a topic from the publishers of ROS 2 that are there now.
+
+    Blocks: until the networks have answered, a second each at most.
+    """
+    from actionlib_core.wire.ros2.names import Kind as RosKind
+    from actionlib_core.wire.ros2.names import data_key
+
+    keys = {
+        (network, data_key(token.domain, token.name, token.type, token.type_hash))
+        for network in networks(node)
+        for token in network.ros.list(kind=RosKind.PUBLISHER, name=network.name(full))
+    }
+    return [network.transport.subscribe(key, callback, cached=1) for network, key in keys]
+
+
 # -- types -----------------------------------------------------------------------------------------
 
 

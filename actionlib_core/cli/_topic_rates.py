@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from actionlib_core.cli._command import add_command, count
 from actionlib_core.cli._network import open_node
+from actionlib_core.cli._ros2 import subscribe_to_bytes
 from actionlib_core.wire.presence import Kind, parse_token, token_pattern
 
 if TYPE_CHECKING:
@@ -65,12 +66,15 @@ def listening(node: Node, name: str, callback: Callable[[Sample], None]) -> Iter
         if end is not None and presence.alive and not announced:
             announced.append(node.announce(Kind.SUBSCRIBER, end.name, end.type, end.md5))
 
-    subscription = node.transport.subscribe(full, callback)
+    subscriptions = [
+        node.transport.subscribe(full, callback),
+        *subscribe_to_bytes(node, full, callback),
+    ]
     watch = node.transport.watch_alive(token_pattern(Kind.PUBLISHER, full), on_presence)
     try:
         yield
     finally:
-        for part in (watch, subscription, *announced):
+        for part in (watch, *subscriptions, *announced):
             part.close()
 
 

@@ -8,10 +8,12 @@ import pytest
 
 from actionlib_core.cli import main
 from actionlib_core.config import Config, Ros2
+from actionlib_core.interfaces import ros2
 from actionlib_core.interfaces.ros2.test_msgs.action import Fibonacci
 from actionlib_core.node import Node
+from actionlib_core.transport import Quality
 from actionlib_core.wire.ros2.graph import RosNode, RosType
-from actionlib_core.wire.ros2.names import Kind
+from actionlib_core.wire.ros2.names import LATCHED, Kind
 from tests.ros2_server import Ros2Server
 
 ID = "0123456789abcdef0123456789abcdef"
@@ -155,3 +157,16 @@ def test_options_of_a_robot_without_its_router(capsys, monkeypatch):
     assert "--ros2" in capsys.readouterr().err
     assert main(["--ros2", "nonsense", "list"]) == 2
     assert "nonsense" in capsys.readouterr().err
+
+
+def test_the_bytes_of_a_topic(robot):
+    message = ros2.get_message("std_msgs/msg/String")
+    node = RosNode(robot.session, robot.clock, domain=42, full_name="talker")
+    end = node.end(Kind.PUBLISHER, "chatter", RosType(message._type, message._rihs01), LATCHED)
+    publisher = robot.session.publisher(end.key, "", Quality(cache=1))
+    publisher.put(message(data="hello").to_cdr(), end.attachment())
+    end.show()
+    assert "hello" in robot("topic", "echo", "chatter", "--raw", "--once")
+    assert robot("topic", "echo", "chatter", "--once") == 'data: "hello"\n---\n'
+    end.close()
+    publisher.close()
