@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 GROUP = "smachpy.missions"
 DEFAULT_NAMES = ("mission", "machine", "sm")
-PLANS = (".pnml",)
+PLANS = (".pnml", ".plan", ".pddlout")
 
 
 class TargetError(SmachError):
@@ -124,8 +124,8 @@ def load_target(text: str) -> Target:
     Args:
         text: A mission's name (`patrol`), `module:factory`, or `path.py[:factory]`. Without
             `:factory` a file's `mission`, `machine` or `sm` is taken, else its only machine. Or a
-            Petri net plan, `path.pnml`; STEM.actions.yaml or actions.yaml beside it says what its
-            actions and conditions are.
+            Petri net plan, `path.pnml` (.plan, .pddlout); STEM.actions.yaml or actions.yaml beside
+            it says what its actions and conditions are.
 
     Raises:
         TargetError: there is no such thing; names the nearest ones.

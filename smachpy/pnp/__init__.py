@@ -14,6 +14,14 @@ from smachpy.pnp.actions import Call as Call
 from smachpy.pnp.actions import Function as Function
 from smachpy.pnp.actions import Goal as Goal
 from smachpy.pnp.actions import Made as Made
+from smachpy.pnp.build import Part as Part
+from smachpy.pnp.build import action as action
+from smachpy.pnp.build import choose as choose
+from smachpy.pnp.build import fork as fork
+from smachpy.pnp.build import go_to as go_to
+from smachpy.pnp.build import loop as loop
+from smachpy.pnp.build import mark as mark
+from smachpy.pnp.build import sense as sense
 from smachpy.pnp.check import check_plan as check_plan
 from smachpy.pnp.conditions import Condition as Condition
 from smachpy.pnp.conditions import ConditionError as ConditionError
@@ -37,3 +45,7 @@ from smachpy.pnp.problems import PlanError as PlanError
 from smachpy.pnp.problems import PlanProblem as PlanProblem
 from smachpy.pnp.reach import Reachable as Reachable
 from smachpy.pnp.reach import explore as explore
+from smachpy.pnp.reading import read_net as read_net
+from smachpy.pnp.text import parse_pddl as parse_pddl
+from smachpy.pnp.text import parse_plan as parse_plan
+from smachpy.pnp.text import parse_rules as parse_rules

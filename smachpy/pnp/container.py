@@ -17,8 +17,8 @@ from smachpy.pnp.firing import Table
 from smachpy.pnp.knowledge import EVENT_LIFE_S, Knowledge
 from smachpy.pnp.net import Net
 from smachpy.pnp.plan import Plan, problem_of, understand
-from smachpy.pnp.pnml import read_pnml
 from smachpy.pnp.problems import PlanError, PlanProblem, raise_errors
+from smachpy.pnp.reading import PLANS, read_net
 from smachpy.run.child import ContainerData
 from smachpy.run.visit import End
 
@@ -463,10 +463,11 @@ def load(
     event_life: float = EVENT_LIFE_S,
     **options: Any,
 ) -> PetriNetPlan:
-    """Load a plan from a PNML file.
+    """Load a plan from a file: `.pnml`, or a text form, `.plan` or `.pddlout`.
 
-    An action that is not registered under its whole name and for which there is a file NAME.pnml
-    beside `file` is that plan.
+    A text form takes the execution rules of the file with the same name and the ending `.er`. An
+    action that is not registered under its whole name and for which there is a file NAME.pnml (or
+    .plan, .pddlout) beside `file` is that plan.
 
     Args:
         file: The file.
@@ -491,14 +492,14 @@ _DEEPEST = 20
 def _load(
     file: Path, parameters: Parameters, above: tuple[Path, ...], options: Mapping[str, Any]
 ) -> PetriNetPlan:
-    net, problems = read_pnml(file)
+    net, problems = read_net(file)
     plan = understand(net, strict=parameters.strict, problems=problems)
     found = list(plan.problems)
     stack = (*above, file.resolve())
     subs: dict[str, PetriNetPlan] = {}
     for name, known in plan.executables.items():
-        part = file.parent / f"{name}.pnml"
-        if name in parameters.actions or "/" in name or not _is_file(part):
+        part = _file_of(file.parent, name)
+        if name in parameters.actions or part is None:
             continue
         if part.resolve() in stack or len(stack) > _DEEPEST:
             line = net.places[known.places[0]].line if known.places else 0
@@ -521,8 +522,11 @@ def _load(
     )
 
 
-def _is_file(path: Path) -> bool:
+def _file_of(folder: Path, name: str) -> Path | None:
+    """Return the file of the plan with this name; None when there is none."""
+    if "/" in name:
+        return None
     try:
-        return path.is_file()
+        return next((f for end in PLANS if (f := folder / f"{name}{end}").is_file()), None)
     except (OSError, ValueError):
-        return False
+        return None

@@ -151,7 +151,8 @@ class Explorer:
         states = list(record.walk())
         self._root, self._root_path = root, record.path
         self._options = options
-        self._merges = merges
+        # What a plan does next depends on more than on which states are active.
+        self._merges = merges and all(s.net is None for s in states)
         self._parallel = {s.path for s in states if s.kind == "concurrence"}
         # It makes no difference how long these have been active.
         self._timeless = {

@@ -1,0 +1,43 @@
+"""Files that hold plans, by their endings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from smachpy.pnp.pnml import read_pnml
+from smachpy.pnp.problems import PlanProblem, raise_errors
+from smachpy.pnp.text import parse_pddl, parse_plan, parse_rules
+
+if TYPE_CHECKING:
+    from smachpy.pnp.net import Net
+
+PLANS: Final = (".pnml", ".plan", ".pddlout")
+
+
+def read_net(file: Path | str) -> tuple[Net, tuple[PlanProblem, ...]]:
+    """Read a plan in any form.
+
+    Returns:
+        The net, and what is doubtful about the file.
+
+    Raises:
+        PlanError: the file cannot be read, or is no plan; all problems at once.
+    """
+    path = Path(file)
+    if path.suffix not in PLANS[1:]:
+        return read_pnml(path)
+    beside = path.with_suffix(".er")
+    rules = parse_rules(_text(beside), file=str(beside)) if beside.is_file() else ()
+    name = path.name.partition(".")[0]
+    parse = parse_pddl if path.suffix == ".pddlout" else parse_plan
+    return parse(_text(path), rules, name=name, file=str(file)), ()
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        why = getattr(error, "strerror", None) or "is not UTF-8"
+        raise_errors([PlanProblem("file", "error", f"{why}; expected a plan.", "", str(path))])
+        raise
