@@ -16,9 +16,11 @@ from actionlib_core.interfaces import ros2
 from actionlib_core.node import Node, use_node
 from actionlib_core.pubsub.topic import Publisher, Subscriber
 from actionlib_core.transport.memory import MemoryNetwork
+from smachpy import StateMachine
 from smachpy.sim.geometry import Pose2D, quaternion_of, wrap_angle
 from smachpy.sim.nav2 import Nav2Server
 from smachpy.sim.world import Robot, World
+from smachpy.states import drive_back, drive_to, locate
 from smachpy.states.nav2 import nav2_active
 from tests.free_port import free_port
 from tests.ros2_client import Ros2Client
@@ -88,7 +90,7 @@ def nav2(clock: VirtualClock, office: Any, office_robot: Any) -> Iterator[Callab
         robot.close()
 
 
-def drive_to(client: Ros2Client, pose: Pose2D, frame: str = "map") -> Any:
+def nav_goal(client: Ros2Client, pose: Pose2D, frame: str = "map") -> Any:
     goal = client.parts.action.Goal()
     goal.pose.header.frame_id = frame
     goal.pose.pose.position.x, goal.pose.pose.position.y = pose.x, pose.y
@@ -102,7 +104,7 @@ def test_it_drives_to_a_pose_and_tells_how_far_it_is(nav2: Any, distro: str) -> 
     world = nav2(distro)
     client = world.client("navigate_to_pose", "NavigateToPose")
     target = Pose2D(2.0, 3.0, 0.0)
-    status, result = world.run(client, drive_to(client, target))
+    status, result = world.run(client, nav_goal(client, target))
     assert status == SUCCEEDED
     assert getattr(result, "error_code", 0) == 0
     assert world.robot.body.pose.distance(target) < 0.05
@@ -121,9 +123,9 @@ def test_a_pose_that_cannot_be_reached_is_aborted_with_the_reason(nav2: Any) -> 
     world = nav2()
     client = world.client("navigate_to_pose", "NavigateToPose")
     for goal, why in (
-        (drive_to(client, Pose2D(0.5, 5.0, 0.0)), "in a wall"),
-        (drive_to(client, Pose2D(1.0, 0.0, 0.0), "nowhere"), "goal frame: got 'nowhere'"),
-        (drive_to(client, Pose2D(math.nan, 0.0, 0.0)), "no finite numbers"),
+        (nav_goal(client, Pose2D(0.5, 5.0, 0.0)), "in a wall"),
+        (nav_goal(client, Pose2D(1.0, 0.0, 0.0), "nowhere"), "goal frame: got 'nowhere'"),
+        (nav_goal(client, Pose2D(math.nan, 0.0, 0.0)), "no finite numbers"),
     ):
         status, result = world.run(client, goal)
         assert (status, result.error_code) == (ABORTED, 9000)
@@ -134,7 +136,7 @@ def test_a_pose_that_cannot_be_reached_is_aborted_with_the_reason(nav2: Any) -> 
 def test_a_cancel_stops_it(nav2: Any) -> None:
     world = nav2()
     client = world.client("navigate_to_pose", "NavigateToPose")
-    uuid = world.send(client, drive_to(client, Pose2D(2.0, 3.0, 0.0)))
+    uuid = world.send(client, nav_goal(client, Pose2D(2.0, 3.0, 0.0)))
     pending = client.result(uuid)
     world.clock.sleep(5.0)
     assert world.robot.body.speed > 1.0
@@ -147,10 +149,10 @@ def test_a_cancel_stops_it(nav2: Any) -> None:
 def test_a_newer_pose_takes_the_place_of_the_one_before(nav2: Any) -> None:
     world = nav2()
     client = world.client("navigate_to_pose", "NavigateToPose")
-    first = client.result(world.send(client, drive_to(client, Pose2D(2.0, 3.0, 0.0))))
+    first = client.result(world.send(client, nav_goal(client, Pose2D(2.0, 3.0, 0.0))))
     world.clock.sleep(2.0)
     target = world.robot.body.pose.then(Pose2D(1.0, 0.0, 0.0))
-    status, _ = world.run(client, drive_to(client, target))
+    status, _ = world.run(client, nav_goal(client, target))
     assert status == SUCCEEDED
     assert client.end_of(first)[0] == CANCELED
 
@@ -176,7 +178,7 @@ def test_it_backs_up_as_far_as_it_was_told(nav2: Any) -> None:
         world.client("navigate_to_pose", "NavigateToPose"),
         world.client("back_up", "BackUp"),
     )
-    assert world.run(drive, drive_to(drive, Pose2D(2.0, 3.0, 0.0)))[0] == SUCCEEDED
+    assert world.run(drive, nav_goal(drive, Pose2D(2.0, 3.0, 0.0)))[0] == SUCCEEDED
     before = world.robot.body.pose
     goal = client.parts.action.Goal(speed=0.2)
     goal.target.x = 0.4
@@ -226,7 +228,7 @@ def test_what_takes_longer_than_allowed_is_aborted(nav2: Any) -> None:
 def test_another_behavior_takes_over(nav2: Any) -> None:
     world = nav2()
     drive, client = world.client("navigate_to_pose", "NavigateToPose"), world.client("spin", "Spin")
-    pending = drive.result(world.send(drive, drive_to(drive, Pose2D(2.0, 3.0, 0.0))))
+    pending = drive.result(world.send(drive, nav_goal(drive, Pose2D(2.0, 3.0, 0.0))))
     world.clock.sleep(3.0)
     assert world.run(client, client.parts.action.Goal(target_yaw=1.0))[0] == SUCCEEDED
     status, result = drive.end_of(pending)
@@ -298,6 +300,26 @@ def test_a_mission_waits_until_it_is_active(nav2: Any) -> None:
         assert nav2_active(manager="nobody", timeout=10.0).execute() == "aborted"
         assert 10.0 <= world.clock.now() - began < 13.0
         node.transport.close()
+
+
+def test_ready_made_states_with_ros_1_types_drive_it(nav2: Any) -> None:
+    world = nav2("jazzy")
+    network = Ros2(domain=DOMAIN, distro="jazzy", names=("move_base", "odom"))
+    session = world.network.session()
+    config = Config(ros2=(network,))
+    with (
+        Node("mission", transport=session, clock=world.clock, config=config) as node,
+        use_node(node),
+    ):
+        sm = StateMachine(["succeeded", "aborted", "preempted"])
+        sm.add("WHERE", locate("start"), {"valid": "GO", "invalid": "aborted"})
+        sm.add("GO", drive_to(Pose2D(2.0, 3.0, 0.0)), {"succeeded": "BACK"})
+        sm.add("BACK", drive_back("start"))
+        start = world.robot.body.pose
+        assert sm.execute() == "succeeded"
+        assert world.robot.body.pose.distance(start) < 0.1
+        assert world.robot.odometer > 10.0
+        session.close()
 
 
 @pytest.mark.zenoh
