@@ -19,6 +19,7 @@ from smachpy.actions.wakeup import Wakeup
 from smachpy.machines.problems import Problems
 from smachpy.machines.state import State
 from smachpy.run.frame import current_scope
+from smachpy.slips import accepting
 from smachpy.util import is_shutdown
 
 if TYPE_CHECKING:
@@ -110,7 +111,7 @@ class ServiceState(State):
         self.__request = Outgoing(
             "request",
             service_spec._request_class,
-            copy.deepcopy(request),
+            copy.deepcopy(_as_request(service_spec, request)),
             request_key,
             problems.names("request_slots", request_slots),
             UserCallback.of(
@@ -224,6 +225,14 @@ class ServiceState(State):
         if self.__timeout_s is not None:
             own.append(("timeout", f"{self.__timeout_s:g} s -> {self.__timeout_outcome}"))
         return kind, (*own, *details)
+
+
+def _as_request(service_spec: Any, given: Any) -> Any:
+    """Return a request made of a plain value, as rospy made one for programs for ROS 1."""
+    kind = service_spec._request_class
+    if given is None or isinstance(given, kind) or not kind.__slots__ or not accepting():
+        return given
+    return kind(given)
 
 
 class _Call:

@@ -131,14 +131,13 @@ class Concurrence(Container):
         if not (default_outcome or outcome_map or outcome_cb):
             problems.add("outcome policy: got none; expected default_outcome at least")
         for what, named in (("default outcome", [default_outcome]), ("outcome map", outcome_map)):
-            problems.add(
-                *(
-                    f"{what}: got {outcome!r}; expected one of {sorted(known)}."
-                    f"{did_you_mean(outcome, known)}"
-                    for outcome in named
-                    if outcome not in known and (outcome or outcome_map is named)
-                )
+            unknown = (
+                f"{what}: got {outcome!r}; expected one of {sorted(known)}."
+                f"{did_you_mean(outcome, known)}"
+                for outcome in named
+                if outcome not in known and (outcome or outcome_map is named)
             )
+            problems.add(*(problem for problem in unknown if not accepts(problem)))
         self._smachpy.rules = ()
         with problems:
             self._smachpy.rules = as_rules(outcome_map)

@@ -306,6 +306,8 @@ class StateMachine(Container):
 
     def find_problems(self, where: str) -> tuple[str, ...]:
         """Return what is wrong with this machine itself."""
+        if not self._states and type(self).execute is not Container.execute:
+            return ()  # its own `execute` says what it does
         initial = self._smachpy.next_initial or self._smachpy.initial
         outcomes = self.get_registered_outcomes()
         spec = MachineSpec(where, outcomes, tuple(self.__child_specs()), initial)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.clock import Deadlock, RealClock, VirtualClock, current_clock, use_clock
-from actionlib_core.node import Node, use_node
+from actionlib_core.node import Node, get_node, use_node
 from actionlib_core.shutdown import Shutdown, use_shutdown
 from actionlib_core.suggest import did_you_mean
 from actionlib_core.transport.memory import MemoryNetwork
@@ -137,7 +137,9 @@ def load(
     place, colon, call = str(script).rpartition(":")
     path, call = (Path(place), call) if colon and place.endswith(".py") else (Path(script), "")
     install(path, stub_missing=stub_missing)
-    made = Session([str(path), *argv], dry=True, stub_missing=stub_missing)
+    made = Session(
+        [str(path), *argv], dry=True, make_node=_node_in_force, stub_missing=stub_missing
+    )
     made.parameters.merge("/", dict(params or {}))
     known = {id(thing) for thing in gc.get_objects() if isinstance(thing, Container)}
     with contextlib.ExitStack() as stack:
@@ -201,6 +203,11 @@ def where_raised(error: BaseException, script: Path) -> str:
     last = own[-1]
     source = linecache.getline(last.filename, last.lineno or 0).strip()
     return f"{last.filename}:{last.lineno}: {text}" + (f"\n    {source}" if source else "")
+
+
+def _node_in_force(_name: str) -> Node:
+    """Return the node for a program that is not on the network: it has one already."""
+    return get_node()
 
 
 def _go_virtual(stack: contextlib.ExitStack) -> None:

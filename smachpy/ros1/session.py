@@ -53,6 +53,7 @@ class Session:
     Attributes:
         parameters: Its parameters.
         name: What `init_node` called it; "" before.
+        named_node: Its node has that name, maybe renamed by the command line.
         stubbed: What got a stand-in.
         stopped: How a dry program ended, once it has.
         shows_transitions: Somebody shows them already, so SMACH's log need not.
@@ -76,6 +77,7 @@ class Session:
         self.stubbed: list[str] = []
         self.stopped: Stop | None = None
         self.hooks: list[Callable[[str], object]] = []
+        self.named_node = False
         self.shows_transitions = False
         self.loaded = False
         self.on_action: Callable[[str], object] = lambda _name: None
@@ -85,7 +87,9 @@ class Session:
     def begin_node(self, name: str) -> Node:
         """Make the node that the program calls `name`, and put it in force."""
         self.name = name
-        return self._make_node(name)
+        node = self._make_node(name)
+        self.named_node = node.name == name or not self.dry
+        return node
 
     def stop(self, machine: Any = None) -> None:
         """End a dry program here; another one goes on.

@@ -68,10 +68,10 @@ def test_importing_smachpy_leaves_the_names_alone():
 
 
 def test_a_missing_package_is_named_with_its_place(names):
-    (names / "uses.py").write_text("import rospy\nfrom nobody_msgs.msg import Thing\n")
+    (names / "uses.py").write_text("import rospy\nfrom absent_msgs.msg import Thing\n")
     with pytest.raises(ModuleNotFoundError) as caught:
         importlib.import_module("uses")
-    assert caught.value.name == "nobody_msgs"
+    assert caught.value.name == "absent_msgs"
     assert caught.value.file == str(names / "uses.py")
     assert caught.value.line == 2
 

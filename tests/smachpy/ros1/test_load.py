@@ -147,3 +147,16 @@ sm.execute()
         run = mission(machine)
     assert run.outcome == "done"
     assert run.duration == pytest.approx(5)
+
+
+def test_it_joins_no_network(load):
+    from actionlib_core.node import has_node
+
+    before = has_node()
+    machine = load("""
+rospy.init_node('named')
+assert rospy.get_name() == '/named' and rospy.resolve_name('~x') == '/named/x'
+machine().execute()
+""")
+    assert machine is not None
+    assert has_node() == before

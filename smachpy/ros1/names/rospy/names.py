@@ -18,7 +18,10 @@ __all__ = [
 
 def get_name() -> str:
     """Return the full name of the program's node, "/unnamed" before `init_node`."""
-    return f"/{get_node().full_name}" if session().name else "/unnamed"
+    if not session().name:
+        return "/unnamed"
+    node = get_node()
+    return f"/{node.full_name}" if session().named_node else f"{get_namespace()}{session().name}"
 
 
 get_caller_id = get_name
@@ -42,9 +45,9 @@ def resolve_name(name: str, caller_id: str | None = None) -> str:
     name = name.rstrip("/") if len(name) > 1 else name
     if name in {"/", "~"}:
         return "/" if name == "/" else get_name()
-    if caller_id is None:
+    if caller_id is None and not (name[0] == "~" and session().name):
         return f"/{get_node().resolve(name)}"
-    node = caller_id.strip("/")
+    node = (caller_id or get_name()).strip("/")
     return f"/{_resolve(name, namespace=node.rpartition('/')[0], node=node)}"
 
 
