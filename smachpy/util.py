@@ -52,6 +52,11 @@ def set_shutdown_check(cb: Callable[[], bool]) -> None:
     _check[0] = cb
 
 
+def reset_shutdown_check() -> None:
+    """Forget what `set_shutdown_check` was given."""
+    _check[0] = _program_ends
+
+
 def has_shutdown_check() -> bool:
     """Tell whether `set_shutdown_check` was called."""
     return _check[0] is not _program_ends

@@ -8,7 +8,7 @@ import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from smachpy import log, slips
+from smachpy import log, slips, util
 from smachpy.ros1 import session
 from smachpy.ros1.hook import OldNames
 from smachpy.ros1.project import Project
@@ -77,6 +77,7 @@ def uninstall() -> None:
                 del sys.modules[name]
         sys.modules.update(made.hidden)
         log.set_loggers(*made.loggers)
+        util.reset_shutdown_check()
         session.forget_loaded()
         slips.set_accepting(False)
 

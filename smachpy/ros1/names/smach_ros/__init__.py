@@ -1,4 +1,4 @@
-"""smach_ros's public names. Importing it sends SMACH's log to rospy's, as the original does."""
+"""smach_ros's public names. Importing it joins SMACH's log and end with rospy's, as in ROS 1."""
 
 from typing import Any
 
@@ -41,6 +41,7 @@ def _send_log_to_rospy() -> None:
 
 
 _send_log_to_rospy()
+smachpy.set_shutdown_check(_core.is_shutdown)
 
 
 def __getattr__(name: str) -> Any:
