@@ -9,7 +9,7 @@ import threading
 from functools import partial
 from typing import TYPE_CHECKING
 
-from actionlib_core.exceptions import ActionlibError, Ros1Error, TransportError
+from actionlib_core.exceptions import ActionlibError, InterfaceError, Ros1Error, TransportError
 from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from actionlib_core.wire.action_messages import (
@@ -28,6 +28,7 @@ from actionlib_core.wire.encoding import encoding_of
 from actionlib_core.wire.presence import Kind, parse_token, token_key, with_age
 from actionlib_core.wire.ros1.answers import ACTION_WORDS
 from actionlib_core.wire.ros1.goals import GoalsOfClients, GoalsOfServer, Verdict
+from actionlib_core.wire.ros1.node import ANY
 from actionlib_core.wire.ros1.sides import Typed, type_of
 from actionlib_core.wire.server_port import FEEDBACK, RESULT, STATUS
 
@@ -47,6 +48,7 @@ log = logging.getLogger("actionlib_core")
 
 OVERTAKEN_S = 0.05
 STATUS_S = 0.005  # changes within so long are one list, and leave the way to a result that follows
+NEXT_S = 2.0  # a server here that has left may be followed by another
 ACKNOWLEDGE_S = 5.0  # results: clients in ROS 1 take a goal that is no longer listed for lost
 GOAL_ID = Typed(GoalID._type, GoalID._md5sum)
 STATUS_ARRAY = Typed(GoalStatusArray._type, GoalStatusArray._md5sum)
@@ -112,14 +114,12 @@ class ActionBridge:
             error = Ros1Error(f"action {self._name}", f"two servers: {text}; expected one.")
             self._sides.ros.report(f"two servers of {self._name}", error)
         here = bool(servers) and not (rivals and isinstance(side, ServerInRos))
-        if (isinstance(side, ServerHere) and (not here or side.server not in servers)) or (
-            isinstance(side, ServerInRos) and here
-        ):
+        stays = side.look(servers) if isinstance(side, ServerHere) else not here
+        if side is not None and not stays:
             side.close()
             side = None
         if side is None and here:
-            server = min(servers, key=lambda end: end.age)
-            side = ServerHere(self._sides, self._name, server, self._definitions)
+            side = ServerHere(self._sides, self._name, _eldest(servers), self._definitions)
         elif side is None:
             type_name = self._type or next((end.type for end in ends), "")
             side = ServerInRos(
@@ -133,6 +133,10 @@ class ActionBridge:
         """Bridge no more; does not wait."""
         if self._side is not None:
             self._side.close()
+
+
+def _eldest(servers: Collection[Endpoint]) -> Endpoint:
+    return min(servers, key=lambda end: end.age)
 
 
 class ServerInRos:
@@ -174,12 +178,14 @@ class ServerInRos:
         }
 
     def _advertise(self, word: str, type_name: str, md5: str) -> Publication:
-        accept: Callable[[Header], Callable[[], object]] = partial(self._accept, word)
-        definition = ""
-        if type_name and md5:
-            definition = self._definitions.text(Typed(type_name, md5))
+        known = _known(type_name)
         return self._sides.ros.advertise(
-            f"{self._name}/{word}", type_name, md5, definition, latching=False, accept=accept
+            f"{self._name}/{word}",
+            *(type_name, md5),
+            "" if known is None else self._definitions.text(known),
+            latching=False,
+            accept=partial(self._accept, word),
+            guess=known or (ANY, ANY),
         )
 
     def close(self) -> None:
@@ -196,6 +202,8 @@ class ServerInRos:
 
     def _accept(self, word: str, header: Header) -> Callable[[], object]:
         """Take a subscriber of goals or cancels."""
+        if ANY in {header.get("type"), header.get("md5sum")}:
+            return lambda: None  # it takes any message, to record it: no server
         node = header.get("callerid", "")
         self.connect(node, word, type_of(header, f"{self._name}/{word}"))
         return partial(self.disconnect, node, word)
@@ -263,11 +271,12 @@ class ServerInRos:
     def take(self, node: str, word: str, payload: bytes) -> None:
         """Pass on what a node says on `status`, `feedback` or `result`."""
         with self._lock:
-            if word == "status":
-                self._heard = self._clock.now()
-                if self._silent == node and len(self._parts.get(node, ())) == len(ACTION_WORDS):
-                    self._show(node)
+            whole = len(self._parts.get(node, ())) == len(ACTION_WORDS)
+            if word == "status" and node == self._silent and self._shown is None and whole:
+                self._show(node)
             shown = self._shown
+            if word == "status" and shown is not None and shown.ros_node == node:
+                self._heard = self._clock.now()
         if word == "result":  # what was sent before on another connection comes before, here too
             self._subscriptions["feedback"].wait_idle(OVERTAKEN_S)
         if shown is not None and shown.ros_node == node:
@@ -456,6 +465,8 @@ class ServerHere:
         self._goal_encoding = ""
         self._timer: Timer | None = None
         self._acks: list[str] = []
+        self._has_said_farewell = False
+        self._gone_since: float | None = None
         self._closed = False
         self._publications: dict[str, Publication] = {}
         parts = _types_of(server)
@@ -480,6 +491,32 @@ class ServerHere:
             sides.ros.subscribe(f"{name}/{word}", partial(_Client, self, word))
             for word in ("goal", "cancel")
         ]
+
+    def look(self, servers: Collection[Endpoint]) -> bool:
+        """Follow the server; return whether to go on.
+
+        Goals are LOST with their server. Those that it had not taken when it said farewell, and
+        those that come now, are for the next one, which has `NEXT_S` to come.
+
+        Args:
+            servers: The servers of the action here.
+        """
+        now = self._clock.now()
+        if self.server in servers:
+            return True
+        if self._gone_since is None:
+            self._gone_since = now
+            with self._lock:
+                if not self._has_said_farewell:
+                    self._goals.lose_unheard()
+            self._say_nothing_runs()
+        typed = self.server.type, self.server.md5
+        fitting = [end for end in servers if (end.type, end.md5) == typed]
+        if fitting:
+            self.server, self._gone_since = _eldest(fitting), None
+            self._has_said_farewell = False
+            return True
+        return not servers and now < self._gone_since + NEXT_S
 
     def close(self) -> None:
         """Bridge no more: clients in ROS 1 hear that no goal is left; does not wait."""
@@ -539,6 +576,8 @@ class ServerHere:
 
     def _publisher(self, key: str, encoding: str, quality: Quality) -> PublisherPort:
         with self._lock:
+            if self._closed:
+                raise TransportError(f"{key}: its server has left; expected it to be there.")
             which = f"{key} {encoding}", quality
             made = self._publishers.get(which)
             if made is None:
@@ -563,10 +602,13 @@ class ServerHere:
             for entry in entries:
                 self._goals.on_status(entry, self._clock.now())
             self._arm()
-            clients = list(self._clients) if parse_token(frame) is not None else []
+            is_farewell = parse_token(frame) is not None
+            self._has_said_farewell |= is_farewell
+            clients = list(self._clients) if is_farewell else []
         self._publications["status"].put(sample.payload, keep="")
-        for client in clients:  # a farewell, which each client answers
-            self._acknowledge([], client)
+        with contextlib.suppress(TransportError):  # closed meanwhile
+            for client in clients:
+                self._acknowledge([], client)
 
     def _on_feedback(self, sample: Sample) -> None:
         if self._is_of_server(sample):
@@ -596,8 +638,7 @@ class ServerHere:
     def _send_acks(self) -> None:
         with self._lock:
             acks, self._acks = self._acks, []
-            closed = self._closed
-        if not closed:
+        with contextlib.suppress(TransportError):  # closed meanwhile
             self._acknowledge(acks, "")
 
     def _acknowledge(self, goal_ids: list[str], frame: str) -> None:
@@ -620,17 +661,18 @@ class ServerHere:
             due = self._goals.take_due(self._clock.now())
             encoding = self._goal_encoding
             self._arm()
-        for message in due.again:
-            self._publisher(self._keys.goal, encoding, AGAIN).put(message)
-        for goal_id in due.ask:
-            self._sides.node.transport.query(
-                self._keys.result,
-                pack_goal_id(goal_id, 0),
-                encoding=GOAL_ID.encoding,
-                timeout=ASK_TIMEOUT_S,
-                on_reply=self._on_reply,
-                on_done=lambda: None,
-            )
+        with contextlib.suppress(TransportError):  # closed meanwhile
+            for message in due.again:
+                self._publisher(self._keys.goal, encoding, AGAIN).put(message)
+            for goal_id in due.ask:
+                self._sides.node.transport.query(
+                    self._keys.result,
+                    pack_goal_id(goal_id, 0),
+                    encoding=GOAL_ID.encoding,
+                    timeout=ASK_TIMEOUT_S,
+                    on_reply=self._on_reply,
+                    on_done=lambda: None,
+                )
 
     def _on_reply(self, reply: Reply) -> None:
         if not reply.error and reply.encoding != encoding_of(GoalStatus):
@@ -665,15 +707,19 @@ class _Client:
 
 def _types_of(server: Endpoint) -> dict[str, Typed]:
     """Return the types of the topics of an action of ours; checksums "" where it is not known."""
-    from actionlib_core.exceptions import InterfaceError
-    from actionlib_core.interfaces import get_message
-
     types = {"status": STATUS_ARRAY}
+    fits = _known(server.type) == (server.type, server.md5)
     for word in ("feedback", "result"):
         name = f"{server.type}{word.title()}"
-        try:
-            known = get_message(server.type)._md5sum == server.md5
-            types[word] = Typed(name, get_message(name)._md5sum if known else "")
-        except InterfaceError:
-            types[word] = Typed(name, "")
+        types[word] = (_known(name) if fits else None) or Typed(name, "")
     return types
+
+
+def _known(type_name: str) -> Typed | None:
+    """Return a type with the checksum that it has in this program, None if it has none."""
+    from actionlib_core.interfaces import get_message
+
+    try:
+        return Typed(type_name, get_message(type_name)._md5sum)
+    except InterfaceError:
+        return None

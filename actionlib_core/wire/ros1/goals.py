@@ -159,6 +159,10 @@ class GoalsOfClients:
             self._over.add(goal_id)
         return True
 
+    def lose_unheard(self) -> None:
+        """Give up the goals that a server may have taken before it died without a word."""
+        self._unheard.clear()
+
     def is_ours(self, goal_id: str) -> bool:
         """Return whether a goal came from a client in ROS 1."""
         return goal_id in self._ours

@@ -180,6 +180,7 @@ class _Link:
             fields = {"topic": topic, "type": ANY, "md5sum": ANY, "message_definition": ""}
             connection.send_header({"callerid": node.name, **fields, "tcp_nodelay": "1"})
             header = connection.read_header()
+            self._wait_until_counted(where, header)
             receiver = subscription.accept(header)
             node.forget_report(about)
             try:
@@ -188,6 +189,23 @@ class _Link:
             finally:
                 self.connection = None
                 receiver.gone()
+
+    def _wait_until_counted(self, where: tuple[str, int], header: Header) -> None:
+        """Wait until the publisher sends us what it publishes: it counts us after it has answered.
+
+        It takes one connection after the other, so the answer to another one tells. That one asks
+        for a service which nodes have and says at once that it calls nothing.
+
+        Blocks: for one exchange, as `Connection.read_header`.
+        """
+        node = header.get("callerid", "")
+        fields = {"callerid": self._node.name, "service": f"{node}/get_loggers"}
+        with (
+            contextlib.suppress(Ros1Error),  # no such service: that is an answer too
+            Connection.open(*where, node, self._node.clock) as probe,
+        ):
+            probe.send_header({**fields, "md5sum": ANY, "probe": "1"})
+            probe.read_header()
 
 
 class Publication:
@@ -200,6 +218,7 @@ class Publication:
         md5: Its checksum; "" with `type_name`.
         definition: Its text, with that of all nested types.
         latching: What subscribers are told.
+        guess: Type and checksum that a subscriber of any type is told while no other has told any.
         accept: Gets the connection header of each subscriber and returns what is called when its
             connection has ended; may refuse with a `Ros1Error`. It runs in the connection's thread.
 
@@ -217,6 +236,7 @@ class Publication:
         *,
         latching: bool,
         accept: Callable[[Header], Callable[[], object]],
+        guess: tuple[str, str] = (ANY, ANY),
     ) -> None:
         self.topic = topic
         self.type = type_name
@@ -228,6 +248,7 @@ class Publication:
         self._accept = accept
         self._node = node
         self._connections: set[Connection] = set()
+        self._seen = guess
         self._closed = False
 
     def put(self, payload: bytes, *, keep: str | None = None) -> None:
@@ -246,7 +267,8 @@ class Publication:
     def serve(self, connection: Connection, header: Header) -> None:
         """Send to a subscriber until it leaves; in the connection's thread."""
         theirs = header.get("type", ANY), header.get("md5sum", ANY)
-        ours = self.type or theirs[0], self.md5 or theirs[1]
+        known = self._seen if ANY in theirs else theirs
+        ours = self.type or known[0], self.md5 or known[1]
         if any(their not in {ANY, our} for their, our in zip(theirs, ours, strict=True)):
             text = f"got {theirs[0]} ({theirs[1]}); expected {ours[0]} ({ours[1]})."
             connection.send_header({"error": f"{self.topic}: type: {text}"})
@@ -254,6 +276,7 @@ class Publication:
         if ANY in ours:
             connection.send_header({"error": f"{self.topic}: its type is not known yet"})
             return
+        self._seen = ours
         fields = {"callerid": self._node.name, "topic": self.topic, "type": ours[0]}
         fields |= {"md5sum": ours[1], "message_definition": self._definition}
         connection.send_header({**fields, "latching": str(int(self.latching))})

@@ -87,6 +87,17 @@ def test_a_server_in_ros_that_hangs_is_lost_and_comes_back(ros, bridge, node):
     assert send(client, 4) == (GoalStatus.SUCCEEDED, 8)
 
 
+def test_a_recorder_in_ros_hears_goals_and_is_no_server(ros, bridge):
+    recorder = ros.start("topics", "recorder")
+    recorder.ask("record /recorded/goal")
+    bridge(actions={"recorded": "actionlib/Test"})
+    ros.start("action_server", "recorded", "recorded_worker")
+    client = client_of("recorded")
+    assert recorder.ask("connections /recorded/goal") == "1"
+    assert send(client, 4) == (GoalStatus.SUCCEEDED, 8)
+    assert recorder.ask("heard /recorded/goal 1") == "*"
+
+
 def test_a_result_message_that_is_lost_is_told(ros, bridge):
     ros.start("action_server", "muted", "muted_worker", "mute")
     bridge(actions=["muted"])

@@ -34,9 +34,15 @@ for line in sys.stdin:
         (name,) = arguments
         heard[name] = []
         subscribers[name] = rospy.Subscriber(name, String, hear, name)
+    elif word == "record":
+        (name,) = arguments
+        heard[name] = []
+        subscribers[name] = rospy.Subscriber(
+            name, rospy.AnyMsg, lambda message, name=name: heard[name].append(message._type)
+        )
     elif word == "connections":
         (name,) = arguments
-        end = publishers[name]
+        end = publishers.get(name) or subscribers[name]
         deadline = rospy.get_time() + 20
         while not end.get_num_connections() and rospy.get_time() < deadline:
             rospy.sleep(0.01)
