@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from smachpy.sim.config import PlannerConfig
-    from smachpy.sim.floor import Thing
-    from smachpy.sim.traffic import Sighting
+    from smachpy.sim.floor import Sighting, Thing
 
 _WIDE_BERTH = 0.02  # [m] besides the margin, to what moves
 _SHY = 0.4  # [m] further out than needed, it is dearer to pass something that moves

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -19,6 +20,23 @@ if TYPE_CHECKING:
     from smachpy.sim.occupancy import OccupancyMap
 
 SOLID_FROM = 50  # `scale` and `raw` maps: this occupancy and more counts as solid
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """Where something that moves was seen last.
+
+    Attributes:
+        x: [m], map frame.
+        y: [m], map frame.
+        radius: [m].
+        name: What to call it.
+    """
+
+    x: float
+    y: float
+    radius: float
+    name: str
 
 
 class Obstacle(NamedTuple):

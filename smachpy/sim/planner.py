@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from smachpy.sim.costmap import Costmap
-    from smachpy.sim.traffic import Sighting
+    from smachpy.sim.floor import Sighting
 
 Point = tuple[float, float]  # (x, y) [m], map frame
 Cell = tuple[int, int]  # (row, column)

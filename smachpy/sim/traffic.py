@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Protocol
 
 if TYPE_CHECKING:
@@ -29,23 +28,6 @@ class Disc(Protocol):
     x: float
     y: float
     radius: float
-
-
-@dataclass(frozen=True, slots=True)
-class Sighting:
-    """Where something that moves was seen last.
-
-    Attributes:
-        x: [m], map frame.
-        y: [m], map frame.
-        radius: [m].
-        name: What to call it.
-    """
-
-    x: float
-    y: float
-    radius: float
-    name: str
 
 
 class Mover:

@@ -15,10 +15,10 @@ from smachpy.sim.body import Body
 from smachpy.sim.costmap import Costmap
 from smachpy.sim.doors import Door
 from smachpy.sim.exceptions import NavigationError
-from smachpy.sim.floor import Bar, Obstacle
+from smachpy.sim.floor import Bar, Obstacle, Sighting
 from smachpy.sim.planner import Planner
 from smachpy.sim.raycast import Raycaster
-from smachpy.sim.traffic import Mover, Sighting
+from smachpy.sim.traffic import Mover
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias
 
 from actionlib_core.action.server import ActionServer
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from typing import Self
 
     from actionlib_core.action.server import ServerGoalHandle
-    from smachpy.testing.kit import MissionKit
+    from actionlib_core.clock import VirtualClock
+    from actionlib_core.transport.memory import MemoryNetwork
 
 Status: TypeAlias = Literal["succeeded", "aborted", "preempted", "rejected"]
 STATUSES = ("succeeded", "aborted", "preempted", "rejected")
@@ -67,6 +68,23 @@ class Reply:
     function: Callable[[Any], Any] | None = None
 
 
+class Test(Protocol):
+    """What a scripted end needs of the test that it belongs to (`smachpy.testing.kit`)."""
+
+    @property
+    def clock(self) -> VirtualClock:
+        """Its clock."""
+        ...
+
+    @property
+    def network(self) -> MemoryNetwork:
+        """Its network."""
+        ...
+
+    def add_end(self, end: ScriptedEnd) -> None:
+        """Close `end` with the test, and report its errors."""
+
+
 class ScriptedEnd:
     """One scripted server or topic: a process of its own, as far as the mission can see.
 
@@ -86,7 +104,7 @@ class ScriptedEnd:
         causes: What the test's own functions raised.
     """
 
-    def __init__(self, kit: MissionKit, name: str, type_class: Any) -> None:
+    def __init__(self, kit: Test, name: str, type_class: Any) -> None:
         self.name = name
         self.errors: list[str] = []
         self.causes: list[BaseException] = []
@@ -143,7 +161,7 @@ class ScriptedEnd:
 
     # -- the script ----------------------------------------------------------------------------
 
-    def copy_to(self, kit: MissionKit) -> Self:
+    def copy_to(self, kit: Test) -> Self:
         """Make the same end with the same script in another test."""
         made = type(self)(kit, self.name, self._type_class)
         made.replies, made.default = deque(self.replies), self.default
@@ -246,7 +264,7 @@ class ScriptedActionServer(ScriptedEnd):
         conditional: Predicates of goals, and what is done with those for which they hold.
     """
 
-    def __init__(self, kit: MissionKit, name: str, type_class: Any) -> None:
+    def __init__(self, kit: Test, name: str, type_class: Any) -> None:
         self.goals: list[Any] = []
         self.cancelled: list[Any] = []
         self._awaited = 0
@@ -378,7 +396,7 @@ class ScriptedActionServer(ScriptedEnd):
         made.ignore_cancel = True
         return made
 
-    def copy_to(self, kit: MissionKit) -> Self:
+    def copy_to(self, kit: Test) -> Self:
         """Make the same server with the same script in another test."""
         made = super().copy_to(kit)
         made.conditional = list(self.conditional)
@@ -554,7 +572,7 @@ class ScriptedService(ScriptedEnd):
         requests: The requests that arrived, in order.
     """
 
-    def __init__(self, kit: MissionKit, name: str, type_class: Any) -> None:
+    def __init__(self, kit: Test, name: str, type_class: Any) -> None:
         self.requests: list[Any] = []
         super().__init__(kit, name, type_class)
 
@@ -631,7 +649,7 @@ class ScriptedTopic(ScriptedEnd):
         received: All messages on the topic, its own too, in order.
     """
 
-    def __init__(self, kit: MissionKit, name: str, type_class: Any) -> None:
+    def __init__(self, kit: Test, name: str, type_class: Any) -> None:
         self.received: list[Any] = []
         self._calls: list[Callable[[ScriptedTopic], object]] = []  # all that it was told to do
         self._due: list[float] = []  # when it will write [s]
@@ -680,7 +698,7 @@ class ScriptedTopic(ScriptedEnd):
         """Deliver the next messages late by `seconds`: those after them may overtake."""
         self.disturb((seconds,), count)
 
-    def copy_to(self, kit: MissionKit) -> Self:
+    def copy_to(self, kit: Test) -> Self:
         """Make the same topic in another test, where everything is asked of it once more."""
         made = super().copy_to(kit)
         for call in self._calls:

@@ -8,11 +8,10 @@ from hypothesis import strategies as st
 
 from smachpy.sim.config import PlannerConfig
 from smachpy.sim.costmap import Costmap
-from smachpy.sim.floor import Bar, Obstacle, stamp
+from smachpy.sim.floor import Bar, Obstacle, Sighting, stamp
 from smachpy.sim.geometry import Pose2D
 from smachpy.sim.occupancy import OccupancyMap
 from smachpy.sim.planner import Planner, keep_right
-from smachpy.sim.traffic import Sighting
 
 CELL = 0.1
 numbers = st.floats(-5, 5)
