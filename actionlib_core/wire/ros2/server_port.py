@@ -156,15 +156,16 @@ class RosServerPort:
         }
         keys = {name: end.key for name, end in self._ends.items()}
         try:
+            self._feedback = transport.publisher(keys[names.feedback], "", PUBLISHED)
+            self._declared.append(self._feedback)
+            self._status = transport.publisher(keys[names.status], "", STATUS)
+            self._declared.append(self._status)
             for name, answer in (
-                (names.send_goal, self._on_goal),
-                (names.cancel_goal, self._on_cancel),
                 (names.get_result, self._on_result),
+                (names.cancel_goal, self._on_cancel),
+                (names.send_goal, self._on_goal),
             ):
                 self._declared.append(transport.queryable(keys[name], answer, complete=True))
-            self._feedback = transport.publisher(keys[names.feedback], "", PUBLISHED)
-            self._status = transport.publisher(keys[names.status], "", STATUS)
-            self._declared += [self._feedback, self._status]
             for end in self._ends.values():  # last: who sees them may ask at once
                 end.show()
             self._declared.append(self._ros.watch_action(self._there, self._on_token))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -229,6 +230,7 @@ def test_a_suspended_server_goes_on(robot: Robot) -> None:
     process = robot.server_process("client")
     client = robot.client()
     process.send_signal(signal.SIGSTOP)
+    os.waitpid(process.pid, os.WUNTRACED)  # until it has stopped
     pending = client.send(bytes([1] * 16), Fibonacci.Goal())
     again = client.send(bytes([1] * 16), Fibonacci.Goal())
     assert not pending.done.wait(0.3)

@@ -451,6 +451,35 @@ def test_a_server_that_stops_answers_everybody(world: World) -> None:
         world.goals[0].publish_feedback(Fibonacci.Feedback())
 
 
+def test_a_client_that_waits_for_no_token_is_answered_in_full(world: World) -> None:
+    """Its goal comes as soon as a server can be asked: one that was there before has the key."""
+    gone = world.serve()
+    client = world.client()
+    gone.stop()
+    uuids = iter([new_id() for _ in range(200)])
+    asked, starting = [], world.clock.event()
+
+    def ask() -> None:
+        while not starting.wait(0.0):
+            uuid = next(uuids)
+            asked.append((uuid, client.send(uuid, Fibonacci.Goal(order=1))))
+            world.clock.sleep(0.0005)
+
+    asker = world.clock.spawn(ask, name="asker")
+
+    def succeed(goal: ServerGoalHandle) -> None:
+        goal.set_accepted()
+        goal.publish_feedback(Fibonacci.Feedback(sequence=[1]))
+        goal.set_succeeded()
+
+    ActionServer("fib", Fibonacci, succeed, node=world.node)
+    starting.set()
+    asker.join(5.0)
+    for uuid, pending in asked:
+        if pending.answer().payload is not None:
+            assert client.end_of(client.result(uuid))[0] == 4
+
+
 def test_a_second_server_of_the_name_does_not_start(world: World, caplog: Any) -> None:
     world.serve()
     other = Node("other", transport=world.network.session(), clock=world.clock)
