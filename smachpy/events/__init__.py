@@ -63,12 +63,19 @@ class Left(NamedTuple):
 
 
 class Failed(NamedTuple):
-    """A state raised; `error` is "Type: message"."""
+    """A state raised.
+
+    Attributes:
+        error: "Type: message".
+        trace: Where: the innermost lines of the user's code, "file:line in function: source", the
+            last one raised; "" where no code of theirs is involved, and in older recordings.
+    """
 
     path: str
     t: float
     stamp_ns: int
     error: str
+    trace: str = ""
 
 
 class PreemptRequested(NamedTuple):

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import inspect
-from typing import TYPE_CHECKING, Any
+import os
+from typing import TYPE_CHECKING, Any, Final
 
+import actionlib_core
+import smachpy
 from smachpy.context import current_frame
 from smachpy.events import Entered, Failed, Left, OutcomeForced, Retried
 from smachpy.exceptions import (
@@ -32,6 +35,11 @@ if TYPE_CHECKING:
     from smachpy.run.options import Options
     from smachpy.run.step import Step
 
+TRACE_LINES: Final = 6
+_OURS: Final = tuple(
+    os.path.dirname(os.path.abspath(module.__file__ or "")) + os.sep  # noqa: PTH100, PTH120  texts
+    for module in (actionlib_core, smachpy)
+)
 _new = tuple.__new__  # half the time of a NamedTuple's own
 
 
@@ -278,7 +286,20 @@ def publish_raised(frame: Frame, error: BaseException) -> None:
     if isinstance(error, Interruption):
         frame.emit(Left, "preempted")
     else:
-        frame.emit(Failed, f"{type(error).__name__}: {error}")
+        frame.emit(Failed, f"{type(error).__name__}: {error}", trace_of(error))
+
+
+def trace_of(error: BaseException) -> str:
+    """Return the innermost lines of user code that an exception came through, a line each."""
+    import traceback  # only where something went wrong
+
+    frames = [
+        one
+        for one in traceback.extract_tb(error.__traceback__)
+        if not one.filename.startswith((*_OURS, "<"))
+    ]
+    lines = (f"{one.filename}:{one.lineno} in {one.name}: {one.line}" for one in frames)
+    return "\n".join(list(lines)[-TRACE_LINES:])
 
 
 def publish_left(frame: Frame, step: Step, outcome: Any) -> None:

@@ -8,6 +8,7 @@
     GET  /api/picture         svg, png, pdf or dot; `theme` and the paths that are `active`
     GET  /api/export          the run as .html or .jsonl
     GET  /api/statistics      of recorded runs
+    GET  /api/why             why the newest run of a machine ended so
     GET  /api/compare         a machine and another one in one drawing
     GET  /api/value           a value of userdata as it is now, whole
     GET  /api/action          what a form for a goal of an action needs
@@ -135,6 +136,7 @@ class Viewer:
                 Route("/api/picture", self._picture),
                 Route("/api/export", self._export),
                 Route("/api/statistics", self._runs),
+                Route("/api/why", self._why),
                 Route("/api/compare", self._compare),
                 Route("/api/value", self._whole_value),
                 Route("/api/control", self._control, methods=["POST"]),
@@ -217,6 +219,15 @@ class Viewer:
         except SmachError as error:
             return PlainTextResponse(str(error), status_code=503)
 
+    async def _why(self, request: Request) -> Response:
+        machine = self._asked(request)
+        if machine is None or machine.record is None:
+            return _unknown(request)
+        from viz.model.why import why
+
+        found = await run_in_threadpool(why, machine.record, machine.events())
+        return Json(found.to_json())
+
     async def _compare(self, request: Request) -> Response:
         machine = self._asked(request)
         other = self._machines.get(request.query_params.get("with", ""))
@@ -269,12 +280,17 @@ class Viewer:
         if machine is None or machine.record is None or form not in {"html", "jsonl"}:
             return _unknown(request)
         from smachpy.events.recording import recording_lines
+        from viz.model.why import why
 
         if form == "jsonl":
             base, events = machine.history()
             lines = recording_lines(machine.record, events, base)
             return _download("".join(lines).encode(), "application/jsonl", "run.jsonl")
-        run = {"model": page.model(machine.record), "snap": json.loads(machine.snapshot()[1])}
+        run = {
+            "model": page.model(machine.record),
+            "snap": json.loads(machine.snapshot()[1]),
+            "why": why(machine.record, machine.events()).to_json(),
+        }
         text = await run_in_threadpool(page.standalone, run, machine.record.label)
         return _download(
             text.encode("utf-8", "replace"), page.TYPES[".html"], f"{_file_name(machine)}.html"

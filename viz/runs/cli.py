@@ -22,6 +22,7 @@ EXAMPLES = """examples:
   smachpy runs list runs/                     what there is
   smachpy runs show runs/1.jsonl              what happened in it
   smachpy runs show runs/                     what all of them add up to
+  smachpy runs why runs/1.jsonl               why it ended so, from the first cause on
   smachpy runs compare old.jsonl new.jsonl    two runs, or two versions of a machine
   smachpy runs compare old.json my_robot.missions:deliver -o diff.svg    the same as a picture
   smachpy runs export runs/1.jsonl -o 1.html  a page that opens without a server
@@ -49,6 +50,12 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     show = actions.add_parser("show", help="states, times and transitions of one run or many")
     show.add_argument("places", nargs="+", metavar="FILE|DIR")
     show.set_defaults(run=_show)
+    because = actions.add_parser(
+        "why", help="why the newest run in a file ended so, cause by cause"
+    )
+    because.add_argument("file", metavar="FILE")
+    because.add_argument("--json", action="store_true", help="the same for programs")
+    because.set_defaults(run=_why)
     two = actions.add_parser("compare", help="how the second differs from the first")
     what = "recordings, or a machine: a mission's name, module:factory, path.py, a record .json"
     two.add_argument("first", metavar="FILE|DIR|TARGET", help=what)
@@ -168,6 +175,22 @@ def _row(path: str, numbers: dict[str, Any]) -> tuple[str, ...]:
 
 def _seconds(value: float | None) -> str:
     return "" if value is None else f"{value:.3f} s"
+
+
+def _why(args: argparse.Namespace) -> int:
+    import json
+
+    from smachpy.events.recording import read_recording
+    from viz.model.why import why
+
+    recording = read_recording(args.file)
+    found = why(recording.record, recording.events)
+    if args.json:
+        print(json.dumps(found.to_json()))
+        return 0
+    for line in found.text().splitlines():  # a line each, however wide the terminal is
+        print(printable(line))
+    return 0
 
 
 def _compare(args: argparse.Namespace) -> int:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from viz.live import assets as page
 from viz.live.machines import Machine
+from viz.model.why import why
 from viz.runs.statistics import StatisticsOfFiles
 
 if TYPE_CHECKING:
@@ -33,5 +34,6 @@ def standalone_page(recording: Recording, runs: Iterable[str | Path] = ()) -> st
         "model": page.model(recording.record),
         "snap": json.loads(machine.snapshot()[1]),
         "statistics": StatisticsOfFiles(runs).of(recording.record),
+        "why": why(recording.record, recording.events).to_json(),
     }
     return page.standalone(run, recording.record.label)

@@ -287,3 +287,22 @@ type Direction = "DOWN" | "RIGHT";
 interface Window {
   smachpy: unknown;
 }
+
+// `viz.model.why`: from the first cause to the outcome.
+interface WhyStep {
+  path: string;
+  stamp_ns: number;
+  what: string;
+  kind: OutcomeClass;
+  reason: string;
+  detail: string;
+  written: [string, string][];
+}
+interface Why {
+  label: string;
+  outcome: string | null;
+  began: number | null;
+  ended: number | null;
+  steps: WhyStep[];
+  text: string;
+}

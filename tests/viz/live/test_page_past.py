@@ -273,3 +273,45 @@ def test_the_log_is_always_in_sight(served, look):
     box = page.locator(".log").bounding_box()
     assert box["y"] + box["height"] <= 900
     assert box["height"] >= 140
+
+
+def test_why_it_ended_so_and_a_step_goes_there(served, look):
+    ended = [
+        ("Failed", "/JOB/A", {"error": "KeyError: 'x'", "trace": "job.py:7 in go: x", "at": 33.0}),
+        ("Finished", "/JOB", {"outcome": None, "at": 33.0}),
+    ]
+    machine = served.add("one", events=told(*BEGUN))
+    page = look(served.start())
+    assert page.locator(".why-button").count() == 0  # it runs
+    machine.add(served.events(told(*ended), after=2))
+    page.click(".why-button")
+    page.wait_for_selector(".why li")
+    said = [text.split() for text in page.locator(".why .step").all_text_contents()]
+    assert [(words[0], words[-1]) for words in said] == [
+        ("A", "33.00"),
+        ("A", "33.00"),
+        ("JOB", "33.00"),
+    ]
+    assert page.text_content(".why pre") == "job.py:7 in go: x"
+    page.click(".why .step")
+    wait_for(
+        page, "smachpy.store.selected.value === '/JOB/A' && smachpy.store.cursor.value !== null"
+    )
+    page.keyboard.press("w")
+    wait_for(page, "!document.querySelector('.why')")
+
+
+def test_a_run_in_one_file_says_why_too(served, look, tmp_path):
+    ended = [
+        ("Left", "/JOB/A", {"outcome": "aborted", "at": 2.0}),
+        ("Finished", "/JOB", {"outcome": "aborted", "at": 2.0}),
+    ]
+    served.add("one", events=told(*BEGUN, *ended))
+    page = look(served.start())
+    saved = page.request.get(f"{served.address}api/export?machine=one&format=html")
+    file = tmp_path / "run.html"
+    file.write_bytes(saved.body())
+    alone = look(file.as_uri())
+    alone.keyboard.press("w")
+    alone.wait_for_selector(".why li")
+    assert "aborted" in alone.text_content(".why")

@@ -21,6 +21,8 @@ let token = null;
 /** @type {(events: RunEvent[]) => void} */
 let onEvents = () => {};
 let onMachine = () => {};
+/** @type {Why | null} */
+let whyOfFile = null;
 
 /** Whether this page is a file that holds its run. */
 export const isFile = () => document.getElementById("run-data") !== null;
@@ -48,6 +50,7 @@ export async function connect(handlers) {
     store.connection.value = "file";
     await takeSnapshot(run.snap, run.model);
     store.statistics.value = run.statistics ?? null;
+    whyOfFile = run.why ?? null;
     return;
   }
   const asked = new URLSearchParams(location.search);
@@ -182,7 +185,10 @@ async function takeSnapshot(snapshot, payload) {
   store.wanted.value ||= snapshot.name;
   const known = store.facts.value;
   const same = known?.name === snapshot.name && known.epoch === snapshot.epoch;
-  if (!same) store.robotLag.forget();
+  if (!same) {
+    store.robotLag.forget();
+    store.why.value = null;
+  }
   batch(() => {
     store.facts.value = snapshot;
     store.problems.value = snapshot.problems;
@@ -265,6 +271,14 @@ const post = (address, data) =>
 
 /** Check or send a goal, or cancel one. @param {object} data */
 export const askAction = (data) => post("/api/action", data);
+
+/** Show why the run ended so, or stop showing it. @param {boolean} [open] */
+export async function showWhy(open = store.why.value === null) {
+  const shown = store.facts.value?.epoch;
+  const answer = open ? (whyOfFile ?? (await ask(link("why")))) : null;
+  if (answer && "ok" in answer) store.notify(`Why: ${answer.text}`, "error");
+  else if (shown === store.facts.value?.epoch) store.why.value = /** @type {Why | null} */ (answer);
+}
 
 /** Give the machine shown a command. @param {string} name @param {Record<string, unknown>} [more] */
 export async function command(name, more = {}) {

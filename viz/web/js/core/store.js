@@ -64,6 +64,8 @@ export const theme = signal(saved("theme", "system"));
 /** @type {Signal<Set<string>>} */
 export const opened = signal(new Set()); // paths of containers
 export const help = signal(false);
+/** @type {Signal<Why | null>} */
+export const why = signal(null); // why the run ended so, while that is shown
 export const treeOpen = signal(false); // on small screens, where it lies over the page
 export const overview = signal(false); // so many states are open that they are tiles, without arrows
 /** @type {Signal<{ done: number, all: number } | null>} */

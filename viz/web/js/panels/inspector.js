@@ -9,6 +9,7 @@ import { Numbers } from "#panels/numbers.js";
 import { Preempts } from "#panels/preempts.js";
 import { SelectedState } from "#panels/selected_state.js";
 import { Changes, Userdata } from "#panels/userdata.js";
+import { WhyPanel } from "#panels/why.js";
 
 /** @typedef {import("#drawing/page.js").Page} Page */
 
@@ -22,6 +23,7 @@ export function Inspector({ page }) {
   const shared = { page, data: store.shown(), now: store.nowMs() };
   return html`<aside class="inspector" aria-label="details">
     <${MissingEvents} dropped=${shared.data.dropped ?? 0} />
+    <${WhyPanel} page=${page} />
     <${SelectedState} ...${shared} model=${model} />
     <${Differences} page=${page} />
     <${Preempts} ...${shared} />

@@ -1,5 +1,5 @@
 // The keyboard: everything the pointer can do.
-import { command, control, isFile, showActions } from "#core/connection.js";
+import { command, control, isFile, showActions, showWhy } from "#core/connection.js";
 import * as store from "#core/store.js";
 import { isDark } from "#drawing/theme.js";
 
@@ -18,6 +18,7 @@ export function listenToKeys(page) {
     "/": () => document.getElementById("search")?.focus(),
     f: () => page.refit(),
     F: () => page.refit(),
+    w: () => showWhy(),
     t: () => {
       store.treeOpen.value = !store.treeOpen.value;
     },

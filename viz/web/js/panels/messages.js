@@ -28,6 +28,7 @@ const KEYS = [
   [", .", "one event back or forward"],
   ["l", "back to now"],
   ["1 \u2026 9", "levels to open"],
+  ["w", "why it ended so"],
   ["t", "states, on a small screen"],
   ["i", "implicit transitions"],
   ["a", "actions"],

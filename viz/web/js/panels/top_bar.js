@@ -1,6 +1,6 @@
 // Above the diagram: which machine, how it runs, the way to the state shown, search, the view, commands.
 import { useEffect, useRef, useState } from "preact/hooks";
-import { choose, encoded, isFile, link } from "#core/connection.js";
+import { choose, encoded, isFile, link, showWhy } from "#core/connection.js";
 import { KIND_NAMES } from "#core/model.js";
 import { MODES, OF_RECORDED_RUNS } from "#core/statistics.js";
 import * as store from "#core/store.js";
@@ -28,6 +28,11 @@ export function TopBar({ page }) {
     <${Chooser} />
     <span class=${`status ${status.kind}`} role="status" data-testid="status">${status.word}</span>
     ${
+      canAskWhy() &&
+      html`<button class=${`why-button ${store.why.value ? "on" : ""}`} aria-pressed=${store.why.value !== null}
+        title="from the first cause to the outcome (w)" onClick=${() => showWhy()}>Why?</button>`
+    }
+    ${
       problems > 0 &&
       html`<span class="chip" title="problems of the machine's structure; see the inspector">\u26a0 ${problems}</span>`
     }
@@ -41,6 +46,14 @@ export function TopBar({ page }) {
     <${ActionsButton} />
     <${Controls} />
   </header>`;
+}
+
+/** When the run is over: it has ended, or nobody tells of it any more. */
+function canAskWhy() {
+  store.tick.value;
+  const { now } = store.run;
+  const about = store.facts.value;
+  return now.started != null && (now.ended != null || about?.recorded || about?.stale != null || isFile());
 }
 
 const toggleTree = () => {

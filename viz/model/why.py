@@ -1,0 +1,318 @@
+"""Why a run ended so: the causes from the first one to the outcome, from its events alone.
+
+Pure: no files, no time, no network. A step is an end of a state or what caused one; each follows
+from the one before it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from smachpy.events import asker_text
+from smachpy.events.run_state import RAISED
+from smachpy.outcome_classes import is_good, outcome_class
+from viz.model.labels import shorten
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from smachpy.introspection import StateRecord
+
+ENDS = frozenset({"Left", "Failed", "Finished"})
+MOST_BEFORE = 10
+"""So many failed states that led to each other are told of one machine."""
+
+MOST_WRITTEN = 8
+LONGEST = 300
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One cause, which the next one follows from.
+
+    Attributes:
+        path: The state.
+        stamp_ns: When [ns since the epoch].
+        what: What happened, in words: "aborted", "goal to move_base: LOST".
+        kind: Class of the outcome it is or led to, as `smachpy.outcome_classes` has it.
+        reason: Why, or where it led to; may be "".
+        detail: More lines, such as those of a traceback; may be "".
+        written: Pairs (key, value as text) that the state wrote on the way.
+    """
+
+    path: str
+    stamp_ns: int
+    what: str
+    kind: str
+    reason: str = ""
+    detail: str = ""
+    written: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Why:
+    """The newest run of a machine, and why it ended so.
+
+    Attributes:
+        label: Name of the machine.
+        outcome: How it ended; None: it has not, or its end is missing. "exception": its code
+            raised.
+        began: When [ns since the epoch]; None: never.
+        ended: When, or of the last event that is known.
+        steps: From the first cause to the outcome; what ran last when it has not ended.
+    """
+
+    label: str
+    outcome: str | None
+    began: int | None
+    ended: int | None
+    steps: tuple[Step, ...] = field(default=())
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as plain data, with its text."""
+        return {**asdict(self), "text": self.text()}
+
+    def text(self) -> str:
+        """Return it for people, a step a line."""
+        if self.began is None or self.ended is None:
+            return f"{self.label}: has not run"
+        began = self.began
+        took = (self.ended - began) / 1e9
+        head = (
+            f"{self.label}: no end is recorded; after {took:.2f} s there ran:"
+            if self.outcome is None
+            else f"{self.label}: {shorten(self.outcome, LONGEST)} after {took:.2f} s, because:"
+        )
+        lines = [head]
+        for number, step in enumerate(self.steps, 1):
+            at = (step.stamp_ns - began) / 1e9
+            reason = f": {step.reason}" if step.reason else ""
+            lines.append(f"{number:3}. {at:8.2f}  {step.path} {step.what}{reason}")
+            lines += [f"               {line}" for line in step.detail.splitlines()]
+            lines += [f"               wrote {key} = {value}" for key, value in step.written]
+        return "\n".join(lines)
+
+
+def why(record: StateRecord, events: Sequence[dict[str, Any]]) -> Why:
+    """Return why the newest run of a machine ended so.
+
+    Args:
+        record: The machine.
+        events: Its events in order, as `smachpy.events.to_record` has them; the oldest may be
+            missing.
+    """
+    begins = [i for i, event in enumerate(events) if _is(event, "Started", record.path)]
+    run = list(events[begins[-1] :] if begins else events)
+    if not run:
+        return Why(record.label, None, None, None)
+    ends = [i for i, event in enumerate(run) if _is(event, "Finished", record.path)]
+    began = run[0]["stamp_ns"]
+    reader = _Reader({one.path: one for one in record.walk()}, run)
+    if not ends:
+        return Why(record.label, None, began, run[-1]["stamp_ns"], reader.running())
+    end = run[ends[-1]]
+    steps = reader.causes(record.path, ends[-1])
+    return Why(record.label, end.get("outcome") or RAISED, began, end["stamp_ns"], steps)
+
+
+def _is(event: dict[str, Any], kind: str, path: str) -> bool:
+    return bool(event["kind"] == kind and event["path"] == path)
+
+
+class _Reader:
+    """Reads one run backwards."""
+
+    def __init__(self, states: dict[str, StateRecord], run: list[dict[str, Any]]) -> None:
+        self._states = states
+        self._parents = {child.path: one for one in states.values() for child in one.children}
+        self._run = run
+
+    def causes(self, path: str, end: int) -> tuple[Step, ...]:
+        """The steps to the end of a state, which is event number `end`, and that end."""
+        begin = self._begin(path, end)
+        outcome = self._outcome(end)
+        state = self._states.get(path)
+        led = self._led(path, end)
+        own = self._step(path, end, outcome, led, written=self._written(path, begin, end))
+        request = self._first("PreemptRequested", path, begin, end)
+        if request is not None and outcome_class(outcome) == "preempted":
+            return (*self._request(request), own)
+        if state is None or not state.children:
+            first = self._own_cause(path, begin, end, outcome)
+            return (first, own) if first is not None else (own,)
+        return (*self._children(state, begin, end, outcome), own)
+
+    def running(self) -> tuple[Step, ...]:
+        """The innermost states that have not ended."""
+        active: dict[str, int] = {}
+        for i, event in enumerate(self._run):
+            if event["kind"] in {"Started", "Entered"}:
+                active[event["path"]] = i
+            elif event["kind"] in ENDS:
+                active.pop(event["path"], None)
+        leaves = [p for p in active if not any(other.startswith(f"{p}/") for other in active)]
+        found = []
+        for path in leaves:
+            event = self._run[active[path]]
+            cause = self._own_cause(path, active[path], len(self._run), "")
+            reason = "" if cause is None else f"{cause.what}: {cause.reason}"
+            found.append(Step(path, event["stamp_ns"], "entered, and not left", "other", reason))
+        return tuple(found)
+
+    # -- parts -----------------------------------------------------------------------------------
+
+    def _step(self, path: str, at: int, what: str, reason: str = "", **more: Any) -> Step:
+        kind = "failure" if what == RAISED else outcome_class(what)
+        return Step(path, self._run[at]["stamp_ns"], shorten(what, LONGEST), kind, reason, **more)
+
+    def _outcome(self, end: int) -> str:
+        return self._run[end].get("outcome") or RAISED
+
+    def _begin(self, path: str, end: int) -> int:
+        for i in range(end - 1, -1, -1):
+            if self._run[i]["path"] == path and self._run[i]["kind"] in {"Entered", "Started"}:
+                return i
+        return 0
+
+    def _first(self, kind: str, path: str, begin: int, end: int) -> int | None:
+        found = (i for i in range(begin, end) if _is(self._run[i], kind, path))
+        return next(found, None)
+
+    def _written(self, path: str, begin: int, end: int) -> tuple[tuple[str, str], ...]:
+        values = {
+            event["key"]: event["value"]
+            for event in self._run[begin:end]
+            if _is(event, "UserdataWritten", path)
+        }
+        pairs = [(shorten(key, 80), shorten(_plain(value), 120)) for key, value in values.items()]
+        return tuple(pairs[-MOST_WRITTEN:])
+
+    def _request(self, at: int) -> tuple[Step, ...]:
+        """Who asked a state to stop: a sibling whose end did is followed further."""
+        event = self._run[at]
+        by = event.get("by") or ""
+        if event.get("source") == "concurrence" and by in self._states:
+            ends = [
+                i
+                for i in range(at, -1, -1)
+                if self._run[i]["path"] == by and self._run[i]["kind"] in ENDS
+            ]
+            if ends:
+                return self.causes(by, ends[0])
+        asker = asker_text(event.get("source") or "program", by, event.get("why") or "")
+        what = f"asked to stop by {shorten(asker, LONGEST)}"
+        return (Step(event["path"], event["stamp_ns"], what, "preempted"),)
+
+    def _own_cause(self, path: str, begin: int, end: int, outcome: str) -> Step | None:
+        """What in a visit of a state made it end so, that is not another state; the strongest."""
+        found: dict[str, dict[str, Any]] = {}
+        attempts = 1
+        for event in self._run[begin : end + 1]:
+            if event["path"] == path:
+                found[event["kind"]] = event
+                attempts = event["attempt"] + 1 if event["kind"] == "Retried" else attempts
+        tries = f"in attempt {attempts}" if attempts > 1 else ""
+        kind = outcome_class(outcome) if outcome else "other"
+        for name, tell in _CAUSES.items():
+            told = tell(found[name]) if name in found else None
+            if told is not None:
+                what, reason, detail = told
+                reason = ", ".join(filter(None, (reason, tries)))
+                stamp = found[name]["stamp_ns"]
+                return Step(path, stamp, shorten(what, LONGEST), kind, reason, detail)
+        return None
+
+    def _children(self, state: StateRecord, begin: int, end: int, outcome: str) -> tuple[Step, ...]:
+        """The steps to the end of the child that decided, with failures that led to it."""
+        children = {child.path for child in state.children}
+        ends = [
+            i
+            for i in range(begin, end)
+            if self._run[i]["kind"] in ENDS and self._run[i]["path"] in children
+        ]
+        if not ends:
+            first = self._own_cause(state.path, begin, end, outcome)
+            return () if first is None else (first,)
+        if state.kind == "concurrence":
+            decided = self._deciding(state, begin, end, ends, outcome)
+            return self.causes(self._run[decided]["path"], decided)
+        chain = [ends[-1]]
+        for i in reversed(
+            ends[:-1]
+        ):  # failures that were handled, and what handled them failed too
+            if is_good(self._outcome(i)) or len(chain) > MOST_BEFORE:
+                break
+            chain.insert(0, i)
+        return tuple(step for i in chain for step in self.causes(self._run[i]["path"], i))
+
+    def _deciding(
+        self, state: StateRecord, begin: int, end: int, ends: list[int], outcome: str
+    ) -> int:
+        """The end of the child that ended a concurrence: the one that stopped the others."""
+        askers = [
+            event["by"]
+            for event in self._run[begin:end]
+            if event["kind"] == "PreemptRequested"
+            and event.get("source") == "concurrence"
+            and event["path"].startswith(f"{state.path}/")
+        ]
+        for asker in askers:
+            for i in ends:
+                if self._run[i]["path"] == asker:
+                    return i
+        if not is_good(outcome) or outcome == state.default_outcome:
+            bad = [i for i in ends if not is_good(self._outcome(i))]
+            if bad:
+                return bad[0]
+        return ends[-1]
+
+    def _led(self, path: str, end: int) -> str:
+        """Where the outcome of a state led to in its container, in words."""
+        parent = self._parents.get(path)
+        state = self._states.get(path)
+        if parent is None or state is None:
+            return ""
+        outcome = self._outcome(end)
+        if outcome == RAISED:
+            return f"nothing in {parent.label} catches it"
+        for edge in parent.transitions:
+            if (edge.source, edge.outcome) == (state.label, outcome):
+                falls = f"no transition for it, so the outcome of {parent.label}"
+                return falls if edge.implicit else f"leads to {shorten(edge.target, 80)}"
+        if parent.kind != "concurrence":
+            return ""
+        for rule in parent.rules:
+            if (state.label, outcome) in rule.conditions:
+                return f"rule for {shorten(rule.outcome, 80)}: {shorten(rule.text, 200)}"
+        return f"no rule of {parent.label} names it; its default is {parent.default_outcome}"
+
+
+def _goal(event: dict[str, Any]) -> tuple[str, str, str] | None:
+    if event["status"] == "SUCCEEDED":
+        return None
+    text = shorten(event.get("text") or "", LONGEST)
+    return f"goal to {event['action']}: {event['status']}", text, ""
+
+
+_CAUSES: dict[str, Any] = {
+    "OutcomeForced": lambda e: ("ended by an operator", f"with {e['outcome']!r}", ""),
+    "Failed": lambda e: (f"raised {e['error']}", "", e.get("trace") or ""),
+    "Abandoned": lambda e: (f"ignored its preempt for {e['grace']:g} s", "abandoned", e["stack"]),
+    "TimedOut": lambda e: (f"ran into its timeout of {e['timeout']:g} s", "", ""),
+    "GoalDone": _goal,
+    "Retried": lambda e: ("tried again", shorten(str(e["reason"]), LONGEST), ""),
+    "PreemptRequested": lambda e: (
+        "asked to stop by "
+        + asker_text(e.get("source") or "program", e.get("by") or "", e.get("why") or ""),
+        "",
+        "",
+    ),
+}
+"""What an event says of why its state ended: (what, reason, more lines); the strongest first."""
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, dict) and "$msg" in value:
+        return f"{value['$msg']} {value.get('fields')}"
+    return str(value)
