@@ -7,7 +7,6 @@ import os
 from typing import TYPE_CHECKING, Any, Final
 
 import actionlib_core
-import smachpy
 from smachpy.context import current_frame
 from smachpy.events import Entered, Failed, Left, OutcomeForced, Retried
 from smachpy.exceptions import (
@@ -37,9 +36,11 @@ if TYPE_CHECKING:
 
 TRACE_LINES: Final = 6
 _OURS: Final = tuple(
-    os.path.dirname(os.path.abspath(module.__file__ or "")) + os.sep  # noqa: PTH100, PTH120  texts
-    for module in (actionlib_core, smachpy)
+    os.path.dirname(os.path.abspath(path)) + os.sep  # noqa: PTH100, PTH120  texts
+    for path in (actionlib_core.__file__ or "", os.path.dirname(__file__))  # noqa: PTH120
 )
+"""Folders of our packages; a package's is that of its `__init__.py`."""
+
 _new = tuple.__new__  # half the time of a NamedTuple's own
 
 

@@ -21,7 +21,10 @@ const LINES = {
   Resumed: () => ["resumed", "active"],
   Jumped: (e) => [`jump to ${e.label}`, "waiting"],
   Fired: (e) => [`${e.transition} fired`, "other"],
-  HeldBack: (e) => [`waits: ${e.guards.map((/** @type {string} */ guard) => `[${guard}]`).join(", ")} false`, "waiting"],
+  HeldBack: (e) => [
+    `waits: ${e.guards.map((/** @type {string} */ guard) => `[${guard}]`).join(", ")} false`,
+    "waiting",
+  ],
   OutcomeForced: (e) => [`forced: ${e.outcome}`, "waiting"],
   GoalSent: (e) => [`goal to ${e.action}`, "active"],
   GoalDone: (e) => [`${e.action}: ${e.status.toLowerCase()} ${e.text}`.trim(), outcomeClass(e.status)],

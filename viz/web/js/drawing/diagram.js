@@ -97,7 +97,11 @@ export class Diagram {
     const group = this.#group(node, `box ${node.kind}`);
     const frame = el("rect", { class: "frame", x, y, width: box.w, height: box.h, rx: 9 });
     frame.style.fill = `var(--depth${Math.min(node.depth, 11)})`;
-    const title = el("text", { x: x + 24, y: y + 16.5, class: "title" }, node.shown);
+    const name = measure(node.shown, 11, true) + (TAGS[node.kind] ? 60 : 0);
+    const entry = layout.entry && layout.entry.y < 8 ? layout.entry.x : -1; // a line comes in there
+    const isCrossed = entry > 4 && entry < 30 + name && entry + 26 + name < box.w;
+    const left = isCrossed ? x + entry - 2 : x;
+    const title = el("text", { x: left + 24, y: y + 16.5, class: "title" }, node.shown);
     if (layout.head) {
       // a tile of the overview
       const size = 0.5 * layout.head;
@@ -105,7 +109,7 @@ export class Diagram {
       title.setAttribute("x", String(x + 8));
       title.style.fontSize = `${size}px`;
     } else if (TAGS[node.kind]) title.append(el("tspan", { dx: 7, class: "tag" }, TAGS[node.kind]));
-    group.append(frame, ...(layout.head ? [] : [icon(node.kind, x + 9, y + 7.5)]), title);
+    group.append(frame, ...(layout.head ? [] : [icon(node.kind, left + 9, y + 7.5)]), title);
     this.#register(node, group, frame, null, { ...box, h: 26 }, box.w);
     into.append(group);
     if (layout.joins.length)

@@ -412,6 +412,8 @@ class Plan {
     const { node, dir, outer } = this;
     const tag = { concurrence: 66, iterator: 52, sequence: 60 }[node.kind] ?? 8;
     const pill = Math.max(0, ...this.outcomes.map(pillWidth));
+    const name = measure(node.shown, 11, true) + tag + 30;
+    const title = outer === "DOWN" ? 2 * name - 20 : name; // beside the line that comes in at the top
     const right = outer === "RIGHT" ? 14 + pill / 2 : 14;
     const bottom = outer === "DOWN" ? 20 : 14;
     return {
@@ -419,7 +421,7 @@ class Plan {
       children: [],
       edges: [],
       ports: [],
-      labels: [{ text: node.shown, width: measure(node.shown, 11, true) + tag + 30, height: 17 }],
+      labels: [{ text: node.shown, width: title, height: 17 }],
       layoutOptions: {
         ...SPACING,
         "elk.algorithm": "layered",
