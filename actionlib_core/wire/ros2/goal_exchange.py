@@ -127,10 +127,10 @@ class GoalExchange:
         """Take the answer to the request."""
         if accepted:
             return self._take(GoalCode.ACCEPTED)
+        if self._sendings == 1 and self.code <= GoalCode.ACCEPTED:
+            return Step.REFUSED
         if self.phase is Phase.TAKEN:  # the refusal of a repetition
             return Step.NOTHING
-        if self._sendings == 1:
-            return Step.REFUSED
         self._refused = True
         self.phase = Phase.UNSURE
         return self.ask_again()

@@ -245,7 +245,9 @@ class RosServerPort:
 
     def _publish_status(self, listed: list[StatusEntry]) -> None:
         states = [
-            GoalState(goal_uuid(entry.id), entry.stamp_ns, self._code(entry)) for entry in listed
+            GoalState(goal_uuid(entry.id), entry.stamp_ns, self._code(entry))
+            for entry in listed
+            if entry.id not in self._undecided  # it may yet be refused, and never be known
         ]
         states = [state for state in states if state.code != GoalCode.UNKNOWN]
         if states != self._shown:
@@ -335,6 +337,8 @@ class RosServerPort:
             due = [goal_id for goal_id, goal in self._undecided.items() if goal.due <= now]
         for goal_id in due:
             self._decide(goal_id, accepted=True)
+        if due:
+            self.send_status(())
         self._arm()
 
     # -- results -------------------------------------------------------------------------------

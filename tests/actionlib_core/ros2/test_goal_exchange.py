@@ -31,6 +31,12 @@ def test_refusal_of_the_only_sending_is_a_refusal():
     assert sent().on_answer(accepted=False) is Step.REFUSED
 
 
+def test_refusal_whose_state_came_first_is_a_refusal_too():
+    goal = sent()
+    assert goal.on_state(1) & Step.TELL
+    assert goal.on_answer(accepted=False) is Step.REFUSED
+
+
 def test_wish_is_not_a_second_sending():
     goal = GoalExchange()
     assert goal.want() is Step.QUEUE
