@@ -7,6 +7,7 @@
           |    +-- InconsistentMachineError  a finished machine does not hold together
           +-- InvalidTransitionError     an outcome or a target that does not exist
           |    +-- InconsistentMachineError
+          +-- MissionError               what a mission or a command is given is wrong
           +-- InvalidUserCodeError       a state or a callback raised; see `path` and `__cause__`
                +-- UserDataKeyError      a key was not declared or is not there (KeyError too)
                +-- UserDataTypeError     a value does not fit its typed field (TypeError too)
@@ -37,6 +38,10 @@ class SmachError(Exception):
     def __init__(self, message: str = "") -> None:
         self.message = message
         super().__init__(message)
+
+
+class MissionError(SmachError):
+    """What a mission, a command or the simulated robot was given is wrong, or it cannot do it."""
 
 
 class InvalidConstructionError(SmachError):

@@ -33,8 +33,8 @@ from typing import (
 
 from actionlib_core.suggest import nearest
 from actionlib_core.yaml_text import YamlTextError, load_yaml
+from smachpy.exceptions import MissionError
 from smachpy.machines.container import Container
-from smachpy.sim.exceptions import MissionError
 
 if TYPE_CHECKING:
     from smachpy.command.targets import Target

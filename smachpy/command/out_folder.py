@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from smachpy.command.extras import advice, load_view
 from smachpy.command.track_recorder import TrackRecorder
 from smachpy.events.recording import Recorder, RecordingError
+from smachpy.exceptions import MissionError
 from smachpy.log import logwarn
-from smachpy.sim.exceptions import MissionError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

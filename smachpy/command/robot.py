@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any, get_args
 from actionlib_core import shutdown
 from actionlib_core.clock import current_clock
 from actionlib_core.config import Distro, Ros2
+from smachpy.exceptions import MissionError
 from smachpy.sim.config import SimConfig, load_config
-from smachpy.sim.exceptions import MissionError, NavigationError
+from smachpy.sim.exceptions import NavigationError
 from smachpy.sim.geometry import Pose2D, finite, wrap_angle
 from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
 from smachpy.sim.robot_process import end_with_stdin

@@ -24,8 +24,7 @@ from smachpy.command.runner import (
 )
 from smachpy.command.surroundings import ROBOT_ACTIONS, open_surroundings
 from smachpy.command.watching import watched
-from smachpy.exceptions import InvalidUserCodeError
-from smachpy.sim.exceptions import MissionError
+from smachpy.exceptions import InvalidUserCodeError, MissionError
 
 if TYPE_CHECKING:
     from collections.abc import Callable

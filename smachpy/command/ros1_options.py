@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.output import tell
 from smachpy.command.targets import Target, TargetError, load_target
-from smachpy.sim.exceptions import MissionError
+from smachpy.exceptions import MissionError
 
 if TYPE_CHECKING:
     import argparse

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from typing import TYPE_CHECKING, Any
 
-from smachpy.sim.exceptions import MissionError
+from smachpy.exceptions import MissionError
 
 if TYPE_CHECKING:
     import argparse

@@ -18,8 +18,8 @@ from smachpy.command.ros1_options import add_options as add_ros1_options
 from smachpy.command.ros1_options import options_of
 from smachpy.command.ros1_robot import add_option as add_ros1_robot
 from smachpy.command.ros1_robot import ros1_robot
+from smachpy.exceptions import MissionError
 from smachpy.mission_info import mission_info
-from smachpy.sim.exceptions import MissionError
 from smachpy.sim.geometry import finite
 from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
 

@@ -19,9 +19,9 @@ from smachpy.command.extras import load_view
 from smachpy.command.out_folder import OutFolder
 from smachpy.command.surroundings import REAL_TIME, Pace, RobotOptions, open_surroundings
 from smachpy.command.watching import Watching, watched
+from smachpy.exceptions import MissionError
 from smachpy.mission_info import mission_info
 from smachpy.outcome_classes import is_good
-from smachpy.sim.exceptions import MissionError
 from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from actionlib_core.output import tell
 from actionlib_core.suggest import nearest
 from actionlib_core.wire.ports import watch_for_server
 from actionlib_core.wire.presence import Kind, list_endpoints
-from smachpy.sim.exceptions import MissionError
+from smachpy.exceptions import MissionError
 from smachpy.sim.robot_process import RobotProcess
 
 if TYPE_CHECKING:

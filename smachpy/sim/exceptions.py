@@ -1,6 +1,6 @@
-"""What missions and the simulated robot raise.
+"""What the simulated robot and the readers of its files raise.
 
-MissionError
+smachpy.exceptions.MissionError
 ├── InputFileError        a YAML file, map or waypoint list is wrong: all problems at once
 └── NavigationError       the robot cannot do what a goal asks
 """
@@ -9,16 +9,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from smachpy.exceptions import SmachError
+from smachpy.exceptions import MissionError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from smachpy.sim.checked_yaml import Problem
-
-
-class MissionError(SmachError):
-    """The root of this package's errors."""
 
 
 class InputFileError(MissionError):

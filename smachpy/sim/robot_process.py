@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from actionlib_core.child_process import ChildProcess, end_with_stdin
-from smachpy.sim.exceptions import MissionError
+from smachpy.exceptions import MissionError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

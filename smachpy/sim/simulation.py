@@ -11,8 +11,8 @@ from actionlib_core.interfaces.std_srvs.srv import SetBool, SetBoolResponse
 from actionlib_core.node import Node, get_node
 from actionlib_core.pubsub.service import Service
 from actionlib_core.pubsub.topic import Publisher
+from smachpy.exceptions import MissionError
 from smachpy.sim.config import ControlConfig, load_config
-from smachpy.sim.exceptions import MissionError
 from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
 from smachpy.sim.occupancy import load_map
 from smachpy.sim.server import RobotServer

@@ -6,7 +6,8 @@ Each is a state for `sm.add(...)`, or a function that makes one: `drive_to`, `tu
 
 from __future__ import annotations
 
-from smachpy.sim.exceptions import InputFileError, MissionError, NavigationError
+from smachpy.exceptions import MissionError
+from smachpy.sim.exceptions import InputFileError, NavigationError
 from smachpy.sim.geometry import Pose2D
 from smachpy.states.ask_operator import AskOperator
 from smachpy.states.driving import (

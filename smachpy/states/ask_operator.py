@@ -20,10 +20,9 @@ from actionlib_core.node import get_node
 from actionlib_core.pubsub.service import Service
 from actionlib_core.pubsub.topic import Publisher, Subscriber
 from smachpy import State, UserData
-from smachpy.exceptions import did_you_mean
+from smachpy.exceptions import MissionError, did_you_mean
 from smachpy.log import logwarn
 from smachpy.run.child import on_preempt
-from smachpy.sim.exceptions import MissionError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

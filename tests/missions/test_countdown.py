@@ -10,7 +10,7 @@ from actionlib_core.wire.presence import Kind, list_endpoints
 from missions.course.countdown import CountdownServer, countdown, main
 from missions.interfaces import CountdownAction, CountdownGoal
 from smachpy import events as ev
-from smachpy.sim.exceptions import MissionError
+from smachpy.exceptions import MissionError
 
 
 @pytest.fixture

@@ -15,7 +15,8 @@ from actionlib_core.transport.memory import MemoryNetwork
 from missions.delivery.delivery import delivery
 from smachpy import events as ev
 from smachpy.checks import check
-from smachpy.sim.exceptions import InputFileError, MissionError
+from smachpy.exceptions import MissionError
+from smachpy.sim.exceptions import InputFileError
 from smachpy.sim.maps import OFFICE_DOORS, OFFICE_MAP, OFFICE_ROBOT
 from smachpy.sim.simulation import simulation
 

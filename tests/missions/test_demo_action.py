@@ -14,7 +14,7 @@ from missions.course.demo_action import server as server_machine
 from missions.interfaces import Demo_actionAction, Demo_actionGoal
 from smachpy import events as ev
 from smachpy.checks import check
-from smachpy.sim.exceptions import MissionError
+from smachpy.exceptions import MissionError
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from missions.interfaces import DemoMsg
 from missions.interfaces.srv import DemoSrv
 from smachpy import events as ev
 from smachpy.checks import check
-from smachpy.sim.exceptions import MissionError
+from smachpy.exceptions import MissionError
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from actionlib_core.time import Time
 from missions.explore.explore import IN_VAIN, explore, pose_at
 from smachpy import events as ev
 from smachpy.checks import check
-from smachpy.sim.exceptions import MissionError
+from smachpy.exceptions import MissionError
 from smachpy.sim.geometry import quaternion_of
 from smachpy.sim.occupancy import FREE, load_map
 from smachpy.testing import mission_kit

@@ -31,7 +31,8 @@ from missions.fleet.robot import main as robot_main
 from missions.fleet.site import load_site
 from missions.interfaces.srv import PermitRequest
 from smachpy.checks import check
-from smachpy.sim.exceptions import InputFileError, MissionError
+from smachpy.exceptions import MissionError
+from smachpy.sim.exceptions import InputFileError
 from smachpy.sim.geometry import Pose2D
 from smachpy.sim.interfaces import ChargeAction
 from smachpy.sim.maps import OFFICE_FLEET

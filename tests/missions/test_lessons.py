@@ -19,7 +19,7 @@ from missions.lesson_5_inspect import inspect
 from missions.lesson_6_server import go_and_look, look_at, offer
 from missions.lesson_7_shuttle import shuttle
 from smachpy.checks import check
-from smachpy.sim.exceptions import MissionError
+from smachpy.exceptions import MissionError
 from smachpy.states import Pose2D, goal_at
 
 LESSONS = sorted(Path(missions.__file__).parent.glob("lesson_*.py"))

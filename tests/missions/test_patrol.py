@@ -7,7 +7,8 @@ import pytest
 from actionlib_core.clock import VirtualClock, use_clock
 from missions.lesson_2_patrol import patrol
 from smachpy import events as ev
-from smachpy.sim.exceptions import InputFileError, MissionError
+from smachpy.exceptions import MissionError
+from smachpy.sim.exceptions import InputFileError
 from smachpy.sim.maps import OFFICE_WAYPOINTS
 from smachpy.states import load_route
 

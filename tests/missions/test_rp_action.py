@@ -19,8 +19,7 @@ from missions.course.turn_server import TurnServer
 from missions.interfaces import TurnAction, TurnGoal
 from smachpy import events as ev
 from smachpy.checks import check
-from smachpy.exceptions import SmachError
-from smachpy.sim.exceptions import MissionError
+from smachpy.exceptions import MissionError, SmachError
 from smachpy.sim.geometry import Pose2D, wrap_angle
 from smachpy.states import goal_at
 

@@ -14,7 +14,7 @@ from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.pubsub.topic import Publisher
 from missions.tour.save_waypoints import TOPIC, WaypointSaver, waypoints_text
 from missions.tour.tour_file import Stop, load_tour
-from smachpy.sim.exceptions import MissionError
+from smachpy.exceptions import MissionError
 from smachpy.sim.geometry import Pose2D
 from smachpy.sim.maps import OFFICE_MAP, OFFICE_TOUR
 

@@ -6,7 +6,7 @@ import pytest
 
 from missions.lesson_1_errand import there_and_back
 from smachpy import events as ev
-from smachpy.sim.exceptions import MissionError
+from smachpy.exceptions import MissionError
 
 
 def test_it_stops_after_three_seconds_and_drives_home(clock, simulation):

@@ -13,7 +13,8 @@ from actionlib_core.interfaces.std_srvs.srv import Trigger
 from missions.tour.waypoints import waypoints
 from smachpy import events as ev
 from smachpy.checks import check
-from smachpy.sim.exceptions import InputFileError, MissionError
+from smachpy.exceptions import MissionError
+from smachpy.sim.exceptions import InputFileError
 from smachpy.sim.geometry import Pose2D
 from smachpy.sim.maps import OFFICE_TOUR
 from smachpy.states import goal_at

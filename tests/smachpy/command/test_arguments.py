@@ -21,7 +21,7 @@ from smachpy.command.arguments import (
     wants_help,
 )
 from smachpy.command.targets import Target
-from smachpy.sim.exceptions import MissionError
+from smachpy.exceptions import MissionError
 
 
 class Mode(enum.Enum):

@@ -10,7 +10,7 @@ from smachpy.command.arguments import Text
 from smachpy.command.runner import RunOptions, build, good_outcomes, needed_servers
 from smachpy.command.targets import Target
 from smachpy.command.track_recorder import TrackRecorder
-from smachpy.sim.exceptions import MissionError
+from smachpy.exceptions import MissionError
 from smachpy.sim.geometry import Pose2D
 from smachpy.states import Waypoint, goal_at
 

@@ -18,7 +18,8 @@ from actionlib_core.node import Node, use_node
 from actionlib_core.pubsub.service_proxy import ServiceProxy
 from actionlib_core.pubsub.topic import Subscriber, wait_for_message
 from actionlib_core.transport.memory import MemoryNetwork
-from smachpy.sim.exceptions import MissionError, NavigationError
+from smachpy.exceptions import MissionError
+from smachpy.sim.exceptions import NavigationError
 from smachpy.sim.geometry import Pose2D
 from smachpy.sim.interfaces import ChargeAction, ChargeGoal
 from smachpy.sim.server import RobotServer

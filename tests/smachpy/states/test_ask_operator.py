@@ -10,7 +10,7 @@ from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import SetBool
 from actionlib_core.node import Node
 from actionlib_core.pubsub.service_proxy import ServiceProxy
-from smachpy.sim.exceptions import MissionError
+from smachpy.exceptions import MissionError
 from smachpy.states.ask_operator import AskOperator
 
 
