@@ -6,6 +6,7 @@ import threading
 from typing import TYPE_CHECKING
 
 from actionlib_core.exceptions import TypeMismatchError
+from actionlib_core.goal.recent import Recent
 from actionlib_core.wire.encoding import check_encoding, encoding_of
 
 if TYPE_CHECKING:
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
     from actionlib_core.exceptions import ActionlibError
     from actionlib_core.transport import Sample
     from actionlib_core.wire.encoding import Typed
+
+TOLD = 1000  # what was reported is remembered so far back; senders can be made up
 
 
 class Readable:
@@ -25,7 +28,7 @@ class Readable:
     def __init__(self, log: logging.Logger) -> None:
         self._log = log
         self._lock = threading.Lock()
-        self._told: set[str] = set()
+        self._told = Recent(TOLD)
         self._encodings: dict[type[Typed], str] = {}
 
     def check(self, sample: Sample, message_class: type[Typed]) -> bool:

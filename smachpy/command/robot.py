@@ -122,7 +122,8 @@ def serve(args: argparse.Namespace) -> int:
         alone = args.world is None and not args.robots
         served = make_robot(args.map, args.config, args.pose or ()) if alone else None
         spec = _world(args) if served is None else None
-        config = load_network()
+        # A robot that drives on ROS 2 is not to be joined by this one, but where it is asked for.
+        config = dataclasses.replace(load_network(), ros2=())
         name, space = ("move_base", config.namespace) if served else ("simulation", "")
         if args.ros2:
             if served is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import subprocess
 import sys
 from dataclasses import replace
@@ -355,6 +356,21 @@ def test_the_command_serves_it_behind_a_router() -> None:
         session.close()
         process.communicate(timeout=30.0)
         router.close()
+    assert process.returncode == 0
+
+
+@pytest.mark.zenoh
+def test_without_the_option_it_joins_no_robot_that_missions_drive() -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "smachpy.sim", "--child"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "SMACHPY_ROS2": "tcp/127.0.0.1:9"},
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline().startswith("move_base: ready")
+    process.communicate(timeout=30.0)
     assert process.returncode == 0
 
 
