@@ -27,6 +27,7 @@ from smachpy.pnp.conditions import Condition as Condition
 from smachpy.pnp.conditions import ConditionError as ConditionError
 from smachpy.pnp.container import PetriNetPlan as PetriNetPlan
 from smachpy.pnp.container import load as load
+from smachpy.pnp.export import export_net as export_net
 from smachpy.pnp.files import load_plan as load_plan
 from smachpy.pnp.knowledge import Expression as Expression
 from smachpy.pnp.knowledge import Polled as Polled

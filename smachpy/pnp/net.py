@@ -80,11 +80,10 @@ class Net:
         twice = sorted(name for name, number in count.items() if number > 1)
         if twice:
             raise ValueError(f"net {self.name!r}: ids: got {twice} twice; expected unique ids.")
+        places = self.place_numbers
         for arc in self.arcs:
-            if (arc.source in self.place_numbers) == (arc.target in self.place_numbers) or not {
-                arc.source,
-                arc.target,
-            } <= set(count):
+            known = arc.source in count and arc.target in count
+            if not known or (arc.source in places) == (arc.target in places):
                 raise ValueError(
                     f"net {self.name!r}: arc: got {arc.source!r} -> {arc.target!r}; expected a "
                     "place and a transition of the net."
@@ -151,8 +150,23 @@ class Net:
 
         One that takes from no place is never among them, as in PNP.
         """
-        candidates = {t for place in dict.fromkeys(marking) for t in self.consumers[place]}
-        return sorted(t for t in candidates if self.has_tokens(marking, t))
+        marked = set(marking)
+        candidates = {t for place in marked for t in self.consumers[place]}
+        found = [t for t in candidates if self._needs[t] <= marked]
+        if self._heavy:
+            found = [t for t in found if t not in self._heavy or self.has_tokens(marking, t)]
+        found.sort()
+        return found
+
+    @cached_property
+    def _needs(self) -> tuple[frozenset[int], ...]:
+        """For each transition: the places that it takes from."""
+        return tuple(frozenset(place for place, _ in pairs) for pairs in self.inputs)
+
+    @cached_property
+    def _heavy(self) -> frozenset[int]:
+        """Transitions that take more than one token from a place."""
+        return frozenset(t for t, pairs in enumerate(self.inputs) if any(w > 1 for _, w in pairs))
 
     def has_tokens(self, marking: Marking, transition: int) -> bool:
         """Tell whether the places that a transition takes from hold enough tokens."""

@@ -77,12 +77,16 @@ def explore(net: Net, *, limit: int = MOST_MARKINGS) -> Reachable:
                 continue
             came[after] = (marking, transition)
             queue.append(after)
+            if len(set(after)) == len(after):
+                for place, _ in net.outputs[transition]:
+                    most.setdefault(place, 1)
+                continue
             counts = Counter(after)
             for place, count in counts.items():
                 if count > most.get(place, 0):
                     most[place] = count
             # A net that grows without end comes to a place with two tokens.
-            before = _covered(after, counts, came) if len(counts) < len(after) else None
+            before = _covered(after, counts, came)
             if before is not None:
                 covering = before, after
                 break
