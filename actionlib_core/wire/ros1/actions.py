@@ -103,9 +103,10 @@ class ActionBridge:
         """Bridge what is there now.
 
         Args:
-            ends: The clients and servers of the action here that belong to no bridge.
+            ends: The ends of that name here that belong to no bridge.
             state: Who is there in ROS 1.
         """
+        ends = [end for end in ends if end.kind in {Kind.ACTION_CLIENT, Kind.ACTION_SERVER}]
         servers = [end for end in ends if end.kind is Kind.ACTION_SERVER]
         rivals = set(state.publishers.get(f"{self._name}/status", ())) - {self._sides.ros.name}
         side = self._side

@@ -27,21 +27,36 @@ LARGEST_QUESTION = 1 << 20
 SILENCE_S = 10.0  # longest silence of one that asks us
 
 
+class _HttpConnection(http.client.HTTPConnection):
+    """Knows its answer, which has the socket once the other side is to close it."""
+
+    answer: http.client.HTTPResponse | None = None
+
+    def getresponse(self) -> http.client.HTTPResponse:
+        self.answer = super().getresponse()
+        return self.answer
+
+
 class _Transport(xmlrpc.client.Transport):
-    """Waits no longer than a time-out and reads no more than a limit."""
+    """Waits no longer than a time-out and reads no more than a limit; for one call."""
 
     accept_gzip_encoding = False  # packed bytes may grow beyond any limit
 
     def __init__(self, timeout: float) -> None:
         super().__init__(use_builtin_types=True)
         self._timeout = timeout
+        self._made: list[_HttpConnection] = []
 
     def make_connection(self, host: Any) -> http.client.HTTPConnection:
-        if self._connection[1] is None or host != self._connection[0]:
-            connection = http.client.HTTPConnection(host, timeout=self._timeout)
-            self._connection = host, connection
-        made: http.client.HTTPConnection = self._connection[1]  # type: ignore[assignment]  # set above
+        made = _HttpConnection(host, timeout=self._timeout)
+        self._made.append(made)
         return made
+
+    def close(self) -> None:
+        for made in self._made:
+            if made.answer is not None:
+                made.answer.close()
+            made.close()
 
     def parse_response(self, response: http.client.HTTPResponse) -> Any:
         raw = response.read(LARGEST_ANSWER + 1)

@@ -7,7 +7,12 @@ import threading
 from functools import partial
 from typing import TYPE_CHECKING
 
-from actionlib_core.exceptions import Ros1Error, ServiceBusyError, TypeMismatchError
+from actionlib_core.exceptions import (
+    ActionlibError,
+    Ros1Error,
+    ServiceBusyError,
+    TypeMismatchError,
+)
 from actionlib_core.wire.encoding import check_encoding
 from actionlib_core.wire.presence import Kind
 from actionlib_core.wire.ros1.node import RETRY_FIRST_S, RETRY_LONGEST_S
@@ -21,7 +26,6 @@ if TYPE_CHECKING:
     from actionlib_core.wire.ros1.links import Connection
     from actionlib_core.wire.ros1.node import Offer
     from actionlib_core.wire.ros1.sides import Sides
-
 
 CALLS_AT_ONCE = 500  # of one service; each has a thread, as in our own services
 _BUSY = f"{CALLS_AT_ONCE} calls are under way; expected fewer. Try ending calls sooner."
@@ -49,11 +53,12 @@ class ServiceBridge:
         """Bridge what is there now.
 
         Args:
-            ends: The service's servers here that belong to no bridge.
+            ends: The ends of that name here that belong to no bridge.
             served: A node in ROS 1 has it, which then stays the one that is used.
         """
         key = self._sides.key(self._name)
-        here = min(ends, key=lambda end: end.age, default=None)
+        servers = (end for end in ends if end.kind is Kind.SERVICE)
+        here = min(servers, key=lambda end: end.age, default=None)
         if served and here is not None:
             text = f"two servers: got one in ROS 1 and one of node '{here.node}' here"
             error = Ros1Error(f"service {self._name}", f"{text}; expected one.")
@@ -103,7 +108,7 @@ class _FromRos:
             try:
                 self._show(about)
                 pause = RETRY_FIRST_S
-            except Ros1Error as error:
+            except ActionlibError as error:
                 self._sides.ros.report(about, error)
             self._closed.wait(pause)
             pause = min(2 * pause, RETRY_LONGEST_S)

@@ -1,0 +1,145 @@
+"""Calls to masters and nodes that are none, and links that are full: without a ROS 1."""
+
+from __future__ import annotations
+
+import socket
+
+import pytest
+
+from actionlib_core.clock import RealClock
+from actionlib_core.exceptions import Ros1Error
+from actionlib_core.wire.ros1 import links
+from actionlib_core.wire.ros1.links import Connection, Listener
+from actionlib_core.wire.ros1.rpc import RpcServer, call
+
+WAIT_S = 40.0
+ANSWERS = {
+    "nothing": b"",
+    "no HTTP": b"hello\r\n\r\n",
+    "no XML": b"HTTP/1.0 200 OK\r\nContent-Length: 3\r\n\r\n<x>",
+    "no page": b"HTTP/1.0 404 Not Found\r\n\r\n",
+    "no answer": b"HTTP/1.0 200 OK\r\n\r\n<methodResponse><params><param><value><int>1</int>"
+    b"</value></param></params></methodResponse>",
+    "packed": b"HTTP/1.0 200 OK\r\nContent-Encoding: gzip\r\n\r\n\x1f\x8b\x08",
+    "many entities": b'HTTP/1.0 200 OK\r\n\r\n<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">'
+    + b"".join(b'<!ENTITY a%d "%s">' % (n, b"&a%d;" % (n - 1) * 10) for n in range(1, 12))
+    + b"]><methodResponse>&a11;</methodResponse>",
+}
+
+
+@pytest.fixture
+def clock():
+    return RealClock()
+
+
+@pytest.fixture
+def listen(clock):
+    """`listen(handle)` returns the port of a server that handles each connection so."""
+    opened = []
+
+    def listen(handle):
+        opened.append(Listener("127.0.0.1", clock, "test", handle))
+        return opened[-1].port
+
+    yield listen
+    for listener in opened:
+        listener.close(WAIT_S)
+
+
+@pytest.mark.parametrize("answer", ANSWERS.values(), ids=ANSWERS.keys())
+def test_what_is_no_answer_is_an_error(listen, answer):
+    def handle(sock, _peer):
+        sock.recv(10_000)
+        sock.sendall(answer)
+
+    uri = f"http://127.0.0.1:{listen(handle)}"
+    with pytest.raises(Ros1Error) as error:
+        call(uri, "getPid", "/me", timeout=WAIT_S)
+    assert error.value.peer == uri
+
+
+def test_nobody_and_somebody_who_is_silent_are_errors(listen, clock):
+    over = clock.event()
+    uri = f"http://127.0.0.1:{listen(lambda _sock, _peer: over.wait(WAIT_S))}"
+    try:
+        with pytest.raises(Ros1Error, match="no answer within"):
+            call(uri, "getPid", "/me", timeout=0.2)
+    finally:
+        over.set()
+    with pytest.raises(Ros1Error, match="cannot be reached"):
+        call("http://127.0.0.1:1", "getPid", "/me")
+
+
+def test_a_server_answers_errors_and_goes_on(clock):
+    def fail(_caller):
+        raise ValueError("not today")
+
+    server = RpcServer("127.0.0.1", clock, {"fail": fail, "add": lambda _caller, a, b: a + b})
+    uri = f"http://127.0.0.1:{server.port}"
+    try:
+        for method, arguments in (("fail", ()), ("add", ("x", 1)), ("add", ()), ("unknown", ())):
+            with pytest.raises(Ros1Error):
+                call(uri, method, "/me", *arguments)
+        assert call(f"{uri}/RPC2", "add", "/me", 2, 3) == 5
+    finally:
+        server.close(WAIT_S)
+
+
+@pytest.fixture
+def pair(clock):
+    """A connection, and the plain socket at its other end."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        theirs = socket.create_connection(server.getsockname())
+        ours, _ = server.accept()
+    with theirs, Connection(ours, "/peer", clock) as connection:
+        connection.limit(None)
+        yield connection, theirs
+
+
+def test_messages_for_one_who_does_not_read_are_dropped_and_counted(pair, monkeypatch):
+    connection, theirs = pair
+    monkeypatch.setattr(links, "BUFFER", 1 << 20)
+    message = b"x" * (1 << 18)
+    for _ in range(100):
+        connection.put(message)
+    assert 0 < connection.dropped < 100
+    connection.put(b"last")
+    theirs.settimeout(WAIT_S)
+    with theirs.makefile("rb") as file:
+        received = []
+        while not received or received[-1] != b"last":
+            received.append(file.read(int.from_bytes(file.read(4), "little")))
+    assert len(received) == 101 - connection.dropped
+    assert set(received[:-1]) == {message}
+
+
+def test_waiting_until_all_has_been_taken_ends_with_the_connection(pair, clock):
+    connection, theirs = pair
+    theirs.sendall(b"\1\0\0\0x")
+    assert connection.read_frame() == b"x"
+    theirs.sendall(b"\5\0\0\0cut")
+    connection.wait_idle(0.01)
+    theirs.shutdown(socket.SHUT_WR)
+    assert connection.read_frame() is None
+    connection.close()
+    connection.wait_idle(0.01)
+    connection.put(b"to nobody")
+
+
+def test_a_message_that_is_too_long_is_an_error(pair):
+    connection, theirs = pair
+    theirs.sendall(b"\xff\xff\xff\xff")
+    with pytest.raises(Ros1Error):
+        connection.read_frame()
+
+
+def test_connections_beyond_the_limit_are_refused(listen, clock, monkeypatch):
+    monkeypatch.setattr(links, "MOST_CONNECTIONS", 1)
+    over = clock.event()
+    port = listen(lambda _sock, _peer: over.wait(WAIT_S))
+    with (
+        socket.create_connection(("127.0.0.1", port), WAIT_S),
+        socket.create_connection(("127.0.0.1", port), WAIT_S) as refused,
+    ):
+        assert refused.recv(1) == b""
+        over.set()
