@@ -94,6 +94,10 @@ class Ros2Action:
     Feedback: ClassVar[type[Ros2Message]]
     _parts: ClassVar[tuple[type[Message], type[Message], type[Message]]]
 
+    action_goal: Any
+    action_result: Any
+    action_feedback: Any
+
     def __init__(self) -> None:
         self.action_goal, self.action_result, self.action_feedback = (
             part() for part in self._parts

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.interfaces._definition import FLOATS, INTEGERS, OCTETS, FieldType
 from actionlib_core.interfaces._registry import ROOT, Registry, ServiceType
-from actionlib_core.interfaces._sources import BUNDLED, Sources
+from actionlib_core.interfaces._ros2 import (
+    DEFAULT_DISTRO,
+    Ros2Action,
+    Ros2Registry,
+    Ros2Service,
+)
+from actionlib_core.interfaces._sources import BUNDLED, KINDS, Sources
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
     from actionlib_core.interfaces._definition import Constant, Definition
-    from actionlib_core.interfaces._message import Message
     from actionlib_core.interfaces._sources import Kind
 
 _HEADER: Final = "# Written by `actionlib interface stubs`; changes are lost.\n"
@@ -25,6 +30,15 @@ _SCALARS: Final = {
     "time": "_Time",
     "duration": "_Duration",
 }
+_BASES: Final = {
+    "_Message": "Message",
+    "_Ros2Action": "Ros2Action",
+    "_Ros2Message": "Ros2Message",
+    "_Ros2Service": "Ros2Service",
+    "_ServiceType": "ServiceType",
+}
+_PARTS: Final = {"Goal": "_HasGoal", "Result": "_HasResult", "Feedback": "_HasFeedback"}
+"""The parts of a ROS 2 action, and the protocols of what stands around them."""
 _BUILTIN_NAMES: Final = frozenset({"int", "float", "bool", "str", "bytes", "list", "type"})
 
 
@@ -35,6 +49,35 @@ def bundled_stubs() -> dict[str, str]:
     files: dict[str, str] = {}
     for package in registry.sources.packages():
         files |= package_stubs(registry, package)
+    return files | _ros2_stubs(files)
+
+
+def _ros2_stubs(ros1: dict[str, str]) -> dict[str, str]:
+    """Return the stubs of ROS 2's packages, below `ros2` and where else they are imported from.
+
+    Those of `DEFAULT_DISTRO`: which distribution it will be is known only as the program runs.
+
+    Args:
+        ros1: The stubs of ROS 1's packages, by path.
+    """
+    registry = Ros2Registry(DEFAULT_DISTRO, ours=True)
+    files: dict[str, str] = {}
+    for package in registry.sources.packages():
+        texts = {kind: _module(registry, package, kind, _Ros2Stub) for kind in KINDS}
+        kinds = [kind for kind, text in texts.items() if text]
+        imports = [f"from . import {kind} as {kind}\n" for kind in kinds]
+        files[f"ros2/{package}/__init__.pyi"] = _HEADER + "".join(imports)
+        files |= {f"ros2/{package}/{kind}.pyi": texts[kind] for kind in kinds}
+        # A package that ROS 1 has too keeps its own modules, and gets `action` beside them.
+        front = ros1.get(f"{package}/__init__.pyi", _HEADER)
+        others = kinds if front is _HEADER else [kind for kind in kinds if kind == "action"]
+        plain = [f"from . import {kind} as {kind}\n" for kind in others]
+        files[f"{package}/__init__.pyi"] = front + "".join(plain)
+        for kind in others:
+            names = registry.names(kind, package)
+            again = "".join(f"    {name} as {name},\n" for name in names)
+            path = f"{ROOT}.ros2.{package}.{kind}"
+            files[f"{package}/{kind}.pyi"] = f"{_HEADER}from {path} import (\n{again})\n"
     return files
 
 
@@ -59,18 +102,20 @@ def write(files: dict[str, str], folder: Path) -> list[Path]:
     return written
 
 
-def _module(registry: Registry, package: str, kind: Kind) -> str:
-    """Return the stub of `pkg.msg` or `pkg.srv`, "" when it has no classes."""
+def _module(registry: Registry, package: str, kind: Kind, make: type[_Stub] | None = None) -> str:
+    """Return the stub of `pkg.msg`, `pkg.srv` or `pkg.action`, "" when it has no classes."""
     names = registry.names(kind, package)
     if not names:
         return ""
-    stub = _Stub(registry, package, kind)
+    stub = (make or _Stub)(registry, package, kind)
     bodies = [stub.body(registry.attribute(package, kind, name)) for name in names]
     return "\n".join([_HEADER + stub.imports(), *bodies])
 
 
 class _Stub:
     """The text of one stub module, and the imports that its classes turned out to need."""
+
+    _base = "_Message"
 
     def __init__(self, registry: Registry, package: str, kind: Kind) -> None:
         self._registry = registry
@@ -82,7 +127,7 @@ class _Stub:
     def imports(self) -> str:
         collections = "from collections.abc import Collection as _Collection"
         lines = [collections] if "_Collection" in self._needs else []
-        if typing := sorted(self._needs & {"_ClassVar", "_Final"}):
+        if typing := sorted(self._needs & {"_ClassVar", "_Final", "_TypeAlias"}):
             lines.append(
                 f"from typing import {', '.join(f'{name[1:]} as {name}' for name in typing)}"
             )
@@ -92,14 +137,13 @@ class _Stub:
             f"import {self._path(package)}.{section} as _{package}_{section}"
             for package, section in sorted(self._others)
         ]
-        bases = {"_Message": "Message", "_ServiceType": "ServiceType"}
-        for alias in sorted(self._needs & bases.keys()):
-            lines.append(f"from {ROOT} import {bases[alias]} as {alias}")
+        for alias in sorted(self._needs & _BASES.keys()):
+            lines.append(f"from {ROOT} import {_BASES[alias]} as {alias}")
         for alias in sorted(self._needs & {"_Duration", "_Time"}):
             lines.append(f"from actionlib_core.time import {alias[1:]} as {alias}")
         return "\n".join([*lines, ""])
 
-    def body(self, cls: type[Message | ServiceType]) -> str:
+    def body(self, cls: Any) -> str:
         if issubclass(cls, ServiceType):
             return self._service(cls)
         return "\n".join([*self._message(cls._definition), ""])
@@ -114,8 +158,8 @@ class _Stub:
         )
 
     def _message(self, definition: Definition) -> Iterator[str]:
-        self._needs.add("_Message")
-        yield f"class {definition.short_name}(_Message):"
+        self._needs.add(self._base)
+        yield f"class {definition.short_name}({self._base}):"
         if definition.comment:
             yield f'    """{_escaped(definition.comment)}"""'
             yield ""
@@ -149,12 +193,16 @@ class _Stub:
         """Return the type a field holds and the type the constructor takes."""
         element = self._element(kind.base, shadowed)
         if not kind.is_array:
-            return element, f"{element} | float" if kind.base in {"time", "duration"} else element
+            return element, f"{element}{self._also_taken(kind.base)}"
         self._needs.add("_Collection")
         taken = f"_Collection[{element}]"
         if kind.base in OCTETS:
             return self._builtin("bytes", shadowed), taken
         return f"{self._builtin('list', shadowed)}[{element}]", taken
+
+    def _also_taken(self, base: str) -> str:
+        """What the constructor takes besides the type itself."""
+        return " | float" if base in {"time", "duration"} else ""
 
     def _element(self, base: str, shadowed: set[str]) -> str:
         if base in _SCALARS:
@@ -179,6 +227,63 @@ class _Stub:
     def _path(package: str) -> str:
         """The module of a package: below this one if bundled, else its plain ROS name."""
         return f"{ROOT}.{package}" if (BUNDLED / package).is_dir() else package
+
+
+class _Ros2Stub(_Stub):
+    """As `_Stub`, of a module of ROS 2's classes."""
+
+    _base = "_Ros2Message"
+
+    def body(self, cls: Any) -> str:
+        if issubclass(cls, Ros2Service):
+            self._needs |= {"_Ros2Service", "_ClassVar", "_TypeAlias"}
+            name = cls.__name__
+            return (
+                f"class {name}(_Ros2Service):\n"
+                f"    Request: _TypeAlias = {name}_Request\n"
+                f"    Response: _TypeAlias = {name}_Response\n"
+                f"    _request_class: _ClassVar[type[{name}_Request]]\n"
+                f"    _response_class: _ClassVar[type[{name}_Response]]\n"
+            )
+        if issubclass(cls, Ros2Action):
+            self._needs |= {"_Ros2Action", "_TypeAlias", *_PARTS.values()}
+            name = cls.__name__
+            aliases = [f"    {part}: _TypeAlias = {name}_{part}\n" for part in _PARTS]
+            fields = [
+                f"    action_{part.lower()}: {protocol}[{name}_{part}]\n"
+                for part, protocol in _PARTS.items()
+            ]
+            return "".join([f"class {name}(_Ros2Action):\n", *aliases, *fields])
+        return "\n".join([*self._message(cls._definition), ""])
+
+    def imports(self) -> str:
+        lines = [super().imports().rstrip("\n")]
+        protocols = sorted(self._needs & {*_PARTS.values()})
+        lines += [
+            f"from actionlib_core.action._action_spec import {alias[1:]} as {alias}"
+            for alias in protocols
+        ]
+        return "\n".join([*lines, ""])
+
+    def _also_taken(self, base: str) -> str:
+        plain = {f"builtin_interfaces/msg/{name}": name for name in ("Time", "Duration")}.get(base)
+        if plain is None:
+            return ""
+        self._needs.add(f"_{plain}")
+        return f" | _{plain} | float"
+
+    def _element(self, base: str, shadowed: set[str]) -> str:
+        if base in _SCALARS:
+            return self._builtin(_SCALARS[base], shadowed)
+        package, kind, short = base.split("/")
+        if (package, kind) == (self._package, self._kind):
+            return short
+        self._others.add((package, kind))
+        return f"_{package}_{kind}.{short}"
+
+    @staticmethod
+    def _path(package: str) -> str:
+        return f"{ROOT}.ros2.{package}"
 
 
 def _escaped(text: str) -> str:

@@ -1,2 +1,3 @@
 # Written by `actionlib interface stubs`; changes are lost.
 from . import msg as msg
+from . import action as action

@@ -20,7 +20,7 @@ ROOT = Path(interfaces.__file__).parents[2]
 def test_shipped_stubs_are_current() -> None:
     folder = Path(interfaces.__file__).parent
     expected = _stubs.bundled_stubs()
-    shipped = {str(p.relative_to(folder)): p.read_text() for p in folder.glob("*/*.pyi")}
+    shipped = {str(p.relative_to(folder)): p.read_text() for p in folder.rglob("*.pyi")}
     outdated = {name for name in expected | shipped if expected.get(name) != shipped.get(name)}
     assert not outdated, "Run: python -m actionlib_core.interfaces._stubs"
 

@@ -1,0 +1,2 @@
+# Written by `actionlib interface stubs`; changes are lost.
+from . import msg as msg

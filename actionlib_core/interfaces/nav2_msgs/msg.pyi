@@ -1,0 +1,20 @@
+# Written by `actionlib interface stubs`; changes are lost.
+from actionlib_core.interfaces.ros2.nav2_msgs.msg import (
+    BehaviorTreeLog as BehaviorTreeLog,
+    BehaviorTreeStatusChange as BehaviorTreeStatusChange,
+    CollisionDetectorState as CollisionDetectorState,
+    CollisionMonitorState as CollisionMonitorState,
+    Costmap as Costmap,
+    CostmapFilterInfo as CostmapFilterInfo,
+    CostmapMetaData as CostmapMetaData,
+    CostmapUpdate as CostmapUpdate,
+    EdgeCost as EdgeCost,
+    MissedWaypoint as MissedWaypoint,
+    Particle as Particle,
+    ParticleCloud as ParticleCloud,
+    Route as Route,
+    RouteEdge as RouteEdge,
+    RouteNode as RouteNode,
+    SpeedLimit as SpeedLimit,
+    VoxelGrid as VoxelGrid,
+)
