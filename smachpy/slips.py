@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from types import FrameType
@@ -27,7 +27,7 @@ class SlipWarning(UserWarning):
 
 
 _accepting = [False]
-_registry: dict[Any, Any] = {}
+_told: set[tuple[str, int, str]] = set()
 
 
 def accepting() -> bool:
@@ -38,7 +38,7 @@ def accepting() -> bool:
 def set_accepting(on: bool) -> None:
     """Accept slips from now on, or refuse them; which ones were told is forgotten."""
     _accepting[0] = on
-    _registry.clear()
+    _told.clear()
 
 
 def accepts(problem: str) -> bool:
@@ -54,13 +54,10 @@ def accepts(problem: str) -> bool:
         return False
     frame = _program_frame(sys._getframe(1))  # as `warnings` looks for its caller
     file, line = (frame.f_code.co_filename, frame.f_lineno) if frame else ("smachpy", 0)
-    warnings.warn_explicit(
-        f"{problem} SMACH went on with it, and so does this run.",
-        SlipWarning,
-        file,
-        line,
-        registry=_registry,
-    )
+    if (file, line, problem) not in _told:
+        _told.add((file, line, problem))
+        text = f"{problem} SMACH went on with it, and so does this run."
+        warnings.warn_explicit(text, SlipWarning, file, line)
     return True
 
 

@@ -66,7 +66,7 @@ def to_tree(source: bytes, filename: str) -> ast.Module:
     try:
         tree = ast.parse(text, filename)
     except SyntaxError as error:
-        return _convert(_straight(text), filename, error)
+        return _convert(straight(text), filename, error)
     if _GONE.search(text):
         return _parse_as(text, convert(text, _NAMES), filename)
     return tree
@@ -87,7 +87,7 @@ def read(source: bytes) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def _straight(text: str) -> str:
+def straight(text: str) -> str:
     """Indent with spaces only: Python 2 took a tab for the way to the next multiple of eight."""
     return _INDENT.sub(lambda match: match[0].expandtabs(8), text)
 
@@ -137,7 +137,8 @@ def _tool(names: tuple[str, ...] | None) -> tuple[Any, type[Exception]]:
     options = {"print_function": True, "exec_function": True} if names else {}
     fixers = [f"fissix.fixes.fix_{name}" for name in wanted]
     tool = refactor.RefactoringTool(fixers, options)
-    tool.log_message = tool.log_debug = tool.log_error = lambda *_args, **_kwargs: None
+    tool.log_message = tool.log_debug = lambda *_args: None
+    tool.log_error = _raise_on  # it would log what is no Python 2, and return None
     return tool, (parse.ParseError, tokenize.TokenError)  # type: ignore[return-value]
 
 
@@ -156,6 +157,11 @@ def _parse_as(text: str, converted: str, filename: str) -> ast.Module:
                 if getattr(place, "end_lineno", None):
                     place.end_lineno = max(lines[place.end_lineno], place.lineno)
     return tree
+
+
+def _raise_on(*_args: Any, **_kwargs: Any) -> None:
+    """Raise what the caller has just caught."""
+    raise  # noqa: PLE0704  called where it was caught
 
 
 class _StringFunctions(ast.NodeTransformer):

@@ -37,6 +37,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--mission-rate", type=float, help="virtual seconds per real second, to watch missions"
     )
     group.addoption(
+        "--ros1",
+        action="store_true",
+        help="tests and missions are scripts for ROS 1: rospy, smach and the others are there",
+    )
+    group.addoption(
         "--mission-coverage", action="store_true", help="measure what the tests run of the missions"
     )
     group.addoption(
@@ -72,6 +77,11 @@ def pytest_configure(config: pytest.Config) -> None:
 
         measuring = _Measuring(config, Coverage())
         config.pluginmanager.register(measuring, "mission-coverage")
+    if config.getoption("ros1"):
+        from smachpy import ros1
+
+        ros1.install(Path(str(config.rootpath)) / "conftest.py")
+        config.add_cleanup(ros1.uninstall)
     made = session.Session(
         _seeds(config) or (config.getoption("mission_seed"),),
         config.getoption("mission_rate"),

@@ -1,0 +1,57 @@
+"""`smachpy port`: a script for ROS 1 in this package's own words."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.output import printable
+from smachpy.command.targets import TargetError
+
+if TYPE_CHECKING:
+    import argparse
+
+
+def register(subparsers: Any) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "port",
+        help="rewrite a script for ROS 1",
+        description="Rewrite a script for ROS 1 in smachpy's own words, comments and layout kept, "
+        "and list what a person must look at.",
+    )
+    parser.add_argument("script", type=Path, metavar="SCRIPT", help="it stays as it is")
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="the new script; it must not exist yet (default: standard output)",
+    )
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Rewrite the script; notes go to the standard error output."""
+    from smachpy.ros1.port import port_file
+
+    try:
+        ported = port_file(args.script)
+    except OSError as error:
+        raise TargetError(str(args.script), f"got {error}; expected a script.") from error
+    except SyntaxError as error:
+        raise TargetError(
+            str(args.script), f"line {error.lineno}: got {error.msg}; expected Python, 2 or 3."
+        ) from error
+    if args.output is None:
+        sys.stdout.write(ported.text)
+    else:
+        try:
+            with Path(args.output).open("x", encoding="utf-8") as file:
+                file.write(ported.text)
+        except OSError as error:
+            raise TargetError(args.output, f"got {error}; expected a new file.") from error
+        print(args.output)
+    for line, text in ported.notes:
+        print(printable(f"{args.script}:{line}: {text}"), file=sys.stderr)
+    return 0

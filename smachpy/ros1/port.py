@@ -1,0 +1,350 @@
+"""`smachpy port`: an old script in this package's own words, comments and layout kept.
+
+What has one meaning is rewritten; what needs a person is left as it is and listed, with its line.
+
+    import smach, smach_ros                      import smachpy
+    smach.State.__init__(self, outcomes=[...])   super().__init__(outcomes=[...])
+    with sm: smach.StateMachine.add('A', ...)    with sm: sm.add('A', ...)
+    rospy.sleep(2) in a state                    self.sleep(2)
+    rospy.loginfo("x")                           logger.info("x")
+"""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+
+from smachpy.ros1 import python2
+from smachpy.ros1.extra import import_extra
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+_LOG: Final = {
+    "logdebug": "debug",
+    "loginfo": "info",
+    "logwarn": "warning",
+    "logwarning": "warning",
+    "logerr": "error",
+    "logerror": "error",
+    "logfatal": "critical",
+}
+_ROSPY: Final = {
+    "Duration": "actionlib_core.Duration",
+    "Publisher": "actionlib_core.Publisher",
+    "Service": "actionlib_core.Service",
+    "ServiceException": "actionlib_core.ServiceException",
+    "ServiceProxy": "actionlib_core.ServiceProxy",
+    "Subscriber": "actionlib_core.Subscriber",
+    "Time": "actionlib_core.Time",
+    "is_shutdown": "smachpy.is_shutdown",
+    "wait_for_message": "actionlib_core.wait_for_message",
+    "wait_for_service": "actionlib_core.wait_for_service",
+}
+"""Names of rospy with the same arguments here."""
+
+_HINTS: Final = {
+    "Rate": "a loop with self.sleep(seconds) ends early on a preempt",
+    "Timer": "use the clock of actionlib_core.clock, or a state with a timeout",
+    "get_param": "make it an argument of the mission's function: `smachpy run FILE --input K=V`",
+    "myargv": "make the arguments those of the mission's function",
+    "on_shutdown": "actionlib_core.shutdown.on_shutdown(function), in a thread of its own",
+    "set_param": "keep it in userdata",
+    "signal_shutdown": "actionlib_core.shutdown.request(reason), or return from the function",
+    "sleep": "outside of a state: actionlib_core.clock.current_clock().sleep(seconds)",
+    "spin": "nothing is needed: `smachpy run` ends with the machine",
+}
+_WANTS_FUNCTION: Final = (
+    "`smachpy run FILE` wants a function `mission()` that returns the machine in place of one that "
+    "executes it"
+)
+_CONTAINERS: Final = {
+    ("StateMachine", "add"),
+    ("StateMachine", "add_auto"),
+    ("Concurrence", "add"),
+    ("Sequence", "add"),
+    ("Iterator", "set_contained_state"),
+    ("Iterator", "set_iteritems"),
+}
+
+
+@dataclass(slots=True)
+class Ported:
+    """A script in the new form.
+
+    Attributes:
+        text: Its source.
+        notes: What a person must look at: line of the old script, and why.
+    """
+
+    text: str
+    notes: list[tuple[int, str]] = field(default_factory=list)
+
+
+def port(source: bytes, filename: str) -> Ported:
+    """Rewrite a script for ROS 1.
+
+    Raises:
+        SyntaxError: it is Python in neither version.
+        MissingExtraError: libcst is not installed.
+    """
+    cst = import_extra("libcst", "smachpy port")
+    metadata = import_extra("libcst.metadata", "smachpy port")
+    text = python2.read(source)
+    notes: list[tuple[int, str]] = []
+    try:
+        ast.parse(text, filename)
+    except SyntaxError:
+        text = python2.convert(python2.straight(text))
+        ast.parse(text, filename)
+        notes.append((1, "it was Python 2: look at divisions of whole numbers, and at text"))
+    wrapper = metadata.MetadataWrapper(cst.parse_module(text))
+    transformer = _transformer(cst, metadata)(_packages(text))
+    module = wrapper.visit(transformer)
+    code = str(module.code)
+    if any(isinstance(n, ast.Name) and n.id == "rospy" for n in ast.walk(ast.parse(code))):
+        notes.append((1, "rospy is still used: such a script runs by `smachpy run --ros1 FILE`"))
+    else:
+        code = str(module.visit(_forget(cst, "rospy")).code)
+    code = _add_imports(code, transformer)
+    if transformer.main_line:
+        notes.append(
+            (
+                transformer.main_line,
+                _WANTS_FUNCTION,
+            )
+        )
+    return Ported(code, sorted({*notes, *transformer.notes}))
+
+
+def port_file(path: Path) -> Ported:
+    """Rewrite a file; see `port`."""
+    return port(path.read_bytes(), str(path))
+
+
+def _packages(text: str) -> set[str]:
+    """Return the packages of messages that a script imports, of those that are known here."""
+    from importlib.util import find_spec
+
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(text)):
+        names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+        names += [name.name for name in node.names] if isinstance(node, ast.Import) else []
+        for name in names:
+            package, _, section = name.partition(".")
+            known = find_spec(f"actionlib_core.interfaces.{package}") if package else None
+            if section in {"msg", "srv"} and known is not None:
+                found.add(package)
+    return found
+
+
+def _add_imports(code: str, transformer: Any) -> str:
+    """Put the imports that the new names need where the first import was."""
+    wanted = [f"import {name}" for name in sorted(transformer.needs)]
+    if transformer.logs:
+        wanted = ["import logging", *wanted]
+    lines = code.splitlines(keepends=True)
+    tree = ast.parse(code)
+    there = {ast.unparse(node) for node in tree.body if isinstance(node, ast.Import)}
+    wanted = [line for line in wanted if line not in there]
+    body = [n for n in tree.body if not (isinstance(n, ast.Expr) and n is tree.body[0])]
+    future = [n for n in body if isinstance(n, ast.ImportFrom) and n.module == "__future__"]
+    first = (future[-1].end_lineno or 0) if future else (body[0].lineno - 1 if body else 0)
+    added = [f"{line}\n" for line in wanted]
+    lines[first:first] = added
+    if transformer.logs:
+        imports = [n for n in tree.body if isinstance(n, ast.Import | ast.ImportFrom)]
+        last = max((n.end_lineno or 0 for n in imports), default=0)
+        last = max(last, first) + len(added)
+        lines[last:last] = ["\nlogger = logging.getLogger(__name__)\n"]
+    return "".join(lines)
+
+
+def _forget(cst: Any, name: str) -> Any:
+    """Return what removes `import name`."""
+
+    class Forget(cst.CSTTransformer):  # type: ignore[misc]
+        def leave_Import(self, original_node: Any, updated_node: Any) -> Any:
+            del original_node
+            kept = [a for a in updated_node.names if getattr(a.name, "value", "") != name]
+            if not kept:
+                return cst.RemoveFromParent()
+            kept[-1] = kept[-1].with_changes(comma=cst.MaybeSentinel.DEFAULT)
+            return updated_node.with_changes(names=kept)
+
+    return Forget()
+
+
+def _transformer(cst: Any, metadata: Any) -> Any:  # noqa: C901  a class that needs libcst
+    """Return the class that rewrites; libcst is only there with the extra."""
+
+    def dotted(name: str) -> Any:
+        parts = name.split(".")
+        made = cst.Name(parts[0])
+        for part in parts[1:]:
+            made = cst.Attribute(made, cst.Name(part))
+        return made
+
+    def text_of(node: Any) -> str:
+        if isinstance(node, cst.Name):
+            return str(node.value)
+        if isinstance(node, cst.Attribute):
+            before = text_of(node.value)
+            return f"{before}.{node.attr.value}" if before else ""
+        return ""
+
+    class Rewrite(cst.CSTTransformer):  # type: ignore[misc]
+        METADATA_DEPENDENCIES = (metadata.PositionProvider,)
+
+        def __init__(self, packages: set[str]) -> None:
+            super().__init__()
+            self.packages = packages
+            self.needs: set[str] = set()
+            self.logs = False
+            self.notes: set[tuple[int, str]] = set()
+            self.main_line = 0
+            self._opened: list[str] = []
+            self._classes: list[tuple[str, bool]] = []  # its base, whether it is a state
+            self._functions: list[str] = []
+
+        def note(self, node: Any, text: str) -> None:
+            line = self.get_metadata(metadata.PositionProvider, node).start.line
+            self.notes.add((line, text))
+
+        # -- where we are ----------------------------------------------------------------------
+
+        def visit_ClassDef(self, node: Any) -> None:
+            bases = [text_of(base.value) for base in node.bases]
+            base = bases[0] if len(bases) == 1 else ""
+            self._classes.append((base, base.rpartition(".")[2] == "State"))
+
+        def leave_ClassDef(self, original_node: Any, updated_node: Any) -> Any:
+            del original_node
+            self._classes.pop()
+            return updated_node
+
+        def visit_FunctionDef(self, node: Any) -> None:
+            self._functions.append(node.params.params[0].name.value if node.params.params else "")
+
+        def leave_FunctionDef(self, original_node: Any, updated_node: Any) -> Any:
+            del original_node
+            self._functions.pop()
+            return updated_node
+
+        def visit_With(self, node: Any) -> None:
+            self._opened.append(text_of(node.items[0].item) if len(node.items) == 1 else "")
+
+        def leave_With(self, original_node: Any, updated_node: Any) -> Any:
+            del original_node
+            self._opened.pop()
+            return updated_node
+
+        def visit_If(self, node: Any) -> None:
+            test = node.test
+            if isinstance(test, cst.Comparison) and text_of(test.left) == "__name__":
+                self.main_line = self.get_metadata(metadata.PositionProvider, node).start.line
+
+        # -- imports ---------------------------------------------------------------------------
+
+        def leave_Import(self, original_node: Any, updated_node: Any) -> Any:
+            kept = []
+            for alias in updated_node.names:
+                name = text_of(alias.name)
+                if name in {"smach", "smach_ros"} and alias.asname is None:
+                    self.needs.add("smachpy")
+                elif name == "roslib" and alias.asname is None:
+                    continue
+                elif name == "actionlib" and alias.asname is None:
+                    self.needs.add("actionlib_core")
+                elif name == "rospy" and alias.asname is None:
+                    kept.append(alias)
+                elif name.partition(".")[0] in self.packages:
+                    self.note(original_node, f"import {name}: import its classes by name")
+                    kept.append(alias)
+                else:
+                    kept.append(alias)
+            if not kept:
+                return cst.RemoveFromParent()
+            kept[-1] = kept[-1].with_changes(comma=cst.MaybeSentinel.DEFAULT)
+            return updated_node.with_changes(names=kept)
+
+        def leave_ImportFrom(self, original_node: Any, updated_node: Any) -> Any:
+            if updated_node.module is None:
+                return updated_node
+            name = text_of(updated_node.module)
+            package, _, rest = name.partition(".")
+            if package in self.packages and rest in {"msg", "srv"}:
+                return updated_node.with_changes(module=dotted(f"actionlib_core.interfaces.{name}"))
+            star = isinstance(updated_node.names, cst.ImportStar)
+            new = {"smach": "smachpy", "smach_ros": "smachpy", "actionlib": "actionlib_core"}
+            if name in new and not star:
+                return updated_node.with_changes(module=dotted(new[name]))
+            if package in {*new, "rospy", "tf"}:
+                self.note(original_node, f"from {name} import ...: name what is used, from smachpy")
+            return updated_node
+
+        # -- names and calls -------------------------------------------------------------------
+
+        def leave_Attribute(self, original_node: Any, updated_node: Any) -> Any:
+            name = text_of(original_node)
+            package, _, rest = name.partition(".")
+            if not rest or "." in rest:
+                return updated_node
+            if package in {"smach", "smach_ros"}:
+                return updated_node.with_changes(value=cst.Name("smachpy"))
+            if package == "actionlib":
+                return updated_node.with_changes(value=cst.Name("actionlib_core"))
+            if package == "rospy" and rest in _ROSPY:
+                home = _ROSPY[rest].partition(".")[0]
+                self.needs.add(home)
+                return dotted(_ROSPY[rest])
+            if package == "rospy" and rest not in _LOG:
+                hint = _HINTS.get(rest, "it has no twin of the same meaning")
+                if not (rest == "sleep" and self._in_state()) and rest != "init_node":
+                    self.note(original_node, f"rospy.{rest}: {hint}")
+            return updated_node
+
+        def _in_state(self) -> bool:
+            return bool(self._classes and self._classes[-1][1] and self._functions[-1:] == ["self"])
+
+        def leave_Call(self, original_node: Any, updated_node: Any) -> Any:
+            name = text_of(original_node.func)
+            package, _, rest = name.partition(".")
+            if package == "rospy" and rest in _LOG:
+                self.logs = True
+                return updated_node.with_changes(func=dotted(f"logger.{_LOG[rest]}"))
+            if name == "rospy.sleep" and self._in_state():
+                return updated_node.with_changes(func=dotted("self.sleep"))
+            if name == "rospy.init_node" and len(updated_node.args) == 1:
+                self.needs.add("actionlib_core")
+                return updated_node.with_changes(func=dotted("actionlib_core.init"))
+            made = self._super_call(name, updated_node)
+            if made is not None:
+                return made
+            if name == "rospy.init_node":
+                self.note(original_node, "rospy.init_node: actionlib_core.init(name) takes a name")
+            words = tuple(name.split(".")[-2:])
+            opened = self._opened[-1] if self._opened else ""
+            if words in _CONTAINERS and opened:
+                return updated_node.with_changes(func=dotted(f"{opened}.{words[1]}"))
+            return updated_node
+
+        def _super_call(self, name: str, node: Any) -> Any:
+            base = self._classes[-1][0] if self._classes else ""
+            given = node.args
+            if not base or name != f"{base}.__init__" or not given:
+                return None
+            if text_of(given[0].value) != "self":
+                return None
+            function = cst.Attribute(cst.Call(cst.Name("super")), cst.Name("__init__"))
+            return node.with_changes(func=function, args=given[1:])
+
+        def leave_Expr(self, original_node: Any, updated_node: Any) -> Any:
+            """Remove `roslib.load_manifest(...)`."""
+            value = original_node.value
+            if isinstance(value, cst.Call) and text_of(value.func) == "roslib.load_manifest":
+                return cst.RemoveFromParent()
+            return updated_node
+
+    return Rewrite

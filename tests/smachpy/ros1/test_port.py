@@ -1,0 +1,106 @@
+"""`smachpy port`: what comes out is Python, does the same, and what is left is said with its line."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from smachpy.ros1.port import port
+
+SCRIPTS = Path(__file__).parents[2] / "ros1_scripts"
+OLD = b"""#!/usr/bin/env python
+# a comment that stays
+import roslib; roslib.load_manifest('x')
+import rospy
+import smach  # and this one
+import smach_ros
+from std_srvs.srv import Trigger
+
+
+class Foo(smach.State):
+    def __init__(self):
+        smach.State.__init__(self, outcomes=['ok'])
+
+    def execute(self, userdata):
+        rospy.loginfo("in %s",   'foo')   # layout stays
+        rospy.sleep(0.1)
+        return 'ok'
+
+
+def main():
+    rospy.init_node('x')
+    sm = smach.StateMachine(outcomes=['ok'])
+    with sm:
+        smach.StateMachine.add('FOO', Foo())
+        inner = smach.Concurrence(outcomes=['ok'], default_outcome='ok')
+        with inner:
+            smach.Concurrence.add('BAR', Foo())
+    print(sm.execute())
+
+
+if __name__ == '__main__':
+    main()
+"""
+
+
+def test_the_new_script_runs_by_itself(tmp_path):
+    ported = port(OLD, "old.py")
+    script = tmp_path / "new.py"
+    script.write_text(ported.text)
+    done = subprocess.run(
+        [sys.executable, script], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert done.stdout == "ok\n"
+
+
+def test_what_is_rewritten():
+    text = port(OLD, "old.py").text
+    assert "# a comment that stays\n" in text
+    assert "import roslib" not in text
+    assert "import rospy" not in text
+    assert "from actionlib_core.interfaces.std_srvs.srv import Trigger\n" in text
+    assert "super().__init__(outcomes=['ok'])\n" in text
+    assert "logger.info(\"in %s\",   'foo')   # layout stays\n" in text
+    assert "self.sleep(0.1)\n" in text
+    assert "sm.add('FOO', Foo())\n" in text
+    assert "inner.add('BAR', Foo())\n" in text
+
+
+def test_what_a_person_must_look_at():
+    ported = port(b"import rospy\nx = rospy.get_param('~x')\n\nrospy.spin()\n", "old.py")
+    assert [line for line, _ in ported.notes] == [1, 2, 4]
+    assert "rospy.get_param" in ported.notes[1][1]
+
+
+@pytest.mark.parametrize("source", [b"def f(:\n", b"print 'a' +\n"])
+def test_what_is_no_python(source):
+    with pytest.raises(SyntaxError):
+        port(source, "bad.py")
+
+
+@pytest.mark.parametrize("path", sorted(SCRIPTS.glob("*.py")), ids=lambda path: path.name)
+def test_all_scripts_give_python(path):
+    before = path.read_bytes()
+    ported = port(before, str(path))
+    ast.parse(ported.text)
+    assert path.read_bytes() == before
+    again = port(ported.text.encode(), str(path))
+    assert again.text.count("import smachpy") <= 2
+
+
+def test_the_command_writes_no_file_twice(tmp_path):
+    from smachpy.command import main
+
+    script, new = tmp_path / "old.py", tmp_path / "new.py"
+    script.write_bytes(OLD)
+    assert main(["port", str(script), "-o", str(new)]) == 0
+    first = new.read_text()
+    assert main(["port", str(script), "-o", str(new)]) == 2
+    assert new.read_text() == first
+    assert main(["port", str(tmp_path / "none.py")]) == 2
+    script.write_text("def f(:\n")
+    assert main(["port", str(script)]) == 2

@@ -1,0 +1,168 @@
+"""Slips that SMACH accepted: warned of once, with the line; refused, and better told, elsewhere."""
+
+from __future__ import annotations
+
+import warnings
+
+import pytest
+
+import smachpy
+from smachpy import InvalidStateError, ReadOnlyError, UserDataKeyError, ros1, slips
+
+
+def done(userdata):
+    return "done"
+
+
+class Plain(smachpy.State):
+    def __init__(self, **more):
+        super().__init__(outcomes=["done"], **more)
+
+    def execute(self, userdata):
+        return "done"
+
+
+class NoInit(smachpy.State):
+    def __init__(self):
+        self.count = 1
+
+    def execute(self, userdata):
+        return "done"
+
+
+class Duck:
+    outcome = "done"
+
+    def execute(self, userdata):
+        return self.outcome
+
+    def get_registered_outcomes(self):
+        return ["done"]
+
+
+class Changes(Plain):
+    def __init__(self):
+        super().__init__(input_keys=["seen"])
+
+    def execute(self, userdata):
+        userdata.seen.append(1)
+        userdata.seen.append(2)
+        return "done"
+
+
+class Writes(Plain):
+    def execute(self, userdata):
+        userdata.undeclared = 1
+        return "done"
+
+
+def machine(*states, **values):
+    sm = smachpy.StateMachine(outcomes=["done"])
+    for key, value in values.items():
+        sm.userdata[key] = value
+    with sm:
+        for index, state in enumerate(states):
+            last = index == len(states) - 1
+            sm.add(str(index), state, {"done": "done" if last else str(index + 1)})
+    return sm
+
+
+def early_initial():
+    sm = smachpy.StateMachine(outcomes=["done"])
+    with sm:
+        sm.set_initial_state(["LATER"])
+        sm.add("FIRST", Plain(), {"done": "LATER"})
+        sm.add("LATER", Plain())
+    assert sm.get_initial_states() == ["LATER"]
+    return sm
+
+
+def empty_label():
+    sm = smachpy.StateMachine(outcomes=["done"])
+    with sm:
+        sm.add("", Plain())
+    return sm
+
+
+def unknown_rules():
+    cc = smachpy.Concurrence(["done"], "done", outcome_map={"never": {"A": "preempted"}})
+    with cc:
+        cc.add("A", Plain())
+        cc.add("A", Plain())
+    return cc
+
+
+SLIPS = {
+    "early_initial": (early_initial, InvalidStateError),
+    "empty_label": (empty_label, InvalidStateError),
+    "no_init": (lambda: machine(NoInit()), InvalidStateError),
+    "duck": (lambda: machine(Duck()), InvalidStateError),
+    "changes": (lambda: machine(Changes(), seen=[]), ReadOnlyError),
+    "writes": (lambda: machine(Writes()), UserDataKeyError),
+    "rules": (unknown_rules, InvalidStateError),
+    "string": (lambda: machine(smachpy.CBState(done, outcomes="done")), InvalidStateError),
+}
+
+
+@pytest.fixture
+def accepted(tmp_path):
+    with ros1.installed(tmp_path / "script.py"):
+        yield
+
+
+@pytest.mark.parametrize("name", SLIPS)
+def test_a_slip_runs_with_a_warning_at_its_line(name, accepted):
+    make, _ = SLIPS[name]
+    with pytest.warns(slips.SlipWarning) as caught:
+        outcome = make().execute()
+    assert outcome == "done"
+    assert all(warning.filename == __file__ for warning in caught)
+    assert all(warning.lineno > 0 for warning in caught)
+
+
+@pytest.mark.parametrize("name", SLIPS)
+def test_a_slip_is_an_error_elsewhere(name):
+    make, error = SLIPS[name]
+    with pytest.raises((error, smachpy.SmachError)):
+        make().execute()
+
+
+def test_each_slip_is_told_once(accepted):
+    sm = machine(Changes(), seen=[])
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for _ in range(3):
+            sm.execute()
+    lines = [(w.filename, w.lineno) for w in caught]
+    assert len(lines) == len(set(lines)) == 2
+    assert sm.userdata.seen == [1, 2] * 3
+
+
+def test_the_initial_state_is_said_to_be_missing_yet():
+    with pytest.raises(InvalidStateError) as caught:
+        early_initial()
+    assert "not added yet" in str(caught.value)
+
+
+def test_a_read_only_error_names_key_and_state():
+    with pytest.raises(ReadOnlyError) as caught:
+        machine(Changes(), seen=[]).execute()
+    assert (caught.value.key, caught.value.path) == ("seen", "/SM_ROOT/0")
+
+
+def test_a_monitor_state_without_init_is_named():
+    class Watch(smachpy.MonitorState):
+        def __init__(self):
+            self.count = 0
+
+    with pytest.raises(InvalidStateError) as caught:
+        machine(Watch())
+    assert "Watch" in str(caught.value)
+
+
+def test_wrapper_outcomes_that_the_container_lacks(accepted):
+    from actionlib_core.interfaces.actionlib.msg import TestAction
+    from smachpy.testing import MissionKit
+
+    with MissionKit(), pytest.warns(slips.SlipWarning):
+        smachpy.ActionServerWrapper("x", TestAction, machine(Plain()), ["done", "not_there"])
