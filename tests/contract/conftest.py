@@ -63,6 +63,18 @@ class World:
         self.nodes.append(node)
         return node
 
+    def text(self, said: str) -> str:
+        """Return what a client reads where a server has said something about a goal's end."""
+        return said
+
+    def refusal(self, said: str) -> str:
+        """The same of a goal that was refused."""
+        return said
+
+    def end(self, status: str) -> str:
+        """Return the end that a client sees where the server has one of the suite."""
+        return status
+
     def event(self):
         return self.clock.event()
 

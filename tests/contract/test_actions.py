@@ -99,7 +99,7 @@ def test_goal_succeeds_with_feedback_and_callbacks_in_order(world):
     assert seen == ["active", 0, 1, 2, ("done", S.SUCCEEDED, 42, SimpleGoalState.DONE)]
     assert client.get_state() == S.SUCCEEDED
     assert client.get_result() == msg.TestResult(42)
-    assert client.get_goal_status_text() == "doubled"
+    assert client.get_goal_status_text() == world.text("doubled")
 
 
 def test_goals_one_after_another(world):
@@ -118,7 +118,10 @@ def test_cancel_preempts(world):
     doubler.wait_started()
     client.cancel_goal()
     assert client.wait_for_result(LONG_S)
-    assert (client.get_state(), client.get_goal_status_text()) == (S.PREEMPTED, "stopped")
+    assert (client.get_state(), client.get_goal_status_text()) == (
+        S.PREEMPTED,
+        world.text("stopped"),
+    )
 
 
 def test_execute_timeout_cancels(world):
@@ -183,10 +186,11 @@ def test_execute_callback_without_end_or_with_an_exception_aborts(world, caplog)
     SimpleActionServer("demo", msg.TestAction, execute, node=world.node("server"))
     client = simple_client(world)
     assert client.send_goal_and_wait(msg.TestGoal(0), LONG_S) == S.ABORTED
-    assert client.get_goal_status_text() == "No terminal state was set."
+    assert client.get_goal_status_text() == world.text("No terminal state was set.")
     with caplog.at_level(logging.CRITICAL):
         assert client.send_goal_and_wait(msg.TestGoal(1), LONG_S) == S.ABORTED
-    assert client.get_goal_status_text() == "Exception in execute callback: no battery"
+    said = world.text("Exception in execute callback: no battery")
+    assert client.get_goal_status_text() == said
 
 
 def test_goal_callback_style_accepts_and_rejects(world):
@@ -203,7 +207,7 @@ def test_goal_callback_style_accepts_and_rejects(world):
     server.start()
     client = simple_client(world)
     assert client.send_goal_and_wait(msg.TestGoal(13), LONG_S) == S.REJECTED
-    assert client.get_goal_status_text() == "unlucky"
+    assert client.get_goal_status_text() == world.refusal("unlucky")
     assert client.send_goal_and_wait(msg.TestGoal(3), LONG_S) == S.SUCCEEDED
 
 
@@ -290,7 +294,7 @@ def test_goals_sent_as_servers_come_and_go_run_once_and_none_is_lost(world):
     for number, handle in enumerate(handles):
         state = handle.get_terminal_state()
         if state is TerminalState.REJECTED:  # it waited in the queue as its server was stopped
-            assert handle.get_goal_status_text() == "The action server was stopped"
+            assert handle.get_goal_status_text() == world.refusal("The action server was stopped")
             assert ran[number] == 0
         else:
             assert state is TerminalState.SUCCEEDED, handle.get_goal_status_text()
@@ -508,9 +512,9 @@ def test_many_goals_each_accepted_rejected_or_cancelled(world):
             handle.cancel()
     assert all(handle.wait(LONG_S) for handle in sent)
     names = [handle.get_terminal_state().name for handle in sent]
-    assert names == ["REJECTED", "SUCCEEDED", "PREEMPTED"] * 4
+    assert [world.end(name) for name in names] == ["REJECTED", "SUCCEEDED", "PREEMPTED"] * 4
     assert sent[2].get_result() == msg.TestResult(-1)
-    assert sent[0].get_goal_status_text() == "divisible"
+    assert sent[0].get_goal_status_text() == world.refusal("divisible")
     with pytest.raises(IllegalTransitionError, match=r"cannot go REJECTED -> ACTIVE"):
         handles[0].set_accepted()
     server.stop()
@@ -537,7 +541,8 @@ def test_goal_callback_that_raises_ends_the_goal(world, monkeypatch):
         handle = client.send_goal(msg.TestGoal(number))
         assert handle.wait(LONG_S)
         assert handle.get_terminal_state().name == state
-        assert handle.get_goal_status_text() == "Exception in goal callback: no map"
+        said = world.refusal if state == "REJECTED" else world.text
+        assert handle.get_goal_status_text() == said("Exception in goal callback: no map")
     assert both.wait(LONG_S)
     assert raised == [RuntimeError] * 2
 

@@ -48,6 +48,7 @@ from actionlib_core.wire.ros2.network import ros_network
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from actionlib_core.clock import Timer
     from actionlib_core.goal.ports import ClientListener
     from actionlib_core.node import Node
     from actionlib_core.transport import Closable, Reply, Sample
@@ -64,6 +65,7 @@ FOREVER_S = 1e8  # for the network, which wants a number: three years
 AT_ONCE = 8  # goals on their way: a ROS 2 server's queue holds 10 requests and drops the oldest
 PAUSE_S = 0.1  # before a question that was not answered is asked again; then twice as long
 LONGEST_S = 2.0
+LAST_WORDS_S = 0.03  # answers of a server that leaves may come so long after its tokens went
 
 TEXT_REFUSED = "the server refused the goal"
 TEXT_RECALLED = "This goal was canceled before any action server could have it"
@@ -183,6 +185,7 @@ class RosClientPort:
         self._sending: set[_Goal] = set()
         self._there: dict[RosServer, TypeMismatchError | None] = {}
         self._silent: set[RosServer] = set()
+        self._leaving: dict[RosServer, Timer] = {}
         self._probe = LinkProbe(
             node.clock,
             network.settings.probe,
@@ -217,6 +220,10 @@ class RosClientPort:
                 declared += goal.open.values()
                 goal.open.clear()
             self._closed = True
+            timers = list(self._leaving.values())
+            self._leaving.clear()
+        for timer in timers:
+            timer.cancel()
         for entry in reversed(declared):
             entry.close()
 
@@ -604,8 +611,9 @@ class RosClientPort:
             else:
                 self._there.pop(server, None)
         if not change.alive:
-            self._lose(server, "is gone")
+            self._lose_soon(server)
             return
+        self._lose_now()
         self._hear()
         if error is not None:
             self._readable.report(f"{server.session} {server.node}", error)
@@ -620,6 +628,26 @@ class RosClientPort:
         return TypeMismatchError(
             self._name, own, found, by=f"action server of node {change.server.node!r}"
         )
+
+    def _lose_soon(self, server: RosServer) -> None:
+        """Take the loss of a server after its last answers, which its tokens may overtake."""
+        with self._lock:
+            asked = any(goal.open for goal in self._goals.values())
+            if asked and not self._closed:
+                later = self._clock.call_later(LAST_WORDS_S, partial(self._lose_now, server))
+                self._leaving[server] = later
+        if not asked:
+            self._lose(server, "is gone")
+
+    def _lose_now(self, only: RosServer | None = None) -> None:
+        """Take the loss of a server that has left, or of all that have."""
+        with self._lock:
+            left = [server for server in self._leaving if only in {None, server}]
+            timers = [self._leaving.pop(server) for server in left]
+        for timer in timers:
+            timer.cancel()
+        for server in left:
+            self._lose(server, "is gone")
 
     def _lose(self, server: RosServer, why: str) -> None:
         """Take the loss of a server: what was asked there is answered no more."""

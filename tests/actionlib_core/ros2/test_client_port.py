@@ -360,6 +360,18 @@ def test_goals_of_a_server_that_dies_are_lost_at_once(world):
     assert "node 'robot'" in handle.get_goal_status_text()
 
 
+def test_last_answer_of_a_server_that_leaves_may_come_after_its_tokens_went(world):
+    server, client = world.server(), world.client()
+    handle, uuid, _ = begin(server, client)
+    for end in server.ends:
+        end.close()
+    world.clock.sleep(0.01)
+    server.end(uuid, 6)
+    assert handle.wait(5.0)
+    assert handle.get_goal_status() == Status.ABORTED
+    assert not client.wait_for_server(0.1)
+
+
 def test_goal_outlives_a_lost_link_within_the_time_given(world):
     server, client = world.server(), world.client(server_lost_timeout=300.0)
     handle, uuid, _ = begin(server, client)

@@ -1,0 +1,88 @@
+"""What action clients and servers promise, on ROS 2's wire: the suite of our own, on every network.
+
+The names of the suite are on ROS 2 by configuration, their ROS 1 types with the ROS 2 type of the same
+fields, so that goals cross the wire as those of ROS 2 nodes do.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+import pytest
+
+from actionlib_core.config import Config, Ros2
+from actionlib_core.interfaces._ros2 import ros2_registry
+from actionlib_core.transport.faulty import FaultyTransport
+from actionlib_core.wire.ros2.client_port import TEXT_REFUSED
+from tests.contract.conftest import LATE_S, SEED, SmallFaults, World
+from tests.contract.test_actions import *  # noqa: F403  each test of the suite, with our `world`
+from tests.transports import TRANSPORTS, opened
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from actionlib_core.node import Node
+    from actionlib_core.transport import Transport
+
+NOT_ON_ROS2 = {
+    "test_server_is_swapped_under_a_live_client": "there is no farewell",
+    "test_goals_sent_as_servers_come_and_go_run_once_and_none_is_lost": "there is no farewell",
+    "test_copy_of_a_goal_that_outlives_its_server_does_not_run_at_the_next": "goals name no server",
+    "test_goal_runs_although_a_dead_server_still_shows_a_token": "tokens tell no age",
+    "test_second_server_that_knows_of_the_first_too_late_stops_and_the_first_goes_on": (
+        "tokens tell no age"
+    ),
+    "test_server_behind_a_bridge_is_known_by_its_status_lists": "every server shows tokens",
+    "test_wrong_type_is_an_error_on_both_sides": "test_client_port has it",
+    "test_messages_that_cannot_be_read_are_dropped_and_reported_once": "test_client_port has it",
+}
+
+ON_ROS2 = Config(ros2=(Ros2(names=("**/demo", "demo", "other", "*")),))
+
+
+class Ros2World(World):
+    """Nodes whose names are on ROS 2, where nothing is said about the end of a goal."""
+
+    def text(self, said: str) -> str:
+        return ""
+
+    def refusal(self, said: str) -> str:
+        return TEXT_REFUSED
+
+    def end(self, status: str) -> str:
+        """A goal that was not seen to run counts as recalled when it was cancelled."""
+        return "PREEMPTED" if status == "RECALLED" else status
+
+    def node(self, name: str, **kwargs: object) -> Node:
+        return super().node(name, config=ON_ROS2, **kwargs)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def definitions() -> None:
+    for name in ("Test", "TwoInts"):
+        ros2_registry("jazzy").define("action", f"actionlib/{name}", DEFINITIONS[name])
+
+
+DEFINITIONS = {
+    "Test": "int32 goal\n---\nint32 result\n---\nint32 feedback\n",
+    "TwoInts": "int64 a\nint64 b\n---\nint64 sum\n---\n",
+}
+
+
+@pytest.fixture(params=TRANSPORTS)
+def world(request: pytest.FixtureRequest) -> Iterator[World]:
+    seeds = itertools.count(SEED)
+    late = LATE_S if request.param == "faulty" else 0.0
+
+    def make_faulty(session: Transport) -> Transport:
+        return FaultyTransport(session, SmallFaults(next(seeds)))
+
+    with opened(request.param, SEED, make_faulty) as (clock, open_session):
+        world = Ros2World(clock, open_session, late=late)
+        yield world
+        world.close()
+
+
+for _name in NOT_ON_ROS2:
+    del globals()[_name]
