@@ -1,0 +1,24 @@
+"""What the plans of this folder do beside driving."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from smachpy import log, pnp
+
+if TYPE_CHECKING:
+    from smachpy import UserData
+
+
+def say(userdata: UserData, *words: str, robot: str = "") -> None:
+    """Say something, in the log."""
+    del userdata
+    log.loginfo(f"{robot or 'robot'}: {' '.join(words)}")
+
+
+def _look(userdata: UserData) -> str:
+    """Look for a cup; the simulated robot sees what the userdata says."""
+    return "cup" if "cup" in userdata and userdata.cup else "nothing"
+
+
+look = pnp.Function(_look, outcomes=("cup", "nothing"), input_keys=("cup",))

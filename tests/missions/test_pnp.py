@@ -1,0 +1,90 @@
+"""The plans of missions/pnp: loaded, checked, and driven on the simulated robot."""
+
+from pathlib import Path
+
+import pytest
+
+import missions.pnp
+import smachpy
+from missions.pnp.robot import look, say
+from smachpy import State, events
+from smachpy.pnp import load, load_plan
+from smachpy.pnp.mapping import read_mapping
+
+FOLDER = Path(missions.pnp.__file__).parent
+PLANS = ["rounds", "look", "together", "avoid", "errand", "meet"]
+
+
+def driven(plan):
+    heard = []
+    plan.subscribe(heard.append)
+    outcome = plan.execute()
+    return outcome, [e.path for e in heard if isinstance(e, events.Left)]
+
+
+@pytest.mark.parametrize("name", PLANS)
+def test_nothing_is_wrong_with_them(name):
+    plan = load_plan(FOLDER / f"{name}.pnml")
+    assert plan.problems == ()
+    assert smachpy.check(plan).ok, str(smachpy.check(plan))
+
+
+def test_together(clock, simulation):
+    outcome, left = driven(load_plan(FOLDER / "together.pnml"))
+    assert outcome == "goal"
+    assert left == ["/together/say_hello", "/together/wait_2", "/together/goto_kitchen"]
+    assert simulation.robot.body.pose.x == pytest.approx(4.6, abs=0.3)
+
+
+def test_look(clock, simulation):
+    plan = load_plan(FOLDER / "look.pnml")
+    plan.userdata.cup = True
+    outcome, left = driven(plan)
+    assert outcome == "goal"
+    assert "/look/say_cup" in left
+
+
+def test_avoid(clock, simulation):
+    plan = load_plan(FOLDER / "avoid.pnml")
+    clock.call_later(3.0, lambda: plan.post("obstacle"))
+    outcome, left = driven(plan)
+    assert outcome == "goal"
+    assert left.count("/avoid/goto_kitchen") == 2
+
+
+def test_errand(clock, simulation):
+    outcome, left = driven(load_plan(FOLDER / "errand.pnml"))
+    assert outcome == "goal"
+    assert left[-2:] == ["/errand/avoid", "/errand/goto_hall"]
+
+
+class Count(State):
+    def __init__(self, *parameters):
+        super().__init__(["succeeded"], io_keys=["rounds"])
+
+    def execute(self, ud):
+        ud.rounds = ud.rounds + 0.5 if "rounds" in ud else 0.5
+        return "succeeded"
+
+
+def test_rounds():
+    conditions = read_mapping(FOLDER / "actions.yaml").conditions
+    plan = load(FOLDER / "rounds.pnml", {"goto": Count}, conditions)
+    outcome, left = driven(plan)
+    assert (outcome, len(left)) == ("goal", 4)
+
+
+def test_meet(clock):
+    class Drive(State):
+        def __init__(self, place):
+            super().__init__(["succeeded", "preempted"])
+            self.seconds = {"kitchen": 5.0, "hall": 2.0}[place]
+
+        def execute(self, ud):
+            return "preempted" if self.sleep(self.seconds) else "succeeded"
+
+    plan = load(FOLDER / "meet.pnml", {"goto": Drive, "say": say, "look": look})
+    outcome, left = driven(plan)
+    assert outcome == "goal"
+    assert clock.now() == pytest.approx(5.0)
+    assert left[:2] == ["/meet/robot_1#goto_hall", "/meet/robot_0#goto_kitchen"]
