@@ -8,7 +8,7 @@ from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from actionlib_core.cli import UsageError
-from actionlib_core.cli._ros2 import class_of, is_ros2, merged, typed, watching
+from actionlib_core.cli._ros2 import is_ros2, merged, typed, watching
 from actionlib_core.exceptions import InterfaceError
 from actionlib_core.output import tell
 from actionlib_core.suggest import did_you_mean
@@ -240,10 +240,11 @@ def class_of_end(node: Node, end: Endpoint) -> Any:
     """Return the class of the type of an end, of ROS 1 or of ROS 2.
 
     Raises:
-        InterfaceError: its definition is not known here.
-        UsageError: a ROS 2 robot has another definition of it.
+        InterfaceError: its definition is not known here, or a ROS 2 robot has another one.
     """
     if is_ros2(end.type):
+        from actionlib_core.wire.ros2.ends import class_of
+
         load_packages()
         return class_of(node, end)
     from actionlib_core.interfaces import get_action, get_message, get_service

@@ -7,22 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.cli import UsageError
 from actionlib_core.exceptions import InterfaceError
-from actionlib_core.wire.presence import Endpoint, Kind
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
+    from types import ModuleType
 
     from actionlib_core.interfaces.ros2 import ServiceParts
     from actionlib_core.node import Node
     from actionlib_core.transport import Closable, Sample
+    from actionlib_core.wire.presence import Endpoint, Kind
     from actionlib_core.wire.ros2.action_messages import Canceling, GoalState
-    from actionlib_core.wire.ros2.names import Token
-    from actionlib_core.wire.ros2.network import RosNetwork
 
 ASK_S = 2.0
 STATUS_S = 1.0  # the last status comes within this from a server that has had a goal
-
-_FEEDBACK = "_FeedbackMessage"
 
 
 def is_ros2(type_name: str) -> bool:
@@ -30,23 +27,14 @@ def is_ros2(type_name: str) -> bool:
     return type_name.count("/") > 1
 
 
+def _ends() -> ModuleType:
+    """The room that knows ROS 2's tokens; without a robot it is not loaded."""
+    from actionlib_core.wire.ros2 import ends
+
+    return ends
+
+
 # -- who is there ----------------------------------------------------------------------------------
-
-
-def networks(node: Node) -> Iterator[RosNetwork]:
-    """Yield the networks of ROS 2 that the configuration names, joined.
-
-    Raises:
-        TransportError: one cannot be joined.
-
-    Blocks: the first time, until they are.
-    """
-    if not node.config.ros2:
-        return
-    from actionlib_core.wire.ros2.network import network_of
-
-    for settings in node.config.ros2:
-        yield network_of(node, settings)
 
 
 def list_ros2_ends(node: Node) -> list[Endpoint]:
@@ -54,67 +42,27 @@ def list_ros2_ends(node: Node) -> list[Endpoint]:
 
     Blocks: until the networks have answered, a second each at most.
     """
-    found = []
-    for network in networks(node):
-        for token in network.ros.list():
-            end = end_of(network, token)
-            if end is not None:
-                found.append(end)
-    return found
-
-
-def end_of(network: RosNetwork, token: Token) -> Endpoint | None:
-    """Return what a token shows as an end of ours; None for a node and what tools hide.
-
-    Those of an action are its servers and clients, told by its feedback. The checksum is the hash.
-    """
-    from actionlib_core.wire.ros2.names import Kind as RosKind
-    from actionlib_core.wire.ros2.names import action_of
-    from actionlib_core.wire.ros2.network import name_here
-
-    action = action_of(token.name)
-    name, type_name = token.name, token.type
-    if action is not None:
-        kinds = {
-            RosKind.PUBLISHER: Kind.ACTION_SERVER,
-            RosKind.SUBSCRIPTION: Kind.ACTION_CLIENT,
-        }
-        if not (name.endswith("/feedback") and type_name.endswith(_FEEDBACK)):
-            return None
-        name, type_name = action, type_name.removesuffix(_FEEDBACK)
-    else:
-        kinds = {
-            RosKind.PUBLISHER: Kind.PUBLISHER,
-            RosKind.SUBSCRIPTION: Kind.SUBSCRIBER,
-            RosKind.SERVICE: Kind.SERVICE,
-        }
-    if token.kind not in kinds or any(word.startswith("_") for word in name.split("/")):
-        return None
-    return Endpoint(
-        kinds[token.kind],
-        name_here(network.settings, name),
-        type_name,
-        token.type_hash,
-        token.session,
-        token.full_node,
-        token.entity_id,
+    if not node.config.ros2:
+        return []
+    found = (
+        _ends().end_of(network, token)
+        for network in _ends().networks(node)
+        for token in network.ros.list()
     )
+    return [end for end in found if end is not None]
 
 
 @contextlib.contextmanager
 def watching(node: Node, on_end: Callable[[Endpoint], object]) -> Iterator[None]:
     """Tell of every end that is there or comes, on the networks' threads."""
+
+    def on_change(end: Endpoint, _key: str, alive: bool) -> None:
+        if alive:
+            on_end(end)
+
     with contextlib.ExitStack() as stack:
-        for network in networks(node):
-
-            def on_token(
-                token: Token, _key: str, alive: bool, network: RosNetwork = network
-            ) -> None:
-                end = end_of(network, token) if alive else None
-                if end is not None:
-                    on_end(end)
-
-            stack.callback(network.ros.watch(on_token).close)
+        for watch in _ends().watch_ends(node, on_change) if node.config.ros2 else ():
+            stack.callback(watch.close)
         yield
 
 
@@ -123,71 +71,20 @@ def subscribe_to_bytes(node: Node, full: str, callback: Callable[[Sample], None]
 
     Blocks: until the networks have answered, a second each at most.
     """
+    if not node.config.ros2:
+        return []
     from actionlib_core.wire.ros2.names import Kind as RosKind
     from actionlib_core.wire.ros2.names import data_key
 
     keys = {
         (network, data_key(token.domain, token.name, token.type, token.type_hash))
-        for network in networks(node)
+        for network in _ends().networks(node)
         for token in network.ros.list(kind=RosKind.PUBLISHER, name=network.name(full))
     }
     return [network.transport.subscribe(key, callback, cached=1) for network, key in keys]
 
 
 # -- types -----------------------------------------------------------------------------------------
-
-
-def class_of(node: Node, end: Endpoint) -> Any:
-    """Return the class of the type of an end, by the definition that its hash is of.
-
-    Raises:
-        UsageError: our definition is another one.
-        InterfaceError: there is none.
-    """
-    from actionlib_core.interfaces import ros2
-    from actionlib_core.wire.ros2.network import choose_network
-
-    network = choose_network(node.config.ros2, end.name)
-    get: Callable[[str, str], Any] = ros2.get_message
-    hashed = end.type
-    if end.kind in {Kind.ACTION_SERVER, Kind.ACTION_CLIENT}:
-        get, hashed = ros2.get_action, f"{end.type}{_FEEDBACK}"
-    elif end.kind is Kind.SERVICE:
-        get = ros2.get_service
-    found = get(end.type, network.distro)
-    own = ros2.hash_of(hashed, network.distro)
-    if own != end.md5:
-        raise UsageError(
-            f"'/{end.name}': {mismatch_text(end.type, hashed, (network.distro, own), end.md5)}"
-        )
-    return found
-
-
-def mismatch_text(type_name: str, hashed: str, own: tuple[str, str], found: str) -> str:
-    """Return what to say about a type whose hash there is another than ours.
-
-    Args:
-        type_name: The type.
-        hashed: The type that the hash is of.
-        own: Our distribution, and the hash of its definition.
-        found: The hash there.
-    """
-    from actionlib_core.interfaces import ros2
-
-    if found == ros2.NO_HASH:
-        fitting = ["humble"]
-    else:
-        fitting = [d for d in ros2.distros_of(hashed, found) if d != "humble"]
-    way_out = (
-        f"Try --distro {fitting[0]}."
-        if fitting
-        else ("Try the definition of the robot's own workspace in SMACHPY_INTERFACE_PATH.")
-    )
-    whose = f"It is that of {', '.join(fitting)}. " if fitting else ""
-    return (
-        f"{type_name}: got the type hash {found}; expected {own[1]}, that of {own[0]}. "
-        f"{whose}{way_out}"
-    )
 
 
 def typed(node: Node, kind: str, name: str) -> Any:
@@ -219,7 +116,7 @@ class RemoteAction:
         server: What `find_server` has found.
 
     Raises:
-        UsageError: our definition of the action is another one.
+        InterfaceError: our definition of the action is another one.
     """
 
     def __init__(self, node: Node, server: Endpoint) -> None:
@@ -229,7 +126,7 @@ class RemoteAction:
 
         self._node = node
         self._network = ros_network(node, server.name)
-        self.parts = ros2_action(class_of(node, server))
+        self.parts = ros2_action(_ends().class_of(node, server))
         self.name = server.name
         self._names = action_names(self._network.name(server.name))
 

@@ -122,17 +122,28 @@ class Actions:
         self._clients: dict[tuple[Node, str, str], ActionClient[Any]] = {}
         self._searched = False
         self.revision = 0
-        self._watches: dict[Node, Closable] = {}
+        self._watches: dict[Node, list[Closable]] = {}
         self.join(node)
 
     def join(self, node: Node) -> None:
-        """Look where `node` is too."""
+        """Look where `node` is too, and at the ROS 2 robots of its configuration.
+
+        Raises:
+            TransportError: a robot's router cannot be reached.
+
+        Blocks: until the networks of the robots are joined.
+        """
         pattern, on_presence = token_pattern(Kind.ACTION_SERVER), partial(self._on_presence, node)
-        self._watches[node] = node.transport.watch_alive(pattern, on_presence)
+        self._watches[node] = [node.transport.watch_alive(pattern, on_presence)]
+        if node.config.ros2:
+            from actionlib_core.wire.ros2.ends import watch_ends
+
+            self._watches[node] += watch_ends(node, partial(self._on_end, node))
 
     def leave(self, node: Node) -> None:
         """Look where `node` is no more."""
-        self._watches.pop(node).close()
+        for watch in self._watches.pop(node):
+            watch.close()
         with self._lock:
             for name in [name for name, owner in self._nodes.items() if owner is node]:
                 del self._nodes[name], self._servers[name]
@@ -147,7 +158,7 @@ class Actions:
 
     def close(self) -> None:
         """Leave the network; goals that run go on. A second call does nothing."""
-        for watch in self._watches.values():
+        for watch in itertools.chain(*self._watches.values()):
             watch.close()
         with self._lock:
             clients = list(self._clients.values())
@@ -184,7 +195,7 @@ class Actions:
             GoalRefusedError: no server, or its type is not known here.
         """
         end = self._server(name)
-        cls = self._goal_class(end)
+        cls = self._goal_class(name, end)
         goal = sensible(cls)
         return {
             "name": name,
@@ -201,7 +212,7 @@ class Actions:
         Raises:
             GoalRefusedError: with the problems of every bad field; as `definition`.
         """
-        goal = self._read(self._goal_class(self._server(name)), text)
+        goal = self._read(self._goal_class(name, self._server(name)), text)
         return {"values": values_of(goal), "yaml": yaml_of(goal)}
 
     # -- goals -----------------------------------------------------------------------------------
@@ -215,7 +226,7 @@ class Actions:
         Blocks: until the server has been found, 2 s at most.
         """
         end = self._server(name)
-        goal = self._read(self._goal_class(end), text)
+        goal = self._read(self._goal_class(name, end), text)
         with self._lock:
             running = sum(one.ended_ns is None for one in self._goals.values())
         if running >= MOST_RUNNING:
@@ -291,16 +302,20 @@ class Actions:
 
     def _on_presence(self, node: Node, presence: Presence) -> None:
         end = parse_token(presence.key)
-        if end is None:
+        if end is not None:
+            self._on_end(node, end, presence.key, presence.alive)
+
+    def _on_end(self, node: Node, end: Endpoint, key: str, alive: bool) -> None:
+        if end.kind is not Kind.ACTION_SERVER:
             return
         with self._lock:
             names = (f"{end.name} ({i})" if i > 1 else end.name for i in itertools.count(1))
             shown = next(name for name in names if self._nodes.setdefault(name, node) is node)
             servers = self._servers.setdefault(shown, {})
-            if presence.alive:
-                servers[presence.key] = end
+            if alive:
+                servers[key] = end
             else:
-                servers.pop(presence.key, None)
+                servers.pop(key, None)
         self._changed()
 
     def _changed(self) -> None:
@@ -317,12 +332,14 @@ class Actions:
             raise GoalRefusedError(_gone(name))
         return found[0]
 
-    def _goal_class(self, end: Endpoint) -> Any:
-        spec = self._action_class(end)
+    def _goal_class(self, name: str, end: Endpoint) -> Any:
+        spec = self._action_class(name, end)
         return type(spec().action_goal.goal)
 
-    def _action_class(self, end: Endpoint) -> Any:
+    def _action_class(self, name: str, end: Endpoint) -> Any:
         """The class of an action, found here; servers do not send their definitions."""
+        if end.type.count("/") > 1:
+            return self._ros2_class(name, end)
         try:
             spec = get_action(end.type)
         except InterfaceError:
@@ -342,6 +359,15 @@ class Actions:
             )
         return spec
 
+    def _ros2_class(self, name: str, end: Endpoint) -> Any:
+        from actionlib_core.wire.ros2.ends import class_of
+
+        self._search()
+        try:
+            return class_of(self._nodes.get(name, self._node), end)
+        except InterfaceError as error:
+            raise GoalRefusedError(str(error)) from error
+
     def _search(self) -> None:
         """Import what installed packages have registered, once."""
         with self._lock:
@@ -355,7 +381,7 @@ class Actions:
                 logger.exception("interfaces of %s cannot be loaded", point.value)
 
     def _client(self, name: str, end: Endpoint) -> ActionClient[Any]:
-        spec = self._action_class(end)
+        spec = self._action_class(name, end)
         with self._lock:
             node = self._nodes.get(name)
             if node is None:

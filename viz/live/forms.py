@@ -10,7 +10,7 @@ import re
 import textwrap
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core.interfaces import get_message
+from actionlib_core.interfaces import get_message, ros2
 from actionlib_core.interfaces._definition import FLOATS, INTEGERS, TIMES
 from actionlib_core.interfaces._yaml import quote
 
@@ -49,6 +49,11 @@ def fields_of(cls: type[Message]) -> list[dict[str, Any]]:
     ]
 
 
+def _class_of(base: str) -> type[Message]:
+    """Return the class of a nested type; ROS 2's have their kind in the name."""
+    return (ros2.get_message if base.count("/") > 1 else get_message)(base)
+
+
 def _kind(base: str) -> dict[str, Any]:
     if base in INTEGERS:
         least, most = INTEGERS[base]
@@ -59,7 +64,7 @@ def _kind(base: str) -> dict[str, Any]:
         return {"kind": base}
     if base in TIMES:
         return {"kind": "time"}
-    nested = get_message(base)
+    nested = _class_of(base)
     return {
         "kind": "message",
         "fields": fields_of(nested),
@@ -93,7 +98,7 @@ def sensible(cls: type[Message]) -> Message:
         return message
     for one in cls._definition.fields:
         if not one.type.is_builtin and not one.type.is_array:
-            setattr(message, one.attribute, sensible(get_message(one.type.base)))
+            setattr(message, one.attribute, sensible(cls._nested[one.type.base]))
     return message
 
 
@@ -113,7 +118,7 @@ def _texts(value: Any, base: str) -> Any:
     if base in TIMES:
         return _seconds(value)
     if isinstance(value, dict):
-        cls = get_message(base)
+        cls = _class_of(base)
         return {f.name: _texts(value[f.name], f.type.base) for f in cls._definition.fields}
     if isinstance(value, (bool, str)):
         return value
@@ -162,13 +167,13 @@ def _type_words(kind: Any) -> str:
 def _entry(head: str, value: Any, base: str, indent: str, words: str) -> Iterator[str]:
     inner = f"{indent}  "
     if isinstance(value, dict):
-        cls = get_message(base)
+        cls = _class_of(base)
         yield from _commented(head if value else f"{head} {{}}", words, indent)
         yield from _lines(cls, value, inner)
     elif isinstance(value, list) and any(isinstance(item, dict) for item in value):
         yield from _commented(head, words, indent)
         for item in value:
-            first, *others = _lines(get_message(base), item, f"{inner}  ")
+            first, *others = _lines(_class_of(base), item, f"{inner}  ")
             yield f"{inner}- {first.lstrip()}"
             yield from others
     else:

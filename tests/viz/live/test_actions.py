@@ -5,10 +5,13 @@ from __future__ import annotations
 import pytest
 
 from actionlib_core.action.simple_server import SimpleActionServer
+from actionlib_core.config import Config, Ros2
 from actionlib_core.interfaces import define_action, get_action
 from actionlib_core.interfaces.actionlib import msg
+from actionlib_core.interfaces.nav2_msgs.action import NavigateToPose
 from actionlib_core.node import Node
 from actionlib_core.transport.memory import MemoryNetwork
+from tests.ros2_server import Ros2Server
 from viz.live.actions import KEPT_GOALS, MOST_RUNNING, Actions, GoalRefusedError
 
 
@@ -230,3 +233,31 @@ def test_actions_of_two_networks_are_told_apart(world):
     viewer.close()
     robot.close()
     world.clock.sleep(60.0)
+
+
+def test_actions_of_a_ros2_robot(clock):
+    network = MemoryNetwork(clock)
+    sessions = network.session(), network.session()
+    config = Config(ros2=(Ros2(domain=42),))
+    viewer = Node("viewer", transport=sessions[0], clock=clock, config=config)
+    robot = Ros2Server(sessions[1], clock, "navigate_to_pose", NavigateToPose, domain=42)
+    robot.on_result = lambda query, uuid: robot.answer_result(query, 4)
+    actions = Actions(viewer)
+    clock.sleep(0.5)
+    (shown,) = actions.summary()["actions"]
+    assert (shown["name"], shown["type"]) == ("navigate_to_pose", "nav2_msgs/action/NavigateToPose")
+    form = actions.definition("navigate_to_pose")
+    assert [field["name"] for field in form["fields"]] == ["pose", "behavior_tree"]
+    assert form["values"]["pose"]["pose"]["orientation"]["w"] == "1.0"
+    with pytest.raises(GoalRefusedError):
+        actions.send("navigate_to_pose", "{poze: {}}")
+    actions.send("navigate_to_pose", form["yaml"])
+    clock.sleep(1.0)
+    (goal,) = actions.summary()["goals"]
+    assert goal["status"] == "SUCCEEDED"
+    assert robot.problems == []
+    actions.close()
+    robot.close()
+    viewer.close()
+    for session in sessions:
+        session.close()

@@ -1,0 +1,143 @@
+"""The ends on networks of ROS 2, as tools show those of our own: by name here, kind, type, node.
+
+An action's ends are told by its feedback; what ROS 2's tools hide is left out.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.exceptions import InterfaceError
+from actionlib_core.interfaces import ros2
+from actionlib_core.wire.presence import Endpoint, Kind
+from actionlib_core.wire.ros2.names import Kind as RosKind
+from actionlib_core.wire.ros2.names import action_of
+from actionlib_core.wire.ros2.network import choose_network, name_here, network_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from actionlib_core.node import Node
+    from actionlib_core.transport import Closable
+    from actionlib_core.wire.ros2.names import Token
+    from actionlib_core.wire.ros2.network import RosNetwork
+
+_FEEDBACK = "_FeedbackMessage"
+
+
+def networks(node: Node) -> Iterator[RosNetwork]:
+    """Yield the networks of ROS 2 that the configuration names, joined.
+
+    Raises:
+        TransportError: one cannot be joined.
+
+    Blocks: the first time, until they are.
+    """
+    for settings in node.config.ros2:
+        yield network_of(node, settings)
+
+
+def end_of(network: RosNetwork, token: Token) -> Endpoint | None:
+    """Return what a token shows as an end of ours; None for a node and what tools hide.
+
+    Those of an action are its servers and clients, told by its feedback. The checksum is the hash.
+    """
+    action = action_of(token.name)
+    name, type_name = token.name, token.type
+    if action is not None:
+        kinds = {
+            RosKind.PUBLISHER: Kind.ACTION_SERVER,
+            RosKind.SUBSCRIPTION: Kind.ACTION_CLIENT,
+        }
+        if not (name.endswith("/feedback") and type_name.endswith(_FEEDBACK)):
+            return None
+        name, type_name = action, type_name.removesuffix(_FEEDBACK)
+    else:
+        kinds = {
+            RosKind.PUBLISHER: Kind.PUBLISHER,
+            RosKind.SUBSCRIPTION: Kind.SUBSCRIBER,
+            RosKind.SERVICE: Kind.SERVICE,
+        }
+    if token.kind not in kinds or any(word.startswith("_") for word in name.split("/")):
+        return None
+    return Endpoint(
+        kinds[token.kind],
+        name_here(network.settings, name),
+        type_name,
+        token.type_hash,
+        token.session,
+        token.full_node,
+        token.entity_id,
+    )
+
+
+def watch_ends(node: Node, on_end: Callable[[Endpoint, str, bool], object]) -> list[Closable]:
+    """Hear of the ends there are and of every change.
+
+    Args:
+        node: On whose networks.
+        on_end: Gets an end, what identifies it, and whether it is there; called on the networks'
+            threads, must not wait.
+
+    Raises:
+        TransportError: a network cannot be joined.
+
+    Blocks: the first time, until they are joined.
+    """
+
+    def watch(network: RosNetwork) -> Closable:
+        def on_token(token: Token, key: str, alive: bool) -> None:
+            end = end_of(network, token)
+            if end is not None:
+                on_end(end, key, alive)
+
+        return network.ros.watch(on_token)
+
+    return [watch(network) for network in networks(node)]
+
+
+def class_of(node: Node, end: Endpoint) -> Any:
+    """Return the class of the type of an end, by the definition that its hash is of.
+
+    Raises:
+        InterfaceError: there is none here, or it is another one.
+    """
+    network = choose_network(node.config.ros2, end.name)
+    get: Callable[[str, str], Any] = ros2.get_message
+    hashed = end.type
+    if end.kind in {Kind.ACTION_SERVER, Kind.ACTION_CLIENT}:
+        get, hashed = ros2.get_action, f"{end.type}{_FEEDBACK}"
+    elif end.kind is Kind.SERVICE:
+        get = ros2.get_service
+    found = get(end.type, network.distro)
+    own = ros2.hash_of(hashed, network.distro)
+    if own != end.md5:
+        raise InterfaceError(
+            f"'/{end.name}': {mismatch_text(end.type, hashed, (network.distro, own), end.md5)}"
+        )
+    return found
+
+
+def mismatch_text(type_name: str, hashed: str, own: tuple[str, str], found: str) -> str:
+    """Return what to say about a type whose hash there is another than ours.
+
+    Args:
+        type_name: The type.
+        hashed: The type that the hash is of.
+        own: Our distribution, and the hash of its definition.
+        found: The hash there.
+    """
+    if found == ros2.NO_HASH:
+        fitting = ["humble"]
+    else:
+        fitting = [d for d in ros2.distros_of(hashed, found) if d != "humble"]
+    way_out = (
+        f"Try --distro {fitting[0]}."
+        if fitting
+        else ("Try the definition of the robot's own workspace in SMACHPY_INTERFACE_PATH.")
+    )
+    whose = f"It is that of {', '.join(fitting)}. " if fitting else ""
+    return (
+        f"{type_name}: got the type hash {found}; expected {own[1]}, that of {own[0]}. "
+        f"{whose}{way_out}"
+    )
