@@ -369,6 +369,7 @@ def test_last_answer_of_a_server_that_leaves_may_come_after_its_tokens_went(worl
     server.end(uuid, 6)
     assert handle.wait(5.0)
     assert handle.get_goal_status() == Status.ABORTED
+    world.clock.sleep(0.1)
     assert not client.wait_for_server(0.1)
 
 
