@@ -265,14 +265,16 @@ class Container(Openable, Callbacks, State):
                 THREAD.reset(token)
                 frame.end_thread()
 
+    _smachpy_execute: ClassVar[object] = execute
+
     def __run(self, frame: Frame, parent_ud: UserData | Remapper | None) -> str:
         """Run in `frame`: copy the keys, call the callbacks, run the children."""
         data = self._smachpy
         plan = data.plan
         if plan is None or plan.userdata is not self.userdata or plan.epoch != EPOCH.value:
             plan = data.plan = self.__current_plan(frame, plan)
-        if data.frame is not None:
-            raise self.__already_runs(frame)
+        if data.frame is not None or data.callback is not None:
+            return self.__run_inside(frame, parent_ud)
         raised = True
         try:
             data.frame = frame.first.innermost = frame
@@ -299,6 +301,19 @@ class Container(Openable, Callbacks, State):
                 data.answered = frame.answered
             if raised or self._preempt_requested or frame.visit is not None or data.end_waiters:
                 self.__leave(frame)
+
+    def __run_inside(self, frame: Frame, parent_ud: UserData | Remapper | None) -> str:
+        """Run for code of the user around it, whose grace pauses as the children have theirs."""
+        data = self._smachpy
+        if data.frame is not None:
+            raise self.__already_runs(frame)
+        around = data.callback
+        around.end()
+        try:
+            return self.__run(frame, parent_ud)
+        finally:
+            if not frame.dead:
+                around.begin()
 
     def __interrupted(self, frame: Frame) -> str:
         """Return how the container ends when a callback of it outlasted the grace."""

@@ -369,7 +369,11 @@ def make_step(label: str, state: State, window: Any) -> Step:
     execute: Callable[[Any], Any] = state.execute
     callback = state._smachpy.code[0] if isinstance(state, CBState) else None
     is_async = inspect.iscoroutinefunction(execute) or inspect.iscoroutinefunction(callback)
-    run = runner_of(state, get_options(state), execute, is_async=is_async)
+    kind: Any = type(state)
+    is_own = kind._smachpy_is_container and (
+        kind.execute is not kind._smachpy_execute or "execute" in vars(state)
+    )
+    run = runner_of(state, get_options(state), execute, is_async=is_async, is_callback=is_own)
     return Step(label, state, window, run)
 
 

@@ -57,7 +57,7 @@ class CallbackFrame(Frame):
         above = parent.step
         self._is_hook = above is not None and above.state is container  # called around its run
         self._path = parent.here() if self._is_hook else parent.path
-        self.step = Step(name_of(function), _Code(function), None, function)
+        self._step = Step(name_of(function), _Code(function), None, function)
 
     def here(self) -> str:
         """Return the container's path."""
@@ -65,7 +65,7 @@ class CallbackFrame(Frame):
 
     def described(self) -> str:
         """Name the callback and its container, for the log."""
-        return f"{self.path}: {self.step.label}"
+        return f"{self.path}: {self._step.label}"
 
     def is_in_child(self) -> bool:
         """Tell that no child runs here."""
@@ -84,8 +84,19 @@ class CallbackFrame(Frame):
         group = None if self._is_hook else parent.group
         return group if group is not None and group.started else None
 
+    def begin(self) -> None:
+        """The callback runs from here on."""
+        container, parent = self.container, self.parent
+        self.step = self._step
+        container._smachpy.callback = self
+        assert parent is not None
+        visit = parent.visit if self._is_hook else None
+        if container._preempt_requested or (visit is not None and visit.is_asked()):
+            with self.run.lock:  # its grace begins now
+                ask(self)
+
     def end(self) -> None:
-        """The callback has returned, raised, or was interrupted."""
+        """The callback has returned, raised, was interrupted, or runs the container now."""
         self.step = None  # first the mark, then the look: see `smachpy.run.grace.ask`
         data = self.container._smachpy
         if data.callback is self:
@@ -114,13 +125,11 @@ def call_bounded(
     data = container._smachpy
     if data.callback is not None:  # code of the same container called this
         return function(*arguments)
-    frame = data.callback = CallbackFrame(container, parent, function)
+    frame = CallbackFrame(container, parent, function)
     answer: Any = None
     failure: BaseException | None = None
     try:
-        if container._preempt_requested:  # its grace begins now
-            with frame.run.lock:
-                ask(frame)
+        frame.begin()
         answer = function(*arguments)
     except BaseException as error:  # noqa: BLE001  raised below, once nothing can interrupt it
         failure = error

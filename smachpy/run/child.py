@@ -149,7 +149,7 @@ class ContainerData(StateData):
         self.listeners: tuple[Callable[[Event], object], ...] = ()
         self.tapes: tuple[Tape, ...] = ()
         self.control: Gate | None = None
-        self.callback: Frame | None = None
+        self.callback: Any = None  # a smachpy.run.callback.CallbackFrame
         self.answered = False
         self.origin: Origin | None = None
         self.is_passing_on = False

@@ -378,7 +378,7 @@ def request(container: Parent, only: Frame | None = None) -> Run | None:
     data = container._smachpy
     origin = current_origin()
     with asking(*origin):
-        frame = data.root or data.frame or data.callback
+        frame: Frame | None = data.root or data.frame or data.callback
         if frame is None and only is None:
             data.origin = origin
             pass_on(container)

@@ -48,11 +48,26 @@ _new = tuple.__new__  # half the time of a NamedTuple's own
 
 
 def runner_of(
-    state: Child, options: Options, execute: Callable[[Any], Any], *, is_async: bool = False
+    state: Child,
+    options: Options,
+    execute: Callable[[Any], Any],
+    *,
+    is_async: bool = False,
+    is_callback: bool = False,
 ) -> Callable[[Any], Any]:
-    """Return `execute` with `options` around it: itself when it asks for nothing more."""
+    """Return `execute` with `options` around it: itself when it asks for nothing more.
+
+    Args:
+        state: The child.
+        options: Its options.
+        execute: Runs it.
+        is_async: `execute` is a coroutine function.
+        is_callback: `execute` is code of the user around a container's own.
+    """
     if is_async:
         execute = _Async(state, execute)
+    if is_callback:
+        execute = _OwnExecute(state, execute)
     plain = (
         options.timeout is None
         and options.retry is None
@@ -99,6 +114,22 @@ class _Async:
 
 def _cancel(task: asyncio.Task[Any]) -> None:
     task.cancel()
+
+
+class _OwnExecute:
+    """Runs a container's `execute` that is the user's: bounded by the grace but in the container's.
+
+    A container has no grace of its own, as its children have theirs.
+    """
+
+    def __init__(self, container: Any, execute: Callable[[Any], Any]) -> None:
+        self._container = container
+        self._execute = execute
+
+    def __call__(self, userdata: Any) -> Any:
+        frame: Frame | None = current_frame()
+        assert frame is not None  # a container runs it
+        return call_bounded(self._container, frame, self._execute, (userdata,))
 
 
 class _WithOptions:

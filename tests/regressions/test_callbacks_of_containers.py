@@ -385,3 +385,82 @@ def test_a_preempt_timeout_of_none_waits_for_a_callback_as_long_as_it_takes(cloc
     clock.call_later(1.0, machine.request_preempt)
     assert machine.execute() == "preempted"
     assert clock.now() == 1000.0
+
+
+# -- a container whose `execute` is the user's ---------------------------------------------------
+
+
+class Around(StateMachine):
+    """Does something before and after its own run, as programs for SMACH do."""
+
+    def __init__(self, before, after, *states):
+        super().__init__(["done", "preempted"], preempt_timeout=GRACE_S)
+        self.before = before
+        self.after = after
+        for number, state in enumerate(states or (Work(),)):
+            self.add(
+                f"S{number}", state, {"done": f"S{number + 1}"} if states[number + 1 :] else {}
+            )
+
+    def execute(self, parent_ud=None):
+        self.before()
+        outcome = super().execute(parent_ud)
+        self.after()
+        return outcome
+
+
+def nothing():
+    """Do nothing."""
+
+
+@pytest.mark.parametrize("where", ["before", "after"])
+def test_a_container_with_an_execute_of_its_own_that_blocks(where, execute):
+    inside, go_on = threading.Event(), threading.Event()
+    blocking = [True]
+
+    def block():
+        if blocking[0]:
+            inside.set()
+            go_on.wait(LONG_S)
+
+    inner = Around(block if where == "before" else nothing, block if where == "after" else nothing)
+    machine = machine_of(inner)
+    asker = threading.Thread(target=lambda: inside.wait(LONG_S) and machine.request_preempt())
+    asker.start()
+    try:
+        assert execute(machine) == "preempted"
+        assert not go_on.is_set()
+    finally:
+        go_on.set()
+        asker.join()
+    blocking[0] = False
+    assert execute(machine) == "done"
+
+
+def test_the_children_of_such_a_container_have_their_own_grace(clock):
+    """The grace of what is around them neither ends them nor goes on from before them."""
+
+    class Slow(Work):
+        def execute(self, userdata):
+            self.wait_preempt()
+            self.clock().sleep(5.0)
+            self.ran += 1
+            return "preempted"
+
+    slow = Slow(preempt_timeout=10.0)
+    ended = []
+    machine = machine_of(Around(nothing, lambda: ended.append(clock.now()), slow))
+    heard = []
+    machine.subscribe(heard.append)
+    clock.call_later(1.0, machine.request_preempt)
+    assert machine.execute() == "preempted"
+    assert slow.ran == 1
+    assert ended == [6.0]
+    assert not any(isinstance(e, Abandoned) for e in heard)
+
+
+def test_what_follows_an_asked_child_in_such_a_container_has_the_grace(clock):
+    machine = machine_of(Around(nothing, lambda: clock.sleep(100.0), Work(LONG_S)))
+    clock.call_later(1.0, machine.request_preempt)
+    assert machine.execute() == "preempted"
+    assert clock.now() == pytest.approx(1.0 + GRACE_S)
