@@ -77,7 +77,8 @@ class Ros2Client:
             for full, kind, ros_type in zip(self.names, kinds, types, strict=True)
         }
         self.servers = ActionServers(name, types)
-        self.ready: Event = clock.event()
+        self.ready: Event = clock.event()  # a server has appeared
+        self.gone: Event = clock.event()  # a server has vanished
         self.feedback: list[tuple[bytes, Any]] = []
         self.statuses: list[list[GoalState]] = []
         self.problems: list[str] = []
@@ -97,8 +98,8 @@ class Ros2Client:
 
     def _on_token(self, token: Token, key: str, alive: bool) -> None:
         change = self.servers.on_token(token, alive=alive)
-        if change is not None and change.alive:
-            self.ready.set()
+        if change is not None:
+            (self.ready if change.alive else self.gone).set()
 
     def _on_feedback(self, sample: Sample) -> None:
         unpack_attachment(sample.attachment)

@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -214,14 +213,9 @@ def test_a_killed_server_is_seen_and_its_questions_end(robot: Robot, mode: str) 
     client = robot.client()
     uuid = bytes([1] * 16)
     assert client.accepted(uuid, Fibonacci.Goal()) is not None
-    result, gone = client.result(uuid), threading.Event()
-    client.declared.append(
-        client.node.watch(
-            lambda token, key, alive: None if alive else gone.set(), name=client.names.status
-        )
-    )
+    result = client.result(uuid)
     process.send_signal(signal.SIGKILL)
-    assert gone.wait(LONG_S)
+    assert client.gone.wait(LONG_S)
     assert result.answer(LONG_S).payload is None
     assert len(client.servers) == 0
 
