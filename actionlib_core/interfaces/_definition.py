@@ -43,6 +43,7 @@ BUILTINS = tuple(n for n in (*INTEGERS, *FLOATS, "bool", "string", *TIMES) if n 
 """ROS 1's built-in types."""
 OCTETS = ("uint8", "char", "octet")
 """Types whose arrays are `bytes`."""
+_AS_ROS2 = "Try importing it from `actionlib_core.interfaces.ros2`"
 _ROS2_SPELT = {"char": "uint8", "byte": "octet"}
 """ROS 2's names of one byte: `char` is another name of `uint8`, `byte` is unsigned."""
 _ROS2_BUILTINS = (*(name for name in BUILTINS if name not in {*TIMES, "char"}), "octet")
@@ -284,7 +285,8 @@ class _Reader:
     def _bad_type(self, at: Position, text: str) -> None:
         if "<=" in text:
             what = (
-                f"bounded type {text!r} is ROS 2's; expected ROS 1's `string`, `type[]`, `type[N]`"
+                f"bounded type {text!r} is ROS 2's; expected ROS 1's `string`, `type[]`, "
+                f"`type[N]`. {_AS_ROS2}"
             )
         elif "[" in text or "]" in text:
             what = f"malformed array {text!r}; expected `type[]` or `type[N]`"
@@ -297,7 +299,7 @@ class _Reader:
         words = name.split()
         if len(words) > 1 and _NAME.match(words[0]):
             what = f"unexpected {words[1]!r} behind the field name; expected `type name`"
-            hint = ". Default values are ROS 2's; a constant is `type NAME=value`"
+            hint = f". Default values are ROS 2's; a constant is `type NAME=value`. {_AS_ROS2}"
             self._problem(at, column + name.index(words[1], len(words[0])), what + hint)
             return
         if self._check_name(at, column, name, "field"):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.exceptions import InterfaceError
 from actionlib_core.interfaces._registry import ROOT, Registry, registry
-from actionlib_core.interfaces._ros2 import ros2_registry
+from actionlib_core.interfaces._ros2 import is_only_ros2, ros2_registry
 from actionlib_core.suggest import did_you_mean
 
 if TYPE_CHECKING:
@@ -153,8 +153,12 @@ def _ros2(package: str, section: str) -> Registry | None:
 
 
 def _either(package: str, section: str) -> Registry | None:
-    """Choose ROS 1 for what it has; only ROS 2 has `pkg.action`."""
-    return _ros1(package, section) or _ros2(package, section)
+    """Choose ROS 1 for what it has; only ROS 2 has `pkg.action`, and some packages of ours.
+
+    A folder of yours with another version of such a package makes it no package of ROS 1.
+    """
+    first, second = (_ros2, _ros1) if is_only_ros2(package) else (_ros1, _ros2)
+    return first(package, section) or second(package, section)
 
 
 def _install(prefix: str, choose: Choose) -> None:

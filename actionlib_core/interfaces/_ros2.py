@@ -480,6 +480,11 @@ def _defines(distro: str, full: str) -> bool:
     )
 
 
+def is_only_ros2(package: str) -> bool:
+    """Tell whether of the definitions that come with us only ROS 2's have a package."""
+    return bool(_entries(package)) and not (BUNDLED / package).is_dir()
+
+
 _NAME = re.compile(r"([a-z][a-z0-9_]*)/(?:(msg|srv|action)/)?([A-Za-z][A-Za-z0-9_]*)\Z")
 
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import os
 import pickle
 import random
 import struct
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -370,3 +373,30 @@ def test_wrong_definitions_are_named_by_line(text: str, problem: str) -> None:
     registry = Ros2Registry("jazzy", ours=True)
     with pytest.raises(InterfaceError, match=problem):
         registry.define("msg", "p/msg/Bad", text)
+
+
+def test_a_workspace_with_its_own_version_of_a_package(tmp_path: Path) -> None:
+    """In a process of its own: which class a name is, is decided once."""
+    folder = tmp_path / "nav2_msgs"
+    for kind, name, text in (
+        ("action", "Spin", "float32<=2 bad\n---\n---\n"),
+        ("action", "Wait", "float32 seconds 2.5\n---\n---\nParticle last\n"),
+        ("msg", "Particle", "string<=3 name\n"),
+    ):
+        (folder / kind).mkdir(parents=True, exist_ok=True)
+        (folder / kind / f"{name}.{kind}").write_text(text)
+    program = (
+        "from actionlib_core.interfaces.nav2_msgs.action import NavigateToPose, Wait\n"
+        "from actionlib_core.interfaces.nav2_msgs.msg import Costmap, Particle\n"
+        "assert Wait.Goal().seconds == 2.5 and Wait.Feedback().last == Particle()\n"
+        "assert Particle._wire == Costmap._wire == 'ros2'\n"
+        "assert 'pose' in NavigateToPose.Goal.__slots__\n"
+        "try:\n"
+        "    from actionlib_core.interfaces.nav2_msgs.action import Spin\n"
+        "except Exception as error:\n"
+        "    assert 'Spin.action:1' in str(error), error\n"
+        "else:\n"
+        "    raise AssertionError\n"
+    )
+    environment = {**os.environ, "SMACHPY_INTERFACE_PATH": str(tmp_path)}
+    subprocess.run([sys.executable, "-c", program], env=environment, check=True, timeout=100)
