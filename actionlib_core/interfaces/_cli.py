@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from actionlib_core.exceptions import InterfaceError
 from actionlib_core.interfaces import _stubs
 from actionlib_core.interfaces._registry import parse_name, registry
+from actionlib_core.interfaces._ros2 import is_only_ros2, ros2_registry
 from actionlib_core.interfaces._sources import ACTION_PARTS, BUNDLED, KINDS, SERVICE_PARTS
 
 if TYPE_CHECKING:
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from actionlib_core.interfaces._definition import Definition
+    from actionlib_core.interfaces._registry import Registry
     from actionlib_core.interfaces._sources import Kind
 
 _PARTS: dict[Kind, tuple[str, ...]] = {"msg": (), "srv": SERVICE_PARTS, "action": ACTION_PARTS}
@@ -30,15 +32,15 @@ def show(name: str, *, all_comments: bool = False) -> str:
     Raises:
         InterfaceError: Unknown or malformed.
     """
-    found = _kinds_of(name)
+    source, found = _kinds_of(name)
     package, _, short = parse_name(name)
     blocks = []
     for kind in found:
         title = [f"# {package}/{kind}/{short}"] if len(found) > 1 else []
         lines: list[str] = []
-        for number, definition in enumerate(_definitions(kind, package, short)):
+        for number, definition in enumerate(_definitions(source, kind, package, short)):
             lines += ["---"] if number else []
-            lines += _lines(definition, "", comments=True, nested_comments=all_comments)
+            lines += _lines(source, definition, "", comments=True, nested_comments=all_comments)
         blocks.append("\n".join([*title, *lines]).rstrip())
     return "\n\n".join(blocks)
 
@@ -49,12 +51,13 @@ def describe(name: str) -> dict[str, Any]:
     Raises:
         InterfaceError: Unknown or malformed.
     """
+    source, kinds = _kinds_of(name)
     package, _, short = parse_name(name)
     return {
         f"{package}/{kind}/{short}": [
             {
                 "type": definition.name,
-                "md5": registry.message(definition.name)._md5sum,
+                "md5": source.message(definition.name)._md5sum,
                 "constants": [
                     {"name": c.name, "type": c.type, "value": c.value, "comment": c.comment}
                     for c in definition.constants
@@ -64,9 +67,9 @@ def describe(name: str) -> dict[str, Any]:
                     for f in definition.fields
                 ],
             }
-            for definition in _definitions(kind, package, short)
+            for definition in _definitions(source, kind, package, short)
         ]
-        for kind in _kinds_of(name)
+        for kind in kinds
     }
 
 
@@ -107,24 +110,32 @@ def write_stubs(folder: str | os.PathLike[str], packages: Sequence[str] = ()) ->
     return _stubs.write(files, Path(folder))
 
 
-def _kinds_of(name: str) -> list[Kind]:
-    """Return the kinds that define a name; parts of services and actions count as messages."""
+def _kinds_of(name: str) -> tuple[Registry, list[Kind]]:
+    """Return where a name is defined, of ROS 1 or else of ROS 2, and the kinds that define it.
+
+    Parts of services and actions count as messages of ROS 1.
+    """
     package, given, short = parse_name(name)
     kinds = [kind for kind in KINDS if given in {None, kind}]
-    found = [kind for kind in kinds if registry.sources.find(kind, package, short) is not None]
-    if not found:
-        registry.message(name)  # raises where it is unknown
-        return ["msg"]
-    return found
+    sources = [registry, ros2_registry()]
+    if is_only_ros2(package):
+        sources.reverse()
+    for source in sources:
+        found = [kind for kind in kinds if source.sources.find(kind, package, short) is not None]
+        if found:
+            return source, found
+    registry.message(name)  # raises where it is unknown
+    return registry, ["msg"]
 
 
-def _definitions(kind: Kind, package: str, short: str) -> list[Definition]:
-    names = [f"{package}/{short}{part.title()}" for part in _PARTS[kind]]
-    return [registry.message(name)._definition for name in names or [f"{package}/{short}"]]
+def _definitions(source: Registry, kind: Kind, package: str, short: str) -> list[Definition]:
+    front = f"{package}/{short}" if source is registry else f"{package}/{kind}/{short}_"
+    names = [f"{front}{part.title()}" for part in _PARTS[kind]]
+    return [source.message(name)._definition for name in names or [front.rstrip("_")]]
 
 
 def _lines(
-    definition: Definition, indent: str, *, comments: bool, nested_comments: bool
+    source: Registry, definition: Definition, indent: str, *, comments: bool, nested_comments: bool
 ) -> Iterator[str]:
     waiting = list(definition.fields)
     for line in definition.text.splitlines():
@@ -134,8 +145,9 @@ def _lines(
         if waiting and line == waiting[0].position.text:
             field = waiting.pop(0)
             if not field.type.is_builtin:
-                nested = registry.message(field.type.base)._definition
+                nested = source.message(field.type.base)._definition
                 yield from _lines(
+                    source,
                     nested,
                     f"{indent}\t",
                     comments=nested_comments,

@@ -83,3 +83,20 @@ def test_stubs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "class Note(_Message):" in (tmp_path / "test_cli_pkg/msg.pyi").read_text()
     with pytest.raises(InterfaceError, match="got package 'gone'"):
         run("stubs", str(tmp_path), "gone")
+
+
+def test_show_what_only_ros2_has() -> None:
+    shown = _cli.show("nav2_msgs/action/NavigateToPose").splitlines()
+    assert shown[:3] == [
+        "geometry_msgs/PoseStamped pose",
+        "\tstd_msgs/Header header",
+        "\t\tbuiltin_interfaces/Time stamp",
+    ]
+    assert shown.count("---") == 2
+    parts = _cli.describe("lifecycle_msgs/GetState")["lifecycle_msgs/srv/GetState"]
+    assert [part["type"] for part in parts] == [
+        "lifecycle_msgs/srv/GetState_Request",
+        "lifecycle_msgs/srv/GetState_Response",
+    ]
+    with pytest.raises(InterfaceError, match="nav2_msgs/NavigateToPosse"):
+        _cli.show("nav2_msgs/NavigateToPosse")
