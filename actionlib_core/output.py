@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from types import TracebackType
 
     from _typeshed import ReadableBuffer
 
@@ -115,11 +116,23 @@ def _escape_errors() -> None:
     if logging.lastResort is not None:
         logging.lastResort.setFormatter(_Formatter())
     threading.excepthook = _tell_thread_exception
+    sys.excepthook = _tell_exception
 
 
 class _Formatter(logging.Formatter):
     def format(self, record: logging.LogRecord) -> str:
         return printable(super().format(record))
+
+
+def _tell_exception(
+    kind: type[BaseException], error: BaseException, where: TracebackType | None
+) -> None:
+    """Write what `sys.excepthook` does, escaped."""
+    text = "".join(traceback.format_exception(kind, error, where))
+    if sys.stderr is not None:
+        with contextlib.suppress(OSError):
+            sys.stderr.write(printable(text))
+            sys.stderr.flush()
 
 
 def _tell_thread_exception(what: threading.ExceptHookArgs) -> None:

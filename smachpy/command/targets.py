@@ -58,7 +58,8 @@ class Target:
         """Return the machine; a factory is called with `arguments`.
 
         Raises:
-            TargetError: it takes no such argument, or gives something that is no container.
+            TargetError: it takes no such argument, raises something that smachpy does not raise, or
+                gives something that is no container.
         """
         if isinstance(self.thing, Container):
             if arguments:
@@ -69,7 +70,16 @@ class Target:
                 )
             return self.thing
         self._check_arguments(arguments)
-        machine = self.thing(**arguments)
+        try:
+            machine = self.thing(**arguments)
+        except SmachError:
+            raise
+        except Exception as error:
+            raise TargetError(
+                self.name,
+                f"{self.source} raised {_text_of(error)}; expected a state machine. Try --debug, "
+                "which shows where.",
+            ) from error
         if not isinstance(machine, Container):
             raise TargetError(
                 self.name, f"{self.source} returned {machine!r}; expected a state machine."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from importlib.metadata import EntryPoint
 
@@ -179,3 +180,22 @@ def test_a_file_that_raises_leaves_no_half_module_behind(file):
     with pytest.raises(TargetError):
         load_target("half_target.py")
     assert "half_target" not in sys.modules
+
+
+def test_a_factory_that_raises_is_an_error_of_the_target(tmp_path):
+    path = tmp_path / "job.py"
+    path.write_text("def mission():\n    raise ValueError('no map')\n")
+    with pytest.raises(TargetError, match="raised ValueError: no map") as caught:
+        load_target(str(path)).build()
+    assert isinstance(caught.value.__cause__, ValueError)
+
+
+def test_no_control_character_of_an_exception_reaches_the_terminal(tmp_path):
+    path = tmp_path / "job.py"
+    path.write_text("def mission():\n    raise ValueError('\\x1b]0;title\\x07')\n")
+    for more in ([], ["--debug"]):
+        command = [sys.executable, "-m", "smachpy.command", "run", str(path), *more]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 2 if not more else done.returncode != 0
+        assert "title" in done.stderr
+        assert "\x1b" not in done.stderr + done.stdout

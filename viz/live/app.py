@@ -38,7 +38,7 @@ from smachpy.exceptions import SmachError
 from viz.live import assets as page
 from viz.live.actions import GoalRefusedError
 from viz.live.machines import KEPT_EVENTS
-from viz.live.security import Guard, refuse_command
+from viz.live.security import WRONG_TOKEN, Guard, refuse_command
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable
@@ -299,7 +299,7 @@ class Viewer:
     async def _control(self, request: Request) -> Response:
         reason = refuse_command(request, self._token)
         if reason is not None or self._send is None:
-            return Json({"ok": False, "text": reason}, status_code=403)
+            return _refused(reason)
         name = request.query_params.get("machine", "")
         command = await _read_command(request)
         if command is None:
@@ -323,7 +323,7 @@ class Viewer:
     async def _command_action(self, request: Request) -> Response:
         reason = refuse_command(request, self._token)
         if reason is not None or self._actions is None:
-            return Json({"ok": False, "text": reason}, status_code=403)
+            return _refused(reason)
         command = await _read_command(request)
         if command is None:
             return _no_command()
@@ -489,7 +489,7 @@ def _compared(old: tuple[str, Any, Any], new: tuple[str, Any, Any]) -> dict[str,
     sides = []
     for name, record, events in (old, new):
         statistics = Statistics()
-        statistics.add(events)
+        statistics.add(events, record)
         sides.append(Side(name, record, statistics))
     union = unite(*sides)
     return {
@@ -514,6 +514,12 @@ def _do(actions: Actions, command: dict[str, Any]) -> dict[str, Any]:
         f"command: got {sorted(command)}; expected `check` or `send` with name and yaml, "
         "or `cancel` with goal."
     )
+
+
+def _refused(reason: str | None) -> Response:
+    """Refuse a command; a page whose token is of a viewer before this one asks for the new one."""
+    told = {"ok": False, "text": reason, "wants_token": reason == WRONG_TOKEN}
+    return Json(told, status_code=403)
 
 
 def _unknown(request: Request) -> Response:

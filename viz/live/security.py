@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from starlette.requests import Request
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+WRONG_TOKEN = "token: missing or wrong; expected the one in the address that smachpy printed."  # noqa: S105
 TOKEN_HEADER = "x-smachpy-token"  # noqa: S105  a header's name
 
 
@@ -108,5 +109,5 @@ def refuse_command(request: Request, token: str | None) -> str | None:
     if origin != f"{request.url.scheme}://{headers.get('host', '')}":
         return f"origin: got {origin!r}; expected this page."
     if not secrets.compare_digest(headers.get(TOKEN_HEADER, "").encode(), token.encode()):
-        return "token: missing or wrong; expected the one in the address that smachpy printed."
+        return WRONG_TOKEN
     return None

@@ -13,6 +13,11 @@ if TYPE_CHECKING:
     from viz.live.app import Viewer
 
 GOODBYE_S = 1
+EVERYWHERE = {
+    "0.0.0.0": (socket.AF_INET, "192.0.2.1", "127.0.0.1"),  # noqa: S104  what a user asked for
+    "::": (socket.AF_INET6, "2001:db8::1", "::1"),
+}
+"""Hosts that mean all of this computer's addresses: family, an address far away, its own."""
 
 
 class AddressError(SmachError):
@@ -30,6 +35,25 @@ class AddressError(SmachError):
             f"smachpy view: {host}:{port}: cannot listen: {reason}; expected a free port. "
             "Try --port 0, which takes any."
         )
+
+
+def outward_address(host: str) -> str:
+    """Return this computer's address on the way to other networks, where a server listens to all.
+
+    Nothing is sent: a datagram socket that is connected only looks the way up (the addresses are
+    those for documentation, RFC 5737 and RFC 3849). Without a way out it is the computer itself.
+
+    Args:
+        host: "0.0.0.0" or "::".
+    """
+    family, target, alone = EVERYWHERE[host]
+    try:
+        with socket.socket(family, socket.SOCK_DGRAM) as probe:
+            probe.connect((target, 9))
+            found: str = probe.getsockname()[0]
+    except OSError:
+        return alone
+    return found
 
 
 class PageServer(uvicorn.Server):
@@ -67,8 +91,9 @@ class PageServer(uvicorn.Server):
 
     @property
     def address(self) -> str:
-        """Return the page's address."""
-        host = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(self.host, self.host)  # noqa: S104  shown
+        """Return the page's address: one that others can open where it listens everywhere."""
+        host = outward_address(self.host) if self.host in EVERYWHERE else self.host
+        host = f"[{host}]" if ":" in host and not host.startswith("[") else host
         return f"http://{host}:{self.port}/"
 
     def serve_here(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -46,9 +47,11 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     actions = parser.add_subparsers(metavar="ACTION", required=True)
     one = actions.add_parser("list", help="one line per run")
     one.add_argument("places", nargs="*", default=["."], metavar="FILE|DIR")
+    one.add_argument("--json", action="store_true", help="for programs: an object a line")
     one.set_defaults(run=_list)
     show = actions.add_parser("show", help="states, times and transitions of one run or many")
     show.add_argument("places", nargs="+", metavar="FILE|DIR")
+    show.add_argument("--json", action="store_true", help="for programs: an object a line")
     show.set_defaults(run=_show)
     because = actions.add_parser(
         "why", help="why the newest run in a file ended so, cause by cause"
@@ -90,6 +93,10 @@ def _list(args: argparse.Namespace) -> int:
 
     from smachpy.events.recording import each_recording
 
+    if args.json:
+        for recording in each_recording(args.places):
+            print(json.dumps(_facts(recording)))
+        return 0
     table = Table(box=None, pad_edge=False)
     for title in ("file", "machine", "began", "time", "outcome", "events"):
         table.add_column(title, no_wrap=True, justify="right" if title == "events" else "left")
@@ -99,22 +106,34 @@ def _list(args: argparse.Namespace) -> int:
     return 0
 
 
+def _facts(recording: Recording) -> dict[str, Any]:
+    """What a list says of a run; `outcome` is null when none is recorded."""
+    events = recording.events
+    ends = [event.get("outcome") or "exception" for event in events if event["kind"] == "Finished"]
+    return {
+        "file": str(recording.path),
+        "machine": recording.record.label,
+        "began_ns": recording.stamp_ns,
+        "seconds": (events[-1]["stamp_ns"] - events[0]["stamp_ns"]) / 1e9 if events else 0.0,
+        "outcome": ends[-1] if ends else None,
+        "events": len(events),
+        "missing": recording.dropped,
+    }
+
+
 def _line(recording: Recording) -> tuple[str, ...]:
     from datetime import UTC, datetime
 
-    events = recording.events
-    began = datetime.fromtimestamp(recording.stamp_ns / 1e9, UTC)
-    took = (events[-1]["stamp_ns"] - events[0]["stamp_ns"]) / 1e9 if events else 0.0
-    ends = [event.get("outcome") or "exception" for event in events if event["kind"] == "Finished"]
+    facts = _facts(recording)
+    began = datetime.fromtimestamp(facts["began_ns"] / 1e9, UTC)
+    events, missing = facts["events"], facts["missing"]
     return (
-        str(recording.path),
-        recording.record.label,
+        facts["file"],
+        facts["machine"],
         began.strftime("%Y-%m-%d %H:%M:%S"),
-        f"{took:.1f} s",
-        ends[-1] if ends else "not finished",
-        f"{len(events)} of {len(events) + lost}"
-        if (lost := recording.dropped)
-        else str(len(events)),
+        f"{facts['seconds']:.1f} s",
+        facts["outcome"] or "not finished",
+        f"{events} of {events + missing}" if missing else str(events),
     )
 
 
@@ -137,8 +156,21 @@ def _show(args: argparse.Namespace) -> int:
 
     from viz.runs.statistics import count_by_machine, never_taken
 
+    counted = count_by_machine(_each(args.places))
+    if args.json:
+        for label, (record, statistics, lost) in counted.items():
+            told = {
+                "machine": label,
+                "runs": statistics.runs,
+                "outcomes": statistics.outcomes,
+                "missing": lost,
+                "states": {path: one.to_json() for path, one in statistics.states.items()},
+                "never_taken": never_taken(record, statistics),
+            }
+            print(json.dumps(told))
+        return 0
     console = _console()
-    for label, (record, statistics, lost) in count_by_machine(_each(args.places)).items():
+    for label, (record, statistics, lost) in counted.items():
         ended = ", ".join(f"{outcome} x{n}" for outcome, n in statistics.outcomes.items())
         console.print(
             printable(f"{label}: {statistics.runs} run(s); {ended or 'none has ended'}"),
@@ -147,7 +179,7 @@ def _show(args: argparse.Namespace) -> int:
         if lost:
             console.print(f"{lost} events are missing: visits and outcomes are at least these")
         table = Table(box=None, pad_edge=False)
-        for title in ("state", "visits", "median", "95 %", "failed", "outcomes"):
+        for title in ("state", "visits", "median", "95 %", "failed", "retried", "outcomes"):
             table.add_column(title, justify="left" if title in {"state", "outcomes"} else "right")
         for state in record.walk():
             if state.path in statistics.states:
@@ -169,6 +201,7 @@ def _row(path: str, numbers: dict[str, Any]) -> tuple[str, ...]:
         _seconds(numbers["median"]),
         _seconds(numbers["p95"]),
         f"{numbers['failures']:.0%}",
+        str(numbers["retries"] or ""),
         " ".join(f"{outcome} x{n}" for outcome, n in numbers["outcomes"].items()),
     )
 
@@ -178,8 +211,6 @@ def _seconds(value: float | None) -> str:
 
 
 def _why(args: argparse.Namespace) -> int:
-    import json
-
     from smachpy.events.recording import read_recording
     from viz.model.why import why
 

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from smachpy.introspection import StateRecord
 
 
+WATCHING = frozenset({"monitor", "condition"})
+"""Kinds of states whose outcomes say what they have found, not how well they did."""
+
+
 @dataclass(slots=True)
 class StateStatistics:
     """One state over all runs.
@@ -28,16 +32,24 @@ class StateStatistics:
         durations: Of finished visits [s].
         outcomes: Times each outcome ended it.
         visits: Times it was entered.
+        retries: Times it was tried again.
+        watches: It is a monitor or a condition: what it finds, 'invalid' too, is no failure.
     """
 
     visits: int = 0
     durations: list[float] = field(default_factory=list)
     outcomes: dict[str, int] = field(default_factory=dict)
+    retries: int = 0
+    watches: bool = False
 
     def failures(self) -> float:
         """Return the share of visits that failed or raised, 0 to 1."""
         ended = sum(self.outcomes.values())
-        bad = sum(n for out, n in self.outcomes.items() if outcome_class(out) == "failure")
+        bad = sum(
+            n
+            for out, n in self.outcomes.items()
+            if out == RAISED or (not self.watches and outcome_class(out) == "failure")
+        )
         return bad / ended if ended else 0.0
 
     def to_json(self) -> dict[str, Any]:
@@ -49,6 +61,7 @@ class StateStatistics:
             "p95": quantile(self.durations, 0.95),
             "total": sum(self.durations),
             "failures": self.failures(),
+            "retries": self.retries,
         }
 
 
@@ -78,8 +91,11 @@ class Statistics:
             "states": {path: state.to_json() for path, state in self.states.items()},
         }
 
-    def add(self, events: Iterable[dict[str, Any]]) -> None:
-        """Count the events of one file."""
+    def add(self, events: Iterable[dict[str, Any]], record: StateRecord | None = None) -> None:
+        """Count the events of one file; `record` is its machine, which says what only watches."""
+        for one in () if record is None else record.walk():
+            if one.kind in WATCHING:
+                self._state(one.path).watches = True
         since: dict[str, int] = {}
         for event in events:
             kind, path, stamp = event["kind"], event["path"], event["stamp_ns"]
@@ -87,6 +103,8 @@ class Statistics:
                 since[path] = stamp
                 self._state(path).visits += 1
                 self.runs += kind == "Started"
+            elif kind == "Retried":
+                self._state(path).retries += 1
             elif kind in {"Left", "Failed", "Finished"}:
                 outcome = event.get("outcome") or RAISED
                 state = self._state(path)
@@ -136,7 +154,7 @@ def count_by_machine(recordings: Iterable[Recording]) -> dict[str, Counted]:
         label = recording.record.label
         before = found.get(label)
         statistics = Statistics() if before is None else before.statistics
-        statistics.add(recording.events)
+        statistics.add(recording.events, recording.record)
         dropped = recording.dropped + (0 if before is None else before.dropped)
         found[label] = Counted(recording.record, statistics, dropped)
     return found

@@ -220,6 +220,7 @@ interface Comparison {
   runs: number[];
 }
 interface Answer {
+  wants_token?: boolean;
   ok?: boolean;
   text?: string;
   [fact: string]: any;

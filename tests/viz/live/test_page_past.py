@@ -315,3 +315,21 @@ def test_a_run_in_one_file_says_why_too(served, look, tmp_path):
     alone.keyboard.press("w")
     alone.wait_for_selector(".why li")
     assert "aborted" in alone.text_content(".why")
+
+
+def test_an_old_tab_asks_for_the_token_of_a_new_viewer(served, look):
+    served.add("one", events=told(*BEGUN), control=CONTROL)
+    page = look(f"{served.start(token='new')}#token=old")
+    wait_for(page, "document.querySelector('#pause')")
+    page.click("#pause")
+    page.wait_for_selector(".token")
+    page.fill(".token input", "no token here")
+    page.click(".token .primary")
+    page.wait_for_selector(".token .problem")
+    page.fill(".token input", "http://127.0.0.1:8080/?machine=one#token=new")
+    page.click(".token .primary")
+    page.wait_for_selector(".token", state="detached")
+    assert served.commands == []  # nothing is sent twice by itself
+    page.click("#pause")
+    wait_for(page, "document.querySelector('.notice')?.textContent === 'pause: done'")
+    assert [one["command"] for one in served.commands] == ["pause"]

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import ipaddress
+import socket
 import urllib.error
 import urllib.parse
 import urllib.request
 
 import pytest
+
+from viz.live.app import Viewer
+from viz.live.machines import Machines
+from viz.live.server import EVERYWHERE, AddressError, PageServer, outward_address
 
 
 @pytest.mark.parametrize("last", ["x:²", "x:٣", "x:-1", "x", "x:", f"x:{'9' * 5000}", "x:1.0"])
@@ -25,3 +31,26 @@ def test_the_id_of_an_event_is_taken(served, last):
     address = served.start() + f"api/events?last={urllib.parse.quote(last)}"
     with urllib.request.urlopen(address, timeout=10) as answer:
         assert answer.status == 200
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::"])
+def test_a_server_that_listens_everywhere_names_an_address_of_this_computer(host):
+    family = EVERYWHERE[host][0]
+    address = outward_address(host)
+    assert ipaddress.ip_address(address)
+    assert not ipaddress.ip_address(address).is_unspecified
+    try:
+        socket.socket(family).close()
+    except OSError:
+        pytest.skip("this computer has no such addresses")
+    with socket.create_server((address, 0), family=family):
+        pass  # it is one of this computer's
+
+
+def test_an_address_of_version_six_stands_in_brackets():
+    try:
+        server = PageServer(Viewer(Machines()), "::1", 0)
+    except AddressError:
+        pytest.skip("this computer has no such addresses")
+    assert server.address == f"http://[::1]:{server.port}/"
+    server._socket.close()

@@ -27,7 +27,13 @@ from smachpy.events.recording import (
 from viz.live import machines
 from viz.live.machines import Machine, Machines
 from viz.runs.html import standalone_page
-from viz.runs.statistics import StatisticsOfFiles, count_by_machine, never_taken, quantile
+from viz.runs.statistics import (
+    Statistics,
+    StatisticsOfFiles,
+    count_by_machine,
+    never_taken,
+    quantile,
+)
 
 
 def make_machine(*, failing=False, extra=False):
@@ -687,3 +693,49 @@ def test_half_a_pair_of_utf16_in_a_name_and_odd_addresses(record, tmp_path):
     status, text = ask(app, "/api/statistics", "machine=x")
     assert status == 503
     assert "it is gone" in text
+
+
+def test_what_a_monitor_finds_is_no_failure_and_retries_are_counted():
+    from smachpy.introspection import StateRecord
+
+    outcomes = ("invalid", "valid")
+    children = (
+        StateRecord("/TOP/WATCH", "WATCH", "monitor", "MonitorState", outcomes),
+        StateRecord("/TOP/WORK", "WORK", "state", "State", outcomes),
+    )
+    record = StateRecord("/TOP", "TOP", "machine", "StateMachine", ("done",), children=children)
+    events = []
+    for path in ("/TOP/WATCH", "/TOP/WORK"):
+        kinds = [("Entered", {}), ("Retried", {"attempt": 1, "reason": "invalid"})]
+        kinds += [("Left", {"outcome": "invalid"}), ("Entered", {}), ("Failed", {"error": "E: x"})]
+        events += [
+            {"kind": kind, "path": path, "stamp_ns": n, "t": 0.0, **facts}
+            for n, (kind, facts) in enumerate(kinds)
+        ]
+    statistics = Statistics()
+    statistics.add(events, record)
+    told = statistics.to_json()["states"]
+    assert {path: one["failures"] for path, one in told.items()} == {
+        "/TOP/WATCH": 0.5,  # it raised once
+        "/TOP/WORK": 1.0,
+    }
+    assert [one["retries"] for one in told.values()] == [1, 1]
+
+
+def test_lists_and_statistics_for_programs(tmp_path, capsys):
+    from smachpy import CBState, StateMachine
+    from smachpy.command import main
+
+    sm = StateMachine(outcomes=["done"], name="TOP")
+    with sm:
+        sm.add("A", CBState(lambda _: "ok", outcomes=["ok", "no"]), {"ok": "done", "no": "done"})
+    path = tmp_path / "run.jsonl"
+    with Recorder(path, sm):
+        sm.execute()
+    assert main(["runs", "list", "--json", str(tmp_path)]) == 0
+    (one,) = map(json.loads, capsys.readouterr().out.splitlines())
+    assert (one["file"], one["machine"], one["outcome"]) == (str(path), "TOP", "done")
+    assert main(["runs", "show", "--json", str(path)]) == 0
+    (told,) = map(json.loads, capsys.readouterr().out.splitlines())
+    assert told["states"]["/TOP/A"]["outcomes"] == {"ok": 1}
+    assert told["never_taken"] == [["/TOP/A", "no"]]

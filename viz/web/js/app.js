@@ -11,7 +11,7 @@ import { ActionsPage } from "#panels/actions.js";
 import { html } from "#panels/html.js";
 import { Inspector } from "#panels/inspector.js";
 import { listenToKeys } from "#panels/keys.js";
-import { Help, Laying, Legend, Notice, Overlay } from "#panels/messages.js";
+import { Help, Laying, Legend, Notice, Overlay, TokenDialog } from "#panels/messages.js";
 import { TopBar } from "#panels/top_bar.js";
 import { Tree } from "#panels/tree.js";
 
@@ -82,6 +82,7 @@ function App() {
     <div id="announced" class="hidden" aria-live="polite"></div>
     <${Notice} />
     <${Help} />
+    <${TokenDialog} />
   </div>`;
 }
 

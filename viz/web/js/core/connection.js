@@ -262,12 +262,30 @@ export async function ask(address, options = {}) {
 export const messageOf = (/** @type {unknown} */ error) => (error instanceof Error ? error.message : String(error));
 
 /** @param {string} address @param {object} data */
-const post = (address, data) =>
-  ask(address, {
+async function post(address, data) {
+  const answer = await ask(address, {
     method: "POST",
     headers: { "content-type": "application/json", "x-smachpy-token": token ?? "" },
     body: JSON.stringify(data),
   });
+  if (answer.wants_token) store.tokenAsked.value = true; // of a viewer that was started anew
+  return answer;
+}
+
+/** Take the token of the viewer as it runs now. @param {string} text the token, or the address it stands in */
+export function takeToken(text) {
+  const [, found] = /#token=([\w-]+)/.exec(text) ?? /^\s*([\w-]+)\s*$/.exec(text) ?? [];
+  if (!found) return false;
+  token = found;
+  try {
+    sessionStorage.setItem("smachpy.token", found);
+  } catch {
+    // it is kept until the page is loaded again
+  }
+  store.tokenAsked.value = false;
+  store.notify("Try again now");
+  return true;
+}
 
 /** Check or send a goal, or cancel one. @param {object} data */
 export const askAction = (data) => post("/api/action", data);
@@ -287,6 +305,7 @@ export async function command(name, more = {}) {
     return false;
   }
   const result = await post(link("control"), { command: name, ...more });
+  if (result.wants_token) return false; // it is asked for
   if (result.ok) store.notify(`${name}${more.path ? ` ${more.path}` : ""}: done`);
   else store.notify(`${name}: ${result.text ?? "refused"}`, "error");
   return result.ok;

@@ -64,6 +64,7 @@ export const theme = signal(saved("theme", "system"));
 /** @type {Signal<Set<string>>} */
 export const opened = signal(new Set()); // paths of containers
 export const help = signal(false);
+export const tokenAsked = signal(false); // the viewer does not take the token that this page has
 /** @type {Signal<Why | null>} */
 export const why = signal(null); // why the run ended so, while that is shown
 export const treeOpen = signal(false); // on small screens, where it lies over the page

@@ -1,9 +1,10 @@
 // What lies over the diagram: why there is nothing to see, banners, the legend, notices, help.
-import { choose, isFile } from "#core/connection.js";
+import { useState } from "preact/hooks";
+import { choose, isFile, takeToken } from "#core/connection.js";
 import { CHANGE_SIGNS } from "#core/model.js";
 import * as store from "#core/store.js";
 import { askerText, duration, holdText, shorten } from "#core/text.js";
-import { html, StateLink } from "#panels/html.js";
+import { fieldValue, html, StateLink } from "#panels/html.js";
 
 /** @typedef {import("#drawing/page.js").Page} Page */
 
@@ -149,4 +150,29 @@ export function Help() {
   return html`<div class="veil" onClick=${close}><div class="card" role="dialog" aria-label="keys">
     <h2>Keys</h2>
     <dl>${KEYS.map(([key, text]) => html`<dt><kbd>${key}</kbd></dt><dd>${text}</dd>`)}</dl></div></div>`;
+}
+
+/** An old tab after a restart of the viewer: it asks for the new token. */
+export function TokenDialog() {
+  const [text, setText] = useState("");
+  const [wrong, setWrong] = useState(false);
+  if (!store.tokenAsked.value) return null;
+  const close = () => {
+    store.tokenAsked.value = false;
+  };
+  const onSubmit = (/** @type {Event} */ e) => {
+    e.preventDefault();
+    const taken = takeToken(text);
+    setWrong(!taken);
+    if (taken) setText("");
+  };
+  return html`<div class="veil"><form class="card token" role="dialog" aria-label="token" onSubmit=${onSubmit}>
+    <h2>The viewer has a new token</h2>
+    <p>It was started anew. Paste the address that it printed, or the token at its end.</p>
+    <input aria-label="address or token" autocomplete="off" spellcheck=${false} value=${text} autofocus
+      onInput=${(/** @type {Event} */ e) => setText(fieldValue(e))} />
+    ${wrong && html`<p class="problem">no token; expected ADDRESS/#token=TOKEN, or TOKEN</p>`}
+    <p><button class="primary" type="submit">Use it</button>${" "}
+      <button type="button" onClick=${close}>Only look</button></p>
+  </form></div>`;
 }
