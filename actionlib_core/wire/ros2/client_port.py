@@ -327,6 +327,7 @@ class RosClientPort:
             questions = self._take_back(goal)
         for question in questions:
             question.close()
+        self._send_next()  # it may have been on its way
 
     def _take_back(self, goal: _Goal) -> list[Closable]:
         """Return the open questions of a goal, which count as unanswered now. Needs the lock."""

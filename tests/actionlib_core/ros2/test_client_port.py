@@ -284,6 +284,21 @@ def test_many_goals_never_overfill_the_queue_of_a_server(world):
     assert len(server.sent) == len(set(server.sent)) == 100
 
 
+def test_goals_that_end_before_their_acceptance_arrives_make_room_for_others(world):
+    server, client = world.server(), world.client()
+
+    def end_first(query, uuid):
+        server.set_state(uuid, 2)
+        server.end(uuid, 4)
+        world.clock.call_later(10.0, lambda: server.reply(query, pack_accepted(1)))
+
+    server.on_goal = end_first
+    server.on_result = lambda query, uuid: server.answer_result(query, server.states.get(uuid, 0))
+    handles = [client.send_goal(Fibonacci.Goal(order=1)) for _ in range(5 * AT_ONCE)]
+    assert all(handle.wait(5.0) for handle in handles)
+    assert len(server.sent) == len(handles)
+
+
 # -- cancels ---------------------------------------------------------------------------------------
 
 
