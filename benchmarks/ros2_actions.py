@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import subprocess
 import sys
 import threading
 import time
@@ -58,6 +59,7 @@ def serve(port: int) -> None:
 
 
 def run(*, quick: bool) -> dict:
+    """Measure everything in turns."""
     port = own.free_port()
     server = _Process("--serve", str(port))
     with server:
@@ -81,7 +83,7 @@ def run(*, quick: bool) -> dict:
 
         def goal() -> None:
             client.send_goal(Fibonacci.Goal(order=1))
-            assert client.wait_for_result(own.LONG_S if hasattr(own, "LONG_S") else 10.0)
+            assert client.wait_for_result(10.0)
 
         queries, pings, goals = [], [], []
         for function in (query, wire.round_trip, goal):
@@ -105,8 +107,6 @@ class _Process(own.Peer):
     """A process of this file."""
 
     def __init__(self, *arguments: str) -> None:
-        import subprocess
-
         self.process = subprocess.Popen(
             [sys.executable, str(Path(__file__).resolve()), *arguments],
             stdin=subprocess.PIPE,
@@ -116,6 +116,7 @@ class _Process(own.Peer):
 
 
 def main() -> int:
+    """Print the figures; returns 1 when one does not hold."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--serve", type=int, help=argparse.SUPPRESS)
