@@ -42,6 +42,7 @@ from smachpy.pnp.pnml import parse_pnml as parse_pnml
 from smachpy.pnp.pnml import pnml_text as pnml_text
 from smachpy.pnp.pnml import read_pnml as read_pnml
 from smachpy.pnp.pnml import write_pnml as write_pnml
+from smachpy.pnp.pnp_cmd import PNPCmd as PNPCmd
 from smachpy.pnp.problems import PlanError as PlanError
 from smachpy.pnp.problems import PlanProblem as PlanProblem
 from smachpy.pnp.reach import Reachable as Reachable

@@ -18,7 +18,7 @@ from smachpy.pnp.knowledge import EVENT_LIFE_S, Knowledge
 from smachpy.pnp.net import Net
 from smachpy.pnp.plan import Plan, problem_of, understand
 from smachpy.pnp.problems import PlanError, PlanProblem, raise_errors
-from smachpy.pnp.reading import PLANS, read_net
+from smachpy.pnp.reading import find_plan, read_net
 from smachpy.run.child import ContainerData
 from smachpy.run.visit import End
 
@@ -498,7 +498,7 @@ def _load(
     stack = (*above, file.resolve())
     subs: dict[str, PetriNetPlan] = {}
     for name, known in plan.executables.items():
-        part = _file_of(file.parent, name)
+        part = None if "/" in name else find_plan(file.parent, name)
         if name in parameters.actions or part is None:
             continue
         if part.resolve() in stack or len(stack) > _DEEPEST:
@@ -520,13 +520,3 @@ def _load(
         sub_plans=subs,
         **options,
     )
-
-
-def _file_of(folder: Path, name: str) -> Path | None:
-    """Return the file of the plan with this name; None when there is none."""
-    if "/" in name:
-        return None
-    try:
-        return next((f for end in PLANS if (f := folder / f"{name}{end}").is_file()), None)
-    except (OSError, ValueError):
-        return None

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from smachpy.exceptions import did_you_mean
 from smachpy.pnp.pnml import read_pnml
-from smachpy.pnp.problems import PlanProblem, raise_errors
+from smachpy.pnp.problems import PlanError, PlanProblem, raise_errors
 from smachpy.pnp.text import parse_pddl, parse_plan, parse_rules
 
 if TYPE_CHECKING:
@@ -32,6 +33,29 @@ def read_net(file: Path | str) -> tuple[Net, tuple[PlanProblem, ...]]:
     name = path.name.partition(".")[0]
     parse = parse_pddl if path.suffix == ".pddlout" else parse_plan
     return parse(_text(path), rules, name=name, file=str(file)), ()
+
+
+def find_plan(folder: Path | str, name: str) -> Path | None:
+    """Return the file of the plan with this name in a folder; None when there is none."""
+    try:
+        files = (Path(folder) / f"{name}{end}" for end in PLANS)
+        return next((file for file in files if file.is_file()), None)
+    except (OSError, ValueError):
+        return None
+
+
+def plan_file(folder: Path | str, name: str) -> Path:
+    """Return the file of the plan with this name in a folder.
+
+    Raises:
+        PlanError: there is none.
+    """
+    found = find_plan(folder, name)
+    if found is None:
+        known = sorted(f.stem for f in Path(folder).glob("*") if f.suffix in PLANS)
+        text = f"no such plan; expected one of {known}.{did_you_mean(name, known)}"
+        raise PlanError([PlanProblem("file", "error", text, f"plan {name!r}", str(folder))])
+    return found
 
 
 def _text(path: Path) -> str:

@@ -116,6 +116,11 @@ def parse_rules(text: str, *, file: str = "") -> tuple[ExecutionRule, ...]:
     return tuple(found)
 
 
+def rule_of(condition: str, recovery: str) -> Rule:
+    """Read a rule from its two parts; errors as for `parse_rules`."""
+    return _rule(condition, recovery, "", 0)
+
+
 def _error(file: str, line: int, message: str) -> PlanError:
     return PlanError([PlanProblem("text", "error", message, "", file, line)])
 

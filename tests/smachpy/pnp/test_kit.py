@@ -1,0 +1,61 @@
+"""Plans under the test kit, in explorations, recorded, and with a timeout and a retry of their own."""
+
+import smachpy
+from smachpy import State, StateMachine
+from smachpy.pnp import PetriNetPlan
+from smachpy.testing import explore
+from tests.smachpy.pnp.nets import net_of
+
+FORK = """
+init* -> i j : fork
+i -> A.exec : A.start
+j -> B.exec : B.start
+A.exec -> a : A.end
+B.exec -> b : B.end
+A.exec -> fail : A.fail
+a b -> goal : join
+"""
+
+
+class Leaf(State):
+    def __init__(self):
+        super().__init__(["succeeded", "aborted", "preempted"])
+
+    def execute(self, ud):
+        return "preempted" if self.sleep(1.0) else "succeeded"
+
+
+def plan():
+    return PetriNetPlan(net_of(FORK), {"A": Leaf(), "B": Leaf()})
+
+
+def test_an_exploration_finds_the_outcomes_of_a_plan():
+    outcomes = set()
+
+    def note(run):
+        outcomes.add(run.outcome)
+
+    found = explore(plan, invariants=[note])
+    assert found.ok, str(found)
+    assert found.exhaustive
+    assert {"goal", "fail"} <= outcomes
+
+
+def test_a_recording_tells_where_the_tokens_were(clock):
+    machine = plan()
+    tape = machine.tape()
+    assert machine.execute() == "goal"
+    fired = [record for record in tape.read() if record["kind"] == "Fired"]
+    tape.close()
+    assert fired[-1]["transition"] == "t6"
+
+
+def test_options_of_a_plan(clock):
+    slow = PetriNetPlan(net_of("init* -> wait_60.exec : start\nwait_60.exec -> goal : end"), retry=(2, 0.0, ["late"]),
+                        timeout=2.0, timeout_outcome="late")  # fmt: skip
+    sm = StateMachine(["goal", "fail", "late", "preempted"])
+    with sm:
+        sm.add("P", slow)
+    assert sm.execute() == "late"
+    assert clock.now() == 4.0
+    assert dict(smachpy.describe(sm).children[0].details)["timeout"] == "2 s -> late"
