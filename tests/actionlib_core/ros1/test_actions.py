@@ -135,6 +135,7 @@ def test_goals_from_a_client_in_ros(ros, bridge, serve):
     ended = [client.ask(str(number)) for number in range(GOALS)]
     assert ended == [f"{GoalStatus.SUCCEEDED} {2 * number} done here" for number in range(GOALS)]
     assert client.ask("-5") == "sent"
+    assert client.ask("begun?") == "begun"
     assert client.ask("cancel") == f"{GoalStatus.PREEMPTED} -1 preempted here"
 
 

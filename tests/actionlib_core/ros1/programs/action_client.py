@@ -25,6 +25,7 @@ for line in sys.stdin:
         print("begun" if begun.wait(30) else "not begun", flush=True)
         continue
     elif word != "wait":
+        begun.clear()
         client.send_goal(TestGoal(int(word)), active_cb=begun.set)
         if int(word) < 0:
             print("sent", flush=True)
