@@ -357,19 +357,23 @@ class _Shown:
     # -- from ROS 1 ----------------------------------------------------------------------------
 
     def on_status(self, payload: bytes) -> None:
-        """Take a status list; an idle server's is not passed on, again and again."""
-        entries = unpack_statuses(payload)
+        """Take a status list; it is read and sent soon, as long ones are slow to read."""
         with self._lock:
-            if not self._goals.on_statuses(entries):
-                return
             waits, self._latest = self._latest, payload
         if waits is None:
             self._clock.call_later(STATUS_S, self._send_status)
 
     def _send_status(self) -> None:
+        """Pass on the latest status list, but for those of an idle server, which say nothing."""
         with self._lock:
             payload, self._latest = self._latest, None
-        if payload is not None:
+            assert payload is not None
+            try:
+                news = self._goals.on_statuses(unpack_statuses(payload))
+            except ValueError as error:
+                self._sides.ros.report(f"{self._name}/status", Ros1Error(self._name, str(error)))
+                return
+        if news:
             with contextlib.suppress(TransportError):  # hidden meanwhile
                 self._status.put(payload)
 
