@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import os
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
-from actionlib_core.config import ROS2_DISTRO_VARIABLE, ROS2_DOMAIN_VARIABLE, ROS2_VARIABLE
+from actionlib_core.config import (
+    LAST_DOMAIN,
+    MOST_DIGITS,
+    ROS2_DISTRO_VARIABLE,
+    ROS2_DOMAIN_VARIABLE,
+    ROS2_VARIABLE,
+    Distro,
+)
 from actionlib_core.exceptions import ConfigError
 
 if TYPE_CHECKING:
-    import argparse
     from collections.abc import Iterator
 
 
@@ -29,10 +36,19 @@ def add_ros2_options(parser: argparse.ArgumentParser, **endpoint: Any) -> None:
         "configuration)",
         **endpoint,
     )
-    group.add_argument("--domain", metavar="N", help="its ROS_DOMAIN_ID (default: 0)")
+    group.add_argument("--domain", metavar="N", type=_domain, help="its ROS_DOMAIN_ID (default: 0)")
     group.add_argument(
-        "--distro", metavar="NAME", help="its release: humble, jazzy, ... (default: jazzy)"
+        "--distro",
+        metavar="NAME",
+        choices=get_args(Distro),
+        help=f"its release: {', '.join(get_args(Distro))} (default: jazzy)",
     )
+
+
+def _domain(text: str) -> str:
+    if not (text.isascii() and text.isdecimal() and int(text[:MOST_DIGITS]) <= LAST_DOMAIN):
+        raise argparse.ArgumentTypeError(f"got {text!r}; expected 0 to {LAST_DOMAIN}")
+    return text
 
 
 @contextlib.contextmanager
