@@ -15,7 +15,7 @@ import struct
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Collection, Iterable, Sequence
 
 FRONT = b"\x00\x01\x00\x00"  # CDR version 1, little-endian
 UUID_BYTES = 16
@@ -28,6 +28,7 @@ _INFO = struct.Struct("<16siI")
 _COUNT = struct.Struct("<4sI")
 _CANCELED = struct.Struct("<4sb3xI")
 _FIRST = struct.Struct("<16siIb")
+SOUGHT = 16  # goals at most that are looked for one by one
 _NEXT = struct.Struct("<16s3xiIb")  # an element begins where the status before it has ended
 
 
@@ -183,6 +184,33 @@ def unpack_statuses(payload: bytes) -> list[GoalState]:
     )
     found += rest
     return [GoalState(uuid, sec * _NS + nsec, code) for uuid, sec, nsec, code in found]
+
+
+def find_states(payload: bytes, wanted: Collection[bytes]) -> list[tuple[bytes, int]]:
+    """Return id and status of the goals of GoalStatusArray that are wanted; errors as above.
+
+    A list names every goal of the last seconds, and a client knows few of them: looking for those
+    is quicker than reading all.
+    """
+    if len(wanted) > SOUGHT:
+        return [(uuid, code) for uuid, _, code in unpack_statuses(payload) if uuid in wanted]
+    order = _order(payload, _COUNT.size)
+    (count,) = struct.unpack_from(f"{order}4xI", payload)
+    end = _COUNT.size + (_FIRST.size + (count - 1) * _NEXT.size if count else 0)
+    _order(payload, end)
+    found = []
+    for uuid in wanted:
+        start = payload.find(uuid, _COUNT.size, end)
+        while start >= 0:
+            after_first = start - _COUNT.size - _FIRST.size
+            if after_first + _FIRST.size == 0:
+                found.append((uuid, payload[start + _FIRST.size - 1]))
+                break
+            if after_first >= 0 and after_first % _NEXT.size == 0:
+                found.append((uuid, payload[start + _NEXT.size - 1]))
+                break
+            start = payload.find(uuid, start + 1, end)  # by chance, across two goals
+    return found
 
 
 def _order(payload: bytes, size: int) -> str:

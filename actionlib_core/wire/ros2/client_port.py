@@ -21,13 +21,13 @@ from actionlib_core.wire.bursts import Bursts
 from actionlib_core.wire.readable import Readable
 from actionlib_core.wire.ros2.action_messages import (
     Asked,
+    find_states,
     pack_cancel,
     pack_id,
     pack_with_id,
     status_in,
     unpack_accepted,
     unpack_canceling,
-    unpack_statuses,
     unpack_with_id,
 )
 from actionlib_core.wire.ros2.goal_exchange import GoalExchange, Step
@@ -558,14 +558,16 @@ class RosClientPort:
 
     def _read_states(self, sample: Sample) -> None:
         """Take in what a status list says of goals that are followed."""
+        with self._lock:
+            wanted = set(self._by_uuid)
         try:
-            states = unpack_statuses(sample.payload)
+            states = find_states(sample.payload, wanted)
         except ValueError as error:
             self._report("a status", error)
             return
         steps = []
         with self._lock:
-            for uuid, _, code in states:
+            for uuid, code in states:
                 goal = self._by_uuid.get(uuid)
                 if goal is not None and code > goal.exchange.code:
                     self._note_sender(goal, sample.source)

@@ -16,6 +16,7 @@ from actionlib_core.wire.ros2.action_messages import (
     Asked,
     Canceling,
     GoalState,
+    find_states,
     pack_accepted,
     pack_cancel,
     pack_canceling,
@@ -181,3 +182,23 @@ def test_a_body_that_is_no_cdr_is_not_sent() -> None:
         pack_with_id(bytes(16), b"")
     with pytest.raises(ValueError, match="body"):
         pack_with_id(bytes(16), b"\0\0\0\0")
+
+
+@given(
+    st.lists(st.tuples(st.binary(min_size=16, max_size=16), st.integers(0, 6)), max_size=40),
+    st.sets(st.integers(0, 45), max_size=25),
+    st.booleans(),
+)
+def test_goals_are_found_in_a_list_as_by_reading_all_of_it(goals, chosen, big_endian) -> None:
+    states = dict(goals)
+    listed = [GoalState(uuid, 1_500_000_000, code) for uuid, code in states.items()]
+    payload = pack_statuses(listed)
+    if big_endian:
+        payload = b"\x00\x00\x00\x00" + len(listed).to_bytes(4, "big") + payload[8:]
+    names = list(states)
+    wanted = {names[number] if number < len(names) else bytes([number]) * 16 for number in chosen}
+    found = dict(find_states(payload, wanted))
+    assert found == {uuid: code for uuid, code in states.items() if uuid in wanted}
+    if payload[8:]:
+        with pytest.raises(ValueError, match="payload"):
+            find_states(payload[:-1], wanted)
