@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from actionlib_core.exceptions import Ros1Error, TypeMismatchError
 from actionlib_core.wire.encoding import make_encoding, parse_encoding
+from actionlib_core.wire.presence import token_key, with_age
 from actionlib_core.wire.ros1.node import ANY
 
 if TYPE_CHECKING:
@@ -58,18 +59,11 @@ class Sides:
 
     def ros_name(self, key: str) -> str | None:
         """Return the name in ROS 1 of one of ours; None: it belongs to another robot."""
-        if not self.namespace:
-            return f"/{key}"
-        front, slash, rest = (
-            key[: len(self.namespace)],
-            *key[len(self.namespace) :].partition("/")[1:],
-        )
-        return f"/{rest}" if front == self.namespace and slash else None
+        front = f"{self.namespace}/" if self.namespace else ""
+        return f"/{key.removeprefix(front)}" if key.startswith(front) else None
 
     def show(self, kind: Kind, key: str, typed: Typed, ros_node: str) -> Closable:
         """Show the token of an end in ROS 1, under the name of its node there."""
-        from actionlib_core.wire.presence import token_key, with_age
-
         end = self.node.endpoint(kind, key, typed.type, typed.md5)
         end = end._replace(node=self.key(ros_node) or "-")
         return self.node.transport.declare_alive(

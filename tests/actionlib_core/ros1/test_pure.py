@@ -20,7 +20,7 @@ from actionlib_core.wire.ros1.goals import GoalsOfClients, GoalsOfServer, Verdic
 from actionlib_core.wire.ros1.node import check_master
 from actionlib_core.wire.ros1.plan import Wanted, make_plan, without
 from actionlib_core.wire.ros1.publishers import Publishers
-from actionlib_core.wire.ros1.sides import Typed, type_of
+from actionlib_core.wire.ros1.sides import Sides, Typed, type_of
 
 TEXT = st.text(st.characters(codec="utf-8"), min_size=1).filter(lambda text: "=" not in text)
 
@@ -213,6 +213,23 @@ def test_the_type_of_an_action_follows_from_those_of_its_topics():
 def test_headers_without_a_usable_type_are_refused(header):
     with pytest.raises(Ros1Error):
         type_of(header, "/topic")
+
+
+@pytest.mark.parametrize(
+    ("namespace", "key", "name"),
+    [
+        ("", "move_base", "/move_base"),
+        ("robot_1", "robot_1/move_base", "/move_base"),
+        ("robot_1", "robot_10/move_base", None),
+        ("robot_1", "robot_1", None),
+        ("fleet/robot_1", "fleet/robot_1/a/b", "/a/b"),
+        ("robot_1", "move_base", None),
+    ],
+)
+def test_names_correspond(namespace, key, name):
+    sides = Sides(None, None, namespace)
+    assert sides.ros_name(key) == name
+    assert name is None or sides.key(name) == key
 
 
 # -- which names ---------------------------------------------------------------------------------
