@@ -188,6 +188,7 @@ class Wait(State):
 
     def __init__(self, call: Call) -> None:
         super().__init__(("succeeded", "preempted"), call.variables)
+        _check_count(call, "seconds, as in wait_5", 1)
         self._call = call
         (text,) = call.parameters
         if not text.startswith("@"):
@@ -204,6 +205,12 @@ class Wait(State):
         return kind, (("waits", f"{self._call.parameters[0]} s"), *details)
 
 
+def _check_count(call: Call, expected: str, most: int | None = None) -> None:
+    count = len(call.parameters)
+    if count == 0 or (most is not None and count > most):
+        raise InvalidStateError(f"{call.name}: got {list(call.parameters)}; expected {expected}.")
+
+
 def _seconds(name: str, text: str) -> float:
     if not re.fullmatch(r"\d{1,9}(\.\d{1,9})?", text):
         raise InvalidStateError(f"{name}: got {text!r}; expected seconds, as in wait_5.")
@@ -215,6 +222,7 @@ class WaitFor(State):
 
     def __init__(self, call: Call, knowledge: Knowledge) -> None:
         super().__init__(("succeeded", "preempted"), call.variables)
+        _check_count(call, "a condition, as in waitfor_door")
         parameters = call.parameters
         self._negated = parameters[0] == "not" and len(parameters) > 1
         self._name = "_".join(parameters[1:] if self._negated else parameters)
@@ -246,6 +254,7 @@ class SetVariable(State):
     """`setvar_@V_value`: writes the userdata key V. `unknownvar_@V` forgets it."""
 
     def __init__(self, call: Call, forget: Callable[[str], None] | None = None) -> None:
+        _check_count(call, "a variable, as in setvar_@place_kitchen")
         self._key, *rest = call.parameters
         self._key = self._key.removeprefix("@")
         super().__init__(("succeeded",), (), [self._key])

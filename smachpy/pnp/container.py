@@ -44,18 +44,20 @@ class PlanData(ContainerData):
         net_plan: The plan itself.
         names: Label of a child -> the plan's name for it.
         knowledge: What its guards ask.
+        has_actions: Somebody has said what does some actions.
         unbound: Label -> why nothing does that action.
         execution: Its run, while there is one.
     """
 
-    __slots__ = ("execution", "knowledge", "names", "net_plan", "unbound")
-    _kept = ("knowledge", "names", "net_plan", "unbound")
+    __slots__ = ("execution", "has_actions", "knowledge", "names", "net_plan", "unbound")
+    _kept = ("has_actions", "knowledge", "names", "net_plan", "unbound")
 
     def __init__(self) -> None:
         super().__init__()
         self.net_plan: Any = None
         self.names: dict[str, str] = {}
         self.knowledge: Any = None
+        self.has_actions = False
         self.unbound: dict[str, PlanProblem] = {}
         self.execution: Execution | None = None
 
@@ -205,6 +207,7 @@ class PetriNetPlan(Container):
         subs = problems.mapping("sub_plans", sub_plans, "name -> plan")
         given = problems.mapping("actions", actions, "name -> what does it")
         problems.raise_all()
+        data.has_actions = bool(given)
         self.__bind(Binder({**subs, **given}, self.__built_in()))
 
     def __built_in(self) -> dict[str, Any]:
@@ -292,6 +295,11 @@ class PetriNetPlan(Container):
         """Return the actions and conditions that nothing is registered for."""
         plan, knowledge = self._smachpy.net_plan, self._smachpy.knowledge
         found = self.__unbound()
+        if found and not self._smachpy.has_actions:
+            names = sorted({name.rpartition("#")[2].partition("_")[0] for name in plan.executables})
+            text = f"runs once it is said what does its actions: {', '.join(names)}."
+            hint = "Try a file actions.yaml beside it, or actions={...}."
+            found = [problem_of(plan.net, "unbound", "note", text, hint=hint)]
         table = _Compiled(self).table
         asked = {
             name: number

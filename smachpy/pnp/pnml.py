@@ -228,7 +228,9 @@ def _checked_arcs(found: _Found) -> tuple[Arc, ...]:
         elif (source in found.places) == (target in found.places):
             kind = "places" if source in found.places else "transitions"
             text = f"got an arc between two {kind}; expected a place and a transition."
-            found.problem("error", "arc", element, text)
+            if found.dialect == "pnp":
+                text += " PNP drops it, and so it is left out here."
+            found.problem("warning" if found.dialect == "pnp" else "error", "arc", element, text)
         elif element.get("late"):
             text = "stands above one of its ends; PNP drops it, and so it is left out here."
             hint = "Try to put it behind both."

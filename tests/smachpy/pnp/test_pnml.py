@@ -93,13 +93,20 @@ def test_an_arc_above_its_end_is_dropped_as_there_with_a_warning():
     assert "early" in problems[0].element
 
 
+def test_an_arc_between_two_places_is_dropped_in_pnps_dialect_only():
+    net, problems = parse_pnml(JARP.replace('source="p2" target="t2"', 'source="p2" target="p3"'))
+    assert len(net.arcs) == 3
+    assert [(p.rule, p.severity, p.line) for p in problems] == [("arc", "warning", 16)]
+    with pytest.raises(PlanError):
+        parse_pnml(ISO.replace('source="t" target="r"', 'source="p" target="r"'))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "rule", "line"),
     [
         ('<place id="p2">', "<place>", "id", 10),
         ('<place id="p3">', '<place id="p2">', "id", 11),
         ('source="p2" target="t2"', 'source="p9" target="t2"', "arc", 16),
-        ('source="p2" target="t2"', 'source="p2" target="p3"', "arc", 16),
         ('source="p2" target="t2"', 'source="p2"', "arc", 16),
         ("Default,1", "one", "number", 5),
         ("Default,1", "-1", "number", 5),
