@@ -124,6 +124,8 @@ class Attack:
             self.root.request_preempt()
         if self.chance(0.02):
             raise ValueError("a callback")
+        if self.chance(0.01):
+            current_clock().sleep(self.seconds(5.0))  # longer than any grace
 
     def calm_down(self) -> None:
         """Attack no more; on a busy computer a timeout would ask all the same."""
