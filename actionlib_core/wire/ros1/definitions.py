@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from actionlib_core.transport import Closable, Query
     from actionlib_core.wire.ros1.sides import Typed
 
+MOST_TYPES = 2000  # a robot has some hundred
+
 
 class Definitions:
     """Knows the text of a type from this program's own, from ROS 1, or from whoever has it here.
@@ -32,7 +34,8 @@ class Definitions:
     def learn(self, typed: Typed, text: str) -> None:
         """Take the text that a publisher in ROS 1 tells of its type; "" is none."""
         with self._lock:
-            if not text or typed in self._texts or self._closed:
+            full = len(self._texts) >= MOST_TYPES
+            if not text or typed in self._texts or full or self._closed:
                 return
             self._texts[typed] = text
         raw = text.encode()

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from actionlib_core.wire.ros1.sides import Sides
 
 LATCHED = "1"
+MOST_SENDERS = 64  # of a topic, whose last messages are kept until it is known whether they latch
 
 
 class TopicBridge:
@@ -141,7 +142,10 @@ class _ToRos:
             return
         source = sample.source
         with self._lock:
+            self._last.pop(source, None)
             self._last[source] = sample.payload
+            if len(self._last) > MOST_SENDERS:
+                del self._last[next(iter(self._last))]
             keep = source if source in self._latched else None
             self._publication.put(sample.payload, keep=keep)
 
