@@ -161,6 +161,7 @@ def _net_node(record: StateRecord, levels: int, *, show_implicit: bool) -> Node:
         details=record.details,
         outcomes=record.outcomes,
         children=tuple(nodes),
+        initial=tuple(starts),
         edges=tuple(
             Edge(source, target, False, (text,), back=(source, target) in backward)  # noqa: FBT003
             for source, target, text in arrows

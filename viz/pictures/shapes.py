@@ -151,7 +151,7 @@ class _Interior:
 
     def _starts(self) -> None:
         fork = len(self._node.initial) > 1 or self._node.kind == "concurrence"
-        for label in self._node.initial:
+        for label in self._node.initial if self._node.kind != "plan" else ():
             self._arrow(
                 Anchor(self._name, "in", is_open=True),
                 self._entrance(label, back=False),

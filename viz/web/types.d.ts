@@ -139,6 +139,8 @@ interface StateNode {
   pills: { outcome: string; by_default: boolean }[];
   change: Change;
   note: string;
+  caption: string; // shown in place of the label; of what a net has beside its actions
+  tokens: number;
   parent: StateNode | null;
   depth: number;
   number: number;

@@ -19,6 +19,11 @@ export const KIND_NAMES = {
   sequence: "sequence",
   concurrence: "concurrence",
   iterator: "iterator",
+  plan: "Petri net plan",
+  place: "place",
+  "goal place": "goal",
+  "fail place": "failed plan",
+  transition: "transition",
   missing: "missing state",
 };
 
@@ -47,7 +52,8 @@ export class Model {
   /** @param {StateNode} node @param {StateNode | null} parent @param {number} depth */
   #index(node, parent, depth) {
     Object.assign(node, { parent, depth, number: this.order.length });
-    node.name = shorten(node.label);
+    const tokens = node.tokens ? ` ${"\u25cf".repeat(Math.min(node.tokens, 3))}` : "";
+    node.name = shorten(node.caption || node.label) + tokens;
     node.shown = signed(node.change, node.name);
     this.byPath.set(node.path, node);
     this.order.push(node);
