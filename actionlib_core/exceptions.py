@@ -193,7 +193,13 @@ class TypeMismatchError(ActionlibError, TypeError):
     """
 
     def __init__(
-        self, name: str, expected: tuple[str, str], found: tuple[str, str], *, by: str = ""
+        self,
+        name: str,
+        expected: tuple[str, str],
+        found: tuple[str, str],
+        *,
+        by: str = "",
+        way_out: str = "Try using one type on both ends, or another name.",
     ) -> None:
         self.name = name
         self.expected_type, self.expected_md5 = expected
@@ -201,8 +207,7 @@ class TypeMismatchError(ActionlibError, TypeError):
         whose = f" from {by}" if by else ""
         super().__init__(
             f"{name}: types differ: got {found[0]!r} (md5 {found[1]}){whose}; "
-            f"expected {expected[0]!r} (md5 {expected[1]}). Try using one type on both ends, or "
-            "another name."
+            f"expected {expected[0]!r} (md5 {expected[1]}). {way_out}"
         )
 
 

@@ -17,6 +17,7 @@ from actionlib_core.exceptions import ActionlibError, TransportError, TypeMismat
 from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.goal.states import Status
 from actionlib_core.interfaces import ros2_action
+from actionlib_core.interfaces.ros2 import distros_of
 from actionlib_core.wire.bursts import Bursts
 from actionlib_core.wire.readable import Readable
 from actionlib_core.wire.ros2.action_messages import (
@@ -605,7 +606,8 @@ class RosClientPort:
             change = self._servers.on_token(token, alive=alive)
             if change is None:
                 return
-            server, error = change.server, self._explain(change)
+        server, error = change.server, self._explain(change)
+        with self._lock:
             self._silent.discard(server)
             if change.alive:
                 self._there[server] = error
@@ -628,9 +630,19 @@ class RosClientPort:
             return None
         first = change.mismatches[0]
         own, found = (first.own.name, first.own.hash), (first.found.name, first.found.hash)
-        return TypeMismatchError(
-            self._name, own, found, by=f"action server of node {change.server.node!r}"
+        by = f"action server of node {change.server.node!r}"
+        if own[0] != found[0]:
+            return TypeMismatchError(self._name, own, found, by=by)
+        distro, others = self._network.settings.distro, distros_of(*found)
+        fitting = " or ".join(f"'{other}'" for other in others)
+        way_out = (
+            f"That is how {fitting} defines it, and this program takes '{distro}'. Try 'distro' in "
+            "the configuration, or --distro."
+            if others
+            else "No distribution known here defines it so. Try the robot's own definition, in a "
+            "folder that SMACHPY_INTERFACE_PATH names."
         )
+        return TypeMismatchError(self._name, own, found, by=by, way_out=way_out)
 
     def _lose_soon(self, server: RosServer) -> None:
         """Take the loss of a server after its last answers, which its tokens may overtake."""

@@ -438,6 +438,8 @@ def test_server_with_another_definition_is_told_with_both_hashes(world):
     with pytest.raises(TypeMismatchError) as caught:
         client.wait_for_server(5.0)
     assert str(caught.value).count("RIHS01_") == 2
+    assert "'rolling'" in str(caught.value)
+    assert caught.value.expected_md5 != caught.value.found_md5
 
 
 def test_other_domain_is_another_network(world):
