@@ -471,6 +471,7 @@ class ServerHere:
         self._timer: Timer | None = None
         self._acks: list[str] = []
         self._has_said_farewell = False
+        self._is_next_heard = False  # the server that follows it has sent a status list
         self._gone_since: float | None = None
         self._closed = False
         self._publications: dict[str, Publication] = {}
@@ -514,12 +515,13 @@ class ServerHere:
             with self._lock:
                 if not self._has_said_farewell:
                     self._goals.lose_unheard()
-            self._say_nothing_runs()
+                if not self._is_next_heard:  # else it would hide the goals that the next one has
+                    self._say_nothing_runs()
         typed = self.server.type, self.server.md5
         fitting = [end for end in servers if (end.type, end.md5) == typed]
         if fitting:
             self.server, self._gone_since = _eldest(fitting), None
-            self._has_said_farewell = False
+            self._has_said_farewell = self._is_next_heard = False
             return True
         return not servers and now < self._gone_since + NEXT_S
 
@@ -608,6 +610,8 @@ class ServerHere:
                 self._goals.on_status(entry, self._clock.now())
             self._arm()
             is_farewell = parse_token(frame) is not None
+            if self._has_said_farewell and not is_farewell:
+                self._is_next_heard = True
             self._has_said_farewell |= is_farewell
             clients = list(self._clients) if is_farewell else []
         self._publications["status"].put(sample.payload, keep="")
