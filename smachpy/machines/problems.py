@@ -117,10 +117,16 @@ class Problems:
     ) -> dict[str, Any]:
         """Check a dict from name to name, or to None where that is `optional`."""
         checked = self.mapping(argument, given, holds)
-        for name, other in checked.items():
+        for name, other in [*checked.items()]:
             fits = isinstance(other, str) or (optional and other is None)
-            if not (isinstance(name, str) and fits):
-                self.add(f"{argument}: got {name!r}: {other!r} in it; expected {holds}.")
+            if isinstance(name, str) and fits:
+                continue
+            problem = f"{argument}: got {name!r}: {other!r} in it; expected {holds}."
+            if accepts(problem):
+                del checked[name]
+                checked[str(name)] = None if optional and other is None else str(other)
+            else:
+                self.add(problem)
         return checked
 
     def values(self, argument: str, given: Any) -> tuple[Any, ...]:
