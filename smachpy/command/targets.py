@@ -11,6 +11,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.exceptions import ActionlibError
 from actionlib_core.suggest import did_you_mean
 from smachpy.command.extras import advice, clash, hidden_by
 from smachpy.exceptions import SmachError
@@ -72,7 +73,7 @@ class Target:
         self._check_arguments(arguments)
         try:
             machine = self.thing(**arguments)
-        except SmachError:
+        except (SmachError, ActionlibError):  # says itself what was wrong with an argument
             raise
         except Exception as error:
             raise TargetError(

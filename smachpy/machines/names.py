@@ -15,12 +15,13 @@ if TYPE_CHECKING:
 def name_of(function: object) -> str:
     """Return what to call a function of the user's in texts: its name, without an address.
 
-    A `functools.partial` has that of its function, another object to call that of its class.
+    A method's has its class in front; a `functools.partial` has that of its function, another
+    object to call that of its class.
     """
     while isinstance(function, functools.partial):
         function = function.func
     name = getattr(function, "__qualname__", None) or getattr(function, "__name__", None)
-    return str(name or type(function).__name__)
+    return str(name or type(function).__name__).rpartition("<locals>.")[2]
 
 
 def unique_names(names: Iterable[str], what: str = "names") -> tuple[str, ...]:

@@ -175,7 +175,7 @@ def test_it_describes_itself(world):
     assert dict(details) == {
         "topic": "level",
         "type": "std_msgs/Int32",
-        "condition": "test_it_describes_itself.<locals>.charged",
+        "condition": "charged",
         "checks": "3",
         "timeout": "4 s -> aborted",
     }

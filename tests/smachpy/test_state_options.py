@@ -375,7 +375,9 @@ def test_hooks_may_be_methods_and_failures_name_them():
         def execute(self, userdata):
             return "ok"
 
-    with pytest.raises(smachpy.InvalidUserCodeError, match=r"/SM_ROOT/A: hook on_enter.*door"):
+    with pytest.raises(
+        smachpy.InvalidUserCodeError, match=r"/SM_ROOT/A: hook Hooked\.on_enter.*door"
+    ):
         run(Hooked(["ok"]))
 
 
