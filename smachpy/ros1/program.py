@@ -141,7 +141,7 @@ def load(
         [str(path), *argv], dry=True, make_node=_node_in_force, stub_missing=stub_missing
     )
     made.parameters.merge("/", dict(params or {}))
-    known = {id(thing) for thing in gc.get_objects() if isinstance(thing, Container)}
+    known = [thing for thing in gc.get_objects() if isinstance(thing, Container)]
     with contextlib.ExitStack() as stack:
         _go_virtual(stack)
         stack.enter_context(nothing_done())
@@ -249,12 +249,13 @@ def _deadline(made: Session, seconds: float) -> Iterator[None]:
         signal.signal(signal.SIGURG, before)
 
 
-def _outermost(known: set[int]) -> Container | None:
-    """Return the largest of the containers that were made and are in no other one."""
+def _outermost(known: Sequence[Container]) -> Container | None:
+    """Return the largest of the containers that are not known yet and are in no other one."""
+    before = {id(container) for container in known}
     made = [
         thing
         for thing in gc.get_objects()
-        if isinstance(thing, Container) and id(thing) not in known and "_smachpy" in vars(thing)
+        if isinstance(thing, Container) and id(thing) not in before and "_smachpy" in vars(thing)
     ]
     inner = {
         id(child)

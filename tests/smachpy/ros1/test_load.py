@@ -4,6 +4,7 @@ import os
 
 import pytest
 
+import smachpy
 from smachpy import ros1
 from smachpy.testing import MissionKit
 
@@ -80,6 +81,23 @@ other = machine()
 {end}
 """)
     assert list(machine.get_children()) == ["INNER"]
+
+
+def test_a_machine_in_the_place_of_one_that_was_freed_is_found(load):
+    kept = [smachpy.StateMachine(["done"]) for _ in range(500)]
+    for machine in kept:
+        machine.itself = machine
+    del kept, machine
+    machine = load("""
+import gc; gc.collect()
+made = [smach.StateMachine(['done']) for _ in range(100)]
+sm = smach.StateMachine(outcomes=['done'])
+with sm:
+    for number, each in enumerate(made):
+        smach.StateMachine.add('S%d' % number, each)
+rospy.spin()
+""")
+    assert len(machine.get_children()) == 100
 
 
 @pytest.mark.parametrize(
