@@ -126,6 +126,9 @@ def test_message_on_the_wire_is_what_a_ros_2_node_expects(world):
 
 
 def test_latched_message_reaches_who_comes_later(world):
+    # Until two sessions know one another, Zenoh sends what nobody there has subscribed to yet.
+    linked = Subscriber("linked", String, world.inbox(), node=world.mission)
+    assert Publisher("linked", String, node=world.robot).wait_for_connections(timeout=WAIT_S)
     publisher = Publisher("map", OccupancyGrid, latch=True, node=world.robot)
     for width in (1, 2, 3):
         grid = OccupancyGrid()
@@ -138,6 +141,7 @@ def test_latched_message_reaches_who_comes_later(world):
     grid.info.width = 4
     publisher.publish(grid)
     assert [message.info.width for message in late.wait_for(2)] == [3, 4]
+    linked.unregister()
     (token,) = world.tokens(Kind.PUBLISHER, "map")
     assert token.qos == LATCHED
 
