@@ -82,12 +82,10 @@ def test_what_is_no_python(source):
         port(source, "bad.py")
 
 
-@pytest.mark.parametrize("path", sorted(SCRIPTS.glob("*.py")), ids=lambda path: path.name)
+@pytest.mark.parametrize("path", sorted(SCRIPTS.glob("*.py*")), ids=lambda path: path.name)
 def test_all_scripts_give_python(path):
-    before = path.read_bytes()
-    ported = port(before, str(path))
+    ported = port(path.read_bytes(), str(path))
     ast.parse(ported.text)
-    assert path.read_bytes() == before
     again = port(ported.text.encode(), str(path))
     assert again.text.count("import smachpy") <= 2
 
