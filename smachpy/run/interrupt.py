@@ -33,6 +33,13 @@ class Interruption(BaseException):
     """Raised inside a state that ignored its preempt; never seen outside its container."""
 
 
+class ProgramEnds(Exception):  # noqa: N818  a fact, no fault
+    """Raised by a wait inside a state as the program is to end, in programs for ROS 1.
+
+    A state that lets it through ends as one that was preempted.
+    """
+
+
 @runtime_checkable
 class InterruptingClock(Protocol):
     """A clock that can end a wait with an exception."""

@@ -7,6 +7,8 @@ import os
 from typing import TYPE_CHECKING, Any, Final
 
 import actionlib_core
+from actionlib_core import shutdown
+from smachpy import slips
 from smachpy.context import current_frame
 from smachpy.events import Entered, Failed, Left, OutcomeForced, Retried
 from smachpy.exceptions import (
@@ -18,9 +20,9 @@ from smachpy.machines.names import name_of
 from smachpy.run.callback import call_bounded
 from smachpy.run.child import on_preempt
 from smachpy.run.frame import SUBSCRIPTIONS, clock_of_run
-from smachpy.run.grace import ask, forget_visit
-from smachpy.run.interrupt import Interruption
-from smachpy.run.origin import asking
+from smachpy.run.grace import ask, forget_visit, request_soon
+from smachpy.run.interrupt import Interruption, ProgramEnds
+from smachpy.run.origin import asking, shutdown_asking
 from smachpy.run.visit import Again, Decision, Event, Why, after, after_attempt
 
 if TYPE_CHECKING:
@@ -68,6 +70,8 @@ def runner_of(
         execute = _Async(state, execute)
     if is_callback:
         execute = _OwnExecute(state, execute)
+    if slips.accepting():
+        execute = _EndsWithProgram(execute)
     plain = (
         options.timeout is None
         and options.retry is None
@@ -130,6 +134,33 @@ class _OwnExecute:
         frame: Frame | None = current_frame()
         assert frame is not None  # a container runs it
         return call_bounded(self._container, frame, self._execute, (userdata,))
+
+
+class _EndsWithProgram:
+    """Runs a state whose waits raise `ProgramEnds`: it was preempted then, as its machine is.
+
+    The wait may have heard of the program's end before the machine has, so the machine is asked
+    here.
+    """
+
+    def __init__(self, execute: Callable[[Any], Any]) -> None:
+        self._execute = execute
+
+    def __call__(self, userdata: Any) -> Any:
+        try:
+            return self._execute(userdata)
+        except Exception as error:
+            frame: Frame | None = current_frame()
+            asked = shutdown.requested() and frame is not None and not frame.dead
+            if not asked or not isinstance(error, ProgramEnds):
+                raise
+            while frame is not None and frame.parent is not None:
+                frame = frame.parent
+            assert frame is not None
+            if not frame.container._preempt_requested:
+                with shutdown_asking(shutdown.current_shutdown()):
+                    request_soon(frame.container)
+            raise Interruption from error
 
 
 class _WithOptions:

@@ -15,6 +15,7 @@ from actionlib_core.exceptions import (
     ServiceException as _ServiceError,
 )
 from smachpy.ros1.session import session
+from smachpy.run.interrupt import ProgramEnds
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -37,7 +38,7 @@ class ROSException(Exception):  # noqa: N818  rospy's names, all of them
     """Base of rospy's exceptions."""
 
 
-class ROSInterruptException(ROSException, KeyboardInterrupt):
+class ROSInterruptException(ROSException, ProgramEnds, KeyboardInterrupt):
     """The program is to end while it sleeps or waits.
 
     It is a `KeyboardInterrupt`, as in rospy, so that `except Exception` of a program that does not
