@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING, TypeVar
 
 from actionlib_core.clock._protocol import check_seconds
 from actionlib_core.clock._serial import report_callback, report_thread_exception
-from actionlib_core.clock._threads import ThreadCache, mark_idle
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
 
 T = TypeVar("T")
+
+IDLE_S = 5.0  # a cached thread without work ends after this
+IDLE_NAME = "idle"  # what a cached thread is called between two jobs
 
 
 class RealEvent:
@@ -60,20 +62,17 @@ class RealEvent:
         try:
             self._waiters.append(waiter)
             # Set between the first look and the append: nobody may wake us.
-            if self.is_set():
+            if self._flag:
                 return True
             if threading.get_ident() == threading.main_thread().ident:
-                return _acquire_in_main(waiter, timeout) or self.is_set()
+                return _acquire_in_main(waiter, timeout) or self._flag
             longest = -1 if timeout is None else min(timeout, _LONGEST_S)
-            return waiter.acquire(timeout=longest) or self.is_set()
+            return waiter.acquire(timeout=longest) or self._flag
         finally:
-            self._forget(waiter)
-
-    def _forget(self, waiter: _thread.LockType) -> None:
-        try:
-            self._waiters.remove(waiter)
-        except ValueError:  # `set` has already taken it
-            return
+            try:
+                self._waiters.remove(waiter)
+            except ValueError:  # `set` has already taken it
+                pass
 
 
 _LONGEST_S = threading.TIMEOUT_MAX
@@ -124,7 +123,7 @@ class RealTask:
         finally:
             self._ident = None
             del self._target, self._context
-            mark_idle()
+            threading.current_thread().name = IDLE_NAME  # before anybody hears that it has ended
             self._done.set()
 
     def is_alive(self) -> bool:
@@ -134,8 +133,103 @@ class RealTask:
         return self._done.wait(timeout)
 
 
+class _Worker:
+    """One cached thread: runs tasks handed to it, ends after `IDLE_S` without any."""
+
+    def __init__(self, cache: _ThreadCache) -> None:
+        self._cache = cache
+        self._wake = _thread.allocate_lock()
+        self._wake.acquire()
+        self._task: RealTask | None = None
+        self._thread = threading.Thread(target=self._run, name=IDLE_NAME, daemon=True)
+        self._started = False
+
+    def give(self, task: RealTask | None) -> None:
+        """Run `task`; None only starts the thread."""
+        self._task = task
+        if self._started:
+            self._wake.release()
+        else:
+            self._started = True
+            self._thread.start()
+
+    def _run(self) -> None:
+        while True:
+            task, self._task = self._task, None
+            if task is not None:
+                self._thread.name = task.name
+                task.run()
+            del task
+            self._cache.put_back(self)
+            if not self._wake.acquire(timeout=IDLE_S):
+                if self._cache.retire(self):
+                    return
+                self._wake.acquire()  # kept, or `give` chose this worker at the last moment
+
+
+class _ThreadCache:
+    """Idle threads, newest first; starting one from here costs a lock hand-over.
+
+    No lock: list operations are atomic, and a signal handler may need a thread at any moment.
+    """
+
+    def __init__(self) -> None:
+        self._idle: list[_Worker] = []
+        self._late: list[RealTask] = []  # what waits for a thread, as no more can be started
+        self._kept = 0
+
+    def start(self, task: RealTask) -> None:
+        try:
+            worker = self._idle.pop()
+        except IndexError:
+            worker = _Worker(self)
+        try:
+            worker.give(task)
+        except RuntimeError:
+            if threading.main_thread().is_alive() or not self._kept:
+                raise
+            self._late.append(task)
+            self._start_late()
+
+    def keep(self, count: int) -> None:
+        """Have `count` threads for what runs while the program ends.
+
+        Python 3.12 starts no thread then: jobs wait until one of these is free.
+        """
+        self._kept = max(self._kept, count)
+        for _ in range(count - len(self._idle)):
+            _Worker(self).give(None)
+
+    def put_back(self, worker: _Worker) -> None:
+        self._idle.append(worker)
+        if self._late:
+            self._start_late()
+
+    def retire(self, worker: _Worker) -> bool:
+        if len(self._idle) <= self._kept:
+            return False
+        try:
+            self._idle.remove(worker)
+        except ValueError:
+            return False
+        return True
+
+    def _start_late(self) -> None:
+        while self._late and self._idle:
+            try:
+                worker = self._idle.pop()
+            except IndexError:  # another thread took it; it comes here when it is free again
+                return
+            try:
+                task = self._late.pop(0)
+            except IndexError:
+                self._idle.append(worker)
+            else:
+                worker.give(task)
+
+
 class RealTimer:
-    """One entry of the timer thread."""
+    """One call of the timer thread."""
 
     __slots__ = ("callback",)
 
@@ -146,76 +240,20 @@ class RealTimer:
         self.callback = None
 
 
-class _TimerThread:
-    """All timers of a clock in one thread, which exists while there are timers."""
-
-    def __init__(self, clock: RealClock) -> None:
-        self._clock = clock
-        # Re-entrant: a signal handler that sets a timer may interrupt the code that holds it.
-        self._lock = threading.RLock()
-        self._heap: list[tuple[float, int, RealTimer]] = []
-        self._count = itertools.count()
-        self._running = False
-        self._changed = RealEvent()
-
-    def add(self, delay: float, timer: RealTimer) -> None:
-        check_seconds("call_later", delay)
-        if delay == math.inf:
-            return
-        with self._lock:
-            due = self._clock.now() + max(delay, 0.0)
-            heapq.heappush(self._heap, (due, next(self._count), timer))
-            if not self._running:
-                self._start()
-            elif self._heap[0][2] is timer:
-                self._changed.set()
-
-    def _start(self) -> None:
-        """Start the thread; with the lock held."""
-        self._running = True
-        try:
-            # An empty context: timers belong to the clock, not to who came first.
-            contextvars.Context().run(self._clock.spawn, self._run, name="clock-timers")
-        except BaseException:  # the system gives no thread: the next timer tries again
-            self._running = False
-            raise
-
-    def _run(self) -> None:
-        try:
-            self._call_all()
-        except BaseException:  # out of memory, for one: the timers that are left need a thread
-            with self._lock:
-                self._start()
-            raise
-
-    def _call_all(self) -> None:
-        while True:
-            with self._lock:
-                self._changed.clear()
-                while self._heap and self._heap[0][2].callback is None:
-                    heapq.heappop(self._heap)
-                if not self._heap:
-                    self._running = False
-                    return
-                wait = self._heap[0][0] - self._clock.now()
-                timer = heapq.heappop(self._heap)[2] if wait <= 0 else None
-            if timer is None:
-                self._changed.wait(wait)
-                continue
-            callback, timer.callback = timer.callback, None
-            if callback is not None:
-                try:
-                    callback()
-                except BaseException:  # noqa: BLE001  a border: reported, other timers go on
-                    report_callback("clock-timers")
-
-
 class RealClock:
-    """Monotonic and wall time of the computer, real threads."""
+    """Monotonic and wall time of the computer, real threads.
+
+    All timers are in one thread, which exists while there are any.
+    """
 
     def __init__(self) -> None:
-        self._cache = ThreadCache()
-        self._timers = _TimerThread(self)
+        self._cache = _ThreadCache()
+        # Re-entrant: a signal handler that sets a timer may interrupt the code that holds it.
+        self._timer_lock = threading.RLock()
+        self._timers: list[tuple[float, int, RealTimer]] = []  # a heap: when, a number, which
+        self._timer_count = itertools.count()
+        self._timers_run = False
+        self._timers_changed = RealEvent()
 
     now = staticmethod(time.monotonic)
     time_ns = staticmethod(time.time_ns)
@@ -242,9 +280,60 @@ class RealClock:
         self._cache.keep(count)
 
     def call_later(self, delay: float, callback: Callable[[], object]) -> RealTimer:
+        if not delay >= 0:
+            check_seconds("call_later", delay)
+            delay = 0.0
         timer = RealTimer(callback)
-        self._timers.add(delay, timer)
+        if delay == math.inf:
+            return timer
+        with self._timer_lock:
+            due = self.now() + delay
+            heapq.heappush(self._timers, (due, next(self._timer_count), timer))
+            if not self._timers_run:
+                self._start_timers()
+            elif self._timers[0][2] is timer:
+                self._timers_changed.set()
         return timer
+
+    def _start_timers(self) -> None:
+        """Start the timer thread; with the lock held."""
+        self._timers_run = True
+        try:
+            # An empty context: timers belong to the clock, not to who came first.
+            contextvars.Context().run(self.spawn, self._run_timers, name="clock-timers")
+        except BaseException:  # the system gives no thread: the next timer tries again
+            self._timers_run = False
+            raise
+
+    def _run_timers(self) -> None:
+        try:
+            while (timer := self._next_timer()) is not None:
+                callback, timer.callback = timer.callback, None
+                if callback is not None:
+                    try:
+                        callback()
+                    except BaseException:  # noqa: BLE001  a border: reported, other timers go on
+                        report_callback("clock-timers")
+        except BaseException:  # out of memory, for one: the timers that are left need a thread
+            with self._timer_lock:
+                self._start_timers()
+            raise
+
+    def _next_timer(self) -> RealTimer | None:
+        """Wait for the next timer that is due, and take it; None when none is left."""
+        heap = self._timers
+        while True:
+            with self._timer_lock:
+                self._timers_changed.clear()
+                while heap and heap[0][2].callback is None:
+                    heapq.heappop(heap)
+                if not heap:
+                    self._timers_run = False
+                    return None
+                wait = heap[0][0] - self.now()
+                if wait <= 0:
+                    return heapq.heappop(heap)[2]
+            self._timers_changed.wait(wait)
 
     def run_async(self, main: Coroutine[object, object, T]) -> T:
         import asyncio  # 60 ms that most programs never need

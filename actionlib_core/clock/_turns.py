@@ -7,7 +7,7 @@ import threading
 from typing import TYPE_CHECKING, Protocol
 
 from actionlib_core.clock._gates import make_gate
-from actionlib_core.clock._threads import IDLE_NAME, IDLE_S
+from actionlib_core.clock._real import IDLE_NAME, IDLE_S
 
 if TYPE_CHECKING:
     from actionlib_core.clock._gates import Gate

@@ -7,9 +7,8 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.clock._protocol import check_seconds
-from actionlib_core.clock._real import RealEvent
+from actionlib_core.clock._real import IDLE_NAME, RealEvent
 from actionlib_core.clock._serial import report_thread_exception
-from actionlib_core.clock._threads import mark_idle
 from actionlib_core.clock._turns import take_worker
 
 if TYPE_CHECKING:
@@ -187,7 +186,7 @@ class VirtualTask:
         finally:
             self.ident = None
             del self._target, self._context
-            mark_idle()
+            threading.current_thread().name = IDLE_NAME
             self._done.set()
             if worker is not None:
                 worker.free()

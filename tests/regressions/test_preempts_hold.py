@@ -366,7 +366,7 @@ LOCKS = {
     "introspection's executor": lambda m: m.server._topics.executor._lock,
     "network": lambda m: m.network.lock,
     "log": lambda m: m.log.lock,
-    "timers": lambda m: m.clock._timers._lock,
+    "timers": lambda m: m.clock._timer_lock,
     "threads": lambda m: threading._active_limbo_lock,
 }
 
