@@ -8,6 +8,13 @@ from actionlib_core.exceptions import ActionlibError, DurationTypeError, Invalid
 from actionlib_core.time import to_seconds
 
 
+def check_functions(where: str, **callbacks: object) -> None:
+    """Refuse callbacks, given by their names, that cannot be called; see `check_function`."""
+    for argument, value in callbacks.items():
+        if value is not None and not callable(value):
+            check_function(where, argument, value)
+
+
 def check_function(where: str, argument: str, value: object) -> None:
     """Refuse a callback that cannot be called; None is one that is not wanted.
 

@@ -25,10 +25,8 @@ from actionlib_core.action._callbacks import CallbackQueue
 from actionlib_core.action.goal_id_generator import GoalIDGenerator
 from actionlib_core.action.sent_goal import SentGoal
 from actionlib_core.exceptions import ActionException, ActionlibError, TransportError
-from actionlib_core.goal.backlog import Backlog
-from actionlib_core.goal.client import ClientGoal, Duty, Path
-from actionlib_core.goal.known_servers import STATUS_LIST_TIMEOUT_S, KnownServers
-from actionlib_core.goal.recent import Recent
+from actionlib_core.goal.bounded import Backlog, Recent
+from actionlib_core.goal.client import STATUS_LIST_TIMEOUT_S, ClientGoal, Duty, KnownServers, Path
 from actionlib_core.goal.states import TERMINAL, CommState, Status, TerminalState
 from actionlib_core.node import get_node
 from actionlib_core.shutdown import current_shutdown
@@ -297,10 +295,6 @@ class ClientGoalHandle:
                 self.feedback.dropped,
             )
 
-    def settle(self) -> None:
-        """Note that the last callback has returned, or that nobody follows the goal any more."""
-        self.settled.set()
-
 
 CommStateMachine = ClientGoalHandle
 """ROS's name for what a client keeps of one goal."""
@@ -423,7 +417,9 @@ class GoalManager:
                         return False
                     if self._servers.is_there:
                         return True
-                    self._check_types()
+                    error = self._servers.find_wrong_type()
+                    if error is not None:
+                        raise error
                     changed.clear()
                     if changed not in self._waiters:
                         self._waiters.append(changed)
@@ -447,13 +443,16 @@ class GoalManager:
             TransportError: the client is stopped.
         """
         with self.lock:
-            self._check_open()
+            if self._closed:
+                raise self._stopped()
             goal = handle.goal
             known = self._goals.get(goal.id)
             if known is not None:
                 self._take_over(known, handle)
                 return
-            self._check_types()
+            error = self._servers.find_wrong_type()
+            if error is not None:
+                raise error
             duty = goal.begin(self.clock.now())
             self._goals[goal.id] = handle
             self._arm(goal.due)
@@ -497,7 +496,8 @@ class GoalManager:
             TransportError: the client is stopped.
         """
         with self.lock:
-            self._check_open()
+            if self._closed:
+                raise self._stopped()
             meant = [
                 handle
                 for handle in list(self._goals.values())
@@ -509,15 +509,8 @@ class GoalManager:
             if not handle.goal.acknowledged:  # the goal itself may still be on its way
                 self._fulfil(handle, duty)
 
-    def _check_open(self) -> None:
-        if self._closed:
-            raise TransportError(f"action '{self.name}': the client is stopped.")
-
-    def _check_types(self) -> None:
-        """Raise if the only server has another type. Needs the lock."""
-        error = self._servers.find_wrong_type()
-        if error is not None:
-            raise error
+    def _stopped(self) -> TransportError:
+        return TransportError(f"action '{self.name}': the client is stopped.")
 
     def wait(self, handle: ClientGoalHandle, timeout: float | None) -> bool:
         """Wait until a goal is over and its callbacks have returned; see `ClientGoalHandle.wait`.
@@ -562,7 +555,7 @@ class GoalManager:
             if handle.goal.over:
                 return
             handle.on_state = handle.on_feedback = None
-            handle.settle()
+            handle.settled.set()
             if handle.ended is not None:
                 handle.ended.set()
 
@@ -684,7 +677,9 @@ class GoalManager:
             for entry in entries:
                 listed.add(entry.id)
                 handle = goals.get(entry.id)
-                if handle is not None and self._believes(session, handle):
+                if handle is not None and (
+                    servers.may_speak(session) or self._believes(session, handle)
+                ):
                     self._hear(handle, entry, session, now)
             if whole and (len(listed) < len(goals) or not listed.issuperset(goals)):
                 answers = servers.current is not None
@@ -704,16 +699,18 @@ class GoalManager:
             goal.stamp_ns = entry.stamp_ns
         before = goal.comm
         path = goal.on_status(status, entry.text, now)
+        due = goal.due
         if session and goal.acknowledged:  # not one that knows of the cancel only
             goal.server = session
-        self._pass(handle, path)
+        if path:
+            self._pass(handle, path)
         if goal.comm is not before:
-            self._arm(goal.due)
+            self._arm(due)
 
     def _believes(self, session: str, handle: ClientGoalHandle) -> bool:
-        """Return whether a session may speak of a goal; report one that may not."""
+        """Tell whether a session that is no server may speak of a goal; report one that may not."""
         goal = handle.goal
-        if self._servers.may_speak(session) or (goal.acknowledged and session == goal.server):
+        if goal.acknowledged and session == goal.server:
             return True
         self.on_stranger(session)
         return False
@@ -721,7 +718,9 @@ class GoalManager:
     def on_feedback(self, entry: StatusEntry, body: bytes, session: str) -> None:
         """Handle feedback."""
         handle = self._goals.get(entry.id)
-        if handle is None or not self._believes(session, handle):
+        if handle is None:
+            return
+        if not (self._servers.may_speak(session) or self._believes(session, handle)):
             return
         feedback = None
         if handle.on_feedback is not None:
@@ -761,7 +760,8 @@ class GoalManager:
             if entry.id in self._ended:
                 self._acknowledge(entry.id)
             return
-        if not answered and not self._believes(session, handle):
+        may_speak = answered or self._servers.may_speak(session)
+        if not may_speak and not self._believes(session, handle):
             return
         status = _STATUSES.get(entry.status, Status.LOST)
         text, result = entry.text, None
@@ -828,9 +828,9 @@ class GoalManager:
             for state in path:
                 handle.on_state(state)
         elif goal.over and handle.on_feedback is not None:
-            self.callbacks.call(handle.settle)  # behind the last feedback
+            self.callbacks.call(handle.settled.set)  # behind the last feedback
         elif goal.over:
-            handle.settle()
+            handle.settled.set()
         if goal.over:  # they hold the handle and maybe its client, which would stay until a gc
             handle.on_state = handle.on_feedback = None
 
@@ -1063,7 +1063,7 @@ class ActionClient(Generic[A_co]):
             def on_state(state: CommState) -> None:
                 handle.call(state, transition_cb, handle)
                 if state in _OVER:
-                    handle.manager.callbacks.call(handle.settle)
+                    handle.manager.callbacks.call(handle.settled.set)
 
             handle.on_state = on_state
         if feedback_cb is not None:

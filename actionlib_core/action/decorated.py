@@ -18,7 +18,6 @@ The function can still be called as it is, which is how to test it.
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from actionlib_core.action.simple_server import TEXT_ACCEPTED, SimpleActionServer
@@ -129,7 +128,7 @@ class _Runner(SimpleActionServer):
     def _run_next(self) -> None:
         handle = self._take_next()
         if handle is not None:
-            self._run(partial(self._execute, handle, GoalContext(self, handle)))
+            self._run(handle, self._execute, handle, GoalContext(self, handle))
 
     def _execute(self, handle: ServerGoalHandle, context: GoalContext[Any]) -> None:
         try:

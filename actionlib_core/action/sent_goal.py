@@ -57,7 +57,7 @@ class SentGoal(Generic[R, F]):
 
     def _note_state(self, state: CommState) -> None:
         if state in {CommState.DONE, CommState.LOST}:
-            self._handle.settle()
+            self._handle.settled.set()
         self._tell()
 
     def _tell(self) -> None:

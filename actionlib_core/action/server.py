@@ -160,7 +160,7 @@ class ServerGoalHandle:
             FieldError: `feedback` does not fit the action.
             TransportError: the server's node is closed.
         """
-        self._keeper.send_feedback(_entry(self.record), feedback)
+        self._keeper.send_feedback(self.record.entry(), feedback)
 
     def get_goal(self) -> Any:
         """Return the goal message (XGoal)."""
@@ -190,11 +190,6 @@ def nop_cb(goal_handle: ServerGoalHandle) -> None:
     """Do nothing; the default callback."""
 
 
-def _entry(goal: ServerGoal) -> StatusEntry:
-    """Return what the status list says of a goal."""
-    return StatusEntry(goal.id, goal.stamp_ns, goal.status, goal.text)
-
-
 def _past_entry(goal_id: str, status: Status) -> StatusEntry:
     """Return what is said of a goal of which only its end is remembered, or nothing (LOST)."""
     text = (
@@ -214,7 +209,7 @@ class StatusPublisher:
         clock: Gives time and the timer.
         lock: The server's lock, which guards `goals`.
         goals: The server's goals.
-        send: Sends a list of goals; called without the lock.
+        port: The way to the network; used without the lock.
 
     Threads: any; the timer's calls come on the clock's thread.
     """
@@ -224,12 +219,12 @@ class StatusPublisher:
         clock: Clock,
         lock: threading.RLock,
         goals: ServerGoals,
-        send: Callable[[list[ServerGoal]], None],
+        port: ServerPort,
     ) -> None:
         self._clock = clock
         self._lock = lock
         self._goals = goals
-        self._send = send
+        self._port = port
         self._published = clock.now() - PERIOD_S
         self._timer: Timer | None = None
         self._due = 0.0
@@ -251,9 +246,13 @@ class StatusPublisher:
             self._change_waits = False
             now = self._clock.now()
             self._published = now
-            listed = self._goals.listed()
+            listed = [goal.entry() for goal in self._goals.listed()]
             self._arm(now + PERIOD_S)
-        self._send(listed)
+        try:
+            self._port.send_status(listed)
+        except TransportError:
+            if not self._goals.closed:  # else the server stopped in between
+                raise
 
     def on_change(self) -> None:
         """Note that a goal has changed: send the list now or soon."""
@@ -340,7 +339,7 @@ class GoalKeeper:
         self.stopped = False
         self.left: Event = node.clock.event(f"the end of action server {name}")
         self.goals = ServerGoals(name, result_timeout=result_timeout)
-        self.status = StatusPublisher(node.clock, self.lock, self.goals, self._send_status)
+        self.status = StatusPublisher(node.clock, self.lock, self.goals, port)
         self._clock = node.clock
         self._cancels_lost = on_client_lost == "cancel"
         self._deliver_goal = deliver_goal
@@ -355,8 +354,9 @@ class GoalKeeper:
         """Accept a goal; see `ServerGoalHandle.set_accepted`."""
         text = self._as_text(text, "set_accepted()")
         with self.lock:
-            self.goals.step(handle.record, "accept", "set_accepted()", text)
-        self.port.send_accepted(_entry(handle.record))
+            now = self._clock.now()
+            self.goals.step(handle.record, "accept", "set_accepted()", now, text)
+        self.port.send_accepted(handle.record.entry())
         self.status.on_change()
 
     def request_cancel(self, handle: ServerGoalHandle) -> bool:
@@ -393,16 +393,15 @@ class GoalKeeper:
             FieldError: a field of `result` has a wrong type.
         """
         # Whatever can fail comes first: a goal that has ended must have a result.
-        body = self._pack_result(result, call)
         text = self._as_text(text, call)
+        body = self._pack_result(result, call)
         record = handle.record
         with self.lock:
-            self.goals.step(record, event, call, text)
+            self.goals.step(record, event, call, self._clock.now(), text)
             record.result = body
-            self.goals.finish(record, self._clock.now())
             stopped = self.stopped
         if not stopped:
-            self.port.send_result(_entry(record), body, wait=wait)
+            self.port.send_result(record.entry(), body, wait=wait)
             self.status.on_change()
 
     def give_up(self, handle: ServerGoalHandle, text: str) -> None:
@@ -456,13 +455,6 @@ class GoalKeeper:
             )
         return text if text.isascii() else text.encode("utf-8", "backslashreplace").decode()
 
-    def _send_status(self, goals: list[ServerGoal]) -> None:
-        try:
-            self.port.send_status([_entry(goal) for goal in goals])
-        except TransportError:
-            if not self.goals.closed:  # else `stop` came in between
-                raise
-
     # -- the end -------------------------------------------------------------------------------
 
     def close_to_goals(self) -> None:
@@ -494,7 +486,7 @@ class GoalKeeper:
         with self.lock:
             drained = self._drained = self._clock.event("clients that take their results")
             taken = [
-                _past_entry(goal_id, status) if goal is None else _entry(goal)
+                _past_entry(goal_id, status) if goal is None else goal.entry()
                 for goal_id, status, goal in self.goals.taken()
             ]
         until = self._clock.now() + self.node.time_to_leave(DRAIN_S)
@@ -543,14 +535,14 @@ class GoalKeeper:
             handle = record.tag = ServerGoalHandle(self, record, content)
             if arrival is Arrival.RECALLED:
                 record.result = self._pack_result(None, "the cancel that came first")
-            past = self.goals.past_status(goal_id) or Status.LOST
+            past = None if known is not None else self.goals.past_status(goal_id)
         if arrival is Arrival.NEW:
             self._deliver_goal(handle)
             return True
         if known is None:
-            self.port.send_status([_past_entry(goal_id, past)])
+            self.port.send_status([_past_entry(goal_id, past or Status.LOST)])
         elif isinstance(known.result, bytes):
-            self.port.send_result(_entry(known), known.result, wait=False)
+            self.port.send_result(known.entry(), known.result, wait=False)
         self.status.on_change()
         return False
 
@@ -559,7 +551,7 @@ class GoalKeeper:
         now_ns = self._clock.time_ns()
         with self.lock:
             asked = self.goals.on_cancel(goal_id, stamp_ns, self._clock.now(), now_ns)
-            entries = [_entry(goal) for goal in asked]
+            entries = [goal.entry() for goal in asked]
         if stamp_ns > now_ns + FUTURE_NS:
             log.warning(
                 "action '%s': a cancel of goals up to %.1f s in the future counts as one up to "
@@ -606,7 +598,7 @@ class GoalKeeper:
     def list_goals(self) -> list[StatusEntry]:
         """Return the status list."""
         with self.lock:
-            return [_entry(goal) for goal in self.goals.listed()]
+            return [goal.entry() for goal in self.goals.listed()]
 
     def find_end(self, goal_id: str) -> tuple[StatusEntry, bytes | None]:
         """Return the status of a goal, and its result if it has one."""
@@ -614,7 +606,7 @@ class GoalKeeper:
             goal = self.goals.find(goal_id)
             if goal is None:
                 return _past_entry(goal_id, self.goals.past_status(goal_id) or Status.LOST), None
-            return _entry(goal), goal.result if isinstance(goal.result, bytes) else None
+            return goal.entry(), goal.result if isinstance(goal.result, bytes) else None
 
     def find_goal(self, goal_id: str) -> tuple[int, Any] | None:
         """Return stamp [ns] and message of a goal; None when it is not known any more."""

@@ -7,9 +7,9 @@ import threading
 from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from actionlib_core._arguments import check_function, check_limit, check_wait
+from actionlib_core._arguments import check_functions, check_limit, check_wait
 from actionlib_core.action.client import ActionClient
-from actionlib_core.goal.known_servers import STATUS_LIST_TIMEOUT_S
+from actionlib_core.goal.client import STATUS_LIST_TIMEOUT_S
 from actionlib_core.goal.states import CommState, SimpleGoalState, Status
 
 if TYPE_CHECKING:
@@ -161,9 +161,8 @@ class SimpleActionClient(Generic[A]):
             TypeMismatchError: the action's server has another type.
             TransportError: the client is stopped.
         """
-        limit = check_limit(f"action '{self.action_client.ns}'", "ack_timeout", ack_timeout)
-        handle = self.action_client.make_goal(goal, limit)
-        self._begin(handle, done_cb, active_cb, feedback_cb)
+        make = self.action_client.make_goal
+        self._begin(make, goal, done_cb, active_cb, feedback_cb, ack_timeout)
 
     def attach(
         self,
@@ -179,22 +178,22 @@ class SimpleActionClient(Generic[A]):
         The former goal is followed no more, as with `send_goal`, unless an error is raised. See
         `ActionClient.attach`; the other arguments are those of `send_goal`.
         """
-        limit = check_limit(f"action '{self.action_client.ns}'", "ack_timeout", ack_timeout)
-        handle = self.action_client.find_goal(goal_id, limit)
-        self._begin(handle, done_cb, active_cb, feedback_cb)
+        find = self.action_client.find_goal
+        self._begin(find, goal_id, done_cb, active_cb, feedback_cb, ack_timeout)
 
     def _begin(
         self,
-        handle: ClientGoalHandle,
+        make: Callable[[Any, float | None], ClientGoalHandle],
+        goal: Any,
         done_cb: Callable[[int, Any], object] | None,
         active_cb: Callable[[], object] | None,
         feedback_cb: Callable[[Any], object] | None,
+        ack_timeout: float | Duration | None,
     ) -> None:
         """Send a goal, or ask for it, and follow it instead of the former one."""
         where = f"action '{self.action_client.ns}'"
-        check_function(where, "done_cb", done_cb)
-        check_function(where, "active_cb", active_cb)
-        check_function(where, "feedback_cb", feedback_cb)
+        check_functions(where, done_cb=done_cb, active_cb=active_cb, feedback_cb=feedback_cb)
+        handle = make(goal, check_limit(where, "ack_timeout", ack_timeout))
         callbacks = handle.manager.callbacks
         handle.calls_back = (done_cb or active_cb or feedback_cb or self._condition) is not None
 
@@ -209,7 +208,7 @@ class SimpleActionClient(Generic[A]):
                 if handle.calls_back or self._condition is not None:
                     callbacks.call(self._settle, handle)
                 else:
-                    handle.settle()
+                    handle.settled.set()
 
         handle.on_state = on_state
         if feedback_cb is not None:
@@ -228,7 +227,7 @@ class SimpleActionClient(Generic[A]):
 
     def _settle(self, handle: ClientGoalHandle) -> None:
         """Note that the last callback of a goal has returned."""
-        handle.settle()
+        handle.settled.set()
         if self._condition is not None:
             with self._condition:
                 self._condition.notify_all()
@@ -281,7 +280,7 @@ class SimpleActionClient(Generic[A]):
         Blocks: until then.
         """
         limit = self._check_wait("timeout", timeout)
-        handle = self.gh
+        handle = self._handle
         if handle is None:
             return False
         return handle.manager.wait(handle, limit)

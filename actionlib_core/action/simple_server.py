@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core._arguments import check_delay, check_function
@@ -465,15 +464,15 @@ class SimpleActionServer:
         goal = self._take_next()
         if goal is not None and self.execute_callback is not None:
             goal.set_accepted(TEXT_ACCEPTED)
-            self._run(partial(self.execute_callback, goal.get_goal()))
+            self._run(goal, self.execute_callback, goal.get_goal())
 
-    def _run(self, execute: Callable[[], object]) -> None:
+    def _run(
+        self, handle: ServerGoalHandle, execute: Callable[..., object], *arguments: Any
+    ) -> None:
         """Run one goal and make sure that it ends."""
-        handle = self._policy.current
-        assert handle is not None
         text = TEXT_NO_STATUS
         try:
-            execute()
+            execute(*arguments)
         except Exception as error:  # noqa: BLE001  a border: told to the client and logged
             if handle.record.text == TEXT_STOPPED:
                 return  # `stop` has ended the goal, which the callback found out the hard way

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import _thread
+import contextlib
 import contextvars
 import heapq
 import itertools
@@ -62,17 +63,15 @@ class RealEvent:
         try:
             self._waiters.append(waiter)
             # Set between the first look and the append: nobody may wake us.
-            if self._flag:
+            if self.is_set():
                 return True
             if threading.get_ident() == threading.main_thread().ident:
                 return _acquire_in_main(waiter, timeout) or self._flag
             longest = -1 if timeout is None else min(timeout, _LONGEST_S)
             return waiter.acquire(timeout=longest) or self._flag
         finally:
-            try:
+            with contextlib.suppress(ValueError):  # `set` has already taken it
                 self._waiters.remove(waiter)
-            except ValueError:  # `set` has already taken it
-                pass
 
 
 _LONGEST_S = threading.TIMEOUT_MAX

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from actionlib_core.goal.life_cycle import server_life_cycle
+from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.goal.states import TERMINAL, Status
 
 if TYPE_CHECKING:
@@ -72,6 +73,10 @@ class ServerGoal:
     kept_until: float | None = None
     tag: object = None
 
+    def entry(self) -> StatusEntry:
+        """Return what the status list says of it."""
+        return StatusEntry(self.id, self.stamp_ns, self.status, self.text)
+
 
 class ServerGoals:
     """The goals of one action server.
@@ -131,8 +136,7 @@ class ServerGoals:
             text = TEXT_CANCELLED_BEFORE
         else:
             return Arrival.NEW, arrived
-        self.step(arrived, "cancel", "the cancel that came first", text)
-        self.finish(arrived, now)
+        self.step(arrived, "cancel", "the cancel that came first", now, text)
         return Arrival.RECALLED, arrived
 
     def on_cancel(self, goal_id: str, stamp_ns: int, now: float, now_ns: int) -> list[ServerGoal]:
@@ -178,13 +182,14 @@ class ServerGoals:
         goal.status = path[-1]
         return True
 
-    def step(self, goal: ServerGoal, event: str, call: str, text: str = "") -> None:
-        """Move a goal along its life cycle.
+    def step(self, goal: ServerGoal, event: str, call: str, now: float, text: str = "") -> None:
+        """Move a goal along its life cycle; one that has ended is forgotten after a time.
 
         Args:
             goal: The goal.
             event: Event of the server's table.
             call: What the user called, for the error.
+            now: The time [s, clock].
             text: What the status says from now on.
 
         Raises:
@@ -196,12 +201,9 @@ class ServerGoals:
             path = self._steps.step(goal.status, event, goal=where, call=call)
         goal.status = path[-1]
         goal.text = text
-
-    def finish(self, goal: ServerGoal, now: float) -> None:
-        """Start the time after which a goal in a terminal status is forgotten."""
-        assert goal.status in TERMINAL
-        goal.listed_until = now + LISTED_S
-        goal.kept_until = now + self.result_timeout
+        if goal.status in TERMINAL:
+            goal.listed_until = now + LISTED_S
+            goal.kept_until = now + self.result_timeout
 
     def on_acknowledged(self, goal_ids: Iterable[str], now: float) -> None:
         """Forget the results that their clients have."""

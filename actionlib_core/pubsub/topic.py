@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from actionlib_core._arguments import check_class, check_delay, check_function, check_queue_size
 from actionlib_core.action._callbacks import CallbackQueue
 from actionlib_core.exceptions import NodeError, TypeMismatchError, WaitTimeoutError
-from actionlib_core.goal.backlog import MESSAGES, Backlog
+from actionlib_core.goal.bounded import MESSAGES, Backlog
 from actionlib_core.pubsub._ends import End, NameWatch, close_all
 from actionlib_core.shutdown import requested
 from actionlib_core.wire.presence import Kind

@@ -113,14 +113,12 @@ class Entry:
 class Listener(Entry, Generic[T]):
     """A callback of a session."""
 
-    __slots__ = ("_callback",)
+    __slots__ = ("_callback", "inbox")
 
     def __init__(self, session: MemoryTransport, callback: Callable[[T], None]) -> None:
         super().__init__(session)
         self._callback = callback
-
-    def post(self, item: T) -> None:
-        self.session.inbox.post(self, item)
+        self.inbox = session.inbox
 
     def deliver(self, item: T) -> None:
         if not self.closed:
@@ -152,11 +150,12 @@ class Subscriber(Listener[Sample]):
         for publisher in self.network.latches.get(self._key, ()):
             wanted = self._cached if publisher.has_cache else int(self._history)
             for sample in list(publisher.kept)[-wanted:] if wanted else ():
-                self.post(sample)
+                self.inbox.post(self, sample)
 
     def deliver(self, item: Sample) -> None:
-        if not self.session.is_cut:
-            super().deliver(item)
+        link = self.session.link
+        if not (self.closed or (link is not None and link.is_cut)):
+            self._callback(item)
 
     def withdraw_locked(self) -> None:
         _remove(self.network.subscribers, self._key, self)
@@ -209,7 +208,7 @@ class Watcher(Listener[Presence | None]):
         self._shown: set[str] = set()
         self.network.watchers.append(self)
         for key in self.network.match_tokens(self.pattern):
-            self.post(Presence(key, alive=True))
+            self.inbox.post(self, Presence(key, alive=True))
 
     def deliver(self, item: Presence | None) -> None:
         link = self.session.link
@@ -231,10 +230,10 @@ class Watcher(Listener[Presence | None]):
             super().deliver(Presence(key, alive=True))
 
     def link_dead_locked(self) -> None:
-        self.post(None)
+        self.inbox.post(self, None)
 
     def link_back_locked(self) -> None:
-        self.post(None)
+        self.inbox.post(self, None)
 
     def withdraw_locked(self) -> None:
         self.network.watchers.remove(self)
@@ -314,7 +313,7 @@ class Publisher(Entry):
             if self._latch:
                 self.kept.append(sample)
             for subscriber in subscribers:
-                subscriber.post(sample)
+                subscriber.inbox.post(subscriber, sample)
 
     def matching(self) -> bool:
         link = self.session.link
@@ -355,9 +354,8 @@ class Exchange(Entry):
                 asked = [queryable for queryable in asked if queryable.complete][:1] or asked
             for queryable in asked:
                 self._waiting += 1
-                queryable.post(
-                    MemoryQuery(self, queryable.session, key, payload, encoding, attachment)
-                )
+                query = MemoryQuery(self, queryable.session, key, payload, encoding, attachment)
+                queryable.inbox.post(queryable, query)
             self.finish_locked()
 
     def _time_out(self) -> None:

@@ -75,7 +75,7 @@ class MemoryNetwork:
         if bool(before) != bool(after):
             for watcher in self.watchers:
                 if watcher.pattern.fullmatch(key + "/"):
-                    watcher.post(Presence(key, alive=bool(after)))
+                    watcher.inbox.post(watcher, Presence(key, alive=bool(after)))
 
     def match_tokens(self, pattern: re.Pattern[str]) -> list[str]:
         """Return the tokens that a compiled pattern stands for. Needs the lock."""

@@ -7,18 +7,15 @@ missed. `docs/wire_protocol.md` describes them for writers of other clients.
 
 from __future__ import annotations
 
-import functools
 import struct
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from actionlib_core.exceptions import ActionException
 from actionlib_core.goal.ports import StatusEntry
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
-T = TypeVar("T")
+    from collections.abc import Iterable
 
 _U32 = struct.Struct("<I")
 _HEADER = struct.Struct("<IIII")  # seq, stamp, length of the frame_id
@@ -87,24 +84,11 @@ class ActionTypes:
         return cls(spec, *(type(part) for part in parts), *(type(part) for part in inner))
 
 
+_CUT_SHORT = (struct.error, IndexError)
+
+
 def _too_short(what: str, payload: bytes) -> ValueError:
     return ValueError(f"{what}: got {len(payload)} bytes that end too early")
-
-
-def _reads(what: str) -> Callable[[Callable[[bytes], T]], Callable[[bytes], T]]:
-    """Make a reader raise ValueError, naming the message, when the bytes end too early."""
-
-    def decorate(read: Callable[[bytes], T]) -> Callable[[bytes], T]:
-        @functools.wraps(read)
-        def checked(payload: bytes) -> T:
-            try:
-                return read(payload)
-            except (struct.error, IndexError) as error:
-                raise _too_short(what, payload) from error
-
-        return checked
-
-    return decorate
 
 
 # ROS 1 writes a message as its fields one after another, without gaps. So an XActionGoal is a
@@ -116,8 +100,6 @@ def pack_goal(
     sent_ns: int, goal_id: str, goal_stamp_ns: int, goal: bytes, server: str = ""
 ) -> bytes:
     """Write an XActionGoal: header, goal id, goal; `server` is the token of the one it is for."""
-    if not server:
-        return _pack_front(sent_ns, goal_id, goal_stamp_ns) + goal
     return b"".join((_pack_header(sent_ns, server), pack_goal_id(goal_id, goal_stamp_ns), goal))
 
 
@@ -129,7 +111,7 @@ def unpack_goal(payload: bytes) -> tuple[str, int, bytes]:
     """
     try:
         goal_id, stamp_ns, at = _read_id(payload, 16 + int(_U32.unpack_from(payload, 12)[0]))
-    except (struct.error, IndexError) as error:
+    except _CUT_SHORT as error:
         raise _too_short("XActionGoal", payload) from error
     return goal_id, stamp_ns, payload[at:]
 
@@ -140,14 +122,16 @@ def pack_goal_id(goal_id: str, stamp_ns: int) -> bytes:
     return _ID.pack(stamp_ns // _NS, stamp_ns % _NS, len(raw)) + raw
 
 
-@_reads("GoalID")
 def unpack_goal_id(payload: bytes) -> tuple[str, int]:
     """Read an actionlib_msgs/GoalID: the id, its stamp [ns].
 
     Raises:
         ValueError: the bytes are cut short or are not text where text belongs.
     """
-    goal_id, stamp_ns, _ = _read_id(payload, 0)
+    try:
+        goal_id, stamp_ns, _ = _read_id(payload, 0)
+    except _CUT_SHORT as error:
+        raise _too_short("GoalID", payload) from error
     return goal_id, stamp_ns
 
 
@@ -158,22 +142,25 @@ def pack_status(entry: StatusEntry) -> bytes:
     return front + _TAIL.pack(entry.status, len(text)) + text
 
 
-@_reads("GoalStatus")
 def unpack_status(payload: bytes) -> StatusEntry:
     """Read an actionlib_msgs/GoalStatus.
 
     Raises:
         ValueError: the bytes are cut short or are not text where text belongs.
     """
-    return _read_status(payload, 0)[0]
+    try:
+        return _read_status(payload, 0)[0]
+    except _CUT_SHORT as error:
+        raise _too_short("GoalStatus", payload) from error
 
 
 def pack_report(sent_ns: int, entry: StatusEntry, body: bytes) -> bytes:
     """Write an XActionResult or XActionFeedback: header, status, result or feedback."""
     goal_id, stamp_ns, status, text = entry
-    raw = text.encode()
-    front = _pack_front(sent_ns, goal_id, stamp_ns)
-    return b"".join((front, _TAIL.pack(status, len(raw)), raw, body))
+    raw_id, raw = goal_id.encode(), text.encode()
+    sent, stamp = divmod(sent_ns, _NS), divmod(stamp_ns, _NS)
+    front = _FRONT.pack(0, *sent, 0, *stamp, len(raw_id))
+    return b"".join((front, raw_id, _TAIL.pack(status, len(raw)), raw, body))
 
 
 def unpack_report(payload: bytes) -> tuple[StatusEntry, int]:
@@ -184,7 +171,7 @@ def unpack_report(payload: bytes) -> tuple[StatusEntry, int]:
     """
     try:
         return _read_status(payload, 16 + int(_U32.unpack_from(payload, 12)[0]))
-    except (struct.error, IndexError) as error:
+    except _CUT_SHORT as error:
         raise _too_short("XActionResult or XActionFeedback", payload) from error
 
 
@@ -194,7 +181,6 @@ def pack_statuses(sent_ns: int, entries: Iterable[StatusEntry], frame: str = "")
     return b"".join((_pack_header(sent_ns, frame), _U32.pack(len(parts)), *parts))
 
 
-@_reads("GoalStatusArray")
 def unpack_statuses(payload: bytes) -> list[StatusEntry]:
     """Read an actionlib_msgs/GoalStatusArray.
 
@@ -202,23 +188,28 @@ def unpack_statuses(payload: bytes) -> list[StatusEntry]:
         ValueError: the bytes are cut short or are not text where text belongs.
     """
     entries = []
-    at = 16 + int(_U32.unpack_from(payload, 12)[0])
-    (count,) = _U32.unpack_from(payload, at)
-    at += 4
-    for _ in range(count):
-        entry, at = _read_status(payload, at)
-        entries.append(entry)
+    try:
+        at = 16 + int(_U32.unpack_from(payload, 12)[0])
+        (count,) = _U32.unpack_from(payload, at)
+        at += 4
+        for _ in range(count):
+            entry, at = _read_status(payload, at)
+            entries.append(entry)
+    except _CUT_SHORT as error:
+        raise _too_short("GoalStatusArray", payload) from error
     return entries
 
 
-@_reads("Header")
 def unpack_frame(payload: bytes) -> str:
     """Read the frame id of the header that a message begins with.
 
     Raises:
         ValueError: the bytes are cut short or are not text where text belongs.
     """
-    return _read_text(payload, 12)[0]
+    try:
+        return _read_text(payload, 16, int(_U32.unpack_from(payload, 12)[0]))
+    except _CUT_SHORT as error:
+        raise _too_short("Header", payload) from error
 
 
 def _pack_header(sent_ns: int, frame: str = "") -> bytes:
@@ -226,38 +217,22 @@ def _pack_header(sent_ns: int, frame: str = "") -> bytes:
     return _HEADER.pack(0, sent_ns // _NS, sent_ns % _NS, len(raw)) + raw
 
 
-def _pack_front(sent_ns: int, goal_id: str, stamp_ns: int) -> bytes:
-    """Write a header with an empty frame_id and a GoalID."""
-    raw = goal_id.encode()
-    sent, stamp = divmod(sent_ns, _NS), divmod(stamp_ns, _NS)
-    return _FRONT.pack(0, *sent, 0, *stamp, len(raw)) + raw
-
-
 def _read_id(payload: bytes, at: int) -> tuple[str, int, int]:
     """Read a GoalID: the id, its stamp [ns], where the rest begins."""
     secs, nsecs, length = _ID.unpack_from(payload, at)
-    start = at + 12
-    end = start + length
-    if end > len(payload):
-        raise IndexError(start)
-    return payload[start:end].decode(), secs * _NS + nsecs, end
+    at += 12
+    return _read_text(payload, at, length), secs * _NS + nsecs, at + length
 
 
 def _read_status(payload: bytes, at: int) -> tuple[StatusEntry, int]:
     goal_id, stamp_ns, at = _read_id(payload, at)
     status, length = _TAIL.unpack_from(payload, at)
     at += 5
-    text = _text(payload, at, length) if length else ""
+    text = _read_text(payload, at, length) if length else ""
     return StatusEntry(goal_id, stamp_ns, status, text), at + length
 
 
-def _read_text(payload: bytes, at: int) -> tuple[str, int]:
-    (length,) = _U32.unpack_from(payload, at)
-    at += 4
-    return _text(payload, at, length), at + length
-
-
-def _text(payload: bytes, at: int, length: int) -> str:
+def _read_text(payload: bytes, at: int, length: int) -> str:
     raw = payload[at : at + length]
     if len(raw) < length:
         raise IndexError(at)

@@ -20,10 +20,9 @@ from actionlib_core.wire.action_messages import (
     unpack_status,
     unpack_statuses,
 )
-from actionlib_core.wire.bursts import Bursts
+from actionlib_core.wire.arrivals import Bursts, Readable
 from actionlib_core.wire.encoding import encoding_of
 from actionlib_core.wire.presence import Kind, find_mismatch, parse_token, token_key, token_pattern
-from actionlib_core.wire.readable import Readable
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -24,6 +24,7 @@ from actionlib_core.wire.action_messages import (
     unpack_goal_id,
     unpack_statuses,
 )
+from actionlib_core.wire.arrivals import Readable
 from actionlib_core.wire.encoding import encoding_of
 from actionlib_core.wire.presence import (
     Kind,
@@ -36,7 +37,6 @@ from actionlib_core.wire.presence import (
     token_pattern,
     with_age,
 )
-from actionlib_core.wire.readable import Readable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -143,26 +143,28 @@ class ActionServerPort:
         self._publisher(self._keys.status, GoalStatusArray, RESULT).put(payload)
 
     def pack_result(self, result: Any) -> bytes:
-        return _bytes_of(result)
+        body: bytes = result.to_bytes()
+        return body
 
     def pack_feedback(self, feedback: Any) -> bytes:
-        return _bytes_of(feedback)
+        body: bytes = feedback.to_bytes()
+        return body
 
     def send_accepted(self, entry: StatusEntry) -> None:
         """Send nothing: the status list says it."""
 
     def send_status(self, entries: Iterable[StatusEntry]) -> None:
-        payload = pack_statuses(self._clock.time_ns(), entries)
-        self._publisher(self._keys.status, GoalStatusArray, STATUS).put(payload)
+        statuses = self._publisher(self._keys.status, GoalStatusArray, STATUS)
+        statuses.put(pack_statuses(self._clock.time_ns(), entries))
 
     def send_result(self, entry: StatusEntry, body: bytes, *, wait: bool = True) -> None:
         quality = RESULT if wait else RESULT_OR_NOT
-        payload = pack_report(self._clock.time_ns(), entry, body)
-        self._publisher(self._keys.result, self._types.action_result, quality).put(payload)
+        results = self._publisher(self._keys.result, self._types.action_result, quality)
+        results.put(pack_report(self._clock.time_ns(), entry, body))
 
     def send_feedback(self, entry: StatusEntry, body: bytes) -> None:
-        payload = pack_report(self._clock.time_ns(), entry, body)
-        self._publisher(self._keys.feedback, self._types.action_feedback, FEEDBACK).put(payload)
+        feedback = self._publisher(self._keys.feedback, self._types.action_feedback, FEEDBACK)
+        feedback.put(pack_report(self._clock.time_ns(), entry, body))
 
     def _publisher(self, key: str, message_class: Any, quality: Quality) -> PublisherPort:
         which = key, quality
@@ -186,9 +188,10 @@ class ActionServerPort:
         if not self._readable.check(sample, self._types.action_goal):
             return
         try:
-            if self._is_of_another(unpack_frame(sample.payload)):
-                return
+            receiver = unpack_frame(sample.payload)
             goal_id, stamp_ns, body = unpack_goal(sample.payload)
+            if receiver not in {"", self._own_key} and self._is_of_another(receiver):
+                return
             content = self._types.goal.from_bytes(body)
         except (ValueError, ActionlibError) as error:
             self._report_unreadable("a goal", sample, error)
@@ -197,8 +200,6 @@ class ActionServerPort:
 
     def _is_of_another(self, frame: str) -> bool:
         """Return whether a goal is a late copy of one for another server of this name."""
-        if not frame or frame == self._own_key:
-            return False
         server = parse_token(frame)
         return (
             server is not None and server.kind is Kind.ACTION_SERVER and server.name == self._name
@@ -298,8 +299,3 @@ class ActionServerPort:
                 self._listener.on_acknowledged([])
             if not any(end.session == client.session for end in self._clients.values()):
                 self._listener.on_client_lost(client.session)
-
-
-def _bytes_of(message: Any) -> bytes:
-    body: bytes = message.to_bytes()
-    return body

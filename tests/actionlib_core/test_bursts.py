@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from actionlib_core.clock import RealClock, VirtualClock, use_clock
-from actionlib_core.wire.bursts import PAUSE_S, RAPID, RAPID_S, Bursts
+from actionlib_core.wire.arrivals import PAUSE_S, RAPID, RAPID_S, Bursts
 
 
 class Desk:

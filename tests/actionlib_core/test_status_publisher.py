@@ -52,10 +52,10 @@ class Server:
         self.clock = LateClock()
         self.goals = ServerGoals("demo")
         self.said = []
-        self.status = StatusPublisher(self.clock, threading.RLock(), self.goals, self._send)
+        self.status = StatusPublisher(self.clock, threading.RLock(), self.goals, self)
 
-    def _send(self, goals):
-        self.said.append([goal.id for goal in goals])
+    def send_status(self, entries):
+        self.said.append([entry.id for entry in entries])
 
     def take(self, goal_id):
         self.goals.on_goal(ServerGoal(goal_id, 1), self.clock.now())
@@ -63,8 +63,7 @@ class Server:
 
     def end(self, goal_id):
         goal = self.goals.find(goal_id)
-        self.goals.step(goal, "reject", "set_rejected()")
-        self.goals.finish(goal, self.clock.now())
+        self.goals.step(goal, "reject", "set_rejected()", self.clock.now())
         self.goals.on_acknowledged([goal_id], self.clock.now())
         self.status.on_change()
 

@@ -19,7 +19,7 @@ from actionlib_core.exceptions import (
     TransportError,
     TypeMismatchError,
 )
-from actionlib_core.goal.known_servers import GIVES_WAY_S
+from actionlib_core.goal.client import GIVES_WAY_S
 from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from actionlib_core.time import Duration

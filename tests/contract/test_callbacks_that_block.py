@@ -11,7 +11,7 @@ from actionlib_core.action.server import ActionServer
 from actionlib_core.action.simple_client import SimpleActionClient
 from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.clock import RealClock
-from actionlib_core.goal.backlog import Backlog
+from actionlib_core.goal.bounded import Backlog
 from actionlib_core.interfaces.actionlib.msg import TestAction as Action
 from actionlib_core.interfaces.actionlib.msg import TestFeedback as Feedback
 from actionlib_core.interfaces.actionlib.msg import TestGoal as Goal

@@ -12,7 +12,7 @@ from actionlib_core.action.server import ActionServer
 from actionlib_core.action.simple_client import SimpleActionClient
 from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.exceptions import ActionlibError, TypeMismatchError
-from actionlib_core.goal.known_servers import STATUS_LIST_TIMEOUT_S
+from actionlib_core.goal.client import STATUS_LIST_TIMEOUT_S
 from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.goal.states import Status
 from actionlib_core.interfaces.actionlib.msg import (

@@ -16,7 +16,7 @@ from actionlib_core.action.simple_client import SimpleActionClient, SimpleGoalSt
 from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.clock import RealClock
 from actionlib_core.exceptions import ActionlibError
-from actionlib_core.goal.backlog import Backlog
+from actionlib_core.goal.bounded import Backlog
 from actionlib_core.goal.client import ClientGoal
 from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus

@@ -10,9 +10,9 @@ from __future__ import annotations
 import enum
 from typing import TYPE_CHECKING, NamedTuple
 
+from actionlib_core.goal.bounded import Recent
 from actionlib_core.goal.client import ASK_FIRST_S, LONGEST_S, RESEND_FIRST_S
 from actionlib_core.goal.ports import StatusEntry
-from actionlib_core.goal.recent import Recent
 from actionlib_core.goal.states import TERMINAL, Status
 
 if TYPE_CHECKING:

@@ -18,8 +18,7 @@ from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.goal.states import Status
 from actionlib_core.interfaces import ros2_action
 from actionlib_core.interfaces.ros2 import distros_of
-from actionlib_core.wire.bursts import Bursts
-from actionlib_core.wire.readable import Readable
+from actionlib_core.wire.arrivals import Bursts, Readable
 from actionlib_core.wire.ros2.action_messages import (
     Asked,
     find_states,

@@ -18,11 +18,11 @@ from actionlib_core.exceptions import (
     TransportError,
     TypeMismatchError,
 )
-from actionlib_core.goal.recent import Recent
+from actionlib_core.goal.bounded import Recent
 from actionlib_core.goal.states import TERMINAL, Status
 from actionlib_core.interfaces import ros2_action
 from actionlib_core.transport import Quality
-from actionlib_core.wire.readable import Readable
+from actionlib_core.wire.arrivals import Readable
 from actionlib_core.wire.ros2.action_messages import (
     Canceling,
     GoalState,

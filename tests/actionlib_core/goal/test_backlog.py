@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from actionlib_core.goal.backlog import Backlog
+from actionlib_core.goal.bounded import Backlog
 
 
 def test_oldest_message_is_dropped_and_counted():

@@ -5,14 +5,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from actionlib_core.exceptions import TypeMismatchError
-from actionlib_core.goal.client import ClientGoal
-from actionlib_core.goal.known_servers import (
+from actionlib_core.goal.bounded import Recent
+from actionlib_core.goal.client import (
     GIVES_WAY_S,
     STATUS_LIST_TIMEOUT_S,
+    ClientGoal,
     KnownServers,
     Receiver,
 )
-from actionlib_core.goal.recent import Recent
 from actionlib_core.wire.presence import Endpoint, Kind
 
 

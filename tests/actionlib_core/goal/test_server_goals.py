@@ -18,10 +18,9 @@ def book(*goals, **kwargs):
 
 def end(goals, goal_id, now=0.0):
     goal = goals.find(goal_id)
-    goals.step(goal, "accept", "set_accepted()")
-    goals.step(goal, "succeed", "set_succeeded()")
+    goals.step(goal, "accept", "set_accepted()", now)
+    goals.step(goal, "succeed", "set_succeeded()", now)
     goal.result = b"result"
-    goals.finish(goal, now)
     return goal
 
 

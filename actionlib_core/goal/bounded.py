@@ -1,4 +1,4 @@
-"""Messages that wait for a reader who may be slower than they come."""
+"""Memories with a limit: messages that wait for a slow reader, and what was seen lately."""
 
 from __future__ import annotations
 
@@ -63,3 +63,20 @@ class Backlog(Generic[T]):
         self._bytes = 0
         self.dropped += count
         return count
+
+
+class Recent(dict[str, None]):
+    """Words that were added; beyond the limit, those that came first are forgotten.
+
+    A word that comes again keeps its place.
+    """
+
+    def __init__(self, limit: int) -> None:
+        super().__init__()
+        self._limit = limit
+
+    def add(self, word: str) -> None:
+        """Keep a word."""
+        self[word] = None
+        if len(self) > self._limit:
+            del self[next(iter(self))]

@@ -1,4 +1,4 @@
-"""Take messages one by one while they are rare, and many at once when they come in bursts."""
+"""What arrives at either end of an action: which samples can be read, and what comes in bursts."""
 
 from __future__ import annotations
 
@@ -7,17 +7,65 @@ from collections import deque
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from actionlib_core.clock._serial import report_thread_exception
+from actionlib_core.exceptions import TypeMismatchError
+from actionlib_core.goal.bounded import Recent
+from actionlib_core.wire.encoding import check_encoding, encoding_of
 
 if TYPE_CHECKING:
+    import logging
     from collections.abc import Callable
 
     from actionlib_core.clock import Clock
+    from actionlib_core.exceptions import ActionlibError
+    from actionlib_core.transport import Sample
+    from actionlib_core.wire.encoding import Typed
 
 T = TypeVar("T")
 
 RAPID_S = 0.5e-3  # messages closer than this follow each other rapidly
 RAPID = 8  # so many of them make a burst
 PAUSE_S = 1e-3  # in a burst they are gathered for so long
+TOLD = 1000  # what was reported is remembered so far back; senders can be made up
+
+
+class Readable:
+    """Checks the types of samples; reports what is dropped once of each kind, to `log`.
+
+    Threads: any.
+    """
+
+    def __init__(self, log: logging.Logger) -> None:
+        self._log = log
+        self._lock = threading.Lock()
+        self._told = Recent(TOLD)
+        self._encodings: dict[type[Typed], str] = {}
+
+    def check(self, sample: Sample, message_class: type[Typed]) -> bool:
+        """Tell whether `message_class` reads a sample; if not, report its sender and type."""
+        encoding = self._encodings.get(message_class)
+        if encoding is None:
+            encoding = self._encodings.setdefault(message_class, encoding_of(message_class))
+        if sample.encoding == encoding:
+            return True
+        try:
+            check_encoding(
+                sample.encoding,
+                message_class,
+                name=sample.key,
+                sender=f"session {sample.source or 'unknown'}",
+            )
+        except TypeMismatchError as error:
+            self.report(f"{sample.source} {sample.encoding}", error)
+            return False
+        return True
+
+    def report(self, about: str, error: ActionlibError) -> None:
+        """Log an error, unless one about the same was: a sender may go on like this."""
+        with self._lock:
+            known = about in self._told
+            self._told.add(about)
+        if not known:
+            self._log.error("%s", error)
 
 
 class Bursts(Generic[T]):
@@ -68,7 +116,8 @@ class Bursts(Generic[T]):
     def flush(self) -> None:
         """Hand everything on that was taken before."""
         with self._lock:
-            self._hand_on()
+            if self._waiting:
+                self._hand_on()
 
     def _gather(self) -> None:
         self._clock.sleep(PAUSE_S)
