@@ -21,6 +21,7 @@ EXTRAS: Final = {
     "uvicorn": "web",
     "textual": "tui",
     "mcap": "mcap",
+    "psycopg": "postgres",
 }
 OWN_PACKAGES: Final = ("actionlib_core", "viz", "missions")
 """Top-level packages that are installed beside `smachpy`."""
