@@ -21,7 +21,7 @@ from actionlib_core.config import (
 )
 from actionlib_core.exceptions import TransportError
 from actionlib_core.transport._zenoh_config import DISCOVERY_GROUP, FIRST_PORT
-from actionlib_core.wire.presence import ROOT
+from actionlib_core.wire.presence import LIST_TIMEOUT_S, ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -75,11 +75,29 @@ def watch_private_networks(
     """
 
     def on_presence(presence: Presence) -> None:
-        word = presence.key.split("/")[3]
-        if word.isascii() and word.isdigit() and int(word) <= LAST_DOMAIN:
-            callback(int(word), presence.alive)
+        domain = _domain_of(presence.key)
+        if domain is not None:
+            callback(domain, presence.alive)
 
     return transport.watch_alive(f"{_prefix()}/*/*", on_presence)
+
+
+def list_private_networks(transport: Transport) -> list[int]:
+    """Return the domains of the private networks of this user, sorted.
+
+    Args:
+        transport: A session in the default domain.
+
+    Blocks: until the network has answered, 1 s at most.
+    """
+    keys = transport.list_alive(f"{_prefix()}/*/*", LIST_TIMEOUT_S)
+    return sorted({domain for key in keys if (domain := _domain_of(key)) is not None})
+
+
+def _domain_of(key: str) -> int | None:
+    word = key.split("/")[3]
+    known = word.isascii() and word.isdigit() and int(word) <= LAST_DOMAIN
+    return int(word) if known else None
 
 
 def _prefix() -> str:

@@ -12,7 +12,14 @@ from actionlib_core.cli._ros2 import is_ros2, merged, typed, watching
 from actionlib_core.exceptions import InterfaceError
 from actionlib_core.output import tell
 from actionlib_core.suggest import did_you_mean
-from actionlib_core.wire.presence import Kind, list_endpoints, parse_token, token_pattern
+from actionlib_core.wire.presence import (
+    SETTLE_S,
+    Kind,
+    list_endpoints,
+    parse_token,
+    settle_network,
+    token_pattern,
+)
 
 if TYPE_CHECKING:
     import argparse
@@ -22,8 +29,6 @@ if TYPE_CHECKING:
     from actionlib_core.transport import Presence, Reply
     from actionlib_core.wire.presence import Endpoint
 
-SETTLE_S = 0.4  # the network is known when nobody new has shown up for so long
-SETTLE_MOST_S = 3.0
 FIND_S = 2.0  # a name that is not there then may still come within this: a busy machine is slow
 ASK_S = 2.0
 
@@ -61,23 +66,8 @@ def open_node(args: argparse.Namespace, *, settle: float = SETTLE_S) -> Iterator
         f"actionlib_{os.getpid()}", config=config, namespace=config.namespace, arguments=args.names
     ) as node:
         if settle:
-            _settle(node, settle)
+            settle_network(node.transport, node.clock, settle)
         yield node
-
-
-def _settle(node: Node, quiet: float) -> None:
-    """Wait until nobody new has been found for `quiet` [s].
-
-    Blocks: `SETTLE_MOST_S` at most.
-    """
-    news = node.clock.event()
-    watch = node.transport.watch_alive(token_pattern(None, "**"), lambda _presence: news.set())
-    deadline = node.clock.now() + SETTLE_MOST_S
-    try:
-        while news.wait(min(quiet, max(deadline - node.clock.now(), 0.0))):
-            news.clear()
-    finally:
-        watch.close()
 
 
 # -- who is there ----------------------------------------------------------------------------------

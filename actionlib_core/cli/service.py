@@ -11,7 +11,6 @@ from actionlib_core.cli._command import add_command, print_progress, rate, secon
 from actionlib_core.cli._listing import add_list, add_type
 from actionlib_core.cli._network import (
     SERVICE_KINDS,
-    SETTLE_S,
     class_of_end,
     find_ends,
     only_type,
@@ -21,6 +20,7 @@ from actionlib_core.cli._network import (
 )
 from actionlib_core.exceptions import ServiceException
 from actionlib_core.output import tell
+from actionlib_core.wire.presence import SETTLE_S
 
 if TYPE_CHECKING:
     import argparse

@@ -21,11 +21,14 @@ from actionlib_core.exceptions import TypeMismatchError
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from actionlib_core.clock import Clock
     from actionlib_core.transport import Transport
 
 ROOT = "@smachpy"
 WORDS_BEFORE_NAME = 7
 LIST_TIMEOUT_S = 1.0  # longest wait for the network to say who is there
+SETTLE_S = 0.4  # the network is known when nobody new has shown up for so long
+SETTLE_MOST_S = 3.0
 
 
 class Kind(StrEnum):
@@ -143,6 +146,21 @@ def list_endpoints(
     keys = transport.list_alive(token_pattern(kind, name), timeout)
     found = (parse_token(key) for key in keys)
     return sorted(endpoint for endpoint in found if endpoint is not None)
+
+
+def settle_network(transport: Transport, clock: Clock, quiet: float = SETTLE_S) -> None:
+    """Wait until nobody new has been found for `quiet` [s], in a session that has just been opened.
+
+    Blocks: `SETTLE_MOST_S` at most.
+    """
+    news = clock.event("the network to be known")
+    watch = transport.watch_alive(token_pattern(None, "**"), lambda _presence: news.set())
+    deadline = clock.now() + SETTLE_MOST_S
+    try:
+        while news.wait(min(quiet, max(deadline - clock.now(), 0.0))):
+            news.clear()
+    finally:
+        watch.close()
 
 
 def find_mismatch(endpoints: Iterable[Endpoint], own: Endpoint) -> TypeMismatchError | None:

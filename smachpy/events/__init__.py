@@ -253,6 +253,46 @@ class HeldBack(NamedTuple):
     guards: tuple[str, ...]
 
 
+class QuestionAsked(NamedTuple):
+    """A state asks a person.
+
+    Attributes:
+        text: The question.
+        answers: What may be answered.
+        words: What to write on their buttons, in the same order.
+        default: The outcome when nobody answers.
+        patience: Time for an answer [s].
+        service: Full name of the service that takes the answer (`smachpy.states.questions`).
+        has_picture: The service has a picture to show.
+    """
+
+    path: str
+    t: float
+    stamp_ns: int
+    text: str
+    answers: tuple[str, ...]
+    words: tuple[str, ...]
+    default: str
+    patience: float
+    service: str = ""
+    has_picture: bool = False
+
+
+class QuestionAnswered(NamedTuple):
+    """A question has its answer.
+
+    Attributes:
+        answer: The outcome.
+        by: Who gave it; "": nobody did in time.
+    """
+
+    path: str
+    t: float
+    stamp_ns: int
+    answer: str
+    by: str
+
+
 class GoalSent(NamedTuple):
     """An action state sent a goal."""
 
@@ -309,6 +349,8 @@ Event: TypeAlias = (
     | OutcomeForced
     | Fired
     | HeldBack
+    | QuestionAsked
+    | QuestionAnswered
     | GoalSent
     | GoalFeedback
     | GoalDone

@@ -16,6 +16,8 @@ RAISED = "exception"
 
 _NOT_ASKED = {"preempt": None, "asked": None, "serviced": None, "abandoned": None}
 
+_OF_QUESTION = ("text", "answers", "words", "default", "patience", "service", "has_picture")
+
 CUT_SHORT = "a new run began before it ended"
 """Text of a LOST goal whose run was cut short."""
 
@@ -34,7 +36,10 @@ class RunState:
             was asked to stop), asked (by whom: `source`, `by`, `why` and `grace` of the
             PreemptRequested), serviced (when it serviced the preempt), abandoned (when its grace
             was over); these four are None while it is not asked; attempt, item (of an iterator),
-            waits (why it is held back);
+            waits (why it is held back), question (of its newest visit, if it has asked one: `text`,
+            `answers`, `words`, `default`, `patience`, `service` and `has_picture` of the
+            QuestionAsked, `asked`, when, and `answer`, `by` and `answered` of the
+            QuestionAnswered, None until then);
             goals: by goal id: path, action, since, goal, feedback, first_feedback, status, text,
             result, ended; userdata: by "container key": key, value, writer, at, container;
             dropped: number of events that are missing, by which counts are too low; absent when 0.
@@ -66,6 +71,8 @@ class RunState:
             "Paused": lambda r: self._set(r, waits=r["reason"]),
             "Resumed": lambda r: self._set(r, waits=None),
             "UserdataWritten": self._on_userdata,
+            "QuestionAsked": self._on_question,
+            "QuestionAnswered": self._on_question_answered,
             "GoalSent": self._on_goal_sent,
             "GoalFeedback": self._on_feedback,
             "GoalDone": self._on_goal_done,
@@ -120,6 +127,7 @@ class RunState:
     def _on_entered(self, record: dict[str, Any]) -> None:
         state = self._state(record["path"])
         state["visits"] += 1
+        state.pop("question", None)
         state.update(since=record["stamp_ns"], waits=None, error=None, attempt=1, **_NOT_ASKED)
 
     def _on_failed(self, record: dict[str, Any]) -> None:
@@ -152,6 +160,27 @@ class RunState:
             if state["since"] is not None and state.get("preempt")
         ]
         return [path for path in asked if not any(one.startswith(f"{path}/") for one in asked)]
+
+    def _on_question(self, record: dict[str, Any]) -> None:
+        question = {name: record[name] for name in _OF_QUESTION}
+        question.update(asked=record["stamp_ns"], answer=None, by=None, answered=None)
+        self._set(record, question=question)
+
+    def _on_question_answered(self, record: dict[str, Any]) -> None:
+        question = self._state(record["path"]).get("question")
+        if question is not None:
+            question.update(answer=record["answer"], by=record["by"], answered=record["stamp_ns"])
+
+    def questions(self) -> dict[str, dict[str, Any]]:
+        """Return path -> question of those that wait for an answer, the oldest first."""
+        found = [
+            (path, state["question"])
+            for path, state in self.data["states"].items()
+            if state["since"] is not None
+            and state.get("question") is not None
+            and state["question"]["answered"] is None
+        ]
+        return dict(sorted(found, key=lambda one: (one[1]["asked"], one[0])))
 
     def _on_userdata(self, record: dict[str, Any]) -> None:
         container = record["path"].rpartition("/")[0] or record["path"]

@@ -23,6 +23,12 @@ from smachpy.states.driving import (
 )
 from smachpy.states.nav2 import nav2_active
 from smachpy.states.progress import Progress
+from smachpy.states.questions import (
+    AnswerRefusedError,
+    Question,
+    find_questions,
+    give_answer,
+)
 from smachpy.states.serving import Serve, serve_during, serving_machine
 from smachpy.states.waiting import AwaitMessage, Wait
 from smachpy.states.waypoints import PlaceFile, Route, Waypoint, load_route
@@ -31,6 +37,7 @@ __all__ = [
     "DRIVE_TIMEOUT",
     "SIGNAL_TIMEOUT",
     "TURN_TIMEOUT",
+    "AnswerRefusedError",
     "AskOperator",
     "AwaitMessage",
     "InputFileError",
@@ -39,12 +46,15 @@ __all__ = [
     "PlaceFile",
     "Pose2D",
     "Progress",
+    "Question",
     "Route",
     "Serve",
     "Wait",
     "Waypoint",
     "drive_back",
     "drive_to",
+    "find_questions",
+    "give_answer",
     "goal_at",
     "load_route",
     "locate",

@@ -1,17 +1,20 @@
 """A state that asks a person, and waits for the answer from anywhere on the network.
 
+    smachpy answer                                                    # what is asked now
+    smachpy answer retry
     actionlib topic echo operator/question
     actionlib topic pub -1 operator/answer std_msgs/String '{data: retry}'
-    actionlib service call operator/confirm '{data: true}'          # yes or no
+    actionlib service call operator/confirm '{data: true}'            # yes or no
 
-On the live page (`smachpy run MISSION --view --control`) the operator ends the state with the
-outcome of their choice.
+The live page and the terminal view show the question as well, with a button for each answer.
 """
 
 from __future__ import annotations
 
 import contextlib
 import math
+import uuid
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.interfaces.std_msgs.msg import String
@@ -20,62 +23,97 @@ from actionlib_core.node import get_node
 from actionlib_core.pubsub.service import Service
 from actionlib_core.pubsub.topic import Publisher, Subscriber
 from smachpy import State, UserData
-from smachpy.exceptions import MissionError, did_you_mean
+from smachpy.events import QuestionAnswered, QuestionAsked
+from smachpy.exceptions import MissionError
 from smachpy.log import logwarn
+from smachpy.machines.names import name_of
 from smachpy.run.child import on_preempt
+from smachpy.run.frame import current_scope
+from smachpy.states.questions import (
+    AnswerQuestion,
+    AnswerRefusedError,
+    Inbox,
+    Question,
+    question_text,
+    read_picture,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
+    from os import PathLike
 
     from actionlib_core.interfaces.std_srvs.srv import SetBoolRequest
     from actionlib_core.node import Node
     from smachpy.introspection import Kind
+    from smachpy.run.frame import Scope
 
 YES_NO = ("yes", "no")
+NO_ANSWER = "no_answer"
 
 
 class AskOperator(State):
-    """Asks a question and waits. Outcomes: the answers, 'no_answer', 'preempted'.
+    """Asks a question and waits. Outcomes: the answers, `default`, 'preempted'.
 
-    While it waits, the question is on the latched topic `<channel>/question` (std_msgs/String), and
-    answers are taken from the topic `<channel>/answer` (std_msgs/String: one of the answers) and,
-    for yes and no, from the service `<channel>/confirm` (std_srvs/SetBool). The first one counts.
+    While it waits, viewers show the question, `smachpy answer` answers it by a service of its own
+    (`smachpy.states.questions`), the question is on the latched topic `<channel>/question`
+    (std_msgs/String), and answers are taken from the topic `<channel>/answer` (std_msgs/String:
+    one of the answers) and, for yes and no, from the service `<channel>/confirm`
+    (std_srvs/SetBool). The first one counts, and is recorded with who gave it (`QuestionAnswered`).
     Upper and lower case do not matter unless two answers differ in nothing else. Anything
     else is refused and logged; the question stays.
 
     Args:
-        question: What to ask.
-        answers: What may be answered.
-        patience: Longest wait [s]; the outcome is 'no_answer' then.
-        channel: Where questions and answers go; an answer is for all questions asked there now.
-        **options: See `smachpy.machines.state.StateOptions`.
+        question: What to ask; or a function that returns it for the userdata.
+        answers: What may be answered; as a mapping, with the words for their buttons.
+        patience: Longest wait [s].
+        default: The outcome when nobody answers: 'no_answer', or one of the answers.
+        picture: What to show with it: the path of a PNG, JPEG or GIF file, the userdata key of
+            such a path, of the bytes or of a message with them in `data` (CompressedImage), or a
+            function that returns one of these for the userdata. The question is asked without
+            one that cannot be read, and the log says why.
+        channel: Where questions and answers go; an answer on its topics is for all questions that
+            are asked there now.
+        **options: See `smachpy.machines.state.StateOptions`, and `input_keys` for the functions.
 
     Raises:
-        MissionError: `patience` is no time, or `answers` has none, or one that says something else.
+        MissionError: `patience` is no time, `default` no answer, or `answers` has none, or one
+            that says something else.
     """
 
     def __init__(
         self,
-        question: str,
-        answers: Sequence[str] = YES_NO,
+        question: str | Callable[[Any], str],
+        answers: Sequence[str] | Mapping[str, str] = YES_NO,
         *,
         patience: float,
+        default: str = NO_ANSWER,
+        picture: PathLike[str] | str | Callable[[Any], Any] | None = None,
         channel: str = "operator",
         **options: Any,
     ) -> None:
         if not 0.0 < patience < math.inf:
             raise MissionError(f"patience: got {patience:g}; expected more than 0 [s].")
+        words = dict(answers) if isinstance(answers, Mapping) else {}
         answers = (answers,) if isinstance(answers, str) else tuple(answers)
-        taken = {"", "no_answer", "preempted"}.intersection(answer.strip() for answer in answers)
+        taken = {"", NO_ANSWER, "preempted"}.intersection(answer.strip() for answer in answers)
         if not answers or taken:
             raise MissionError(
                 f"answers: got {list(answers)}; expected at least one, and none that is empty, "
                 "'no_answer' or 'preempted'."
             )
-        super().__init__((*answers, "no_answer", "preempted"), **options)
+        if default not in (*answers, NO_ANSWER):
+            raise MissionError(f"default: got {default!r}; expected {[*answers, NO_ANSWER]}.")
+        if isinstance(picture, str):
+            options["input_keys"] = [*options.get("input_keys", ()), picture]
+        outcomes = dict.fromkeys((*answers, default, "preempted"))
+        super().__init__(outcomes, **options)
+        self._smachpy.code = tuple(one for one in (question, picture) if callable(one))
         self.__question = question
         self.__answers = answers
+        self.__words = tuple(words.get(answer, "") for answer in answers)
         self.__patience = patience
+        self.__default = default
+        self.__picture = picture
         self.__channel = channel
 
     def execute(self, userdata: UserData) -> str:
@@ -83,91 +121,137 @@ class AskOperator(State):
 
         Blocks: until the answer, `patience` [s] or a preempt.
         """
-        del userdata
         node = get_node()
+        scope = current_scope()
+        service = node.resolve(f"{self.__channel}/questions/q{uuid.uuid4().hex[:12]}")
+        question = Question(
+            path="" if scope is None else scope.path,
+            text=str(self.__question(userdata) if callable(self.__question) else self.__question),
+            answers=self.__answers,
+            words=self.__words,
+            default=self.__default,
+            patience=self.__patience,
+            left=self.__patience,
+            service=service,
+        )
+        asking = _Asking(self, question, self.__read_picture(userdata), node)
         with contextlib.ExitStack() as open_ends:
-            inbox = _Inbox(self, self.__question, self.__answers, node)
-            open_ends.callback(on_preempt(self, inbox.wake.set))
+            open_ends.callback(on_preempt(self, asking.wake.set))
             ask = open_ends.enter_context(
                 Publisher(f"{self.__channel}/question", String, latch=True, node=node)
             )
             open_ends.enter_context(
-                Subscriber(f"{self.__channel}/answer", String, inbox.on_answer, node=node)
+                Subscriber(f"{self.__channel}/answer", String, asking.on_topic, node=node)
             )
             if self.__answers == YES_NO:
                 confirm = f"{self.__channel}/confirm"
                 open_ends.enter_context(
-                    Service(confirm, SetBool, inbox.on_confirm, node=node, alone=False)
+                    Service(confirm, SetBool, asking.on_confirm, node=node, alone=False)
                 )
-            ask.publish(String(f"{self.__question} ({', '.join(self.__answers)})"))
-            logwarn(self.__invitation(node))
-            answer = inbox.wait(self.__patience)
+            open_ends.enter_context(
+                Service(f"/{service}", AnswerQuestion, asking.on_call, node=node, alone=False)
+            )
+            ask.publish(String(f"{question.text} ({', '.join(self.__answers)})"))
+            logwarn(
+                f"{question.text} Answer {' or '.join(self.__answers)} within "
+                f"{self.__patience:g} s: smachpy answer {self.__answers[0]}"
+            )
+            answer = asking.wait(scope)
             ask.publish(String(""))
-        if answer is None and self.preempt_requested():
+        if answer is None:
             self.service_preempt()
             return "preempted"
-        return answer or "no_answer"
+        return answer
 
-    def __invitation(self, node: Node) -> str:
-        topic = node.resolve(f"{self.__channel}/answer")
-        return (
-            f"{self.__question} Answer {' or '.join(self.__answers)} within {self.__patience:g} s: "
-            f"actionlib topic pub -1 {topic} std_msgs/String '{{data: {self.__answers[0]}}}'"
-        )
+    def __read_picture(self, userdata: UserData) -> tuple[str, bytes]:
+        picture: Any = self.__picture
+        if picture is None:
+            return "", b""
+        try:
+            if callable(picture):
+                picture = picture(userdata)
+            elif isinstance(picture, str):
+                picture = userdata[picture]
+            return ("", b"") if picture is None else read_picture(picture)
+        except Exception as error:  # noqa: BLE001  the user's code or data: the question matters more
+            logwarn(f"picture: {type(error).__name__}: {error} The question is asked without it.")
+            return "", b""
 
     def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
         """Add the question and the patience."""
         kind, details = super().describe_details()
-        own = (("question", self.__question), ("timeout", f"{self.__patience:g} s -> no_answer"))
-        return kind, (*own, *details)
+        question = self.__question
+        text = name_of(question) if callable(question) else question
+        limit = f"{self.__patience:g} s -> {self.__default}"
+        return kind, (("question", text), ("timeout", limit), *details)
 
 
-def find_answer(text: str, answers: Sequence[str]) -> str | None:
-    """Return the answer that a text means, None when there is none or the text fits several."""
-    word = text.strip()
-    for fold in (str, str.casefold):
-        found = [answer for answer in answers if fold(answer.strip()) == fold(word)]
-        if len(found) == 1:
-            return found[0]
-    return None
+class _Asking:
+    """One question while it waits."""
 
-
-class _Inbox:
-    """Takes answers in; the first that is one wins."""
-
-    def __init__(self, state: AskOperator, question: str, known: Sequence[str], node: Node) -> None:
-        self.wake = node.clock.event(f"an answer to {question!r}")
+    def __init__(
+        self, state: AskOperator, question: Question, picture: tuple[str, bytes], node: Node
+    ) -> None:
+        self.wake = node.clock.event(f"an answer to {question.text!r}")
         self._state = state
         self._question = question
-        self._known = known
+        self._picture = picture
         self._clock = node.clock
-        self._answers: list[str] = []
+        self._until = self._clock.now() + question.patience
+        self._inbox = Inbox(question.path, question.answers, self.wake.set)
 
-    def wait(self, seconds: float) -> str | None:
-        """Return the answer; None when none came in time, or a preempt did."""
-        until = self._clock.now() + seconds
-        while not self._answers and not self._state.preempt_requested():
-            left = until - self._clock.now()
+    def wait(self, scope: Scope | None) -> str | None:
+        """Wait for the answer, tell of both; return it, or None after a preempt."""
+        question, inbox = self._question, self._inbox
+        if scope is not None:
+            scope.emit(
+                QuestionAsked,
+                *(question.text, question.answers, question.words, question.default),
+                *(question.patience, question.service, bool(self._picture[1])),
+            )
+        while inbox.answer is None and not self._state.preempt_requested():
+            left = self._until - self._clock.now()
             if left <= 0.0:
                 break
             self.wake.wait(left)
             self.wake.clear()
-        return self._answers[0] if self._answers else None
+        preempted = self._state.preempt_requested()
+        answer, by = inbox.close("preempted" if preempted else question.default)
+        if preempted and not by:
+            return None
+        if scope is not None:
+            scope.emit(QuestionAnswered, answer, by)
+        return answer
 
-    def on_answer(self, message: String) -> None:
-        known = self._known
-        meant = find_answer(message.data, known)
-        if meant is not None:
-            self._take(meant)
-            return
-        hint = did_you_mean(message.data.strip(), known)
-        logwarn(f"answer: got {message.data!r}; expected one of {list(known)}.{hint}")
+    def on_topic(self, message: String) -> None:
+        self._take_or_log(message.data, f"the topic {self._channel}/answer")
 
     def on_confirm(self, request: SetBoolRequest) -> tuple[bool, str]:
         word = YES_NO[not request.data]
-        return self._take(word), f"{self._question} {self._answers[0]}"
+        taken = self._take_or_log(word, f"the service {self._channel}/confirm")
+        first = self._inbox.answer
+        return taken, f"{self._question.text} {word if first is None else first[0]}"
 
-    def _take(self, word: str) -> bool:
-        self._answers.append(word)
-        self.wake.set()
-        return self._answers[0] == word
+    def on_call(self, request: Any) -> dict[str, Any]:
+        if request.answer.strip():
+            try:
+                self._inbox.take(request.answer, request.by)
+            except AnswerRefusedError as error:
+                return {"accepted": False, "text": error.reason}
+            return {"accepted": True}
+        media, data = self._picture if request.picture else ("", b"")
+        left = max(0.0, self._until - self._clock.now())
+        question = question_text(self._question, left)
+        return {"question": question, "media_type": media, "picture": data}
+
+    @property
+    def _channel(self) -> str:
+        return self._question.service.rpartition("/questions/")[0]
+
+    def _take_or_log(self, text: str, by: str) -> bool:
+        try:
+            self._inbox.take(text, by)
+        except AnswerRefusedError as error:
+            logwarn(str(error))
+            return False
+        return True

@@ -34,6 +34,11 @@ def outcome_text(outcome: str) -> Text:
     return Text(shorten(outcome), STYLES[outcome_class(outcome)])
 
 
+def answered(answer: str, by: str) -> str:
+    """Return how a question was answered, for people."""
+    return f"answered {answer} by {by}" if by else f"nobody answered: {answer}"
+
+
 class EventLines:
     """Turns events into lines.
 
@@ -76,6 +81,12 @@ class EventLines:
                 e, Text(f"paused ({self._reason(e.reason)})", "yellow")
             ),
             ev.Resumed: lambda e: self._line(e, Text("resumed")),
+            ev.QuestionAsked: lambda e: self._line(
+                e, Text(f"asks: {self._reason(e.text)}", "cyan")
+            ),
+            ev.QuestionAnswered: lambda e: self._line(
+                e, Text(self._reason(answered(e.answer, e.by)), "cyan")
+            ),
             ev.GoalFeedback: self._goal_feedback,
             ev.GoalDone: self._goal_done,
         }

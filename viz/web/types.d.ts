@@ -43,6 +43,21 @@ interface StateRun {
   asked?: PreemptRequest | null;
   serviced?: number | null;
   abandoned?: number | null;
+  question?: Question; // of its newest visit
+}
+
+interface Question {
+  text: string;
+  answers: string[];
+  words: string[];
+  default: string;
+  patience: number; // [s]
+  service: string;
+  has_picture: boolean;
+  asked: number;
+  answer: string | null;
+  by: string | null;
+  answered: number | null;
 }
 
 interface GoalRun {

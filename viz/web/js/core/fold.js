@@ -104,6 +104,17 @@ const RULES = {
   Resumed(data, e) {
     stateOf(data, e.path).waits = null;
   },
+  QuestionAsked(data, e) {
+    const { text, answers, words, default: otherwise, patience, service, has_picture } = e;
+    stateOf(data, e.path).question = {
+      ...{ text, answers, words, default: otherwise, patience, service, has_picture },
+      ...{ asked: e.stamp_ns, answer: null, by: null, answered: null },
+    };
+  },
+  QuestionAnswered(data, e) {
+    const { question } = stateOf(data, e.path);
+    if (question) Object.assign(question, { answer: e.answer, by: e.by, answered: e.stamp_ns });
+  },
   UserdataWritten(data, e) {
     const container = containerOf(e.path);
     put(data.userdata, `${container} ${e.key}`, {
@@ -163,6 +174,7 @@ function stateOf(data, path) {
 function enter(data, e) {
   const state = stateOf(data, e.path);
   state.visits += 1;
+  delete state.question;
   Object.assign(state, { since: e.stamp_ns, waits: null, error: null, attempt: 1, ...NO_PREEMPT });
 }
 

@@ -25,6 +25,8 @@ const LINES = {
     `waits: ${e.guards.map((/** @type {string} */ guard) => `[${guard}]`).join(", ")} false`,
     "waiting",
   ],
+  QuestionAsked: (e) => [`asks ${e.text}`.trim(), "waiting"],
+  QuestionAnswered: (e) => [e.by ? `answered ${e.answer} by ${e.by}` : `nobody answered: ${e.answer}`, "waiting"],
   OutcomeForced: (e) => [`forced: ${e.outcome}`, "waiting"],
   GoalSent: (e) => [`goal to ${e.action}`, "active"],
   GoalDone: (e) => [`${e.action}: ${e.status.toLowerCase()} ${e.text}`.trim(), outcomeClass(e.status)],

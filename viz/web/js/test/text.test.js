@@ -52,7 +52,7 @@ test("how long a state holds a preempt up", () => {
 
 test("every kind of event that a filter lets through has a line", () => {
   const facts = { outcome: "ok", error: "no", action: "drive", status: "SUCCEEDED", text: "", key: "x", value: 1 };
-  Object.assign(facts, { guards: ["ready"], transition: "go", label: "A" });
+  Object.assign(facts, { guards: ["ready"], transition: "go", label: "A", answer: "yes", by: "ann" });
   for (const kinds of Object.values(KINDS_OF))
     for (const kind of kinds) {
       const { text } = lineOf(event(kind, "/JOB", facts));

@@ -1,0 +1,138 @@
+"""`smachpy answer`: what missions ask now, and the answer to it."""
+
+from __future__ import annotations
+
+import contextlib
+import getpass
+import json
+import os
+import socket
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.output import printable
+from smachpy.exceptions import MissionError, did_you_mean
+
+if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Iterator, Sequence
+
+    from actionlib_core.node import Node
+    from smachpy.states.questions import Question
+
+EXIT_NOTHING = 1
+EXAMPLES = """examples:
+  smachpy answer                       what missions ask now
+  smachpy answer yes                   answer the only question
+  smachpy answer yes --state CONFIRM   the question of that state, where there are several
+"""
+
+
+def register(subparsers: Any) -> None:
+    """Add `smachpy answer`."""
+    import argparse
+
+    parser = subparsers.add_parser(
+        "answer",
+        help="answer the question of a mission",
+        description="Show the questions that missions ask on this network and in your private "
+        "runs, or answer one. Exit codes: 0 taken or shown, 1 nobody asks anything, 2 not taken.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("answer", nargs="?", help="one of the answers; none shows the questions")
+    parser.add_argument(
+        "--state", metavar="PATH", help="the state that asks, or the end of its path"
+    )
+    parser.add_argument("--by", metavar="NAME", help="who answers, for the record (default: you)")
+    parser.add_argument("--json", action="store_true", help="show the questions as JSON")
+    parser.set_defaults(run=_run)
+
+
+def _run(args: argparse.Namespace) -> int:
+    from smachpy.states.questions import find_questions, give_answer
+
+    with _nodes() as nodes:
+        found = [(one, node) for node in nodes for one in find_questions(node)]
+        if args.answer is None:
+            return _show([one for one, _ in found], as_json=args.json)
+        question = choose([one for one, _ in found], args.state)
+        node = next(node for one, node in found if one is question)
+        give_answer(question.service, args.answer, args.by or _user(), node=node)
+    print(printable(f"{question.path}: answered {args.answer}"))
+    return 0
+
+
+def choose(questions: Sequence[Question], state: str | None) -> Question:
+    """Return the question that is meant.
+
+    Args:
+        questions: All there are.
+        state: Path of the state that asks, or the end of it; None: there is only one.
+
+    Raises:
+        MissionError: there is none, or several fit.
+    """
+    paths = [one.path for one in questions]
+    if not questions:
+        raise MissionError("answer: got no question on the network; expected one.")
+    fits = [
+        one
+        for one in questions
+        if state is None or one.path == state or one.path.endswith("/" + state.strip("/"))
+    ]
+    if not fits:
+        hint = did_you_mean(state or "", paths)
+        raise MissionError(f"state: got {state!r}; expected one of {paths}.{hint}")
+    if len(fits) > 1:
+        raise MissionError(
+            f"state: got {'none' if state is None else repr(state)}, and {len(fits)} questions are "
+            f"asked; expected one of {[one.path for one in fits]}. Try --state."
+        )
+    return fits[0]
+
+
+def _show(questions: Sequence[Question], *, as_json: bool) -> int:
+    if as_json:
+        print(json.dumps([asdict(one) for one in questions]))
+    elif not questions:
+        print("no mission asks anything")
+    for one in questions if not as_json else ():
+        answers = [
+            f"{answer} ({words})" if words else answer
+            for answer, words in zip(one.answers, one.words, strict=True)
+        ]
+        print(printable(f"{one.path}: {one.text}"))
+        print(
+            printable(
+                f"    {', '.join(answers)}; without an answer {one.default} in {one.left:.0f} s"
+            )
+        )
+    return 0 if questions else EXIT_NOTHING
+
+
+@contextlib.contextmanager
+def _nodes() -> Iterator[list[Node]]:
+    """The network that the environment names; else the default one and this user's private runs."""
+    from actionlib_core.config import Config
+    from actionlib_core.node import Node, get_node
+    from actionlib_core.private_network import list_private_networks, network_is_chosen
+    from actionlib_core.wire.presence import settle_network
+
+    node = get_node()
+    settle_network(node.transport, node.clock)
+    with contextlib.ExitStack() as stack:
+        domains = [] if network_is_chosen() else list_private_networks(node.transport)
+        name = f"answer_{os.getpid()}"
+        more = [stack.enter_context(Node(name, config=Config(domain=one))) for one in domains]
+        for one in more:
+            settle_network(one.transport, one.clock)
+        yield [node, *more]
+
+
+def _user() -> str:
+    try:
+        name = getpass.getuser()
+    except (OSError, KeyError):  # a user id without a name
+        name = str(os.getuid())
+    return f"{name}@{socket.gethostname()}"

@@ -1,0 +1,282 @@
+"""Questions of missions on the network: find those that wait for an answer, and answer them.
+
+Each question is a service for as long as it waits, so its token says that it is there:
+
+    <channel>/questions/<id>      smachpy_msgs/AnswerQuestion
+
+A request with an empty `answer` reads the question; any other one answers it. The first answer
+counts; whoever comes later is told whose it was.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from actionlib_core.exceptions import ActionlibError
+from actionlib_core.interfaces import define_service
+from actionlib_core.node import get_node
+from actionlib_core.wire.encoding import encoding_of
+from actionlib_core.wire.presence import Kind, list_endpoints
+from smachpy.exceptions import SmachError, did_you_mean
+from smachpy.log import logwarn
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from actionlib_core.node import Node
+    from actionlib_core.transport import Reply
+
+AnswerQuestion = define_service(
+    "smachpy_msgs/AnswerQuestion",
+    """
+string answer       # one of the answers; "" only reads the question
+string by           # who gives it
+bool picture        # send the picture
+---
+bool accepted
+string text         # why it was not accepted
+string question     # JSON: path, text, answers, words, default, patience, left
+string media_type   # of the picture, "image/png"
+uint8[] picture
+""",
+)
+
+CALL_S: Final = 3.0
+"""A mission has so long to take an answer [s]."""
+
+LONGEST_BY: Final = 200
+MOST_BYTES: Final = 4_000_000
+"""Of a picture."""
+
+_MEDIA = (
+    (b"\x89PNG\r\n\x1a\n", "image/png"),
+    (b"\xff\xd8\xff", "image/jpeg"),
+    (b"GIF8", "image/gif"),
+)
+MEDIA_TYPES = frozenset(media for _, media in _MEDIA)
+
+
+class AnswerRefusedError(SmachError):
+    """An answer was not taken: it is none of those, somebody was faster, or nobody asks any more.
+
+    Attributes:
+        answer: The answer.
+        reason: Why.
+    """
+
+    def __init__(self, where: str, answer: str, reason: str) -> None:
+        self.answer = answer
+        self.reason = reason
+        super().__init__(f"{where}: answer: got {answer!r}; {reason}")
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """A question that waits for an answer.
+
+    Attributes:
+        path: The state that asks.
+        text: What it asks.
+        answers: What may be answered.
+        words: What to write on their buttons, in the same order.
+        default: The outcome when nobody answers.
+        patience: Time for an answer [s].
+        left: What was left of it when the question was read [s].
+        service: Full name of the service that takes the answer.
+    """
+
+    path: str
+    text: str
+    answers: tuple[str, ...]
+    words: tuple[str, ...]
+    default: str
+    patience: float
+    left: float
+    service: str
+
+
+class Inbox:
+    """Takes the answers to one question; the first one counts.
+
+    Args:
+        where: The state that asks, for errors.
+        answers: What may be answered.
+        on_answer: Called once, with the first answer taken.
+
+    Attributes:
+        answer: The answer and who gave it; None until there is one.
+
+    Threads: `take` may be called from any thread.
+    """
+
+    def __init__(self, where: str, answers: Sequence[str], on_answer: Callable[[], object]) -> None:
+        self.answer: tuple[str, str] | None = None
+        self._where = where
+        self._answers = answers
+        self._on_answer = on_answer
+        self._lock = threading.Lock()
+
+    def take(self, text: str, by: str) -> str:
+        """Take an answer; return which one of the answers it is.
+
+        Raises:
+            AnswerRefusedError: it is none of them, fits several, or there is one already.
+        """
+        meant = find_answer(text, self._answers)
+        if meant is None:
+            hint = did_you_mean(text.strip(), self._answers)
+            reason = f"expected one of {list(self._answers)}.{hint}"
+            raise AnswerRefusedError(self._where, text, reason)
+        with self._lock:
+            if self.answer is not None:
+                first, who = self.answer
+                over = f"answered {first!r} by {who}" if who else f"over: {first!r}"
+                reason = f"expected none: it is {over}."
+                raise AnswerRefusedError(self._where, text, reason)
+            self.answer = meant, by[:LONGEST_BY] or "somebody"
+        self._on_answer()
+        return meant
+
+    def close(self, otherwise: str) -> tuple[str, str]:
+        """Take no more answers; return the first one, and by whom, else (`otherwise`, "")."""
+        with self._lock:
+            if self.answer is None:
+                self.answer = otherwise, ""
+            return self.answer
+
+
+def find_answer(text: str, answers: Sequence[str]) -> str | None:
+    """Return the answer that a text means, None when there is none or the text fits several."""
+    word = text.strip()
+    for fold in (str, str.casefold):
+        found = [answer for answer in answers if fold(answer.strip()) == fold(word)]
+        if len(found) == 1:
+            return found[0]
+    return None
+
+
+def find_questions(node: Node | None = None) -> list[Question]:
+    """Return the questions that wait for an answer, by path.
+
+    Args:
+        node: Where to look; the current node when None.
+
+    Blocks: until the network has answered, and each of them, some seconds at most.
+    """
+    node = node or get_node()
+    found = []
+    for end in list_endpoints(node.transport, kind=Kind.SERVICE):
+        if end.type == AnswerQuestion._type:
+            try:
+                reply = _call(node, end.name, AnswerQuestion._request_class())
+                if reply is not None:  # else it has just been answered
+                    found.append(_read(reply.question, end.name))
+            except (ActionlibError, ValueError, TypeError, KeyError) as error:
+                logwarn(f"{end.name}: not read: {type(error).__name__}: {error}")
+    return sorted(found, key=lambda one: (one.path, one.service))
+
+
+def give_answer(service: str, answer: str, by: str, *, node: Node | None = None) -> None:
+    """Answer a question.
+
+    Args:
+        service: Of the question.
+        answer: One of its answers; upper and lower case do not matter.
+        by: Who gives it, for the record.
+        node: Where it is; the current node when None.
+
+    Raises:
+        AnswerRefusedError: it was not taken.
+
+    Blocks: until the mission has taken it, 3 s at most.
+    """
+    if not answer.strip():
+        raise AnswerRefusedError(service, answer, "expected one of its answers.")
+    make: Any = AnswerQuestion._request_class
+    request = make(answer=answer, by=by)
+    reply = _call(node or get_node(), service, request)
+    if reply is None:
+        raise AnswerRefusedError(service, answer, "nobody asks that any more.")
+    if not reply.accepted:
+        raise AnswerRefusedError(service, answer, reply.text)
+
+
+def fetch_picture(service: str, *, node: Node | None = None) -> tuple[str, bytes] | None:
+    """Return media type and bytes of a question's picture; None when there is none any more.
+
+    Blocks: until it has come, 3 s at most.
+    """
+    make: Any = AnswerQuestion._request_class
+    reply = _call(node or get_node(), service, make(picture=True))
+    if reply is None or reply.media_type not in MEDIA_TYPES:
+        return None
+    return reply.media_type, bytes(reply.picture)
+
+
+def question_text(question: Question, left: float) -> str:
+    """Return what the service tells of a question, with what is left of its time [s], as JSON."""
+    told = {**asdict(question), "left": left}
+    del told["service"]
+    return json.dumps(told)
+
+
+def read_picture(value: Any) -> tuple[str, bytes]:
+    """Return media type and bytes of a picture.
+
+    Args:
+        value: The bytes of a PNG, JPEG or GIF file, the path of one, or a message with these bytes
+            in `data`, such as sensor_msgs/CompressedImage.
+
+    Raises:
+        ValueError: it is none, or larger than 4 MB.
+        OSError: the file cannot be read.
+    """
+    if hasattr(value, "__fspath__") or isinstance(value, str):
+        with Path(value).open("rb") as file:
+            data = file.read(MOST_BYTES + 1)
+    else:
+        data = getattr(value, "data", value)
+        if not isinstance(data, (bytes, bytearray, memoryview)):
+            kind = type(value).__name__
+            raise ValueError(f"got {kind}; expected bytes, a path or a CompressedImage.")
+        data = bytes(data)
+    if len(data) > MOST_BYTES:
+        raise ValueError(f"got more than {MOST_BYTES} bytes; expected fewer.")
+    media = next((media for start, media in _MEDIA if data.startswith(start)), None)
+    if media is None:
+        raise ValueError(f"got bytes that begin with {data[:8]!r}; expected PNG, JPEG or GIF.")
+    return media, data
+
+
+def _read(text: str, service: str) -> Question:
+    told = json.loads(text)
+    told["answers"], told["words"] = tuple(told["answers"]), tuple(told["words"])
+    return Question(**told, service=service)
+
+
+def _call(node: Node, service: str, request: Any) -> Any:
+    """Return the answer of a question's service; None when there is none.
+
+    No `ServiceProxy`: what proxies of a name share lasts as long as the node, and every question
+    has a name of its own.
+    """
+    replies: list[Reply] = []
+    done = node.clock.event(f"the answer of {service}")
+    query = node.transport.query(
+        service.removeprefix("/"),
+        request.to_bytes(),
+        encoding=encoding_of(AnswerQuestion),
+        timeout=CALL_S,
+        on_reply=replies.append,
+        on_done=done.set,
+    )
+    done.wait(CALL_S + 1.0)
+    query.close()
+    for reply in replies:
+        if not reply.error:
+            return AnswerQuestion._response_class.from_bytes(reply.payload)
+    return None
