@@ -232,7 +232,7 @@ class Ros1Bridge:
                     self._ros.clean(state, BRIDGE)
                 types = self._ros.types()
                 self._look(state, types)
-                self._ros.register(state)
+                self._ros.register(state, BRIDGE)
                 self._note_master(None)
             except Ros1Error as error:
                 self._note_master(error)

@@ -45,6 +45,8 @@ RETRY_LONGEST_S = 10.0
 UNREGISTER_S = 1.0  # longest silence of a master when a node leaves it
 CLOSE_S = 1.0
 PROBE_S = 0.5
+REMIND_FIRST_S = 3.0  # a subscriber that does not connect is told of us again, as RETRY above
+REMIND_LONGEST_S = 60.0
 ANY = "*"
 PORT = 11311  # a master's by custom
 
@@ -251,6 +253,11 @@ class Publication:
         self._seen = guess
         self._closed = False
 
+    def subscribers(self) -> set[str]:
+        """Return the names of the nodes that are connected."""
+        with self.lock:
+            return {connection.peer for connection in self._connections}
+
     def put(self, payload: bytes, *, keep: str | None = None) -> None:
         """Send a message to all subscribers; never waits.
 
@@ -358,6 +365,22 @@ class Offer:
         self._node.forget(self)
 
 
+class _Reminder:
+    """When a node is told again."""
+
+    def __init__(self, now: float) -> None:
+        self._pause = REMIND_FIRST_S
+        self._due = now + self._pause
+
+    def is_due(self, now: float) -> bool:
+        """Return whether to tell it now; then it is due again later, each time twice as late."""
+        if now < self._due:
+            return False
+        self._pause = min(2 * self._pause, REMIND_LONGEST_S)
+        self._due = now + self._pause
+        return True
+
+
 class Ros1Node:
     """A node in a ROS 1 system.
 
@@ -389,6 +412,7 @@ class Ros1Node:
         self._served: dict[str, Offer] = {}
         self._tasks: set[Task] = set()
         self._told: dict[str, str] = {}
+        self._unconnected: dict[tuple[str, str], _Reminder] = {}
         own = find_host(master, host)
         bind = "127.0.0.1" if is_loopback(own) else ""
         self._rpc = RpcServer(bind, clock, self._methods())
@@ -442,7 +466,7 @@ class Ros1Node:
         """Return the types of all topics that the master has ever heard of; raises as `ask`."""
         return read_types(self.master, self.ask("getTopicTypes"))
 
-    def register(self, state: SystemState) -> None:
+    def register(self, state: SystemState, kin: str = "") -> None:
         """Make the master know what is wanted, and forget what is not.
 
         A topic that is listened to is registered again when other nodes publish on it than
@@ -450,6 +474,7 @@ class Ros1Node:
 
         Args:
             state: What the master knows.
+            kin: How the names of nodes begin that are not told of us; "" for none.
 
         Raises:
             Ros1Error: the master does not answer, or refuses; what is left is tried the next time.
@@ -474,6 +499,35 @@ class Ros1Node:
                 subscription.apply(subscription.publishers.answer(asked, uris))
                 subscription.nodes = nodes
         self._unregister(there - wanted)
+        self._remind(state, published, kin or self.name)
+
+    def _remind(self, state: SystemState, published: dict[str, Publication], kin: str) -> None:
+        """Tell nodes of us that listen to what we publish, by the master, but have not connected.
+
+        rospy gives a publisher up for ever whose connection is reset, and the master's word about
+        a new one may be lost. A node connects when it hears of a publisher that was not there.
+        """
+        missing = {
+            (topic, node)
+            for topic, made in published.items()
+            for node in set(state.subscribers.get(topic, ())) - made.subscribers()
+            if not node.startswith(kin)
+        }
+        for there in self._unconnected.keys() - missing:
+            del self._unconnected[there]
+        now = self.clock.now()
+        for topic, node in sorted(missing):
+            reminder = self._unconnected.setdefault((topic, node), _Reminder(now))
+            if not reminder.is_due(now):
+                continue
+            try:
+                uri = str(self.ask("lookupNode", node))
+                others = sorted(set(state.publishers.get(topic, ())) - {self.name})
+                uris = [str(self.ask("lookupNode", other)) for other in others]
+                for known in (uris, [*uris, self.uri]):
+                    call(uri, "publisherUpdate", "/master", topic, known, timeout=PROBE_S)
+            except Ros1Error as error:  # it has died, or will be told later
+                log.debug("ROS 1 bridge %s: %s of %s: %s", self.name, topic, node, error)
 
     def _unregister(self, names: Names, timeout: float | None = None) -> None:
         for topic in sorted(names.published):

@@ -55,8 +55,10 @@ class Cable:
     def mend(self, *, broken: bool) -> None:
         """Carry again what has waited; `broken`: reset the connections that there were."""
         if broken:
-            for sock in list(self._pairs):
+            there = list(self._pairs)
+            for sock in there:
                 sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
+            for sock in there:
                 self._end(sock)
         self._whole.set()
 
