@@ -76,6 +76,8 @@ if TYPE_CHECKING:
     from smachpy.actions.service_state import ServiceState as ServiceState
     from smachpy.actions.simple_action_state import SimpleActionState as SimpleActionState
     from smachpy.checks import check as check
+    from smachpy.durable.codec import NotDurableError as NotDurableError
+    from smachpy.durable.codec import register_type as register_type
     from smachpy.network.client import IntrospectionClient as IntrospectionClient
     from smachpy.network.server import IntrospectionServer as IntrospectionServer
 
@@ -96,6 +98,7 @@ __all__ = [
     "Iterator",
     "Kind",
     "MonitorState",
+    "NotDurableError",
     "Options",
     "ReadOnlyError",
     "Remapper",
@@ -125,6 +128,7 @@ __all__ = [
     "logwarn",
     "mission",
     "n_of",
+    "register_type",
     "set_loggers",
     "set_options",
     "set_preempt_handler",
@@ -139,9 +143,11 @@ _LAZY: dict[str, str] = {
     "IntrospectionClient": "smachpy.network.client",
     "IntrospectionServer": "smachpy.network.server",
     "MonitorState": "smachpy.actions.monitor_state",
+    "NotDurableError": "smachpy.durable.codec",
     "ServiceState": "smachpy.actions.service_state",
     "SimpleActionState": "smachpy.actions.simple_action_state",
     "check": "smachpy.checks",
+    "register_type": "smachpy.durable.codec",
 }
 
 

@@ -1,0 +1,571 @@
+"""Values as JSON that can be read back as they were: what a journal keeps of userdata.
+
+Reading builds data only. A class is looked up among those that were registered, never by importing
+what a name says, so that a journal from elsewhere runs no code that the mission does not name.
+
+What JSON does not have is an object whose one key, or the first of two, begins with `$`:
+
+    {"$tuple": [...]}  {"$set": [...]}  {"$frozenset": [...]}  {"$items": [[key, value], ...]}
+    {"$bytes": "base64"}  {"$bytearray": "base64"}  {"$float": "nan" | "inf" | "-inf"}
+    {"$int": "0x..."}  {"$time": [secs, nsecs]}  {"$duration": [secs, nsecs]}       of ROS
+    {"$datetime": "ISO 8601", "zone": "Europe/Berlin"}  {"$date"} {"$clock"} {"$timedelta"}
+    {"$path": "text"}  {"$purepath": "text"}
+    {"$msg": "pkg/Type", "fields": {...}}  {"$ros2": "pkg/msg/Type", "distro": ..., "fields": ...}
+    {"$array": "base64", "dtype": ..., "shape": [...]}  {"$scalar": "base64", "dtype": ...}
+    {"$type": "module:Class", "fields": {...}}  {"$enum": "module:Class", "name": "RED"}
+    {"$custom": "module:Class", "data": ...}
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import dataclasses
+import enum
+import inspect
+import json
+import math
+import sys
+import typing
+from datetime import date, datetime, time, timedelta, timezone
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
+
+from actionlib_core.exceptions import ActionlibError
+from actionlib_core.time import Duration, Time
+from smachpy.exceptions import (
+    InvalidStateError,
+    InvalidUserCodeError,
+    MissionError,
+    did_you_mean,
+)
+from smachpy.userdata.readonly import writable
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+C = TypeVar("C", bound=type)
+
+_DEEPEST: Final = 100
+_NO_CONSTRUCTOR: Final = "its constructor takes more than its fields"
+
+
+class NotDurableError(InvalidUserCodeError, TypeError):
+    """A value cannot be kept in a journal.
+
+    Attributes:
+        key: The userdata key.
+        place: Where in its value: ".route[3].socket", or "".
+        kind: The type of what cannot be kept.
+        reason: Why.
+    """
+
+    def __init__(
+        self, key: str, place: str, kind: type, reason: str, way_out: str, *, path: str = ""
+    ) -> None:
+        self.key = key
+        self.place = place
+        self.kind = kind
+        self.reason = reason
+        where = f"{path}: " if path else ""
+        super().__init__(
+            f"{where}userdata key {key!r}: got {kind.__module__}.{kind.__qualname__}"
+            f"{f' at {place}' if place else ''}, which a journal cannot keep: {reason}; expected "
+            f"{way_out}, or transient=[{key!r}] when it need not survive.",
+            path=path,
+        )
+
+
+class JournalValueError(MissionError, ValueError):
+    """A value in a journal cannot be read back.
+
+    Attributes:
+        place: Where it is: "$.route[3]".
+        reason: Why.
+    """
+
+    def __init__(self, place: str, reason: str) -> None:
+        self.place = place
+        self.reason = reason
+        super().__init__(f"journal: {place}: {reason}")
+
+
+@dataclasses.dataclass(frozen=True)
+class _Registered:
+    kind: type
+    to_data: Callable[[Any], Any] | None = None
+    from_data: Callable[[Any], Any] | None = None
+
+
+_registered: dict[str, _Registered] = {}
+
+
+def register_type(
+    kind: C,
+    *,
+    to_data: Callable[[Any], Any] | None = None,
+    from_data: Callable[[Any], Any] | None = None,
+) -> C:
+    """Let journals keep the instances of a class; also a decorator.
+
+    Dataclasses, named tuples and enums need no more than that, and bring along those of the same
+    kinds that their fields are annotated with. A subclass is another class.
+
+    Args:
+        kind: The class; it must be registered before the mission runs, at each start.
+        to_data: Of other classes: makes an instance a value that can be kept.
+        from_data: The reverse.
+
+    Returns:
+        `kind`.
+
+    Raises:
+        InvalidStateError: it is no class, or one that needs both functions.
+    """
+    if not isinstance(kind, type):
+        raise InvalidStateError(f"register_type: got {kind!r}; expected a class.")
+    if (to_data is None) != (from_data is None):
+        raise InvalidStateError(
+            f"register_type: {kind.__qualname__}: got one of to_data and from_data; expected both."
+        )
+    if to_data is None:
+        problem = _problem_of(kind)
+        if problem is not None:
+            raise InvalidStateError(
+                f"register_type: got {kind.__qualname__}: {problem}; expected a dataclass, a named "
+                "tuple or an enum. Try to_data=... and from_data=..."
+            )
+    _registered[_name_of(kind)] = _Registered(kind, to_data, from_data)
+    if to_data is None:
+        register_annotations(kind)
+    return kind
+
+
+def register_annotations(kind: type) -> None:
+    """Register what the fields of a class are annotated with, as far as it registers by itself.
+
+    Args:
+        kind: A dataclass, a TypedDict or another class; its annotations may be nested,
+            `dict[str, list[Waypoint]]`.
+    """
+    try:
+        hints = typing.get_type_hints(kind)
+    except Exception:  # noqa: BLE001  a name that only type checkers see: that field is left out
+        hints = {}
+    for hint in hints.values():
+        _register_hint(hint)
+
+
+def _register_hint(hint: Any) -> None:
+    for inner in typing.get_args(hint):
+        _register_hint(inner)
+    if not isinstance(hint, type) or _name_of(hint) in _registered:
+        return
+    if typing.is_typeddict(hint):
+        register_annotations(hint)
+    elif _problem_of(hint) is None:
+        register_type(hint)
+
+
+def _problem_of(kind: type) -> str | None:
+    """Say why a class needs functions of its own, None when it does not."""
+    if issubclass(kind, enum.Enum) or _is_named_tuple(kind):
+        return None
+    if not dataclasses.is_dataclass(kind):
+        return "it is another class"
+    fields = {field.name for field in dataclasses.fields(kind)}
+    constructor = inspect.signature(kind).parameters if kind.__dataclass_params__.init else ()  # type: ignore[attr-defined]
+    return None if fields.issuperset(constructor) else _NO_CONSTRUCTOR
+
+
+def _is_named_tuple(kind: type) -> bool:
+    return issubclass(kind, tuple) and hasattr(kind, "_fields")
+
+
+def _name_of(kind: type) -> str:
+    return f"{kind.__module__}:{kind.__qualname__}"
+
+
+def encode(value: Any, *, key: str = "", path: str = "") -> Any:
+    """Return what `json` can write in place of a value.
+
+    The result shares nothing with `value` that can change.
+
+    Args:
+        value: A userdata value; read-only views are kept as what they show.
+        key: Its key, for errors.
+        path: The path of the state that sets it, for errors.
+
+    Raises:
+        NotDurableError: it, or something in it, cannot be kept.
+    """
+    try:
+        return _encode(value, "", 0)
+    except _Refused as refused:
+        place, kind, reason, way_out = refused.args
+        cause = refused.__cause__
+        error = NotDurableError(key, place, kind, reason, way_out, path=path)
+    raise error from cause
+
+
+def decode(data: Any) -> Any:
+    """Rebuild the value of an `encode` result.
+
+    Raises:
+        JournalValueError: it names a class that is not registered, or does not fit.
+    """
+    try:
+        return _decode(data, "$")
+    except RecursionError:
+        raise JournalValueError(
+            "$", "got data nested too deeply; expected an encoded value."
+        ) from None
+
+
+class _Refused(Exception):  # noqa: N818  never leaves this module
+    """Arguments: place, type, reason, way out."""
+
+
+_ATOMS: Final = frozenset({type(None), bool, int, str})
+_NUMBERS: Final = _ATOMS | {float}
+_LARGEST: Final = 2**4096
+"""`json` refuses integers of more than 4300 digits (`sys.set_int_max_str_digits`)."""
+
+
+def _encode(value: Any, place: str, depth: int) -> Any:
+    kind = type(value)
+    if kind in _ATOMS and (kind is not int or -_LARGEST < value < _LARGEST):
+        return value
+    if depth > _DEEPEST:
+        reason = "it is nested too deeply"
+        raise _Refused(f"{place[:60]}...", kind, reason, "one that does not contain itself")
+    encoder = _ENCODERS.get(kind)
+    if encoder is not None:
+        return encoder(value, place, depth)
+    registered = _registered.get(_name_of(kind))
+    if registered is not None and registered.kind is kind:
+        return _encode_registered(value, registered, place, depth)
+    shown = writable(value)
+    if shown is not value:
+        return _encode(shown, place, depth + 1)
+    special = _encode_message(value, place, depth) or _encode_numpy(value, place)
+    if special is None:
+        raise _Refused(place, kind, *_why_not(kind))
+    return special
+
+
+def _why_not(kind: type) -> tuple[str, str]:
+    """Return the reason and the way out."""
+    name = kind.__qualname__
+    same_name = _registered.get(_name_of(kind))
+    if "<locals>" in name:
+        return "its class is made inside a function", "a class of a module"
+    if same_name is not None or _problem_of(kind) is None:
+        return "its class is not registered", f"smachpy.register_type({name})"
+    for base in kind.__mro__[1:]:
+        if base in _ENCODERS or base is str:
+            return f"it is a subclass of {base.__name__}", f"a plain {base.__name__}"
+    return (
+        "its class is no dataclass, enum or message",
+        f"smachpy.register_type({name}, to_data=..., from_data=...)",
+    )
+
+
+def _encode_list(value: list[Any], place: str, depth: int) -> Any:
+    if _NUMBERS.issuperset(map(type, value)):  # quickly what is long: scans, paths
+        return [_encode(item, place, depth) for item in value]
+    return [_encode(item, f"{place}[{i}]", depth + 1) for i, item in enumerate(value)]
+
+
+def _encode_dict(value: dict[Any, Any], place: str, depth: int) -> Any:
+    if all(type(key) is str and not key.startswith("$") for key in value):
+        return {key: _encode(item, f"{place}.{key}", depth + 1) for key, item in value.items()}
+    items = value.items()
+    pairs = [
+        [
+            _encode(key, f"{place} key {key!r}", depth + 1),
+            _encode(item, f"{place}[{key!r}]", depth + 1),
+        ]
+        for key, item in items
+    ]
+    return {"$items": pairs}
+
+
+def _sequence(mark: str) -> Callable[[Any, str, int], Any]:
+    def encode_sequence(value: Iterable[Any], place: str, depth: int) -> Any:
+        items = [_encode(item, f"{place}[{i}]", depth + 1) for i, item in enumerate(value)]
+        if mark != "$tuple":  # a set has no order: give it one, so that equal ones look equal
+            items.sort(key=lambda item: json.dumps(item, sort_keys=True))
+        return {mark: items}
+
+    return encode_sequence
+
+
+def _encode_datetime(value: datetime, place: str, _: int) -> Any:
+    zone = value.tzinfo
+    if zone is None or type(zone) is timezone:
+        return {"$datetime": value.isoformat(), "fold": value.fold}
+    if isinstance(zone, ZoneInfo) and zone.key:
+        return {
+            "$datetime": value.replace(tzinfo=None).isoformat(),
+            "fold": value.fold,
+            "zone": zone.key,
+        }
+    raise _Refused(f"{place}.tzinfo", type(zone), "its rules are not known by a name", "a ZoneInfo")
+
+
+def _encode_time(value: time, place: str, _: int) -> Any:
+    if value.tzinfo is None or type(value.tzinfo) is timezone:
+        return {"$clock": value.isoformat(), "fold": value.fold}
+    reason = "its offset depends on a date"
+    raise _Refused(f"{place}.tzinfo", type(value.tzinfo), reason, "a time without a zone")
+
+
+def _base64(value: Any) -> str:
+    return base64.b64encode(value).decode()
+
+
+_ENCODERS: Final[dict[type, Callable[[Any, str, int], Any]]] = {
+    int: lambda value, *_: {"$int": hex(value)},  # a large one
+    float: lambda value, *_: value if math.isfinite(value) else {"$float": str(value)},
+    list: _encode_list,
+    dict: _encode_dict,
+    tuple: _sequence("$tuple"),
+    set: _sequence("$set"),
+    frozenset: _sequence("$frozenset"),
+    bytes: lambda value, *_: {"$bytes": _base64(value)},
+    bytearray: lambda value, *_: {"$bytearray": _base64(value)},
+    Time: lambda value, *_: {"$time": [value.secs, value.nsecs]},
+    Duration: lambda value, *_: {"$duration": [value.secs, value.nsecs]},
+    datetime: _encode_datetime,
+    date: lambda value, *_: {"$date": value.isoformat()},
+    time: _encode_time,
+    timedelta: lambda value, *_: {"$timedelta": [value.days, value.seconds, value.microseconds]},
+    type(Path()): lambda value, *_: {"$path": str(value)},
+    PurePosixPath: lambda value, *_: {"$purepath": str(value)},
+}
+
+
+def _encode_registered(value: Any, registered: _Registered, place: str, depth: int) -> Any:
+    kind = registered.kind
+    name = _name_of(kind)
+    if registered.to_data is not None:
+        try:
+            data = registered.to_data(value)
+        except Exception as error:
+            raise _Refused(
+                place, kind, f"its to_data raised {error!r}", "one that works"
+            ) from error
+        return {"$custom": name, "data": _encode(data, f"{place}.to_data()", depth + 1)}
+    if isinstance(value, enum.Enum):
+        if value.name in kind.__members__:  # type: ignore[attr-defined]  # an enum has them
+            return {"$enum": name, "name": value.name}
+        return {"$enum": name, "value": _encode(value.value, f"{place}.value", depth + 1)}  # flags
+    if isinstance(value, tuple):
+        names: Iterable[str] = value._fields  # type: ignore[attr-defined]
+    else:
+        names = [field.name for field in dataclasses.fields(value)]
+    fields = {}
+    for field in names:
+        try:
+            inner = getattr(value, field)
+        except AttributeError as error:
+            raise _Refused(
+                f"{place}.{field}", kind, "this field is not set", "all of them"
+            ) from error
+        fields[field] = _encode(inner, f"{place}.{field}", depth + 1)
+    return {"$type": name, "fields": fields}
+
+
+def _encode_message(value: Any, place: str, depth: int) -> Any:
+    """Return a message's fields as they are, which need not be those that go over the wire."""
+    kind = type(value)
+    wire = getattr(kind, "_wire", None)
+    if wire is None or not hasattr(kind, "_slot_types"):
+        return None
+    fields = {
+        slot: _encode(getattr(value, slot), f"{place}.{slot}", depth + 1) for slot in kind.__slots__
+    }
+    name = kind._type
+    if wire == "ros2":
+        return {"$ros2": name, "distro": kind._distro, "fields": fields}
+    return {"$msg": name, "fields": fields}
+
+
+def _encode_numpy(value: Any, place: str) -> Any:
+    numpy = sys.modules.get("numpy")  # who has an array has imported it
+    if numpy is None:
+        return None
+    kind = type(value)
+    if kind is not numpy.ndarray and not isinstance(value, numpy.generic):
+        return None
+    if value.dtype.hasobject:
+        raise _Refused(place, kind, "it holds Python objects", "an array of numbers")
+    described = numpy.lib.format.dtype_to_descr(value.dtype)
+    dtype = described if isinstance(described, str) else _encode(described, place, 0)
+    data = _base64(numpy.ascontiguousarray(value).tobytes())
+    if kind is numpy.ndarray:
+        return {"$array": data, "dtype": dtype, "shape": list(value.shape)}
+    return {"$scalar": data, "dtype": dtype}
+
+
+def _decode(data: Any, place: str) -> Any:
+    if isinstance(data, list):
+        return [_decode(item, f"{place}[{i}]") for i, item in enumerate(data)]
+    if not isinstance(data, dict):
+        return data
+    mark = next(iter(data), "")
+    if not mark.startswith("$"):
+        return {key: _decode(value, f"{place}.{key}") for key, value in data.items()}
+    decoder = _DECODERS.get(mark)
+    if decoder is None:
+        raise JournalValueError(place, f"got {mark!r}; expected one of {sorted(_DECODERS)}.")
+    try:
+        return decoder(data, place)
+    except JournalValueError:
+        raise
+    except (
+        TypeError,
+        ValueError,
+        KeyError,
+        AttributeError,
+        binascii.Error,
+        ActionlibError,
+    ) as error:
+        raise JournalValueError(place, f"got {mark!r} that does not fit: {error!r}.") from error
+
+
+def _list(data: Any, place: str) -> list[Any]:
+    if not isinstance(data, list):
+        raise JournalValueError(place, f"got {type(data).__name__}; expected a list.")
+    return [_decode(item, f"{place}[{i}]") for i, item in enumerate(data)]
+
+
+def _fields(data: Any, place: str) -> dict[str, Any]:
+    if not isinstance(data, dict):
+        raise JournalValueError(place, f"got {type(data).__name__}; expected fields.")
+    return {key: _decode(value, f"{place}.{key}") for key, value in data.items()}
+
+
+def _bytes(text: Any) -> bytes:
+    return base64.b64decode(text, validate=True)
+
+
+def _decode_datetime(data: dict[str, Any], place: str) -> datetime:
+    value = datetime.fromisoformat(data["$datetime"]).replace(fold=data["fold"])
+    if "zone" not in data:
+        return value
+    try:
+        return value.replace(tzinfo=ZoneInfo(data["zone"]))
+    except ZoneInfoNotFoundError as error:
+        reason = f"got time zone {data['zone']!r}; expected one that this computer knows."
+        raise JournalValueError(place, reason) from error
+
+
+def _find(name: Any, place: str) -> _Registered:
+    found = _registered.get(name)
+    if found is None:
+        raise JournalValueError(
+            place,
+            f"got class {name!r}; expected one that is registered."
+            f"{did_you_mean(str(name), _registered)} Try smachpy.register_type before the run.",
+        )
+    return found
+
+
+def _decode_fields(data: dict[str, Any], place: str) -> Any:
+    kind = _find(data["$type"], place).kind
+    values = _fields(data["fields"], place)
+    if _is_named_tuple(kind):
+        return kind(**values)
+    if not dataclasses.is_dataclass(kind):
+        raise JournalValueError(place, f"got fields of {data['$type']}; expected no dataclass.")
+    known = {field.name: field.init for field in dataclasses.fields(kind)}
+    unknown = sorted(values.keys() - known.keys())
+    if unknown:
+        reason = f"got fields {unknown} of {data['$type']}; expected {sorted(known)}."
+        raise JournalValueError(place, reason)
+    result = kind(**{name: value for name, value in values.items() if known[name]})
+    for name, value in values.items():
+        # __post_init__ may have changed fields: a value is restored as it was kept.
+        object.__setattr__(result, name, value)
+    return result
+
+
+def _decode_enum(data: dict[str, Any], place: str) -> Any:
+    kind: Any = _find(data["$enum"], place).kind
+    return kind[data["name"]] if "name" in data else kind(_decode(data["value"], place))
+
+
+def _decode_custom(data: dict[str, Any], place: str) -> Any:
+    from_data = _find(data["$custom"], place).from_data
+    if from_data is None:
+        raise JournalValueError(place, f"got data of {data['$custom']}; expected its from_data.")
+    value = _decode(data["data"], place)
+    try:
+        return from_data(value)
+    except Exception as error:
+        raise JournalValueError(
+            place, f"from_data of {data['$custom']} raised {error!r}."
+        ) from error
+
+
+def _decode_message(data: dict[str, Any], place: str) -> Any:
+    if "$msg" in data:
+        from actionlib_core.interfaces import get_message
+
+        kind: type[Any] = get_message(data["$msg"])
+    else:
+        from actionlib_core.interfaces.ros2 import get_message as get_ros2_message
+
+        kind = get_ros2_message(data["$ros2"], data["distro"])
+    message = kind()
+    values = _fields(data["fields"], place)
+    if set(values) != set(kind.__slots__):
+        reason = f"got fields {sorted(values)}; expected those of {kind._type}: {kind.__slots__}."
+        raise JournalValueError(place, reason)
+    for name, value in values.items():
+        setattr(message, name, value)
+    return message
+
+
+def _decode_array(data: dict[str, Any], place: str) -> Any:
+    import numpy as np
+
+    dtype: Any = np.lib.format.descr_to_dtype(_decode(data["dtype"], place))
+    if dtype.hasobject:
+        raise JournalValueError(place, "got an array of Python objects; expected numbers.")
+    if "$scalar" in data:
+        return np.frombuffer(_bytes(data["$scalar"]), dtype)[0]
+    shape = tuple(data["shape"])
+    if dtype.itemsize == 0 or 0 in shape:
+        return np.zeros(shape, dtype)
+    return np.frombuffer(_bytes(data["$array"]), dtype).reshape(shape).copy()
+
+
+_DECODERS: Final[dict[str, Callable[[dict[str, Any], str], Any]]] = {
+    "$tuple": lambda data, place: tuple(_list(data["$tuple"], place)),
+    "$set": lambda data, place: set(_list(data["$set"], place)),
+    "$frozenset": lambda data, place: frozenset(_list(data["$frozenset"], place)),
+    "$items": lambda data, place: dict(_list(data["$items"], place)),
+    "$bytes": lambda data, _: _bytes(data["$bytes"]),
+    "$bytearray": lambda data, _: bytearray(_bytes(data["$bytearray"])),
+    "$int": lambda data, _: int(data["$int"], 16),
+    "$float": lambda data, _: float(data["$float"]),
+    "$time": lambda data, _: Time(*data["$time"]),
+    "$duration": lambda data, _: Duration(*data["$duration"]),
+    "$datetime": _decode_datetime,
+    "$date": lambda data, _: date.fromisoformat(data["$date"]),
+    "$clock": lambda data, _: time.fromisoformat(data["$clock"]).replace(fold=data["fold"]),
+    "$timedelta": lambda data, _: timedelta(*data["$timedelta"]),
+    "$path": lambda data, _: Path(data["$path"]),
+    "$purepath": lambda data, _: PurePosixPath(data["$purepath"]),
+    "$msg": _decode_message,
+    "$ros2": _decode_message,
+    "$array": _decode_array,
+    "$scalar": _decode_array,
+    "$type": _decode_fields,
+    "$enum": _decode_enum,
+    "$custom": _decode_custom,
+}
