@@ -313,3 +313,35 @@ def test_a_notebook_shows_the_machine():
     with machine:
         smachpy.StateMachine.add("ONLY", smachpy.State(outcomes=["done"]))
     assert states_of(machine._repr_svg_()) == ["/SHOWN", "/SHOWN/ONLY"]
+
+
+def test_a_picture_that_nobody_can_look_at_is_refused_with_the_way_out(build, monkeypatch):
+    monkeypatch.setattr(drawing, "LARGEST", 500)
+    record = build.rooted(build.machine("M", [build.leaf(f"S{i}") for i in range(20)], {}))
+    with pytest.raises(drawing.TooLargeError, match="--atlas") as caught:
+        viz.picture(record, "svg")
+    assert caught.value.path == "/M"
+    assert caught.value.states == 21
+    assert max(caught.value.size) > 500
+    assert viz.picture(record, "txt")
+
+
+def test_a_container_that_dot_cannot_lay_out_in_time_is_refused_at_once(build, tmp_path):
+    record = build.rooted(build.machine("M", [build.leaf(f"S{i}") for i in range(1000)], {}))
+    for draw in (lambda: viz.picture(record, "png"), lambda: viz.atlas(record, tmp_path / "pages")):
+        with pytest.raises(drawing.TooLargeError, match=r"FILE\.txt") as caught:
+            draw()
+        assert (caught.value.path, caught.value.states) == ("/M", 1000)
+
+
+def test_a_thousand_nested_states_are_one_picture_of_a_size_that_opens(build):
+    def nested(label, levels):
+        children = [
+            nested(f"{label}{i}", levels - 1) if levels else build.leaf(f"{label}{i}")
+            for i in range(10)
+        ]
+        onwards = {children[i].label: {"succeeded": children[i + 1].label} for i in range(9)}
+        return build.machine(label, children, onwards)
+
+    svg = ET.fromstring(viz.picture(build.rooted(nested("S", 2)), "svg", depth=20))
+    assert max(map(float, svg.get("viewBox").split())) <= drawing.LARGEST

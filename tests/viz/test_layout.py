@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import pytest
 
 from viz.model.extract import extract
 from viz.model.machine import Diagram
-from viz.pictures import curves, graphviz_process, layout, shapes
+from viz.pictures import container_layout, curves, graphviz_process, layout, shapes
 from viz.pictures.theme import LIGHT
 
 DOT = 4.5
@@ -204,3 +205,40 @@ def test_a_page_that_always_crashes_is_told(looping):
     root = shapes.shapes_of(Diagram(extract(looping)), LIGHT)
     with pytest.raises(layout.LayoutError, match="/M/INNER"):
         layout.compose(root, LIGHT, lambda texts: [None for _ in texts])
+
+
+def test_a_long_chain_is_folded(build):
+    states = [build.leaf(f"STEP_{i}") for i in range(53)]
+    onwards = {f"STEP_{i}": {"succeeded": f"STEP_{i + 1}"} for i in range(52)}
+    picture = Picture(build.rooted(build.machine("CHAIN", states, onwards)))
+    width, height = layout.canvas_size(picture.geometry)
+    assert height < 53 * 30  # one below the other they need more than their own heights
+    assert width < 2 * height
+    tops = {round(box[3]) for name, box in picture.boxes.items() if name != picture.root.name}
+    assert len(tops) < 30
+    for one, two in itertools.combinations(picture.root.boxes, 2):
+        assert apart(picture.boxes[one.name], picture.boxes[two.name])
+
+
+def test_regions_side_by_side_become_a_grid(build):
+    steps = [build.leaf(f"STEP_{i}") for i in range(4)]
+    onwards = {f"STEP_{i}": {"succeeded": f"STEP_{i + 1}"} for i in range(3)}
+    regions = [build.machine(f"ROBOT_{i}", steps, onwards) for i in range(20)]
+    picture = Picture(build.rooted(build.concurrence("FLEET", regions, [])), depth=2)
+    rows = {round(picture.boxes[box.name][3]) for box in picture.root.boxes}
+    assert 2 <= len(rows) <= 10
+    for one, two in itertools.combinations(picture.root.boxes, 2):
+        assert apart(picture.boxes[one.name], picture.boxes[two.name])
+
+
+@pytest.mark.parametrize("pieces", [2, 3, 7])
+def test_the_pieces_of_a_fold_follow_the_arrows(build, pieces):
+    names = [f"S{i}" for i in (3, 0, 2, 1)]
+    onwards = {"S0": {"succeeded": "S1"}, "S1": {"succeeded": "S2"}, "S2": {"succeeded": "S3"}}
+    record = build.machine("M", [build.leaf(name) for name in names], onwards)
+    root = shapes.shapes_of(Diagram(extract(build.rooted(replace(record, initial=("S0",))))), LIGHT)
+    labels = {box.name: box.attributes["id"].rpartition("/")[2] for box in root.boxes}
+    dealt = {
+        labels[name]: piece for name, piece in container_layout.pieces_of(root, pieces).items()
+    }
+    assert [dealt[f"S{i}"] for i in range(4)] == [i * pieces // 4 for i in range(4)]

@@ -7,8 +7,8 @@ one per outcome on the lower one. Lengths are points (1/72 inch), y points up.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
-from math import ceil
+from itertools import pairwise, product
+from math import ceil, sqrt
 from typing import TYPE_CHECKING, Any
 
 import graphviz
@@ -36,6 +36,12 @@ LOOP_LABEL = 26
 """Room for the label of such an arrow [points]."""
 CORNER = 6
 """Radius of its corners [points]."""
+LABEL = (16.0, 6.0)
+"""Half the size of a usual arrow's label [points]."""
+FOLDS = (2, 3, 4, 6, 8, 12, 16)
+"""Into how many pieces a container may be folded."""
+MOST_UNFOLDED = 100
+"""With more states than these in one container it is always folded, which also saves minutes."""
 
 
 # What a layout depends on; leaving the looks out halves the time it takes to write and read.
@@ -54,12 +60,14 @@ class Try:
         corner: Whether arrows that lead back leave an outcome towards that side.
         back_first: Whether arrows that lead back are placed before the others.
         plain: Straight arrows without regard to sides, for what makes `dot` crash otherwise.
+        pieces: Columns to fold a chain into, or rows to put states without arrows between them in.
     """
 
     side: str = "e"
     corner: bool = False
     back_first: bool = False
     plain: bool = False
+    pieces: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,12 +94,45 @@ class Page:
 
 def tries(box: Box) -> tuple[Try, ...]:
     """Ways to lay a container out; they differ only for arrows that lead back."""
+    if len(box.boxes) > MOST_UNFOLDED:
+        return folds(box)
     back = [arrow for arrow in box.arrows if arrow.back]
     if not back:
         return (Try(),)
     if not any(arrow.head.is_open or arrow.tail.is_open for arrow in back):
         return (Try(), Try(back_first=True))
     return tuple(Try(*choice) for choice in product("ew", (False, True), (False, True)))
+
+
+def folds(box: Box) -> tuple[Try, ...]:
+    """Ways to lay out a container that is too long or too wide otherwise."""
+    states = len(box.boxes)
+    if states > MOST_UNFOLDED:  # every way takes seconds
+        return (Try(pieces=ceil(sqrt(states) / 2)),)
+    return tuple(Try(pieces=pieces) for pieces in FOLDS if pieces <= min(states // 2, 16))
+
+
+def pieces_of(box: Box, pieces: int) -> dict[str, int]:
+    """Return the piece of each state when a container is folded.
+
+    A chain is cut by how far a state is from the first; states without arrows between them are
+    dealt out as they come.
+    """
+    names = [child.name for child in box.boxes]
+    following: dict[str, list[str]] = {name: [] for name in names}
+    missing = dict.fromkeys(names, 0)
+    for arrow in box.arrows:
+        tail, head = arrow.tail.box, arrow.head.box
+        if not arrow.back and tail != head and tail in missing and head in missing:
+            following[tail].append(head)
+            missing[head] += 1
+    order = [name for name in names if not missing[name]]
+    for name in order:  # it grows: a state comes after all that lead to it
+        for after in following[name]:
+            missing[after] -= 1
+            if not missing[after]:
+                order.append(after)
+    return {name: i * pieces // len(order) for i, name in enumerate(order)}
 
 
 def page_text(box: Box, how: Try, theme: Theme, pages: Mapping[int, Page]) -> str:
@@ -112,10 +153,30 @@ def page_text(box: Box, how: Try, theme: Theme, pages: Mapping[int, Page]) -> st
             for vertex in box.pills:
                 bottom.node(vertex.name, **_sizes(vertex.attributes))
     loops = {arrow.name for child in box.boxes for arrow in _loops(box, child)}
+    piece = pieces_of(box, how.pieces)
     for arrow in sorted(box.arrows, key=lambda arrow: how.back_first and not arrow.back):
         if arrow.name not in loops:
-            _write_arrow(dot, box, arrow, how)
+            apart = piece.get(arrow.tail.box, 0) != piece.get(arrow.head.box, 0)
+            between = apart and arrow.tail.box in piece and arrow.head.box in piece
+            _write_arrow(dot, box, arrow, how, free=between)
+    if how.pieces > 1:
+        _write_folds(dot, box, piece)
     return str(dot.source)
+
+
+def _write_folds(dot: graphviz.Digraph, box: Box, piece: Mapping[str, int]) -> None:
+    """Invisible arrows: each column begins at the top, each row stands below the one before."""
+    assert box.entry is not None
+    pieces: dict[int, list[str]] = {}
+    for name, number in piece.items():
+        pieces.setdefault(number, []).append(name)
+    if any(arrow.tail.box in piece and arrow.head.box in piece for arrow in box.arrows):
+        for names in pieces.values():
+            dot.edge(box.entry.name, names[0], style="invis")
+        return
+    for above, below in pairwise(pieces.values()):
+        for one, two in zip(above, below, strict=False):
+            dot.edge(one, two, style="invis")
 
 
 def _block(child: Box, page: Page | None, room: tuple[int, int]) -> Mapping[str, str]:
@@ -201,12 +262,15 @@ def _cell(width: int, port: str = "") -> str:
     return f'<td fixedsize="true" width="{width}" height="2"{port}></td>'
 
 
-def _write_arrow(dot: graphviz.Digraph, box: Box, arrow: Arrow, how: Try) -> None:
+def _write_arrow(dot: graphviz.Digraph, box: Box, arrow: Arrow, how: Try, *, free: bool) -> None:
+    """Write an arrow; one that is `free` says nothing about what stands above what."""
     towards = how.side if arrow.back and how.corner else ""
     tail, head = _end(arrow.tail, box, f"s{towards}"), _end(arrow.head, box, how.side)
     if how.plain:
         tail, head = tail.partition(":")[0], head.partition(":")[0]
     attributes = {**_sizes(arrow.attributes), "id": arrow.name}
+    if free:
+        attributes["constraint"] = "false"
     if arrow.back:
         dot.edge(head, tail, dir="back", **attributes)
     else:
@@ -232,7 +296,7 @@ def read_page(box: Box, result: Mapping[str, Any], pages: Mapping[int, Page]) ->
     found = {item["name"]: item for item in result.get("objects", ()) if "pos" in item}
     curves = {
         edge["id"]: {key: edge[key] for key in ("pos", "lp") if key in edge}
-        for edge in result.get("edges", ())
+        for edge in _arrows(result)
     }
     left, right, top = _extent(result, curves)
     spots = {name: point(item["pos"]) for name, item in found.items()}
@@ -277,9 +341,44 @@ def _extent(
 
 
 def untidiness(result: Mapping[str, Any]) -> float:
-    """Length of all arrows [points]; a crossing counts as much as a long way round."""
-    traces = [trace(edge["pos"]) for edge in result.get("edges", ())]
-    return sum(map(length, traces)) + DETOUR * crossings([line[::2] for line in traces])
+    """Length of all arrows [points].
+
+    Where one crosses another, a label or a state it does not belong to, that counts as much as a
+    long way round.
+    """
+    arrows = _arrows(result)
+    traces = [trace(edge["pos"]) for edge in arrows]
+    faults = crossings([line[::2] for line in traces])
+    states = [
+        (item["_gvid"], *point(item["pos"]), _size(item, "width") / 2, _size(item, "height") / 2)
+        for item in result.get("objects", ())
+        if "pos" in item
+    ]
+    labels = [(edge["id"], *point(edge["lp"])) for edge in arrows if "lp" in edge]
+    for edge, line in zip(arrows, traces, strict=True):
+        ends = {edge["tail"], edge["head"]}
+        faults += sum(
+            any(abs(x - at_x) < wide - 1 and abs(y - at_y) < high - 1 for x, y in line)
+            for number, at_x, at_y, wide, high in states
+            if number not in ends
+        )
+        faults += sum(
+            any(abs(x - at_x) < LABEL[0] and abs(y - at_y) < LABEL[1] for x, y in line)
+            for name, at_x, at_y in labels
+            if name != edge["id"]
+        )
+    return sum(map(length, traces)) + DETOUR * faults
+
+
+def sprawl(result: Mapping[str, Any]) -> float:
+    """Return the height of the screen that shows a page at full size, one of 16 by 10 [points]."""
+    _, _, width, height = map(float, result["bb"].split(","))
+    return max(height, width / 1.6)
+
+
+def _arrows(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """What is seen of a page's arrows."""
+    return [edge for edge in result.get("edges", ()) if "id" in edge]
 
 
 def _title(

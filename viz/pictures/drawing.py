@@ -12,7 +12,7 @@ from smachpy.exceptions import SmachError
 from smachpy.introspection import StateRecord, describe
 from viz.model import extract
 from viz.model.history import History
-from viz.model.machine import Diagram, Marks
+from viz.model.machine import Diagram, Marks, Node
 from viz.pictures import graphviz_process, layout
 from viz.pictures.container_layout import INCH
 from viz.pictures.dot import dot_text
@@ -32,6 +32,10 @@ SHARP = 144
 """Dots per inch of a PNG."""
 MOST_PIXELS = 16000
 """Longest side of a PNG."""
+LARGEST = 14_400
+"""Longest side of a picture [points]: that of a page of PDF, past which readers give up."""
+MOST_STATES = 400
+"""Most states side by side in one container; `dot` needs minutes for more."""
 
 
 FORMATS = ("dot", "gv", "json", "mmd", "pdf", "png", "svg", "txt")
@@ -39,6 +43,27 @@ FORMATS = ("dot", "gv", "json", "mmd", "pdf", "png", "svg", "txt")
 
 class PictureError(SmachError):
     """The picture cannot be made as asked for."""
+
+
+class TooLargeError(PictureError):
+    """The picture would be larger than anybody can look at.
+
+    Attributes:
+        path: The container that is too large.
+        states: States it would show.
+        size: Width and height it would have [points]; None when it has not been laid out.
+    """
+
+    def __init__(
+        self, path: str, states: int, size: tuple[float, float] | None, expected: str
+    ) -> None:
+        self.path, self.states, self.size = path, states, size
+        got = f"{states} states" + (f", {size[0]:.0f} x {size[1]:.0f} points" if size else "")
+        way_out = "a smaller --depth, one container (--path), a page for each (--atlas DIR)"
+        super().__init__(
+            f"picture: {path}: got {got}; expected at most {expected}. "
+            f"Try {way_out if size else 'containers inside it'}, or text (-o FILE.txt)."
+        )
 
 
 def render(
@@ -72,6 +97,8 @@ def render(
 
     Raises:
         PictureError: unknown format or theme, or the file cannot be written.
+        TooLargeError: an SVG, PNG or PDF would be longer than 14,400 points, or a container has
+            more than 400 states side by side.
         UnknownPathError: `path` or one of `active` names no state.
         EngineError: there is no `dot` program, or it failed.
 
@@ -199,6 +226,7 @@ def atlas(
         if state.path in above:
             links[state.path] = names[above[state.path]]
         shown = legend if state is record else ()
+        _check_states([node])
         pages.append(shapes_of(Diagram(node, marks, links, shown), colours))
     geometries = graphviz_process.lay_out(partial(layout.compose_all, pages, colours))
     texts = [dot_text(p, colours, g) for p, g in zip(pages, geometries, strict=True)]
@@ -238,9 +266,23 @@ def _theme(name: str) -> Theme:
 
 def _draw(diagram: Diagram, form: graphviz_process.Format, theme: Theme) -> bytes:
     shapes = shapes_of(diagram, theme)
+    _check_states([diagram.root])
     places = graphviz_process.lay_out(partial(layout.compose, shapes, theme))
+    size = layout.canvas_size(places)
+    if max(size) > LARGEST:
+        states = sum(1 for _ in diagram.root.walk())
+        raise TooLargeError(diagram.root.path, states, size, f"{LARGEST} points either way")
     text = dot_text(shapes, theme, places)
     return graphviz_process.draw(text, form, dots_per_inch=_resolution(places))
+
+
+def _check_states(roots: Iterable[Node]) -> None:
+    """Refuse what `dot` would work on for minutes."""
+    for node in (node for root in roots for node in root.walk()):
+        if len(node.children) > MOST_STATES:
+            raise TooLargeError(
+                node.path, len(node.children), None, f"{MOST_STATES} side by side in a container"
+            )
 
 
 def _resolution(places: layout.Geometry) -> int:

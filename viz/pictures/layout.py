@@ -17,9 +17,11 @@ from viz.pictures.container_layout import (
     DOT_RADIUS,
     Page,
     Try,
+    folds,
     loop_room,
     page_text,
     read_page,
+    sprawl,
     tries,
     untidiness,
 )
@@ -39,6 +41,8 @@ CANVAS = "canvas"
 """Name of the geometry of the whole picture."""
 PAD = 14
 """Room around a picture [points]."""
+LONG = 1500
+"""A container that needs a screen higher than this is folded, if it can be [points]."""
 
 
 class LayoutError(SmachError):
@@ -67,15 +71,34 @@ def compose_all(roots: Sequence[Box], theme: Theme, run: Engine) -> list[Geometr
     pages: dict[int, Page] = {}
     for height in range(1, max(root.height() for root in roots) + 1):
         level = [box for box in containers if box.height() == height]
-        texts = [page_text(box, how, theme, pages) for box in level for how in tries(box)]
-        results = iter(run(texts))
-        for box in level:
-            found = [r for r in islice(results, len(tries(box))) if r is not None]
-            if not found:
-                found = [_simplest(box, theme, pages, run)]
-            best = found[0] if len(found) == 1 else min(found, key=untidiness)
-            pages[id(box)] = read_page(box, best, pages)
+        found = _results(level, tries, theme, pages, run)
+        best = [
+            min(each, key=untidiness) if each else _simplest(box, theme, pages, run)
+            for box, each in zip(level, found, strict=True)
+        ]
+        long = [i for i, result in enumerate(best) if sprawl(result) > LONG]
+        folded = _results([level[i] for i in long], folds, theme, pages, run)
+        for i, each in zip(long, folded, strict=True):
+            best[i] = min([best[i], *each], key=sprawl)
+        for box, result in zip(level, best, strict=True):
+            pages[id(box)] = read_page(box, result, pages)
     return [_geometry(root, pages) for root in roots]
+
+
+def _results(
+    boxes: Sequence[Box],
+    ways: Callable[[Box], Sequence[Try]],
+    theme: Theme,
+    pages: Mapping[int, Page],
+    run: Engine,
+) -> list[list[dict[str, Any]]]:
+    """What `dot` makes of each container in each of its `ways`, without what it crashes on."""
+    tasks = [(box, how) for box in boxes for how in ways(box)]
+    results = iter(run([page_text(box, how, theme, pages) for box, how in tasks]))
+    return [
+        [result for result in islice(results, len(ways(box))) if result is not None]
+        for box in boxes
+    ]
 
 
 def _simplest(box: Box, theme: Theme, pages: Mapping[int, Page], run: Engine) -> dict[str, Any]:
