@@ -78,8 +78,8 @@ class PostgresStore(SqlStore):
         self.where = "postgresql://"
         try:
             given = conninfo.conninfo_to_dict(url)
-        except psycopg.Error as error:
-            problem = f"got a URL that cannot be read ({_line(error)})"
+        except psycopg.Error:  # its text may hold the password
+            problem = "got a URL that cannot be read"
             raise self._store_error("unreachable", problem) from None
         self.where = _without_password(given)
         self._arguments: dict[str, Any] = {**_DEFAULTS, **given}
@@ -149,6 +149,9 @@ class PostgresStore(SqlStore):
                 again = True
                 self._clock.sleep(min(pause, left))
                 pause = min(2 * pause, _LONGEST_PAUSE_S)
+
+    def _verify(self, cursor: Cursor) -> None:
+        """Leave that to the server: `initdb --data-checksums`."""
 
     def _now(self, cursor: Cursor) -> float:
         # Computers' clocks differ; the server's is one for all.

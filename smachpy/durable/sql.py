@@ -289,6 +289,7 @@ class SqlStore(ABC):
         """As `Store.read`."""
 
         def work(cursor: Cursor, _: bool) -> tuple[Any, list[Any]]:
+            self._verify(cursor)
             self._known(cursor, id, "id" + self.dialect.for_share)
             snapshot = self._one(
                 cursor, "SELECT n, crc, data FROM smachpy_snapshots WHERE mission = ?", id
@@ -366,6 +367,10 @@ class SqlStore(ABC):
             )
 
         self._transact(work)
+
+    @abstractmethod
+    def _verify(self, cursor: Cursor) -> None:
+        """Check that the database itself is whole, where it does not do so on its own."""
 
     @abstractmethod
     def close(self) -> None:
@@ -466,7 +471,10 @@ class SqlStore(ABC):
         fields = dict(zip(_COLUMNS.split(", "), columns, strict=True))
         if fields["status"] == RUNNING and self._may_take(fields["owner"], mark, lease_end, now):
             fields["status"] = INTERRUPTED
-        fields["argv"] = tuple(json.loads(fields["argv"]))
+        try:
+            fields["argv"] = tuple(json.loads(fields["argv"]))
+        except (TypeError, ValueError) as error:
+            raise self._damaged(str(fields["id"]), "its arguments are damaged") from error
         fields["cancel"] = bool(fields["cancel"])
         return MissionRow(**fields)
 

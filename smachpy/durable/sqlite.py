@@ -157,6 +157,13 @@ class SQLiteStore(SqlStore):
                 raise self._error(error) from error
             return result
 
+    def _verify(self, cursor: Cursor) -> None:
+        # A page that lost its parent would only look like fewer entries.
+        problem = self._one(cursor, "PRAGMA integrity_check(1)")[0]
+        if problem != "ok":
+            reason, text = _REASONS[sqlite3.SQLITE_CORRUPT]
+            raise StoreError(self.where, f"{text} ({problem}).", reason=reason)
+
     def _now(self, _: Cursor) -> float:
         return current_clock().time_ns() / 1e9
 

@@ -1,0 +1,373 @@
+"""Files and servers that fail: one clear line, nothing overwritten, and never other data than was written."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+import subprocess
+import sys
+import threading
+from dataclasses import replace
+
+import pytest
+
+from smachpy.durable.processes import this_runner
+from smachpy.durable.store import StoreError, open_store
+from smachpy.exceptions import MissionError
+from tests.free_port import free_port
+from tests.smachpy.durable.test_stores import LONG_S, ROW
+
+
+@pytest.fixture
+def place(tmp_path):
+    return tmp_path / "journal.db"
+
+
+def fill(place, entries=30):
+    """Write a journal, and return its open store and what is in it."""
+    store = open_store(place)
+    store.create(ROW)
+    lease = store.claim("m1", this_runner(), seconds=LONG_S)
+    written = [b"%d " % n * 20 for n in range(entries)]
+    for entry in written:
+        store.append(lease, [entry])
+    return store, lease, written
+
+
+def refused(place, reason, **options):
+    with pytest.raises(StoreError) as caught:
+        open_store(place, **options)
+    error = caught.value
+    assert (error.where, error.reason) == (str(place), reason)
+    assert "\n" not in str(error)
+    return error
+
+
+def test_a_log_that_was_written_in_part_ends_with_a_whole_transaction(place, tmp_path):
+    store, _, written = fill(place)
+    wal = place.with_name("journal.db-wal")
+    whole = wal.read_bytes()
+    torn = tmp_path / "torn" / "journal.db"
+    torn.parent.mkdir()
+    counts = []
+    for cut in range(len(whole) - 25 * 512, len(whole) + 1, 512):
+        shutil.copy(place, torn)
+        # What a disk leaves of a write that was cut: a part, and other bytes after it.
+        torn.with_name("journal.db-wal").write_bytes(whole[:cut] + b"\xa5" * (len(whole) - cut))
+        torn.with_name("journal.db-shm").unlink(missing_ok=True)
+        copy = open_store(torn)
+        entries = copy.read("m1")[1]
+        assert entries == written[: len(entries)]
+        counts.append(len(entries))
+        copy.close()
+    assert counts == sorted(counts)
+    assert counts[0] < counts[-1] == len(written)
+    store.close()
+
+
+def test_a_damaged_file_gives_what_was_written_or_says_so(place, tmp_path):
+    store, lease, written = fill(place, 60)
+    store.append(lease, [], snapshot=b"s" * 500)
+    for entry in written:
+        store.append(lease, [entry])
+    row = store.mission("m1")
+    store.close()
+    whole = place.read_bytes()
+    damaged = tmp_path / "damaged.db"
+    told = 0
+    for at in range(0, len(whole), 101):
+        damaged.write_bytes(whole[:at] + bytes([whole[at] ^ 0x55]) + whole[at + 1 :])
+        try:
+            copy = open_store(damaged)
+            try:
+                found = copy.read("m1")
+                copy.missions()
+            finally:
+                copy.close()
+        except MissionError:  # a StoreError, or one about a mission whose row is damaged
+            told += 1
+        else:
+            assert found == (b"s" * 500, written)
+    assert told > 5
+    assert row.status == "running"
+
+
+def test_a_damaged_entry_is_named_and_left_as_it_is(place):
+    store, _, _ = fill(place)
+    store.close()
+    with sqlite3.connect(place) as raw:
+        raw.execute("UPDATE smachpy_entries SET data = x'00' WHERE n = 5")
+    raw.close()
+    before = place.read_bytes()
+    store = open_store(place)
+    with pytest.raises(StoreError, match="entry 5") as caught:
+        store.read("m1")
+    assert caught.value.reason == "corrupt"
+    store.close()
+    assert place.read_bytes() == before
+
+
+def test_an_entry_that_is_gone_is_noticed(place):
+    store, _, _ = fill(place)
+    store.close()
+    with sqlite3.connect(place) as raw:
+        raw.execute("DELETE FROM smachpy_entries WHERE n = 5")
+    raw.close()
+    store = open_store(place)
+    with pytest.raises(StoreError, match="entry 5"):
+        store.read("m1")
+    store.close()
+
+
+def test_a_journal_from_the_future_is_left_alone(place):
+    fill(place)[0].close()
+    with sqlite3.connect(place) as raw:
+        raw.execute("PRAGMA user_version = 2")
+    raw.close()
+    before = place.read_bytes()
+    refused(place, "future")
+    assert place.read_bytes() == before
+
+
+def test_a_file_of_another_program_is_left_alone(place):
+    with sqlite3.connect(place) as raw:
+        raw.execute("CREATE TABLE songs (title TEXT)")
+    raw.close()
+    before = place.read_bytes()
+    refused(place, "foreign")
+    assert place.read_bytes() == before
+    place.write_text("pick up milk\n" * 100)
+    refused(place, "foreign")
+    assert place.read_text().startswith("pick up milk")
+
+
+def test_a_missing_file_is_made_only_when_asked(place):
+    refused(place, "missing", create=False)
+    assert not place.exists()
+    deep = place.parent / "a" / "b" / "journal.db"
+    open_store(deep).close()
+    open_store(deep, create=False).close()
+
+
+def test_a_folder_is_no_journal(place):
+    place.mkdir()
+    refused(place, "unreachable")
+    (place.parent / "file").write_text("x")
+    refused(place.parent / "file" / "journal.db", "unreachable")
+
+
+def test_a_locked_file_is_waited_for_no_longer_than_allowed(place):
+    store, lease, written = fill(place)
+    store.close()
+    store = open_store(place, patience=0.05)
+    other = sqlite3.connect(place, isolation_level=None)
+    other.execute("BEGIN IMMEDIATE")
+    with pytest.raises(StoreError) as caught:
+        store.append(lease, [b"x"])
+    assert caught.value.reason == "busy"
+    assert store.read("m1") == (None, written)  # to read needs no lock
+    other.execute("ROLLBACK")
+    other.close()
+    store.append(lease, [b"x"])
+    assert store.read("m1")[1] == [*written, b"x"]
+    store.close()
+
+
+def test_a_full_disk_loses_nothing_that_was_written(place):
+    store, lease, written = fill(place)
+    pages = store._connection.execute("PRAGMA page_count").fetchone()[0]
+    store._connection.execute(f"PRAGMA max_page_count = {pages}")
+    with pytest.raises(StoreError) as caught:
+        store.append(lease, [b"x" * 100_000])
+    assert caught.value.reason == "full"
+    assert store.read("m1") == (None, written)
+    store._connection.execute("PRAGMA max_page_count = 1000000")
+    store.append(lease, [b"room again"])
+    assert store.read("m1") == (None, [*written, b"room again"])
+    store.close()
+
+
+NO_ROOM = """
+import resource, signal, sys
+from smachpy.durable.processes import this_runner
+from smachpy.durable.store import open_store, StoreError
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+store = open_store(sys.argv[1])
+lease = store.claim("m1", this_runner(), seconds=60)
+resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+try:
+    for n in range(1000):
+        store.append(lease, [b"more" * 100])
+except StoreError as error:
+    print(error.reason)
+    sys.exit(2)
+"""
+
+
+def test_a_disk_that_refuses_a_write_loses_nothing_that_was_written(place):
+    store, lease, written = fill(place)
+    store.release(lease, "interrupted")
+    store.close()
+    done = subprocess.run(
+        [sys.executable, "-c", NO_ROOM, str(place)], capture_output=True, text=True, timeout=60
+    )
+    assert (done.returncode, done.stdout) == (2, "failed\n"), done.stderr
+    store = open_store(place)
+    entries = store.read("m1")[1]
+    assert entries[: len(written)] == written
+    assert set(entries[len(written) :]) == {b"more" * 100}
+    store.close()
+
+
+@pytest.mark.parametrize("url", ["mysql://db/x", "http://db", "://"])
+def test_another_kind_of_url_is_refused(url):
+    with pytest.raises(StoreError) as caught:
+        open_store(url)
+    assert caught.value.reason == "unreachable"
+
+
+@pytest.mark.parametrize("synchronous", ["OFF", "", None])
+def test_less_than_durable_is_not_offered(place, synchronous):
+    with pytest.raises(ValueError, match="synchronous"):
+        open_store(place, synchronous=synchronous)
+
+
+def test_the_stores_of_a_process_see_one_another(place):
+    first, lease, written = fill(place)
+    second = open_store(place, synchronous="NORMAL")
+    first.append(lease, [b"a"])
+    second.append(lease, [b"b"])
+    first.append(lease, [b"c"])
+    assert second.read("m1")[1] == [*written, b"a", b"b", b"c"]
+    first.close()
+    first.close()
+    second.close()
+    with pytest.raises(StoreError):
+        second.missions()
+
+
+# PostgreSQL
+
+
+@pytest.fixture
+def server_store(postgres_url):
+    store = open_store(postgres_url)
+    store.create(ROW)
+    yield store
+    store.close()
+
+
+@pytest.mark.postgres
+@pytest.mark.parametrize("how", ["stop", "kill"])
+def test_a_server_that_restarts_is_waited_for(server_store, postgres_server, how):
+    lease = server_store.claim("m1", this_runner(), seconds=LONG_S)
+    server_store.append(lease, [b"a"])
+    getattr(postgres_server, how)()
+    starting = threading.Thread(target=postgres_server.start)
+    starting.start()
+    server_store.append(lease, [b"b"])
+    starting.join()
+    server_store.append(lease, [b"c"], status="ended", outcome="done")
+    assert server_store.read("m1") == (None, [b"a", b"b", b"c"])
+    assert server_store.mission("m1").outcome == "done"
+
+
+@pytest.mark.postgres
+def test_a_server_that_keeps_away_is_told(postgres_server, postgres_url):
+    store = open_store(postgres_url, patience=0.2)
+    store.create(ROW)
+    postgres_server.stop()
+    try:
+        with pytest.raises(StoreError) as caught:
+            store.missions()
+        assert caught.value.reason == "unreachable"
+    finally:
+        postgres_server.start()
+    assert store.missions() == [ROW]
+    store.close()
+
+
+@pytest.mark.postgres
+def test_an_answer_that_was_lost_is_no_second_entry(server_store, monkeypatch):
+    import psycopg
+
+    lease = server_store.claim("m1", this_runner(), seconds=LONG_S)
+    server_store.append(lease, [b"a"])
+    transaction = psycopg.Connection.transaction
+    lost = []
+
+    class LosesAnswer:
+        """The server commits, but the connection is gone before its answer is here."""
+
+        def __init__(self, connection):
+            self.connection = connection
+            self.inner = transaction(connection)
+
+        def __enter__(self):
+            return self.inner.__enter__()
+
+        def __exit__(self, *args):
+            self.inner.__exit__(*args)
+            if not lost:
+                lost.append(self)
+                self.connection.close()
+                raise psycopg.OperationalError("server closed the connection unexpectedly")
+
+    monkeypatch.setattr(psycopg.Connection, "transaction", lambda self: LosesAnswer(self))
+    server_store.append(lease, [b"b", b"c"])
+    assert lost
+    assert server_store.read("m1") == (None, [b"a", b"b", b"c"])
+    lost.clear()
+    server_store.create(replace(ROW, id="m2"))
+    assert lost
+    lost.clear()
+    second = server_store.claim("m2", this_runner(), seconds=LONG_S)
+    assert lost
+    assert server_store.mission("m2").owner == this_runner()
+    lost.clear()
+    server_store.append(second, [], snapshot=b"s")
+    lost.clear()
+    server_store.release(second, "interrupted")
+    lost.clear()
+    server_store.forget("m2")
+    assert [row.id for row in server_store.missions()] == ["m1"]
+
+
+@pytest.mark.postgres
+def test_entries_that_a_standby_never_got_are_noticed(server_store, postgres_url):
+    import psycopg
+
+    lease = server_store.claim("m1", this_runner(), seconds=LONG_S)
+    server_store.append(lease, [b"a", b"b"])
+    with psycopg.connect(postgres_url, autocommit=True) as raw:
+        raw.execute("DELETE FROM smachpy_entries WHERE n = 2")
+        raw.execute(
+            "SELECT pg_terminate_backend(pid) FROM pg_stat_activity "
+            "WHERE application_name = 'smachpy' AND datname = current_database()"
+        )
+    with pytest.raises(StoreError) as caught:
+        server_store.append(lease, [b"c"])
+    assert caught.value.reason == "corrupt"
+
+
+@pytest.mark.postgres
+def test_a_server_with_journals_from_the_future_is_left_alone(server_store, postgres_url):
+    import psycopg
+
+    with psycopg.connect(postgres_url, autocommit=True) as raw:
+        raw.execute("UPDATE smachpy_version SET version = 2")
+    with pytest.raises(StoreError) as caught:
+        open_store(postgres_url)
+    assert caught.value.reason == "future"
+
+
+def test_a_server_that_is_not_there_is_told_without_the_password():
+    url = f"postgresql://me:secret@127.0.0.1:{free_port()}/missions"
+    with pytest.raises(StoreError) as caught:
+        open_store(url)
+    assert caught.value.reason == "unreachable"
+    assert "secret" not in str(caught.value)
+    with pytest.raises(StoreError) as caught:
+        open_store("postgresql://me:secret@[::1/missions")
+    assert "secret" not in str(caught.value)
+    assert "\n" not in str(caught.value)
