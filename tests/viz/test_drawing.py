@@ -345,3 +345,16 @@ def test_a_thousand_nested_states_are_one_picture_of_a_size_that_opens(build):
 
     svg = ET.fromstring(viz.picture(build.rooted(nested("S", 2)), "svg", depth=20))
     assert max(map(float, svg.get("viewBox").split())) <= drawing.LARGEST
+
+
+def test_every_text_of_an_svg_has_the_width_that_there_is_room_for(patrol, tmp_path):
+    viz.atlas(patrol, tmp_path)
+    pages = [viz.picture(patrol, "svg"), *(page.read_bytes() for page in tmp_path.iterdir())]
+    for page in pages:
+        texts = list(ET.fromstring(page).iter(f"{SVG}text"))
+        assert texts
+        for text in texts:
+            width = float(text.get("textLength"))
+            letters = len(text.text)
+            assert text.get("lengthAdjust") == "spacingAndGlyphs"
+            assert 2 <= width / letters <= float(text.get("font-size"))

@@ -19,6 +19,7 @@ from viz.pictures.dot import dot_text
 from viz.pictures.mermaid import mermaid_text
 from viz.pictures.outline import outline_text
 from viz.pictures.shapes import shapes_of
+from viz.pictures.text_widths import with_widths
 from viz.pictures.theme import THEMES, Theme
 
 if TYPE_CHECKING:
@@ -231,8 +232,11 @@ def atlas(
     geometries = graphviz_process.lay_out(partial(layout.compose_all, pages, colours))
     texts = [dot_text(p, colours, g) for p, g in zip(pages, geometries, strict=True)]
     place = Path(folder)
-    for state, content in zip(parents, graphviz_process.draw_pages(texts), strict=True):
-        write(content, place / names[state.path])
+    contents = graphviz_process.draw_pages(texts)
+    for state, content, drawn in zip(
+        parents, contents, graphviz_process.describe_pages(texts), strict=True
+    ):
+        write(with_widths(content, drawn), place / names[state.path])
     return place / "index.svg"
 
 
@@ -273,7 +277,10 @@ def _draw(diagram: Diagram, form: graphviz_process.Format, theme: Theme) -> byte
         states = sum(1 for _ in diagram.root.walk())
         raise TooLargeError(diagram.root.path, states, size, f"{LARGEST} points either way")
     text = dot_text(shapes, theme, places)
-    return graphviz_process.draw(text, form, dots_per_inch=_resolution(places))
+    content = graphviz_process.draw(text, form, dots_per_inch=_resolution(places))
+    if form == "svg":
+        content = with_widths(content, *graphviz_process.describe_pages([text]))
+    return content
 
 
 def _check_states(roots: Iterable[Node]) -> None:

@@ -139,6 +139,22 @@ def draw_pages(texts: Sequence[str]) -> list[bytes]:
     return [start + page for page in output.split(start)[1:]]
 
 
+def describe_pages(texts: Sequence[str]) -> list[dict[str, Any]]:
+    """Return what `draw_pages` draws for each DOT text as Graphviz' JSON, with every drawing step.
+
+    Raises:
+        EngineError: as `lay_out`.
+
+    Blocks: for at most `TIME_LIMIT`.
+    """
+    return _decoded(_call([*find_dot(), "-Knop2", "-Tjson"], texts))
+
+
+def _decoded(output: bytes) -> list[dict[str, Any]]:
+    decoder = json.JSONDecoder(strict=False)
+    return [decoder.decode(f"{page.decode()}}}") for page in output.split(_JSON_END)[:-1]]
+
+
 class _TooSlowError(Exception):
     """The time limit has passed."""
 
@@ -173,8 +189,7 @@ class _Layouts:
             self._start()
             half = len(texts) // 2
             return [*self.run(texts[:half]), *self.run(texts[half:])] if half else [None]
-        decoder = json.JSONDecoder(strict=False)
-        return [decoder.decode(f"{page.decode()}}}") for page in output.split(_JSON_END)[:-1]]
+        return list(_decoded(output))
 
     def _start(self) -> None:
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115  closed by `_stop`

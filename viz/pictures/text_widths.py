@@ -1,0 +1,45 @@
+"""Texts of an SVG that keep their width in whatever font the reader has.
+
+`dot` made room for them in the shipped font. With `textLength` (SVG 1.1, chapter 10.5) a reader
+without it squeezes or stretches another font's letters into that room.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+_TEXT = re.compile(rb'<text [^>]*?\bx="([^"]+)" y="([^"]+)"')
+
+
+def with_widths(svg: bytes, drawn: Mapping[str, Any]) -> bytes:
+    """Return `svg` with the width of every text.
+
+    Args:
+        svg: What `dot` drew.
+        drawn: The same picture as Graphviz' JSON, which has the widths.
+    """
+    widths = dict(_widths(drawn))
+
+    def fitted(match: re.Match[bytes]) -> bytes:
+        width = widths.get((round(float(match[1]), 2), round(-float(match[2]), 2)))
+        if not width:
+            return match[0]
+        return match[0] + f' textLength="{width:g}" lengthAdjust="spacingAndGlyphs"'.encode()
+
+    return _TEXT.sub(fitted, svg)
+
+
+def _widths(drawn: Mapping[str, Any]) -> Iterator[tuple[tuple[float, float], float]]:
+    """Where each text begins and its width [points]."""
+    for piece in (drawn, *drawn.get("objects", ()), *drawn.get("edges", ())):
+        for name, steps in piece.items():
+            if not name.endswith("draw_"):
+                continue
+            for step in steps:
+                if step["op"] == "T" and step["align"] == "l":
+                    x, y = step["pt"]
+                    yield (round(x, 2), round(y, 2)), step["width"]
