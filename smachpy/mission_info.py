@@ -90,6 +90,11 @@ def mission(
     return mark if function is None else mark(function)
 
 
+def is_mission(thing: object) -> bool:
+    """Tell whether `@smachpy.mission` marks a function."""
+    return isinstance(getattr(thing, _ATTRIBUTE, None), MissionInfo)
+
+
 def mission_info(thing: object) -> MissionInfo:
     """Return what `@smachpy.mission` was told about a function; nothing when it was not used."""
     info = getattr(thing, _ATTRIBUTE, None)

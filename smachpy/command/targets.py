@@ -16,7 +16,7 @@ from actionlib_core.suggest import did_you_mean
 from smachpy.command.extras import advice, clash, hidden_by
 from smachpy.exceptions import SmachError
 from smachpy.machines.container import Container
-from smachpy.mission_info import mission
+from smachpy.mission_info import is_mission, mission
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -134,7 +134,8 @@ def load_target(text: str) -> Target:
 
     Args:
         text: A mission's name (`patrol`), `module:factory`, or `path.py[:factory]`. Without
-            `:factory` a file's `mission`, `machine` or `sm` is taken, else its only machine. Or a
+            `:factory` a file's `mission`, `machine` or `sm` is taken, else its only function with
+            `@smachpy.mission`, else its only machine. Or a
             Petri net plan, `path.pnml` (.plan, .pddlout); STEM.actions.yaml or actions.yaml beside
             it says what its actions and conditions are.
 
@@ -237,6 +238,13 @@ def _from_module(text: str, module: ModuleType, attribute: str, name: str) -> Ta
     # The decorator `mission`, imported by that name, is not the file's mission.
     found = [n for n in DEFAULT_NAMES if getattr(module, n, mission) is not mission]
     names = [attribute] if attribute else found
+    if not names:
+        marked = [
+            n
+            for n, thing in vars(module).items()
+            if is_mission(thing) and thing.__module__ == module.__name__
+        ]
+        names = marked if len(marked) == 1 else []
     if not names:
         machines = [n for n, thing in vars(module).items() if isinstance(thing, Container)]
         if len(machines) != 1:

@@ -7,6 +7,8 @@ What has one meaning is rewritten; what needs a person is left as it is and list
     with sm: smach.StateMachine.add('A', ...)    with sm: sm.add('A', ...)
     rospy.sleep(2) in a state                    self.sleep(2)
     rospy.loginfo("x")                           logger.info("x")
+    def main(): ...; sm.execute()                @smachpy.mission
+                                                 def main(): ...; return sm
 """
 
 from __future__ import annotations
@@ -100,7 +102,9 @@ def port(source: bytes, filename: str) -> Ported:
         ast.parse(text, filename)
         notes.append((1, "it was Python 2: look at divisions of whole numbers, and at text"))
     wrapper = metadata.MetadataWrapper(cst.parse_module(text))
-    transformer = _transformer(cst, metadata)(_packages(text))
+    main = _find_main(ast.parse(text))
+    transformer = _transformer(cst, metadata)(_packages(text), main)
+    notes += main.notes if main is not None else []
     module = wrapper.visit(transformer)
     code = str(module.code)
     if any(isinstance(n, ast.Name) and n.id == "rospy" for n in ast.walk(ast.parse(code))):
@@ -108,19 +112,132 @@ def port(source: bytes, filename: str) -> Ported:
     else:
         code = str(module.visit(_forget(cst, "rospy")).code)
     code = _add_imports(code, transformer)
-    if transformer.main_line:
-        notes.append(
-            (
-                transformer.main_line,
-                _WANTS_FUNCTION,
-            )
-        )
+    if transformer.main_line and main is None:
+        notes.append((transformer.main_line, _WANTS_FUNCTION))
     return Ported(code, sorted({*notes, *transformer.notes}))
 
 
 def port_file(path: Path) -> Ported:
     """Rewrite a file; see `port`."""
     return port(path.read_bytes(), str(path))
+
+
+@dataclass(slots=True)
+class _Main:
+    """A function that builds a machine and executes it, and is the script's whole program.
+
+    Attributes:
+        function: Its name.
+        machine: The name of its machine.
+        execute: Line of the statement that executes it.
+        removed: Lines of statements that `smachpy run` makes needless.
+        call: Line of the statement of the module that calls it.
+        notes: What was removed.
+    """
+
+    function: str
+    machine: str
+    execute: int
+    call: int
+    removed: set[int] = field(default_factory=set)
+    notes: list[tuple[int, str]] = field(default_factory=list)
+
+
+_NEEDLESS: Final = {
+    "print": "`smachpy run` prints the outcome",
+    "spin": "`smachpy run` ends with the machine",
+    "signal_shutdown": "`smachpy run` ends with the machine",
+    "exit": "`smachpy run` ends by the outcome",
+    "IntrospectionServer": "`smachpy run --view` shows the machine",
+    "request_preempt": "Ctrl-C preempts the machine",
+    **dict.fromkeys(("stop", "start", "join", "init_node"), ""),
+    **dict.fromkeys(_LOG, "`smachpy run` prints the outcome"),
+}
+"""What may come after `execute()`, by the last word of the call, and why it is not needed then."""
+
+
+def _find_main(tree: ast.Module) -> _Main | None:
+    """Return the function that can be a mission; None: none can without a person's judgement."""
+    functions = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
+    called = {name: node for node in tree.body if (name := _calls(node)) in functions}
+    used = [n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and n.id in called]
+    if len(used) != 1 or functions[used[0]].args.args:
+        return None
+    function = functions[used[0]]
+    executed = [(node, machine) for node in function.body if (machine := _executed(node))]
+    if len(executed) != 1 or len({node.lineno for node in function.body}) != len(function.body):
+        return None
+    execute, machine = executed[0]
+    main = _Main(function.name, machine, execute.lineno, called[function.name].lineno)
+    return main if _mark_removed(main, function.body, function.body.index(execute)) else None
+
+
+def _mark_removed(main: _Main, body: list[ast.stmt], execute: int) -> bool:
+    """Mark what `smachpy run` makes needless; return whether all after `execute` is that."""
+    servers = set()
+    for index, node in enumerate(body):
+        value = node.value if isinstance(node, ast.Assign | ast.Expr | ast.Return) else None
+        word = "exit" if isinstance(node, ast.Return) else _last_word(value)
+        before = index < execute
+        if before and word == "IntrospectionServer" and isinstance(node, ast.Assign):
+            servers.add(ast.unparse(node.targets[0]))
+        elif before and not (
+            word == "init_node" or (word == "start" and ast.unparse(value).split(".")[0] in servers)  # type: ignore[arg-type]
+        ):
+            if any(isinstance(n, ast.Return) for n in ast.walk(node)):
+                return False
+            continue
+        elif index == execute:
+            continue
+        if word not in _NEEDLESS:
+            return False
+        main.removed.add(node.lineno)
+        if _NEEDLESS[word] and not isinstance(node, ast.Return):
+            main.notes.append((node.lineno, f"{word}: removed: {_NEEDLESS[word]}"))
+    return True
+
+
+def _calls(statement: ast.stmt) -> str:
+    """Return the function that a statement of a module calls and nothing else; "" for none."""
+    if isinstance(statement, ast.If) and "__name__" in ast.unparse(statement.test):
+        body = [n for n in statement.body if not _begins_node(n)]
+        return _calls(body[0]) if len(body) == 1 and not statement.orelse else ""
+    if isinstance(statement, ast.Try):
+        ends = all(
+            h.type is not None
+            and ast.unparse(h.type).rpartition(".")[2]
+            in {"ROSInterruptException", "KeyboardInterrupt"}
+            and all(isinstance(n, ast.Pass) for n in h.body)
+            for h in statement.handlers
+        )
+        body = [n for n in statement.body if not _begins_node(n)]
+        plain = ends and not statement.finalbody and not statement.orelse
+        return _calls(body[0]) if len(body) == 1 and plain else ""
+    value = statement.value if isinstance(statement, ast.Expr) else None
+    if isinstance(value, ast.Call) and isinstance(value.func, ast.Name) and not value.args:
+        return value.func.id
+    return ""
+
+
+def _begins_node(statement: ast.stmt) -> bool:
+    return isinstance(statement, ast.Expr) and _last_word(statement.value) == "init_node"
+
+
+def _executed(statement: ast.stmt) -> str:
+    """Return the machine that a plain statement executes, in a thread maybe; "" for none."""
+    if not isinstance(statement, ast.Assign | ast.Expr | ast.Return):
+        return ""
+    for node in ast.walk(statement):
+        if isinstance(node, ast.Attribute) and node.attr == "execute":
+            return node.value.id if isinstance(node.value, ast.Name) else ""
+    return ""
+
+
+def _last_word(value: ast.expr | None) -> str:
+    """Return `c` of a call `a.b.c(...)`; "" for everything else."""
+    if not isinstance(value, ast.Call):
+        return ""
+    return ast.unparse(value.func).rpartition(".")[2]
 
 
 def _packages(text: str) -> set[str]:
@@ -197,9 +314,10 @@ def _transformer(cst: Any, metadata: Any) -> Any:  # noqa: C901  a class that ne
     class Rewrite(cst.CSTTransformer):  # type: ignore[misc]
         METADATA_DEPENDENCIES = (metadata.PositionProvider,)
 
-        def __init__(self, packages: set[str]) -> None:
+        def __init__(self, packages: set[str], main: _Main | None) -> None:
             super().__init__()
             self.packages = packages
+            self.main = main
             self.needs: set[str] = set()
             self.logs = False
             self.notes: set[tuple[int, str]] = set()
@@ -209,8 +327,7 @@ def _transformer(cst: Any, metadata: Any) -> Any:  # noqa: C901  a class that ne
             self._functions: list[str] = []
 
         def note(self, node: Any, text: str) -> None:
-            line = self.get_metadata(metadata.PositionProvider, node).start.line
-            self.notes.add((line, text))
+            self.notes.add((self._line_of(node), text))
 
         # -- where we are ----------------------------------------------------------------------
 
@@ -228,9 +345,53 @@ def _transformer(cst: Any, metadata: Any) -> Any:  # noqa: C901  a class that ne
             self._functions.append(node.params.params[0].name.value if node.params.params else "")
 
         def leave_FunctionDef(self, original_node: Any, updated_node: Any) -> Any:
-            del original_node
             self._functions.pop()
-            return updated_node
+            main = self.main
+            if main is None or original_node.name.value != main.function or self._classes:
+                return updated_node
+            self.needs.add("smachpy")
+            mark = cst.Decorator(dotted("smachpy.mission"))
+            return updated_node.with_changes(decorators=[mark, *updated_node.decorators])
+
+        # -- the function that becomes a mission -----------------------------------------------
+
+        def _line_of(self, node: Any) -> int:
+            return int(self.get_metadata(metadata.PositionProvider, node).start.line)
+
+        def _is_in_mission(self, node: Any) -> bool:
+            main = self.main
+            return main is not None and (
+                self._line_of(node) in {main.execute, main.call, *main.removed}
+            )
+
+        def visit_SimpleStatementLine(self, node: Any) -> bool:
+            return not self._is_in_mission(node)
+
+        def leave_SimpleStatementLine(self, original_node: Any, updated_node: Any) -> Any:
+            if self.main is None or not self._is_in_mission(original_node):
+                return updated_node
+            line = self._line_of(original_node)
+            if line == self.main.call:
+                return self._call(updated_node)
+            if line == self.main.execute:
+                returned = cst.parse_statement(f"return {self.main.machine}")
+                return returned.with_changes(leading_lines=updated_node.leading_lines)
+            return cst.RemoveFromParent()
+
+        def visit_Try(self, node: Any) -> bool:
+            return not self._is_in_mission(node)
+
+        def leave_Try(self, original_node: Any, updated_node: Any) -> Any:
+            return self._call(updated_node) if self._is_in_mission(original_node) else updated_node
+
+        def leave_If(self, original_node: Any, updated_node: Any) -> Any:
+            return self._call(updated_node) if self._is_in_mission(original_node) else updated_node
+
+        def _call(self, node: Any) -> Any:
+            assert self.main is not None
+            guard = 'if __name__ == "__main__":'
+            made = cst.parse_statement(f"{guard}\n    print({self.main.function}().execute())\n")
+            return made.with_changes(leading_lines=node.leading_lines)
 
         def visit_With(self, node: Any) -> None:
             self._opened.append(text_of(node.items[0].item) if len(node.items) == 1 else "")
@@ -240,10 +401,11 @@ def _transformer(cst: Any, metadata: Any) -> Any:  # noqa: C901  a class that ne
             self._opened.pop()
             return updated_node
 
-        def visit_If(self, node: Any) -> None:
+        def visit_If(self, node: Any) -> bool:
             test = node.test
             if isinstance(test, cst.Comparison) and text_of(test.left) == "__name__":
-                self.main_line = self.get_metadata(metadata.PositionProvider, node).start.line
+                self.main_line = self._line_of(node)
+            return not self._is_in_mission(node)
 
         # -- imports ---------------------------------------------------------------------------
 

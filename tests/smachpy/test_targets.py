@@ -79,6 +79,18 @@ def test_a_file_gives_its_mission(file, text):
     assert machine.execute() == "done"
 
 
+def test_the_only_marked_function_of_a_file_is_its_mission(tmp_path):
+    path = tmp_path / "marked.py"
+    marked = "@smachpy.mission\ndef {}():\n    return smachpy.StateMachine(['ok'])\n"
+    path.write_text(
+        "import smachpy\nfrom missions.course.countdown import countdown\n" + marked.format("main")
+    )
+    assert load_target(str(path)).thing.__name__ == "main"
+    path.write_text(path.read_text() + marked.format("other"))
+    with pytest.raises(TargetError, match="which machine is meant"):
+        load_target(str(path))
+
+
 def test_a_module_gives_the_named_factory(file):
     assert load_target("drive_about:mission").build().execute() == "done"
 

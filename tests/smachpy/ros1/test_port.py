@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from smachpy.command.targets import load_target
 from smachpy.ros1.port import port
 
 SCRIPTS = Path(__file__).parents[2] / "ros1_scripts"
@@ -68,6 +69,73 @@ def test_what_is_rewritten():
     assert "self.sleep(0.1)\n" in text
     assert "sm.add('FOO', Foo())\n" in text
     assert "inner.add('BAR', Foo())\n" in text
+
+
+PROGRAM = """import threading
+import rospy
+import smach, smach_ros
+
+def main():
+    rospy.init_node('x')
+    sm = smach.StateMachine(outcomes=['ok'])
+    with sm:
+        smach.StateMachine.add('A', smach.CBState(lambda ud: 'ok', outcomes=['ok']))
+    sis = smach_ros.IntrospectionServer('x', sm, '/SM')
+    sis.start()
+    {run}
+
+if __name__ == '__main__':
+    {call}
+"""
+IN_A_THREAD = """thread = threading.Thread(target=sm.execute)
+    thread.start()
+    rospy.spin()
+    sm.request_preempt()
+    thread.join()
+    sis.stop()"""
+GUARDED = """try:
+        main()
+    except rospy.ROSInterruptException:
+        pass"""
+
+
+@pytest.mark.parametrize("call", ["main()", GUARDED], ids=["plain", "guarded"])
+@pytest.mark.parametrize(
+    "run",
+    [
+        "sm.execute()",
+        "outcome = sm.execute()\n    print(outcome)",
+        "return sm.execute()",
+        IN_A_THREAD,
+    ],
+    ids=["execute", "printed", "returned", "thread"],
+)
+def test_a_function_that_executes_its_machine_becomes_a_mission(tmp_path, run, call):
+    ported = port(PROGRAM.format(run=run, call=call).encode(), "old.py")
+    assert "rospy" not in ported.text
+    assert not any("wants a function" in text for _, text in ported.notes)
+    script = tmp_path / "new.py"
+    script.write_text(ported.text)
+    target = load_target(str(script))
+    assert list(target.build().get_children()) == ["A"]
+    assert target.build().execute() == "ok"
+
+
+@pytest.mark.parametrize(
+    "run",
+    [
+        "for _ in range(2):\n        sm.execute()",
+        "sm.execute()\n    print('again')\n    again(sm)",
+        "if not rospy.has_param('x'):\n        return\n    sm.execute()",
+        "other = sm\n    sm.execute()\n    other.execute()",
+    ],
+    ids=["loop", "work after it", "early end", "two runs"],
+)
+def test_a_function_that_does_more_is_left_to_a_person(run):
+    ported = port(PROGRAM.format(run=run, call="main()").encode(), "old.py")
+    assert "@smachpy.mission" not in ported.text
+    assert "sm.execute()" in ported.text
+    assert any("wants a function" in text for _, text in ported.notes)
 
 
 def test_what_a_person_must_look_at():
