@@ -183,9 +183,9 @@ class Ros2Server:
     def let_cancel(self, query: Query, uuid: bytes) -> None:
         goals = [uuid] if uuid in self.states else [u for u in self.states if not any(uuid)]
         code = 0 if goals else 2
-        self.reply(query, pack_canceling(Canceling(code, tuple((u, 0) for u in goals))))
         for goal in goals:
             self.set_state(goal, 3)
+        self.reply(query, pack_canceling(Canceling(code, tuple((u, 0) for u in goals))))
 
     def refuse_cancel(self, query: Query, uuid: bytes) -> None:
         """Answer as rclpy does when its callback refuses: code 0 and an empty list."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from actionlib_core.action.client import TerminalState
 from actionlib_core.node import Node
 from actionlib_core.transport.faulty import DELIVERED, FaultyTransport, RandomFaults
 from tests.transports import TRANSPORTS, opened
@@ -15,6 +16,7 @@ from tests.transports import TRANSPORTS, opened
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from actionlib_core.action.client import ActionClient, ClientGoalHandle
     from actionlib_core.clock import Clock
     from actionlib_core.transport import Transport
     from actionlib_core.transport.faulty import Fate
@@ -44,11 +46,16 @@ class SmallFaults:
 class World:
     """A clock and nodes on one network, each with a session of its own.
 
+    Attributes:
+        tells_recalls: A client is told for certain whether a cancelled goal has run.
+
     Args:
         clock: The clock of all nodes.
         open_session: Opens one of the sessions.
         late: Longest time [s] that a message may be overtaken by others.
     """
+
+    tells_recalls = True
 
     def __init__(
         self, clock: Clock, open_session: Callable[[], Transport], *, late: float = 0.0
@@ -71,9 +78,19 @@ class World:
         """The same of a goal that was refused."""
         return said
 
-    def end(self, status: str) -> str:
-        """Return the end that a client sees where the server has one of the suite."""
-        return status
+    def expect_gone(self, client: ActionClient) -> None:
+        """A client of a server that has stopped knows so: it has heard the farewell."""
+        assert not client.wait_for_server(0.01)
+
+    def check_end(self, handle: ClientGoalHandle, ran: int) -> None:
+        """Check a goal that was sent while servers came and went, and how often it `ran`."""
+        state = handle.get_terminal_state()
+        if state is TerminalState.REJECTED:  # it waited in the queue as its server was stopped
+            assert handle.get_goal_status_text() == "The action server was stopped"
+            assert ran == 0
+        else:
+            assert state is TerminalState.SUCCEEDED, handle.get_goal_status_text()
+            assert ran == 1
 
     def event(self):
         return self.clock.event()

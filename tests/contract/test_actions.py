@@ -155,7 +155,8 @@ def test_three_goals_at_once_to_a_busy_server(world):
     assert doubler.runs[0] == -1
     assert doubler.runs[-1] == 7
     for number, state in zip((-2, -3), states[1:3], strict=True):
-        assert (state is TerminalState.RECALLED) is (number not in doubler.runs)
+        if state is TerminalState.RECALLED or world.tells_recalls:
+            assert (state is TerminalState.RECALLED) is (number not in doubler.runs)
 
 
 def test_queue_policy_runs_all(world):
@@ -267,7 +268,7 @@ def test_server_is_swapped_under_a_live_client(world):
         assert handle.get_terminal_state() is TerminalState.SUCCEEDED, handle.get_goal_status_text()
         assert doubler.runs == [4]
         doubler.server.stop()
-        assert not client.wait_for_server(0.01)  # it has heard the farewell
+        world.expect_gone(client)
 
 
 def test_goals_sent_as_servers_come_and_go_run_once_and_none_is_lost(world):
@@ -292,13 +293,7 @@ def test_goals_sent_as_servers_come_and_go_run_once_and_none_is_lost(world):
     assert all(handle.wait(LONG_S) for handle in handles)
     ran = Counter(number for doubler in doublers for number in doubler.runs)
     for number, handle in enumerate(handles):
-        state = handle.get_terminal_state()
-        if state is TerminalState.REJECTED:  # it waited in the queue as its server was stopped
-            assert handle.get_goal_status_text() == world.refusal("The action server was stopped")
-            assert ran[number] == 0
-        else:
-            assert state is TerminalState.SUCCEEDED, handle.get_goal_status_text()
-            assert ran[number] == 1
+        world.check_end(handle, ran[number])
     assert doublers[-1].runs
 
 
@@ -512,7 +507,7 @@ def test_many_goals_each_accepted_rejected_or_cancelled(world):
             handle.cancel()
     assert all(handle.wait(LONG_S) for handle in sent)
     names = [handle.get_terminal_state().name for handle in sent]
-    assert [world.end(name) for name in names] == ["REJECTED", "SUCCEEDED", "PREEMPTED"] * 4
+    assert names == ["REJECTED", "SUCCEEDED", "PREEMPTED"] * 4
     assert sent[2].get_result() == msg.TestResult(-1)
     assert sent[0].get_goal_status_text() == world.refusal("divisible")
     with pytest.raises(IllegalTransitionError, match=r"cannot go REJECTED -> ACTIVE"):

@@ -7,6 +7,7 @@ there: a server keeps a result as long as its own `result_timeout` says.
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import threading
 from collections import deque
@@ -30,6 +31,7 @@ from actionlib_core.wire.ros2.action_messages import (
     unpack_canceling,
     unpack_with_id,
 )
+from actionlib_core.wire.ros2.attachment import unpack_attachment
 from actionlib_core.wire.ros2.goal_exchange import GoalExchange, Step
 from actionlib_core.wire.ros2.goal_states import CancelCode
 from actionlib_core.wire.ros2.graph import ActionServers
@@ -179,6 +181,7 @@ class RosClientPort:
         self._closed = False
         self._declared: list[Closable] = []
         self._last_status: Sample | None = None
+        self._last_number: tuple[bytes, int] | None = None
         self._goals: dict[str, _Goal] = {}
         self._by_uuid: dict[bytes, _Goal] = {}
         self._queue: deque[_Goal] = deque()
@@ -309,7 +312,8 @@ class RosClientPort:
             on_done()
         self._do(goal, step)
         if not known and self._last_status is not None:
-            self._read_states(self._last_status)
+            with contextlib.suppress(ValueError):  # reported when it came
+                self._read_states(self._last_status)
 
     def _keep(self, goal: _Goal) -> _Goal:
         """Keep a new goal. Needs the lock."""
@@ -554,24 +558,31 @@ class RosClientPort:
         self._feedback.flush()
         self._last_status = sample
         self._hear()
-        self._read_states(sample)
-
-    def _read_states(self, sample: Sample) -> None:
-        """Take in what a status list says of goals that are followed."""
-        with self._lock:
-            wanted = set(self._by_uuid)
+        last, self._last_number = self._last_number, None
         try:
-            states = find_states(sample.payload, wanted)
+            number, _, gid = unpack_attachment(sample.attachment)
+            self._read_states(sample, unbroken=(gid, number - 1) == last)
         except ValueError as error:
             self._report("a status", error)
             return
+        self._last_number = gid, number
+
+    def _read_states(self, sample: Sample, *, unbroken: bool = False) -> None:
+        """Take in what a status list says of goals that are followed.
+
+        Raises:
+            ValueError: it cannot be read.
+        """
+        with self._lock:
+            wanted = set(self._by_uuid)
+        states = find_states(sample.payload, wanted)
         steps = []
         with self._lock:
             for uuid, code in states:
                 goal = self._by_uuid.get(uuid)
-                if goal is not None and code > goal.exchange.code:
+                if goal is not None and code >= goal.exchange.code:
                     self._note_sender(goal, sample.source)
-                    steps.append((goal, goal.exchange.on_state(code)))
+                    steps.append((goal, goal.exchange.on_state(code, unbroken=unbroken)))
         for goal, step in steps:
             self._do(goal, step)
 

@@ -79,9 +79,10 @@ class GoalExchange:
         "_cancel_refused",
         "_cancel_wanted",
         "_cancelling",
+        "_never_active",
         "_refused",
         "_sendings",
-        "_was_active",
+        "_waits",
         "asking",
         "code",
         "phase",
@@ -96,7 +97,8 @@ class GoalExchange:
         self._attached = attached
         self._sendings = 0
         self._refused = False
-        self._was_active = False
+        self._waits = False  # the last list seen shows it as accepted
+        self._never_active = False
         self._cancel_wanted = False
         self._cancelling = False
         self._cancel_refused = False
@@ -104,7 +106,7 @@ class GoalExchange:
     @property
     def status(self) -> Status:
         """What a ROS 1 client would be told."""
-        return to_status(self.code, was_active=self._was_active)
+        return to_status(self.code, was_active=not self._never_active)
 
     # -- sending -------------------------------------------------------------------------------
 
@@ -144,9 +146,22 @@ class GoalExchange:
 
     # -- what the server says of it --------------------------------------------------------------
 
-    def on_state(self, code: int) -> Step:
-        """Take its state from the list that the server publishes."""
-        return self._take(code) if code in _STATES else Step.NOTHING
+    def on_state(self, code: int, *, unbroken: bool = False) -> Step:
+        """Take its state from the list that the server publishes.
+
+        A server publishes one at each change, but late lists may be skipped. So a goal that is
+        cancelled was never executing only if lists without a gap say so.
+
+        Args:
+            code: See `GoalCode`.
+            unbroken: The list before this one was seen, too.
+        """
+        if code not in _STATES:
+            return Step.NOTHING
+        if code >= GoalCode.CANCELING > self.code:
+            self._never_active = self._waits and unbroken
+        self._waits = code == GoalCode.ACCEPTED >= self.code
+        return self._take(code)
 
     def on_feedback(self) -> Step:
         """Take feedback, which shows that it runs."""
@@ -162,7 +177,6 @@ class GoalExchange:
                 step |= Step.CANCEL
         if code > self.code:  # one that was overtaken says nothing new
             self.code = GoalCode(code)
-            self._was_active = self._was_active or self.code is GoalCode.EXECUTING
             step |= Step.TELL
         return step
 

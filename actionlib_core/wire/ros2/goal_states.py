@@ -55,7 +55,7 @@ TO_STATUS_NEVER_ACTIVE = {
     GoalCode.CANCELING: Status.RECALLING,
     GoalCode.CANCELED: Status.RECALLED,
 }
-"""What it sees of one that has not."""
+"""What it sees of one of which it knows that it has not."""
 
 TO_CODE = {
     Status.PENDING: GoalCode.ACCEPTED,
@@ -77,7 +77,7 @@ def to_status(code: int, *, was_active: bool) -> Status:
 
     Args:
         code: See `GoalCode`; other numbers count as unknown.
-        was_active: The goal has been executing, as far as is known.
+        was_active: The goal has been executing, or nobody knows that it has not.
     """
     table = TO_STATUS if was_active else TO_STATUS_NEVER_ACTIVE
     return table.get(code, Status.LOST)  # type: ignore[call-overload, no-any-return]  # an int is equal to its member
@@ -91,7 +91,7 @@ def to_code(status: int) -> GoalCode:
 def draw_tables() -> str:
     """Return the tables in Markdown, as `docs/ros2_servers.md` shows them."""
     lines = [
-        "| ROS 2 | a client here sees | while it was never active | a server here is |",
+        "| ROS 2 | a client here sees | when it has never run | a server here is |",
         "| --- | --- | --- | --- |",
         "| refused (`accepted=false`) | `REJECTED` | `REJECTED` | `REJECTED` at once |",
     ]

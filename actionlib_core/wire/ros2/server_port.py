@@ -51,7 +51,7 @@ from actionlib_core.wire.ros2.names import (
 from actionlib_core.wire.ros2.network import ros_network
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from actionlib_core.clock import Timer
     from actionlib_core.goal.ports import ServerListener, StatusEntry
@@ -69,6 +69,12 @@ DECISION_S = 0.2  # a server that has not refused a goal by then has accepted it
 REFUSED_KEPT = 10_000  # ids of refused goals, which ROS 2 counts as unknown
 PUBLISHED = Quality(express=True, block=False)
 STATUS = Quality(express=True, block=False, cache=LATCHED.depth)
+_BEFORE_CANCEL = {
+    Status.PREEMPTING: GoalCode.EXECUTING,
+    Status.PREEMPTED: GoalCode.EXECUTING,
+    Status.RECALLING: GoalCode.ACCEPTED,
+    Status.RECALLED: GoalCode.ACCEPTED,
+}
 
 
 class _Asker(NamedTuple):
@@ -251,12 +257,21 @@ class RosServerPort:
         ]
         states = [state for state in states if state.code != GoalCode.UNKNOWN]
         if states != self._shown:
-            self._put(self._status, self._names.status, pack_statuses(states))
+            stopped = {
+                goal_uuid(entry.id): _BEFORE_CANCEL[entry.status]
+                for entry in listed
+                if entry.status in _BEFORE_CANCEL
+            }
+            skipped = list_skipped(self._shown, states, stopped)
+            for shown in (skipped, states) if skipped else (states,):
+                self._put(self._status, self._names.status, pack_statuses(shown))
             self._shown = states
         self._answer_forgotten({entry.id for entry in listed})
 
     def send_result(self, entry: StatusEntry, body: bytes, *, wait: bool = True) -> None:  # noqa: ARG002  replies never wait
         self._decide(entry.id, accepted=entry.status != Status.REJECTED)
+        if entry.status in _BEFORE_CANCEL:
+            self.send_status(())  # tells whether it has run, which the result does not
         self._answer(entry.id, with_status(body, self._code(entry)))
 
     def send_feedback(self, entry: StatusEntry, body: bytes) -> None:
@@ -463,6 +478,25 @@ class RosServerPort:
         own = self._ros.full_name, self._ros.token.session
         there = other.full_node, other.session
         return ServerConflictError(self._name, *((there, own) if stays else (own, there)))
+
+
+def list_skipped(
+    before: Iterable[GoalState], now: list[GoalState], stopped: Mapping[bytes, GoalCode]
+) -> list[GoalState]:
+    """Return the list that was skipped and shows what cancelled goals were before their cancel.
+
+    Clients tell from it whether such a goal has run. Empty when none was skipped.
+
+    Args:
+        before: What was shown last.
+        now: What is to be shown.
+        stopped: What the cancelled goals were when they were cancelled.
+    """
+    shown = {goal.uuid: goal.code for goal in before}
+    skipped = {uuid: code for uuid, code in stopped.items() if shown.get(uuid, 0) < code}
+    if not skipped:
+        return []
+    return [goal._replace(code=skipped.get(goal.uuid, goal.code)) for goal in now]
 
 
 def choose_cancelled(goals: Iterable[StatusEntry], asked: Asked) -> list[StatusEntry]:

@@ -107,9 +107,43 @@ def test_states_that_were_overtaken_say_nothing():
     goal = sent()
     goal.on_answer(accepted=True)
     assert goal.on_state(3) is Step.TELL
-    assert goal.status is Status.RECALLING  # it was never seen to run
+    assert goal.status is Status.PREEMPTING  # a list that was skipped may have shown that it ran
     assert goal.on_state(2) is Step.NOTHING
     assert goal.on_state(99) is Step.NOTHING
+
+
+@pytest.mark.parametrize(
+    ("lists", "status"),
+    [
+        ([(1, False), (3, True), (5, True)], Status.RECALLED),
+        ([(1, False), (1, True), (5, True)], Status.RECALLED),
+        ([(1, False), (3, True), (5, False)], Status.RECALLED),
+        ([(1, False), (1, False), (3, True)], Status.RECALLED),
+        ([(1, False), (2, True), (3, True)], Status.PREEMPTED),
+        ([(1, False), (3, False)], Status.PREEMPTED),
+        ([(3, True)], Status.PREEMPTED),
+        ([], Status.PREEMPTED),
+    ],
+)
+def test_cancelled_goal_was_recalled_if_no_list_is_missing_that_may_have_shown_it_executing(
+    lists, status
+):
+    goal = sent()
+    goal.on_answer(accepted=True)
+    for code, unbroken in lists:
+        goal.on_state(code, unbroken=unbroken)
+    assert goal.on_result(5, 1.0) is Step.END
+    assert goal.status is status
+
+
+def test_feedback_shows_that_a_goal_was_executing_whatever_lists_say():
+    goal = sent()
+    goal.on_answer(accepted=True)
+    goal.on_state(1)
+    goal.on_feedback()
+    goal.on_state(1, unbroken=True)
+    goal.on_state(3, unbroken=True)
+    assert goal.status is Status.PREEMPTING
 
 
 def test_cancel_of_what_no_server_has_recalls_it():
@@ -126,7 +160,7 @@ def test_cancel_before_the_answer_goes_out_with_the_acceptance():
     assert goal.on_answer(accepted=True) == Step.TELL | Step.ASK | Step.CANCEL
     assert goal.cancel(again=True) is Step.NOTHING
     assert goal.on_cancel_answer(0, listed=True) is Step.TELL
-    assert goal.status is Status.RECALLING
+    assert goal.status is Status.PREEMPTING
     assert goal.cancel() is Step.NOTHING
 
 

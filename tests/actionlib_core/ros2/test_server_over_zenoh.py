@@ -7,31 +7,26 @@ import os
 import signal
 import subprocess
 import sys
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
 from actionlib_core.action.server import ActionServer, ServerGoalHandle
-from actionlib_core.clock import RealClock
-from actionlib_core.config import Config, Ros2
 from actionlib_core.goal.states import Status
 from actionlib_core.interfaces.ros2.test_msgs.action import Fibonacci
 from actionlib_core.node import Node
-from actionlib_core.transport.zenoh import ZenohTransport
 from actionlib_core.wire.ros2.action_messages import unpack_accepted, unpack_canceling
 from actionlib_core.wire.ros2.attachment import unpack_attachment
-from tests.free_port import free_port
 from tests.ros2_client import Ros2Client
+from tests.ros2_robot import DOMAIN
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from tests.ros2_robot import Ros2Robot
 
 pytestmark = pytest.mark.zenoh
 
 LONG_S = 30.0
-CLOCK = RealClock()
 CALLS = [
     line
     for line in map(
@@ -62,53 +57,23 @@ with Node("robot", config=config) as node:
 """
 
 
-class Robot:
-    """A router, and sessions behind it."""
-
-    def __init__(self) -> None:
-        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
-        self.left = ExitStack()
-        self.config = Config(
-            discovery="off", ros2=(Ros2(router=self.endpoint, domain=42, distro="kilted"),)
-        )
-        self.route()
-
-    def route(self) -> None:
-        self.router = ZenohTransport(
-            Config(mode="router", listen=(self.endpoint,), discovery="off", timestamping=True)
-        )
-
-    def node(self) -> Node:
-        return self.left.enter_context(Node("robot", clock=CLOCK, config=self.config))
-
-    def client(self) -> Ros2Client:
-        session = ZenohTransport(self.config.for_ros2(self.config.ros2[0]))
-        self.left.callback(session.close)
-        client = Ros2Client(session, CLOCK, "fib", Fibonacci, domain=42)
-        self.left.callback(client.close)
-        assert client.ready.wait(LONG_S)
-        return client
-
-    def server_process(self, mode: str) -> subprocess.Popen[str]:
-        process = subprocess.Popen(
-            [sys.executable, "-c", SERVER, self.endpoint, mode], stdout=subprocess.PIPE, text=True
-        )
-        self.left.callback(process.wait)
-        self.left.callback(process.kill)
-        assert process.stdout is not None
-        self.left.enter_context(process.stdout)
-        assert process.stdout.readline() == "ready\n"
-        return process
+def client_of(robot: Ros2Robot) -> Ros2Client:
+    client = Ros2Client(robot.session(), robot.clock, "fib", Fibonacci, domain=DOMAIN)
+    robot.left.callback(client.close)
+    assert client.ready.wait(LONG_S)
+    return client
 
 
-@pytest.fixture
-def robot() -> Iterator[Robot]:
-    robot = Robot()
-    try:
-        with robot.left:
-            yield robot
-    finally:
-        robot.router.close()
+def server_process(robot: Ros2Robot, mode: str) -> subprocess.Popen[str]:
+    process = subprocess.Popen(
+        [sys.executable, "-c", SERVER, robot.endpoint, mode], stdout=subprocess.PIPE, text=True
+    )
+    robot.left.callback(process.wait)
+    robot.left.callback(process.kill)
+    assert process.stdout is not None
+    robot.left.enter_context(process.stdout)
+    assert process.stdout.readline() == "ready\n"
+    return process
 
 
 def answer(goal: ServerGoalHandle) -> None:
@@ -127,10 +92,10 @@ def finish(goal: ServerGoalHandle) -> None:
     getattr(goal, end)(Fibonacci.Result(sequence=sequence))
 
 
-def test_captured_conversations_word_by_word(robot: Robot) -> None:
+def test_captured_conversations_word_by_word(robot: Ros2Robot) -> None:
     """The bytes that a real server answered are sent again; values and attachments agree."""
     server = ActionServer("fib", Fibonacci, answer, finish, node=robot.node())
-    client = robot.client()
+    client = client_of(robot)
     heard: list[str] = []
     for line in CALLS:
         part = line["key"].split("/_action/")[1].split("/")[0]
@@ -162,9 +127,9 @@ def test_captured_conversations_word_by_word(robot: Robot) -> None:
     server.stop()
 
 
-def test_the_attachment_of_a_reply_is_that_of_its_request(robot: Robot) -> None:
+def test_the_attachment_of_a_reply_is_that_of_its_request(robot: Ros2Robot) -> None:
     ActionServer("fib", Fibonacci, node=robot.node())
-    client = robot.client()
+    client = client_of(robot)
     line = CALLS[0]
     pending = client.ask(
         client.names.get_result,
@@ -178,7 +143,7 @@ def test_the_attachment_of_a_reply_is_that_of_its_request(robot: Robot) -> None:
     assert back.time_ns != asked["timestamp_ns"]
 
 
-def test_a_thousand_goals_at_once(robot: Robot) -> None:
+def test_a_thousand_goals_at_once(robot: Ros2Robot) -> None:
     """Nothing is lost here: requests do not wait in a queue of ten."""
 
     def succeed(goal: ServerGoalHandle) -> None:
@@ -186,7 +151,7 @@ def test_a_thousand_goals_at_once(robot: Robot) -> None:
         goal.set_succeeded(Fibonacci.Result(sequence=[goal.get_goal().order]))
 
     ActionServer("fib", Fibonacci, succeed, node=robot.node())
-    client = robot.client()
+    client = client_of(robot)
     ids = {number: number.to_bytes(16, "big") for number in range(1, 1001)}
     sent = [client.send(uuid, Fibonacci.Goal(order=number)) for number, uuid in ids.items()]
     assert all(unpack_accepted(pending.answer(LONG_S).payload) is not None for pending in sent)
@@ -196,21 +161,21 @@ def test_a_thousand_goals_at_once(robot: Robot) -> None:
         assert client.end_of(pending) == (4, Fibonacci.Result(sequence=[number]))
 
 
-def test_a_router_that_is_started_again(robot: Robot) -> None:
+def test_a_router_that_is_started_again(robot: Ros2Robot) -> None:
     ActionServer("fib", Fibonacci, lambda goal: goal.set_accepted(), node=robot.node())
-    client = robot.client()
+    client = client_of(robot)
     assert client.accepted(bytes([1] * 16), Fibonacci.Goal()) is not None
     robot.router.close()
     robot.route()
-    again = robot.client()
+    again = client_of(robot)
     assert again.accepted(bytes([2] * 16), Fibonacci.Goal()) is not None
     assert again.accepted(bytes([1] * 16), Fibonacci.Goal()) is None
 
 
 @pytest.mark.parametrize("mode", ["client", "peer"])
-def test_a_killed_server_is_seen_and_its_questions_end(robot: Robot, mode: str) -> None:
-    process = robot.server_process(mode)
-    client = robot.client()
+def test_a_killed_server_is_seen_and_its_questions_end(robot: Ros2Robot, mode: str) -> None:
+    process = server_process(robot, mode)
+    client = client_of(robot)
     uuid = bytes([1] * 16)
     assert client.accepted(uuid, Fibonacci.Goal()) is not None
     result = client.result(uuid)
@@ -220,9 +185,9 @@ def test_a_killed_server_is_seen_and_its_questions_end(robot: Robot, mode: str) 
     assert len(client.servers) == 0
 
 
-def test_a_suspended_server_goes_on(robot: Robot) -> None:
-    process = robot.server_process("client")
-    client = robot.client()
+def test_a_suspended_server_goes_on(robot: Ros2Robot) -> None:
+    process = server_process(robot, "client")
+    client = client_of(robot)
     process.send_signal(signal.SIGSTOP)
     os.waitpid(process.pid, os.WUNTRACED)  # until it has stopped
     pending = client.send(bytes([1] * 16), Fibonacci.Goal())
@@ -234,10 +199,10 @@ def test_a_suspended_server_goes_on(robot: Robot) -> None:
     assert client.cancel(bytes([1] * 16)).code == 0
 
 
-def test_a_server_ends_with_its_node(robot: Robot) -> None:
-    node = Node("robot", clock=CLOCK, config=robot.config)
+def test_a_server_ends_with_its_node(robot: Ros2Robot) -> None:
+    node = Node("robot", clock=robot.clock, config=robot.config)
     server = ActionServer("fib", Fibonacci, lambda goal: goal.set_accepted(), node=node)
-    client = robot.client()
+    client = client_of(robot)
     uuid = bytes([1] * 16)
     assert client.accepted(uuid, Fibonacci.Goal()) is not None
     result = client.result(uuid)

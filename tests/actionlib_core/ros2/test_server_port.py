@@ -23,14 +23,16 @@ from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.wire.ros2.action_messages import (
     Asked,
     Canceling,
+    GoalState,
     pack_id,
     pack_with_id,
     unpack_accepted,
 )
 from actionlib_core.wire.ros2.attachment import Attachment, pack_attachment
+from actionlib_core.wire.ros2.goal_states import GoalCode
 from actionlib_core.wire.ros2.graph import RosType
 from actionlib_core.wire.ros2.names import NO_GOAL, Kind
-from actionlib_core.wire.ros2.server_port import DECISION_S, choose_cancelled
+from actionlib_core.wire.ros2.server_port import DECISION_S, choose_cancelled, list_skipped
 from tests.ros2_client import Ros2Client
 
 if TYPE_CHECKING:
@@ -556,3 +558,39 @@ def test_which_goals_a_cancel_is_about() -> None:
     assert choose_cancelled(goals, Asked(NO_GOAL, 300)) == [goals[0], goals[2]]
     assert choose_cancelled(goals, Asked(bytes.fromhex(goals[5].id), 100)) == [goals[0], goals[5]]
     assert choose_cancelled(goals, Asked(NO_GOAL, 99)) == []
+
+
+@pytest.mark.parametrize("accepted", [True, False])
+def test_lists_show_whether_a_cancelled_goal_has_run(world: World, accepted: bool) -> None:
+    """Changes go together in a list; what tells whether a cancelled goal has run is not skipped."""
+    world.serve()
+    client = world.client()
+    uuid = new_id()
+    client.send(uuid, Fibonacci.Goal())
+    while not world.goals:
+        world.clock.sleep(0.001)
+    if accepted:
+        world.goals[-1].set_accepted()
+    assert client.cancel(uuid).code == 0
+    world.goals[-1].set_canceled()
+    assert client.end_of(client.result(uuid))[0] == 5
+    world.settle()
+    codes = [state.code for states in client.statuses for state in states if state.uuid == uuid]
+    assert codes == sorted(codes)
+    assert (GoalCode.EXECUTING in codes) is accepted
+    assert (GoalCode.ACCEPTED in codes) is not accepted
+
+
+def test_list_of_what_was_skipped() -> None:
+    one, two, other = new_id(), new_id(), new_id()
+    now = [GoalState(one, 1, 3), GoalState(two, 2, 5), GoalState(other, 3, 2)]
+    stopped = {one: GoalCode.EXECUTING, two: GoalCode.ACCEPTED}
+    first = list_skipped([], now, stopped)
+    assert first == [GoalState(one, 1, 2), GoalState(two, 2, 1), GoalState(other, 3, 2)]
+    assert list_skipped(first, now, stopped) == []
+    assert list_skipped([GoalState(one, 1, 1), first[1]], now, stopped) == [
+        first[0],
+        now[1],
+        now[2],
+    ]
+    assert list_skipped([], now, {}) == []
