@@ -69,7 +69,7 @@ DECISION_S = 0.2  # a server that has not refused a goal by then has accepted it
 REFUSED_KEPT = 10_000  # ids of refused goals, which ROS 2 counts as unknown
 PUBLISHED = Quality(express=True, block=False)
 STATUS = Quality(express=True, block=False, cache=LATCHED.depth)
-_BEFORE_CANCEL = {
+_BEFORE_CANCEL: Mapping[int, GoalCode] = {
     Status.PREEMPTING: GoalCode.EXECUTING,
     Status.PREEMPTED: GoalCode.EXECUTING,
     Status.RECALLING: GoalCode.ACCEPTED,

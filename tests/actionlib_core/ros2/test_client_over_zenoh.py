@@ -59,9 +59,7 @@ class Replay(Ros2Server):
                 key = call["key"].encode() + bytes.fromhex(call["request"])
                 self.answers[key].append(bytes.fromhex(call["reply"]))
         self.instead: dict[bytes, list[bytes | None]] = defaultdict(list)
-        super().__init__(
-            robot.session(), robot.clock, name, action, domain=DOMAIN, distro="kilted"
-        )
+        super().__init__(robot.session(), robot.clock, name, action, domain=DOMAIN, distro="kilted")
         robot.left.callback(self.close)
         self.on_goal = self.on_cancel = self.replay
 
