@@ -43,7 +43,7 @@ class Shutdown:
         self._reason: str | None = None
         self._delivered = False
         self._events: weakref.WeakKeyDictionary[Clock, Event] = weakref.WeakKeyDictionary()
-        self._callbacks: dict[int, tuple[SerialExecutor, Callable[[], object]]] = {}
+        self._callbacks: dict[int, tuple[Clock, Callable[[], object]]] = {}
         self._count = 0
         self._at_exit: dict[int, Callable[[], object]] = {}
 
@@ -79,15 +79,15 @@ class Shutdown:
         Threads: the callback runs in a thread of the current clock, never in a signal handler; it
             may block. An exception is given to `threading.excepthook`.
         """
-        executor = SerialExecutor(current_clock(), "shutdown")
+        clock = current_clock()
         with self._lock:
             late = self._delivered
             self._count += 1
             number = self._count
             if not late:
-                self._callbacks[number] = executor, callback
+                self._callbacks[number] = clock, callback
         if late:
-            executor.submit(callback)
+            SerialExecutor(clock, "shutdown").submit(callback)
 
         def forget() -> None:
             with self._lock:
@@ -147,8 +147,8 @@ class Shutdown:
             self._callbacks.clear()
         for event in events:
             event.set()
-        for executor, callback in callbacks:
-            executor.submit(callback)
+        for clock, callback in callbacks:
+            SerialExecutor(clock, "shutdown").submit(callback)
         return first
 
     def note(self, reason: str) -> None:

@@ -21,9 +21,8 @@ from smachpy.machines.names import name_of
 from smachpy.machines.old_states import as_state
 from smachpy.machines.problems import Problems
 from smachpy.machines.rules import Rule, all_of, any_of, as_rules, decide, n_of
-from smachpy.machines.spec import ChildSpec, ConcurrenceSpec
 from smachpy.machines.state import DataOf
-from smachpy.machines.validate import concurrence_problems
+from smachpy.machines.validate import ChildSpec, ConcurrenceSpec, concurrence_problems
 from smachpy.run.branches import Group
 from smachpy.run.callback import call_bounded
 from smachpy.run.child import ContainerData
@@ -231,7 +230,7 @@ class Concurrence(Container):
     def find_problems(self, where: str) -> tuple[str, ...]:
         """Return what is wrong with this concurrence itself."""
         children = tuple(
-            ChildSpec(label, tuple(state.get_registered_outcomes()))
+            ChildSpec(label, state._smachpy.outcomes)
             for label, state in self._smachpy.children.items()
         )
         spec = ConcurrenceSpec(

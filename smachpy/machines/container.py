@@ -242,8 +242,8 @@ class Container(Openable, Callbacks, State):
         if first is None or parent is None:
             run = partial(Container.execute, self)
             return execute_root(self, run, get_options(self), parent_ud)
-        frame = Frame(self, parent)
-        step, callback = parent.step, parent.container._smachpy.callback
+        frame, step = Frame(self, parent), parent.step
+        callback = parent.container._smachpy.callback
         if callback is not None and callback.parent is parent:
             step = callback.step  # a callback of the parent runs this container
         if step is None or step.state is self:
@@ -286,7 +286,7 @@ class Container(Openable, Callbacks, State):
                 outcome = self._smachpy_run_children(frame, plan)
             except Interruption:  # a callback did not listen
                 outcome = self.__interrupted(frame)
-            if self._smachpy.termination_cbs:
+            if data.termination_cbs:
                 outcome = self.__call_at_end(frame, outcome)
             if data.output_keys and parent_ud is not None:
                 self.__copy_output_keys(self.userdata, parent_ud)
@@ -382,7 +382,8 @@ class Container(Openable, Callbacks, State):
                 self._preempt_requested = False
             if frame.step is not None:  # what a child that raised asked itself
                 frame.step.state._preempt_requested = False
-        forget_visit(frame)
+        if frame.visit is not None:
+            forget_visit(frame)
         for ended in tuple(data.end_waiters):
             ended.set()
 
@@ -410,7 +411,7 @@ class Container(Openable, Callbacks, State):
                 run = request(self)
         finally:
             REQUESTING.reset(token)
-        if run is not None:
+        if run is not None and run.pending:
             run.flush()
 
     _smachpy_request_preempt: ClassVar[object] = request_preempt

@@ -18,13 +18,13 @@ from smachpy.machines.container import Container
 from smachpy.machines.names import name_of
 from smachpy.machines.old_states import as_state
 from smachpy.machines.problems import Problems
-from smachpy.machines.spec import ChildSpec, LoopSpec
 from smachpy.machines.state import DataOf
-from smachpy.machines.validate import loop_problems
+from smachpy.machines.validate import ChildSpec, LoopSpec, loop_problems
 from smachpy.run.callback import call_bounded
 from smachpy.run.child import ContainerData
+from smachpy.run.grace import end_visit, unknown_outcome
 from smachpy.run.interrupt import Interruption
-from smachpy.run.runner import end_visit, run_watched, unknown_outcome, user_error
+from smachpy.run.runner import run_watched, user_error
 from smachpy.run.visit import End, Why
 from smachpy.slips import accepting
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-import math
+from threading import TIMEOUT_MAX
 from typing import (
     TYPE_CHECKING,
     Any,
@@ -22,9 +22,9 @@ from smachpy.exceptions import InvalidStateError
 from smachpy.introspection import Structure
 from smachpy.machines.names import name_of, unique_names
 from smachpy.machines.problems import Problems, as_number, unknown_arguments
-from smachpy.run.child import StateData, mark_preempt, on_preempt
+from smachpy.run.child import StateData, on_preempt
 from smachpy.run.frame import clock_of_run, current_scope
-from smachpy.run.grace import PreemptNotice, note_serviced
+from smachpy.run.grace import PreemptNotice, mark_preempt, note_serviced
 from smachpy.run.options import NAMES, NO_OPTIONS, Options, Retry, changed
 from smachpy.run.origin import REQUESTING
 from smachpy.run.runner import runner_of
@@ -239,12 +239,6 @@ class State:
 
     _smachpy_request_preempt: ClassVar[object] = request_preempt
 
-    def _smachpy_has_own_request(self) -> bool:
-        """Tell whether `request_preempt` is the user's."""
-        kind = type(self)
-        own = kind.request_preempt is not kind._smachpy_request_preempt
-        return own or "request_preempt" in vars(self)
-
     def service_preempt(self) -> None:
         """Say that the request was answered; the machine follows the outcome then."""
         if self._preempt_requested:
@@ -432,7 +426,7 @@ def _is_hook(kind: type, name: str, count: int) -> bool:
 
 def _wait_preempt(state: State, argument: str, seconds: float | None) -> bool:
     """Wait for a preempt of `state`, at most `seconds`; tell whether there is one."""
-    if seconds is not None and not (type(seconds) is float and 0.0 <= seconds < math.inf):
+    if seconds is not None and not (type(seconds) in {float, int} and 0 <= seconds <= TIMEOUT_MAX):
         problems = Problems(current_path() or type(state).__name__)
         number = as_number(seconds)
         past = number is not None and number < 0  # a deadline that is over

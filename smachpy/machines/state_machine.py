@@ -20,21 +20,18 @@ from smachpy.machines.container import Container
 from smachpy.machines.names import unique_names
 from smachpy.machines.old_states import adopt_slips, as_state
 from smachpy.machines.problems import Problems
-from smachpy.machines.spec import ChildSpec, MachineSpec
 from smachpy.machines.state import DataOf, Shown
-from smachpy.machines.validate import machine_problems
+from smachpy.machines.validate import ChildSpec, MachineSpec, machine_problems
 from smachpy.run.child import ContainerData
 from smachpy.run.frame import SUBSCRIPTIONS
-from smachpy.run.grace import forget_visit, request_soon
+from smachpy.run.grace import end_visit, forget_visit, request_soon, unknown_outcome
 from smachpy.run.interrupt import Interruption
 from smachpy.run.origin import asking
 from smachpy.run.runner import (
-    end_visit,
     only_tape,
     publish_left,
     publish_raised,
     run_watched,
-    unknown_outcome,
     user_error,
 )
 from smachpy.run.visit import PREEMPTED, End, Why
@@ -306,17 +303,18 @@ class StateMachine(Container):
 
     def find_problems(self, where: str) -> tuple[str, ...]:
         """Return what is wrong with this machine itself."""
-        if not self._states and type(self).execute is not Container.execute:
+        data = self._smachpy
+        if not data.children and type(self).execute is not Container.execute:
             return ()  # its own `execute` says what it does
-        initial = self._smachpy.next_initial or self._smachpy.initial
-        outcomes = self.get_registered_outcomes()
-        spec = MachineSpec(where, outcomes, tuple(self.__child_specs()), initial)
+        initial = data.next_initial or data.initial
+        spec = MachineSpec(where, data.outcomes, tuple(self.__child_specs()), initial)
         return machine_problems(spec)
 
     def __child_specs(self) -> Iterable[ChildSpec]:
-        for label, state in self._smachpy.children.items():
-            outcomes = tuple(state.get_registered_outcomes())
-            yield ChildSpec(label, outcomes, tuple(self._smachpy.transitions[label].items()))
+        data = self._smachpy
+        for label, state in data.children.items():
+            transitions = tuple(data.transitions[label].items())
+            yield ChildSpec(label, state._smachpy.outcomes, transitions)
 
     def describe_structure(self) -> Structure:
         """Return the children and the edges between them."""
@@ -354,7 +352,7 @@ class StateMachine(Container):
         following: Following = plan.steps[label]
         while not following.final:
             try:
-                following = self.__loop(frame, following)
+                following = self.__loop(frame, following, data)
             except Interruption:
                 if frame.dead:
                     raise
@@ -369,13 +367,13 @@ class StateMachine(Container):
             log.loginfo(f"{frame.path}: {frame.step.label!r} ended it with {outcome!r}")
         return outcome
 
-    def __loop(self, frame: Frame, step: Step) -> End:
+    def __loop(self, frame: Frame, step: Step, data: MachineData) -> End:
         """Run step after step; return how the machine ends, with the last step in the frame.
 
         This is the hot path. While nobody watches, waits or asks for a preempt, a transition is
         one call, one look-up and a few flags.
         """
-        run, data = frame.run, self._smachpy
+        run = frame.run
         while True:
             frame.step = step  # first the mark, then the look: see `smachpy.run.grace.ask`
             if (

@@ -99,13 +99,15 @@ class Feed:
         self._session = node.transport.session_id
         self._node = node
         self._values = serve_values(server_name, machine, path, node)
+        self._is_open = False  # the history may be asked for before the events are offered
+        self._tape = machine.tape(self._on_news, limit=QUEUED_EVENTS, name=path)
         self._history = Service(
             server_name + HISTORY_SERVICE, Trigger, self._answer, node=node, alone=False
         )
         self._events = Publisher(
             server_name + EVENTS_TOPIC, String, node=node
         )  # viewers find machines by it
-        self._tape = machine.tape(self._on_news, limit=QUEUED_EVENTS, name=path)
+        self._is_open = True
 
     def close(self) -> None:
         """Send the events that still wait, then leave the topics.
@@ -138,7 +140,7 @@ class Feed:
         """Encode new events; return path -> kind of its newest event."""
         kinds: dict[str, str] = {}
         with self._lock:
-            wanted = self._events.get_num_connections() > 0
+            wanted = self._is_open and self._events.get_num_connections() > 0
             for record in self._tape.read():
                 kinds[record["path"]] = record["kind"]
                 if record["kind"] == Started.__name__:

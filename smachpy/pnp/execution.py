@@ -11,10 +11,10 @@ from smachpy.exceptions import SmachError
 from smachpy.pnp.actions import take_apart
 from smachpy.run.branches import ChildBranch, Group
 from smachpy.run.child import on_preempt
-from smachpy.run.grace import ask_child
+from smachpy.run.grace import ask_child, end_visit, unknown_outcome
 from smachpy.run.interrupt import Interruption
 from smachpy.run.origin import asking
-from smachpy.run.runner import end_visit, run_watched, unknown_outcome, user_error
+from smachpy.run.runner import run_watched, user_error
 from smachpy.run.visit import Why
 
 if TYPE_CHECKING:

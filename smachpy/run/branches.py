@@ -11,9 +11,9 @@ from actionlib_core.clock import RealClock
 from smachpy.context import THREAD
 from smachpy.exceptions import InvalidUserCodeError
 from smachpy.run.frame import Frame
-from smachpy.run.grace import Visit, ask, outcome_left
+from smachpy.run.grace import Visit, ask, end_visit, outcome_left
 from smachpy.run.interrupt import Interruption
-from smachpy.run.runner import ChildErrors, end_visit, run_watched
+from smachpy.run.runner import ChildErrors, run_watched
 from smachpy.run.visit import Event, Phase, Why
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class Branch(Frame):
             failure = error
         while True:
             try:
-                if self.visit is not None:
+                if self.visit is not None and self.visit.override_call is not None:
                     self.visit.settle()
                 self.end(outcome, failure)
             except Interruption:  # on its way when the child ended; `end` has done nothing yet

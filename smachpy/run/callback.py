@@ -7,7 +7,7 @@ own, whose visit goes through the table of `smachpy.run.visit` as that of a leaf
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from smachpy.machines.names import name_of
 from smachpy.run.child import StateData
@@ -36,11 +36,10 @@ class _Code:
     def request_preempt(self) -> None:
         """Nothing: a function cannot be told."""
 
+    _smachpy_request_preempt: ClassVar[object] = request_preempt
+
     def _smachpy_grace(self, inherited: Any) -> Any:
         return inherited
-
-    def _smachpy_has_own_request(self) -> bool:
-        return False
 
 
 class CallbackFrame(Frame):

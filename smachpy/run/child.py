@@ -169,6 +169,7 @@ class Child(Protocol):
     """What running a state needs of it."""
 
     _preempt_requested: bool
+    _smachpy_request_preempt: ClassVar[object]
 
     @property
     def _smachpy(self) -> StateData: ...
@@ -183,7 +184,6 @@ class Child(Protocol):
         """Ask it to stop; may be the user's."""
 
     def _smachpy_grace(self, inherited: Any) -> Any: ...
-    def _smachpy_has_own_request(self) -> bool: ...
 
 
 class Parent(Child, Protocol):
@@ -203,23 +203,6 @@ class Parent(Child, Protocol):
     def get_children(self) -> Mapping[str, Any]:
         """Return label -> child."""
         ...
-
-
-def mark_preempt(state: Child) -> None:
-    """Set the flag of `state` and call what waits for it.
-
-    Raises:
-        Exception: the first one that a callback raised, after all were called.
-    """
-    state._preempt_requested = True
-    failure: Exception | None = None
-    for callback in tuple(state._smachpy.preempt_callbacks):
-        try:
-            callback()
-        except Exception as error:  # noqa: BLE001  raised below: the others are called too
-            failure = failure or error
-    if failure is not None:
-        raise failure
 
 
 def on_preempt(state: Child, callback: Callable[[], object]) -> Callable[[], None]:

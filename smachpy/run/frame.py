@@ -199,6 +199,7 @@ class Frame:
         self.run = parent.run
         self.first = parent.first
         self.step = None
+        self.visit = None  # read at every step: on the instance that is three times as fast
         self._above = parent.step  # what the parent runs while this frame lives: this container
 
     @property
@@ -231,10 +232,6 @@ class Frame:
     def waits_for(self) -> Group | None:
         """Return the branches that must end before what runs here is left behind; None: none."""
         return None
-
-    def is_asked(self) -> bool:
-        """Tell whether the container itself was asked to stop, not only what runs in it."""
-        return self.container._preempt_requested
 
     def running(self) -> Sequence[Frame]:
         """Return the frames that run a child each: this one, or those of a concurrence."""

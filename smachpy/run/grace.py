@@ -8,21 +8,30 @@ thread of its own. Graces end on the clock's thread, which waits for no listener
 
 from __future__ import annotations
 
+import inspect
 import sys
 import threading
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from smachpy.context import current_frame, current_path
-from smachpy.events import Abandoned, Finished, Left, PreemptRequested, PreemptServiced, TimedOut
-from smachpy.run.child import mark_preempt
+from smachpy.events import (
+    Abandoned,
+    Finished,
+    Left,
+    OutcomeForced,
+    PreemptRequested,
+    PreemptServiced,
+    TimedOut,
+)
+from smachpy.exceptions import InvalidTransitionError, did_you_mean
 from smachpy.run.frame import clock_of_run
 from smachpy.run.interrupt import Interruption, interrupt, take_back
 from smachpy.run.origin import REQUESTING, asking, current_origin
-from smachpy.run.visit import IS_ASKED, STEPS, Effect, Event, Phase
+from smachpy.run.visit import IS_ASKED, STEPS, Decision, Effect, Event, Phase, Why, after
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from actionlib_core.clock import Task, Timer
     from smachpy.run.child import Child, Parent
@@ -45,17 +54,18 @@ class Visit:
         serviced: It has said that it takes the request up.
         timeout: Its own timeout [s], when that has passed.
         override: What an operator wants instead of its outcome.
+        override_call: Its own `request_preempt`, which is running or has run.
     """
 
     __slots__ = (
         "_frame",
         "_injected",
-        "_override_call",
         "_patience",
         "_timer",
         "_timer_number",
         "by_timeout",
         "override",
+        "override_call",
         "phase",
         "serviced",
         "step",
@@ -71,7 +81,7 @@ class Visit:
         self.override: Override | None = None
         self._frame = frame
         self._injected = 0  # thread to which an interruption is on its way
-        self._override_call: Task | None = None
+        self.override_call: Task | None = None
         self._patience = PATIENCE_S
         self._timer: Timer | None = None
         self._timer_number = 0
@@ -102,20 +112,21 @@ class Visit:
 
     def service(self) -> None:
         """Publish, once, that the child takes its request up."""
-        frame = self._frame
-        with frame.run.lock:
+        run = self._frame.run
+        with run.lock:
             if not self.serviced and self.is_asked():
                 self.serviced = True
                 self.happen(Event.SERVICE)
-        frame.run.flush()
+        if run.pending:
+            run.flush()
 
     def settle(self) -> None:
         """Wait until the own `request_preempt` of the child that has ended has returned too.
 
         Else it might meet the child's next visit. One that blocks is left behind.
         """
-        frame, task = self._frame, self._override_call
-        self._override_call = None
+        frame, task = self._frame, self.override_call
+        self.override_call = None
         if task is None or frame.dead:
             return
         try:
@@ -130,18 +141,15 @@ class Visit:
 
     # -- the effects of the table --------------------------------------------------------------
 
-    def _path(self) -> str:
-        return self._frame.here()
-
     def _publish_timed_out(self) -> None:
-        self._frame.note(self._path(), TimedOut, self.timeout)
+        self._frame.note(self._frame.here(), TimedOut, self.timeout)
 
     def _publish_request(self) -> None:
         frame = self._frame
         if frame.run.watched:
             is_container = self.step.state._smachpy_is_container
             grace = None if is_container else grace_of(frame, self.step.state)
-            frame.note(self._path(), PreemptRequested, *current_origin(), grace)
+            frame.note(frame.here(), PreemptRequested, *current_origin(), grace)
 
     def _tell(self) -> None:
         state: Any = self.step.state
@@ -151,15 +159,16 @@ class Visit:
             else:
                 mark_preempt(state)
         except Exception as error:  # noqa: BLE001  its siblings are told all the same
-            self._frame.note_failure(self._path(), state.request_preempt, error)
+            self._frame.note_failure(self._frame.here(), state.request_preempt, error)
 
     def _call_override(self) -> None:
-        state, frame, path = self.step.state, self._frame, self._path()
-        if REQUESTING.get() is state or not state._smachpy_has_own_request():
+        state, frame = self.step.state, self._frame
+        if not has_own_request(state) or REQUESTING.get() is state:
             return
+        path = frame.here()
         call = partial(call_override, state, frame, path)
         try:
-            self._override_call = frame.run.clock.spawn(call, name=f"request_preempt of {path}")
+            self.override_call = frame.run.clock.spawn(call, name=f"request_preempt of {path}")
         except Exception as error:  # noqa: BLE001  no thread, for one: told, as what it raises is
             frame.note_failure(path, state.request_preempt, error)
 
@@ -170,12 +179,12 @@ class Visit:
             self._start_timer(grace, Event.GRACE_OVER)
 
     def _publish_serviced(self) -> None:
-        self._frame.note(self._path(), PreemptServiced)
+        self._frame.note(self._frame.here(), PreemptServiced)
 
     def _publish_abandoned(self) -> None:
         frame, clock = self._frame, self._frame.run.clock
         grace = grace_of(frame, self.step.state)
-        path, described = self._path(), frame.described()
+        path, described = frame.here(), frame.described()
         now = clock.now(), clock.time_ns()
         lines = lines_of(frame.first.thread)
         subscribers = frame.find_subscribers() if frame.run.watched else None  # before it is dead
@@ -298,6 +307,30 @@ class Visit:
 # -- asking --------------------------------------------------------------------------------------
 
 
+def mark_preempt(state: Child) -> None:
+    """Set the flag of `state` and call what waits for it.
+
+    Raises:
+        Exception: the first one that a callback raised, after all were called.
+    """
+    state._preempt_requested = True
+    failure: Exception | None = None
+    for callback in tuple(state._smachpy.preempt_callbacks):
+        try:
+            callback()
+        except Exception as error:  # noqa: BLE001  raised below: the others are called too
+            failure = failure or error
+    if failure is not None:
+        raise failure
+
+
+def has_own_request(state: Child) -> bool:
+    """Tell whether `request_preempt` is the user's."""
+    kind: Any = type(state)
+    own = kind.request_preempt is not kind._smachpy_request_preempt
+    return own or "request_preempt" in vars(state)
+
+
 def ask(frame: Frame, step: Any = None, *, timeout: float | None = None) -> bool:
     """Ask what runs in `frame` to stop; with the run's lock held.
 
@@ -357,7 +390,8 @@ def pass_on(container: Parent) -> None:
             mark_preempt(container)  # first the mark, then the look: see `Container._run`
         finally:
             if data.frame is not None and (data.callback is None or data.frame.group is not None):
-                for each in data.frame.running():  # a child that comes after a callback is not told
+                group = data.frame.group  # a child that comes after a callback is not told
+                for each in (data.frame,) if group is None else group.running():
                     ask(each)
             if data.callback is not None:
                 ask(data.callback)
@@ -412,7 +446,7 @@ def request_soon(container: Parent, only: Frame | None = None) -> None:
     """
     run = request(container, only)
     data = container._smachpy
-    if data.root is None and container._smachpy_has_own_request():
+    if data.root is None and has_own_request(container):
         clock = clock_of_run() if run is None else run.clock
         name = f"request_preempt of /{container.name or 'SM_ROOT'}"
         clock.spawn(partial(call_override, container, data.frame, ""), name=name)
@@ -495,7 +529,71 @@ def forget_visit(frame: Frame) -> None:
             return
         frame.visit = None
         visit.happen(Event.END)
-    visit.settle()
+    if visit.override_call is not None:
+        visit.settle()
+
+
+# -- its end -----------------------------------------------------------------------------------
+
+
+def end_visit(frame: Frame, outcome: Any) -> Decision:
+    """End the visit of what `frame` runs, which ended with `outcome`, and decide what comes now.
+
+    Called when somebody may have asked it, or its container, to stop. The frame's `answered` says
+    afterwards whether the container's own request was taken up.
+
+    Raises:
+        InvalidTransitionError: it has no such outcome.
+        Interruption: its thread was left behind meanwhile.
+    """
+    step = frame.step
+    state: Child = step.state
+    with frame.run.lock:  # whoever passes a request on is done after this
+        if frame.dead:
+            raise Interruption
+        visit = frame.visit
+        if visit is not None and visit.step is not step:  # it was for the one before
+            forget_visit(frame)
+            visit = None
+        answered = visit is not None and visit.has_answered(outcome)
+        asked = state._preempt_requested or (visit is not None and visit.is_asked())
+        override = None if visit is None else visit.override
+        if visit is not None:
+            visit.happen(Event.END)
+        frame.visit = None
+        state._preempt_requested = False
+        run_asked = frame.container._preempt_requested
+        if asked or run_asked:
+            decision = after(
+                outcome, step.next, run_asked=run_asked, answered=answered, override=override
+            )
+        else:
+            target = step.next.get(outcome) if isinstance(outcome, str) else None
+            decision = Decision(Why.UNKNOWN if target is None else Why.FOLLOWED, target)
+        frame.answered = answered
+        if decision.why is Why.ANSWERED:
+            frame.container._preempt_requested = frame.answered = False
+    if visit is not None and visit.override_call is not None:
+        visit.settle()
+    if decision.why is Why.UNKNOWN:
+        raise unknown_outcome(step.path_in(frame), state._smachpy.outcomes, outcome) from None
+    if decision.why is Why.FORCED and override is not None:
+        frame.emit(OutcomeForced, override.outcome)
+    return decision
+
+
+def unknown_outcome(path: str, outcomes: Iterable[str], got: object) -> InvalidTransitionError:
+    """Return the error for a child that returned none of its outcomes."""
+    known = sorted(outcomes)
+    hint = did_you_mean(got, known) if isinstance(got, str) else ""
+    if got is None:
+        hint = " Try a `return` at the end of every way through execute."
+    elif inspect.iscoroutine(got):
+        got.close()
+        hint = " Try `async def execute`, or `await` it."
+    return InvalidTransitionError(
+        f"{path}: unknown outcome: got {got!r}; expected one of {known}.{hint}"
+    )
 
 
 # -- graces --------------------------------------------------------------------------------------

@@ -67,11 +67,12 @@ def _execute_root(
 
     Blocks: until it has ended.
     """
-    stop = _Stop(root, shutdown.current_shutdown())
-    forget = shutdown.on_shutdown(stop)
+    ending = shutdown.current_shutdown()
+    stop = _Stop(root, ending)
+    forget = ending.on_shutdown(stop)
     signals: _Signals | None = None
     try:
-        if shutdown.requested():
+        if ending.requested():
             stop()
         top = Root(root, execute, options, parent_ud)
         if threading.current_thread() is threading.main_thread():
@@ -105,10 +106,6 @@ class Root(Branch):
         self.run = Run(current_clock())
         self.step = Step(root.name or "SM_ROOT", root, parent_ud, runner_of(root, options, execute))
         self._done: Event | None = None
-
-    def is_asked(self) -> bool:
-        """The invisible top itself is never asked."""
-        return False
 
     def run_in_thread(self) -> str:
         """Run the root in a thread that can be left behind."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import os
 from typing import TYPE_CHECKING, Any, Final
 
@@ -10,24 +9,22 @@ import actionlib_core
 from actionlib_core import shutdown
 from smachpy import slips
 from smachpy.context import current_frame
-from smachpy.events import Entered, Failed, Left, OutcomeForced, Retried
+from smachpy.events import Entered, Failed, Left, Retried
 from smachpy.exceptions import (
-    InvalidTransitionError,
     InvalidUserCodeError,
-    did_you_mean,
 )
 from smachpy.machines.names import name_of
 from smachpy.run.callback import call_bounded
 from smachpy.run.child import on_preempt
 from smachpy.run.frame import SUBSCRIPTIONS, clock_of_run
-from smachpy.run.grace import ask, forget_visit, request_soon
+from smachpy.run.grace import ask, request_soon
 from smachpy.run.interrupt import Interruption, ProgramEnds
 from smachpy.run.origin import asking, shutdown_asking
-from smachpy.run.visit import Again, Decision, Event, Why, after, after_attempt
+from smachpy.run.visit import Again, Event, after_attempt
 
 if TYPE_CHECKING:
     import asyncio
-    from collections.abc import Callable, Coroutine, Iterable
+    from collections.abc import Callable, Coroutine
 
     from actionlib_core.clock import Timer
     from smachpy.events.tape import Tape
@@ -387,55 +384,6 @@ def only_tape(frame: Frame) -> Tape | None:
     return subscribers.tape
 
 
-# -- its end -----------------------------------------------------------------------------------
-
-
-def end_visit(frame: Frame, outcome: Any) -> Decision:
-    """End the visit of what `frame` runs, which ended with `outcome`, and decide what comes now.
-
-    Called when somebody may have asked it, or its container, to stop. The frame's `answered` says
-    afterwards whether the container's own request was taken up.
-
-    Raises:
-        InvalidTransitionError: it has no such outcome.
-        Interruption: its thread was left behind meanwhile.
-    """
-    step = frame.step
-    state: Child = step.state
-    with frame.run.lock:  # whoever passes a request on is done after this
-        if frame.dead:
-            raise Interruption
-        visit = frame.visit
-        if visit is not None and visit.step is not step:  # it was for the one before
-            forget_visit(frame)
-            visit = None
-        answered = visit is not None and visit.has_answered(outcome)
-        asked = state._preempt_requested or (visit is not None and visit.is_asked())
-        override = None if visit is None else visit.override
-        if visit is not None:
-            visit.happen(Event.END)
-        frame.visit = None
-        state._preempt_requested = False
-        run_asked = frame.is_asked()
-        if asked or run_asked:
-            decision = after(
-                outcome, step.next, run_asked=run_asked, answered=answered, override=override
-            )
-        else:
-            target = step.next.get(outcome) if isinstance(outcome, str) else None
-            decision = Decision(Why.UNKNOWN if target is None else Why.FOLLOWED, target)
-        frame.answered = answered
-        if decision.why is Why.ANSWERED:
-            frame.container._preempt_requested = frame.answered = False
-    if visit is not None:
-        visit.settle()
-    if decision.why is Why.UNKNOWN:
-        raise unknown_outcome(step.path_in(frame), state._smachpy.outcomes, outcome) from None
-    if decision.why is Why.FORCED and override is not None:
-        frame.emit(OutcomeForced, override.outcome)
-    return decision
-
-
 # -- what goes wrong ---------------------------------------------------------------------------
 
 
@@ -447,18 +395,4 @@ def user_error(path: str, state: Child, error: BaseException) -> InvalidUserCode
     """Return the error for code of a state that raised; raise it `from error`."""
     return InvalidUserCodeError(
         f"{path}: {type(state).__name__} raised {type(error).__name__}: {error}", path=path
-    )
-
-
-def unknown_outcome(path: str, outcomes: Iterable[str], got: object) -> InvalidTransitionError:
-    """Return the error for a child that returned none of its outcomes."""
-    known = sorted(outcomes)
-    hint = did_you_mean(got, known) if isinstance(got, str) else ""
-    if got is None:
-        hint = " Try a `return` at the end of every way through execute."
-    elif inspect.iscoroutine(got):
-        got.close()
-        hint = " Try `async def execute`, or `await` it."
-    return InvalidTransitionError(
-        f"{path}: unknown outcome: got {got!r}; expected one of {known}.{hint}"
     )

@@ -208,14 +208,12 @@ class Why(Enum):
     UNKNOWN = "the child has no such outcome"
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class End:
     """The container ends with this outcome."""
 
-    __slots__ = ("outcome",)
+    outcome: str
     final: ClassVar[Literal[True]] = True
-
-    def __init__(self, outcome: str) -> None:
-        self.outcome = outcome
 
 
 PREEMPTED = End("preempted")

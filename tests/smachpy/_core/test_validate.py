@@ -7,8 +7,15 @@ from hypothesis import strategies as st
 
 import smachpy
 from smachpy.machines.rules import all_of, any_of
-from smachpy.machines.spec import ChildSpec, ConcurrenceSpec, LoopSpec, MachineSpec
-from smachpy.machines.validate import concurrence_problems, loop_problems, machine_problems
+from smachpy.machines.validate import (
+    ChildSpec,
+    ConcurrenceSpec,
+    LoopSpec,
+    MachineSpec,
+    concurrence_problems,
+    loop_problems,
+    machine_problems,
+)
 
 NAMES = st.sampled_from(["a", "b", "c", "A", "B", "C", "preempted"])
 OUTCOMES = st.lists(NAMES, max_size=3, unique=True).map(tuple)
