@@ -11,8 +11,9 @@
     GET  /api/why             why the newest run of a machine ended so
     GET  /api/compare         a machine and another one in one drawing
     GET  /api/value           a value of userdata as it is now, whole
+    GET  /api/question        the picture of a question that a state asks
     GET  /api/action          what a form for a goal of an action needs
-    POST /api/control         a command
+    POST /api/control         a command, or the answer to a question
     POST /api/action          check or send a goal, or cancel one
 
 Nothing here holds up a machine: a page is sent what it has not seen yet when it can take it, and
@@ -98,6 +99,8 @@ class Viewer:
         hosts: Names that the server goes by, besides addresses.
         actions: On the network, for the page that sends goals; None shows none.
         value: Asks a machine for a value of its userdata, by name, container and key; blocks.
+        picture: Asks a machine for the picture of a question, by name and path: media type and
+            bytes; blocks.
     """
 
     def __init__(
@@ -111,7 +114,9 @@ class Viewer:
         hosts: tuple[str, ...] = (),
         actions: Actions | None = None,
         value: Callable[[str, str, str], str] | None = None,
+        picture: Callable[[str, str], tuple[str, bytes] | None] | None = None,
     ) -> None:
+        self._picture_of = picture
         self._machines = machines
         self._value = value
         self._actions = actions
@@ -139,6 +144,7 @@ class Viewer:
                 Route("/api/why", self._why),
                 Route("/api/compare", self._compare),
                 Route("/api/value", self._whole_value),
+                Route("/api/question", self._question_picture),
                 Route("/api/control", self._control, methods=["POST"]),
                 Route("/api/action", self._action, methods=["GET"]),
                 Route("/api/action", self._command_action, methods=["POST"]),
@@ -253,6 +259,17 @@ class Viewer:
         except SmachError as error:
             return Json({"ok": False, "text": str(error)}, status_code=409)
         return Json({"ok": True, "text": text})
+
+    async def _question_picture(self, request: Request) -> Response:
+        machine = self._asked(request)
+        if machine is None or self._picture_of is None:
+            return _unknown(request)
+        path = request.query_params.get("path", "")
+        try:
+            found = await run_in_threadpool(self._picture_of, machine.name, path)
+        except SmachError as error:
+            return PlainTextResponse(str(error), status_code=409)
+        return _unknown(request) if found is None else Response(found[1], media_type=found[0])
 
     async def _picture(self, request: Request) -> Response:
         machine = self._asked(request)

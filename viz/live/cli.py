@@ -119,6 +119,7 @@ def _serve(
         hosts=(args.host,),
         actions=actions,
         value=network.value,
+        picture=network.picture,
     )
     server = PageServer(viewer, args.host, args.port)
     print(server.address + (f"#token={token}" if token else ""), flush=True)

@@ -191,6 +191,11 @@ class Machine:
         with self._lock:
             return self._now.active()
 
+    def questions(self) -> dict[str, dict[str, Any]]:
+        """Return path -> question of those that wait for an answer, the oldest first."""
+        with self._lock:
+            return self._now.questions()
+
     def facts(self) -> dict[str, Any]:
         """Return what is known of the machine besides its events."""
         with self._lock:
@@ -208,6 +213,7 @@ class Machine:
                 "started": run["started"],
                 "ended": run["ended"],
                 "outcome": run["outcome"],
+                "questions": len(self._now.questions()),
             }
 
     def _facts(self) -> dict[str, Any]:

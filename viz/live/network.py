@@ -25,6 +25,7 @@ from smachpy.introspection import StateRecord
 from smachpy.network.feed import DESCRIPTION_TOPIC, EVENTS_TOPIC, HISTORY_SERVICE
 from smachpy.network.remote_control import STATE_TOPIC, CommandError, ControlClient
 from smachpy.network.values import VALUE_SERVICE, ReadValue
+from smachpy.states.questions import fetch_picture, give_answer
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -110,6 +111,8 @@ class Network:
         Blocks: until the answer, some seconds at most.
         """
         link = self._link(name)
+        if command.get("command") == "answer":  # a service of the question: it reaches no twin
+            return link.answer(command)
         with self._lock:
             links = list(self._links.values())
         twins = [one for one in links if one.alive and one.is_twin(link)]
@@ -129,6 +132,16 @@ class Network:
         Blocks: until the answer, some seconds at most.
         """
         return self._link(name).value(container, key)
+
+    def picture(self, name: str, path: str) -> tuple[str, bytes] | None:
+        """Return media type and bytes of the picture of a question; None when there is none.
+
+        Raises:
+            CommandError: no such machine.
+
+        Blocks: until it has come, some seconds at most.
+        """
+        return self._link(name).picture(path)
 
     def _link(self, name: str) -> Link:
         with self._lock:
@@ -249,6 +262,25 @@ class Link:
         if self._client is None:
             raise CommandError(f"{self.server}: this viewer only looks. Try --control.")
         return self._client.send(command)
+
+    def answer(self, command: dict[str, Any]) -> dict[str, Any]:
+        """Answer a question of the machine, whether it takes other commands or not."""
+        words = [command.get(name) for name in ("path", "answer", "by")]
+        if not all(isinstance(word, str) for word in words):
+            raise CommandError(
+                f"command 'answer': got {command}; expected path, answer, by as texts."
+            )
+        path, answer, by = map(str, words)
+        question = self._machine.questions().get(path)
+        if question is None:
+            raise CommandError(f"{path}: answer: got {answer!r}; nobody asks that any more.")
+        give_answer(question["service"], answer, by, node=self._node)
+        return {"ok": True, "text": ""}
+
+    def picture(self, path: str) -> tuple[str, bytes] | None:
+        """Return media type and bytes of the picture of a question; None when there is none."""
+        question = self._machine.questions().get(path)
+        return None if question is None else fetch_picture(question["service"], node=self._node)
 
     def value(self, container: str, key: str) -> str:
         """Return a value of the machine's userdata, whole."""

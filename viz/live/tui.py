@@ -18,11 +18,12 @@ from smachpy.events.run_state import RunState
 from smachpy.exceptions import SmachError
 from smachpy.outcome_classes import outcome_class
 from viz.model.labels import GLYPHS, shorten
-from viz.terminal.lines import STYLES
+from viz.terminal.lines import STYLES, answered
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from textual import events
     from textual.widgets.tree import TreeNode
 
     from smachpy.introspection import StateRecord
@@ -42,6 +43,7 @@ STRIDE = 1000
 LOGGED = {
     *("Started", "Finished", "Left", "Failed", "GoalDone", "Retried"),
     *("PreemptRequested", "PreemptServiced", "Abandoned"),
+    *("QuestionAsked", "QuestionAnswered"),
 }
 
 
@@ -57,6 +59,7 @@ class MissionApp(App[None]):
     CSS = """
     #status { height: 1; background: $panel; padding: 0 1; }
     #preempt { height: auto; max-height: 6; background: $warning 20%; padding: 0 1; }
+    #question { height: auto; max-height: 9; border: round $accent; padding: 0 1; }
     #left { width: 45%; } Tree { height: 1fr; } #search { display: none; dock: bottom; }
     #goals { height: auto; max-height: 9; padding: 0 1; } DataTable { height: 1fr; }
     RichLog { height: 1fr; border-top: solid $panel; }
@@ -90,11 +93,13 @@ class MissionApp(App[None]):
         self._state = RunState()
         self._places: dict[str, TreeNode[StateRecord]] = {}
         self._follow = True
+        self._rung: set[str] = set()  # services of the questions that were heard of
 
     def compose(self) -> ComposeResult:
         """Lay the widgets out."""
         yield Static(id="status")
         yield Static(id="preempt")
+        yield Static(id="question")
         with Horizontal():
             with Vertical(id="left"):
                 yield Tree[Any]("no machine yet", id="tree")
@@ -130,6 +135,7 @@ class MissionApp(App[None]):
             ended = events
         now = events[-1]["stamp_ns"] if ended else time.time_ns() - (machine.behind or 0)
         self._draw_preempt(now)
+        self._draw_question(machine, now)
         self._draw_tree(now)
         self._draw_goals()
 
@@ -266,6 +272,34 @@ class MissionApp(App[None]):
             lines.append(", cleaning up" if state["serviced"] else "", "dim")
         widget.update(lines)
 
+    def _question(self) -> tuple[str, dict[str, Any]] | None:
+        """Path and question of what is asked first."""
+        return next(iter(self._state.questions().items()), None)
+
+    def _draw_question(self, machine: Machine, now: int) -> None:
+        """What the mission asks, the answers with their keys, and how long it waits."""
+        widget = self.query_one("#question", Static)
+        found = None if machine.recorded or machine.stale is not None else self._question()
+        widget.display = found is not None
+        if found is None:
+            return
+        path, question = found
+        if question["service"] not in self._rung:
+            self._rung.add(question["service"])
+            self.bell()
+        left = max(0.0, question["patience"] - (now - question["asked"]) / 1e9)
+        lines = Text.assemble(
+            ("? ", "bold magenta"),
+            (shorten(question["text"], 300), "bold"),
+            (f"  {_name(path)}", "dim"),
+        )
+        pairs = zip(question["answers"], question["words"], strict=False)
+        for number, (answer, words) in enumerate(pairs, 1):
+            lines.append(f"\n {number} ", "reverse")
+            lines.append(f" {shorten(words or answer, 60)}")
+        lines.append(f"\nno answer in {left:.0f} s means {shorten(question['default'], 40)}", "dim")
+        widget.update(lines)
+
     def _draw_tree(self, now: int) -> None:
         for path, node in self._places.items():
             if node.data is None:
@@ -378,13 +412,24 @@ class MissionApp(App[None]):
         if self._machine is not None:
             self._command(self._machine.name, "step")
 
+    async def on_key(self, event: events.Key) -> None:
+        """Answer the question by the number of an answer, unless somebody types in the search."""
+        found = self._question()
+        machine = self._machine
+        if found is None or machine is None or self.query_one("#search", Input).has_focus:
+            return
+        path, question = found
+        number = int(event.key) if event.key.isdecimal() else 0
+        if self._until is None and 1 <= number <= len(question["answers"]):
+            self._command(machine.name, "answer", path=path, answer=question["answers"][number - 1])
+
     @work(thread=True)
-    def _command(self, name: str, command: str) -> None:
+    def _command(self, name: str, command: str, **more: str) -> None:
         if self._send is None:
             self.call_from_thread(self._say, "this viewer only looks; try --control")
             return
         try:
-            answer = self._send(name, {"command": command, "by": f"terminal of {_user()}"})
+            answer = self._send(name, {"command": command, "by": f"terminal of {_user()}", **more})
             text = answer["text"] or f"{command}: done"
         except SmachError as error:
             text = str(error)
@@ -450,6 +495,10 @@ def _line(event: dict[str, Any]) -> Text:
     style = STYLES[outcome_class(str(words))]
     if event["kind"] == "PreemptRequested":
         words, style = f"asked to stop by {_asker(event)}", "yellow"
+    if event["kind"] == "QuestionAsked":
+        words, style = f"asks {event['text']}", "magenta"
+    if event["kind"] == "QuestionAnswered":
+        words, style = answered(event["answer"], event["by"]), "magenta"
     words = {
         "PreemptServiced": "preempt serviced",
         "Abandoned": "abandoned",

@@ -201,6 +201,7 @@ interface MachineSummary extends MachineFacts {
   started: number | null;
   ended: number | null;
   outcome: string | null;
+  questions?: number; // that wait for an answer
 }
 interface Snapshot extends MachineFacts {
   seq: number;

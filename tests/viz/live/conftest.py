@@ -199,6 +199,16 @@ def delivery(domain):
 
 
 @pytest.fixture(scope="module")
+def errand(domain):
+    """A mission that asks its operator again and again and takes no commands, and a viewer."""
+    robot = start_robot("--name", "errand", "--rate", 4, "--ask", 300)
+    view = View("--control")
+    yield view
+    view.end()
+    robot.end()
+
+
+@pytest.fixture(scope="module")
 def simulation(domain):
     """The simulated robot with its actions."""
     child = start_simulation()

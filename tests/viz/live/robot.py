@@ -1,7 +1,7 @@
 """A mission in a process of its own, for tests and measurements of the viewer.
 
     python robot.py [--name NAME] [--states N] [--rate HZ] [--runs N] [--control] [--hostile]
-                    [--stubborn SECONDS]
+                    [--stubborn SECONDS] [--ask SECONDS]
 
 Prints "ready" when it can be found; ends when its standard input ends.
 """
@@ -9,13 +9,18 @@ Prints "ready" when it can be found; ends when its standard input ends.
 from __future__ import annotations
 
 import argparse
+import base64
 import random
 import sys
 import threading
 
 from actionlib_core.node import Node, use_node
 from smachpy import CBState, Concurrence, IntrospectionServer, State, StateMachine
+from smachpy.states.ask_operator import AskOperator
 
+PNG = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
+)
 OUTCOMES = ["succeeded", "aborted", "preempted"]
 WORDS = ["TURN", "LIFT", "GRASP", "SCAN", "MOVE", "DOCK", "ALIGN", "READ", "PLACE", "CHECK"]
 
@@ -128,6 +133,21 @@ def hostile(pace, args):
     return sm
 
 
+def asking(pace, args):
+    """Asks again and again, with a picture."""
+    sm = StateMachine(outcomes=OUTCOMES, name="ERRAND")
+    question = AskOperator(
+        "Delivery to lab: may I hand it over?",
+        {"yes": "Yes, hand over", "no": "No, come back"},
+        patience=args.ask,
+        picture=lambda _userdata: PNG,
+    )
+    with sm:
+        StateMachine.add("GO", Work(pace), {"succeeded": "CONFIRM"})
+        StateMachine.add("CONFIRM", question, {"yes": "GO", "no": "GO", "no_answer": "aborted"})
+    return sm
+
+
 def large(pace, args):
     """A machine of about `states` states, all of which loop for ever."""
     rng = random.Random(args.seed)
@@ -183,6 +203,7 @@ def main():
     parser.add_argument("--rate", type=float, default=5.0)
     parser.add_argument("--seed", type=int, default=4)
     parser.add_argument("--stubborn", type=float, default=0.0)
+    parser.add_argument("--ask", type=float, default=0.0)
     parser.add_argument("--control", action="store_true")
     parser.add_argument("--hostile", action="store_true")
     args = parser.parse_args()
@@ -190,7 +211,7 @@ def main():
     def pace():
         return 1.0 / args.rate
 
-    make = hostile if args.hostile else large if args.states else small
+    make = hostile if args.hostile else large if args.states else asking if args.ask else small
     machine = make(pace, args)
     with Node("robot") as node, use_node(node):
         server = IntrospectionServer(

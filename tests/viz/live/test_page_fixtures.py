@@ -80,6 +80,7 @@ def test_events_add_up_to_a_state(case):
     for event in case["events"]:
         state.fold(event)
     assert state.data == case["state"]
+    assert list(state.questions()) == case.get("questions", [])
 
 
 def test_goals_that_ended_are_forgotten_in_the_order_in_which_they_were_sent():

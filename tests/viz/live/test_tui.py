@@ -287,3 +287,49 @@ def test_looking_back_at_few_events_begins_with_what_was_before_them(tmp_path, c
                 assert app._state.data == there.data, at
 
     asyncio.run(look())
+
+
+ASKED = {
+    "text": "Delivery to lab: may I hand it over?",
+    "answers": ["yes", "no"],
+    "words": ["Yes, hand over", ""],
+    "default": "no",
+    "patience": 60.0,
+    "service": "operator/questions/q1",
+    "has_picture": False,
+}
+WAITS = [("Started", "/JOB"), ("Entered", "/JOB/A"), ("QuestionAsked", "/JOB/A", ASKED)]
+
+
+def test_the_terminal_view_shows_a_question_and_takes_the_number_of_an_answer(served, clock):
+    served.add("one", events=[(kind, path, dict(*more)) for kind, path, *more in WAITS])
+    sent = []
+
+    def send(name, command):
+        sent.append((name, command))
+        return {"text": ""}
+
+    found = {}
+
+    async def look():
+        app = MissionApp(served.machines, send)
+        async with app.run_test(size=(100, 40)) as pilot:
+            app.refresh_view()
+            await pilot.pause()
+            found["question"] = str(app.query_one("#question", Static).render())
+            await pilot.press("slash", "1", "enter")  # typed in the search
+            await pilot.press("1")
+            await app.workers.wait_for_complete()
+
+    asyncio.run(look())
+    assert "Delivery to lab: may I hand it over?" in found["question"]
+    assert "1  Yes, hand over" in found["question"]
+    assert "means no" in found["question"]
+    ((name, command),) = sent
+    assert (name, command["command"], command["path"], command["answer"]) == (
+        "one",
+        "answer",
+        "/JOB/A",
+        "yes",
+    )
+    assert command["by"].startswith("terminal of ")

@@ -65,6 +65,7 @@ function App() {
     paused && "paused",
     store.cursor.value !== null && "past",
     store.treeOpen.value && "with-tree",
+    store.asksNow.value && "asks",
   ];
   return html`<div class=${classes.filter(Boolean).join(" ")}>
     <${TopBar} page=${page} />

@@ -79,6 +79,12 @@ export function control() {
   return hasToken() && store.connection.value === "live" && facts?.stale == null ? (facts?.control ?? null) : null;
 }
 
+/** Whether a question of the machine shown may be answered from this page, which needs no control of the mission. */
+export function canAnswer() {
+  const facts = store.facts.value;
+  return hasToken() && store.connection.value === "live" && facts?.stale == null && !facts?.recorded;
+}
+
 /** Show the machine of that name. @param {string} name */
 export function choose(name) {
   store.wanted.value = name;

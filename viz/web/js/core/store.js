@@ -64,6 +64,10 @@ export const theme = signal(saved("theme", "system"));
 /** @type {Signal<Set<string>>} */
 export const opened = signal(new Set()); // paths of containers
 export const help = signal(false);
+/** @type {Signal<boolean>} */
+export const sound = signal(saved("sound", true)); // when a question comes
+/** @type {Signal<string>} */
+export const operator = signal(saved("operator", "")); // the name under which answers are given
 export const tokenAsked = signal(false); // the viewer does not take the token that this page has
 /** @type {Signal<Why | null>} */
 export const why = signal(null); // why the run ended so, while that is shown
@@ -186,8 +190,10 @@ export const robotLag = new Lag();
 export const viewerLag = new Lag();
 
 /** The instant shown, on the robot's clock [ms since the epoch]. */
-export function nowMs() {
-  if (cursor.value !== null) return cursor.value;
+export const nowMs = () => cursor.value ?? liveMs();
+
+/** The newest instant there is, on the robot's clock [ms since the epoch]. */
+export function liveMs() {
   const ended = run.now.ended != null || facts.value?.stale != null || connection.value === "file";
   const lag = robotLag.value ?? (viewerLag.value ?? 0) + (ms(facts.value?.behind) ?? 0);
   const robot = Date.now() - lag;
@@ -256,10 +262,21 @@ export const runStatus = computed(() => {
   if (about.stale != null && data.ended == null) return { word: "stale", kind: "waiting" };
   if (connection.value === "lost") return { word: "reconnecting", kind: "waiting" };
   if (data.ended != null) return { word: `ended: ${data.outcome}`, kind: "done" };
+  if (asks(data)) return { word: "asks you", kind: "waiting" };
   if (about.control?.paused) return { word: pausedText(data), kind: "waiting" };
   if (data.states[model.value?.root.path ?? ""]?.preempt) return { word: "preempting", kind: "preempted" };
   if (data.started == null) return { word: "not started", kind: "other" };
   return { word: about.recorded ? "recording ends here" : "running", kind: "active" };
+});
+
+/** Whether a state waits for an answer. @param {RunState} data */
+const asks = (data) =>
+  Object.values(data.states).some(({ since, question }) => since != null && question?.answered === null);
+
+/** Whether the machine waits for an answer now, whatever instant is looked at. */
+export const asksNow = computed(() => {
+  tick.value;
+  return asks(run.now) && !facts.value?.recorded && facts.value?.stale == null;
 });
 
 /** What is held back, and why, in words. @param {RunState} data */

@@ -345,7 +345,8 @@ export class Diagram {
     classes.toggle("active", active);
     classes.toggle("preempting", asked);
     classes.toggle("serviced", asked && Boolean(state?.serviced));
-    classes.toggle("waiting", Boolean(state?.waits) || (active && noServer));
+    const asks = active && state.question?.answered === null;
+    classes.toggle("waiting", Boolean(state?.waits) || (active && noServer) || asks);
     classes.toggle("visited", (state?.visits ?? 0) > 0);
     for (const name of CLASSES) classes.toggle(`was-${name}`, !active && kind === name);
     classes.toggle("raised", !active && Boolean(state?.error));

@@ -101,7 +101,6 @@ export class Page {
       store.follow.value = true;
       this.followIsSet = true;
     }
-    document.title = `${store.facts.value?.label} \u2013 smachpy`;
     this.relayout({ frame: true });
   }
 

@@ -7,6 +7,7 @@ import { html, StateLink } from "#panels/html.js";
 import { Log } from "#panels/log.js";
 import { Numbers } from "#panels/numbers.js";
 import { Preempts } from "#panels/preempts.js";
+import { Questions } from "#panels/questions.js";
 import { SelectedState } from "#panels/selected_state.js";
 import { Changes, Userdata } from "#panels/userdata.js";
 import { WhyPanel } from "#panels/why.js";
@@ -22,6 +23,7 @@ export function Inspector({ page }) {
   if (!model) return html`<aside class="inspector"></aside>`;
   const shared = { page, data: store.shown(), now: store.nowMs() };
   return html`<aside class="inspector" aria-label="details">
+    <${Questions} page=${page} />
     <${MissingEvents} dropped=${shared.data.dropped ?? 0} />
     <${WhyPanel} page=${page} />
     <${SelectedState} ...${shared} model=${model} />

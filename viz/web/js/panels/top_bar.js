@@ -78,7 +78,8 @@ function Chooser() {
 }
 
 /** @param {MachineSummary} machine */
-function statusOf({ recorded, stale, ended, outcome }) {
+function statusOf({ recorded, stale, ended, outcome, questions }) {
+  if (questions && stale == null && !recorded) return "asks you";
   if (ended != null) return `${recorded ? "recorded" : "ended"}: ${outcome}`;
   if (recorded) return "recording, without an end";
   return stale != null ? "stale" : "running";
@@ -181,11 +182,28 @@ function ViewMenu({ page }) {
             <option value="system">as the system</option>
             <option value="light">light</option>
             <option value="dark">dark</option></select></label>
+        ${!isFile() && html`<${AboutQuestions} />`}
         ${!isFile() && html`<${Downloads} />`}
         <div class="line"><span>Keys</span><button onClick=${showKeys}>show (?)</button></div>
       </div>`
     }
   </div>`;
+}
+
+/** How a question makes itself heard, and the name under which it is answered. */
+function AboutQuestions() {
+  const onSound = (/** @type {Event} */ e) => {
+    store.sound.value = /** @type {HTMLInputElement} */ (e.target).checked;
+    store.save("sound", store.sound.value);
+  };
+  const onName = (/** @type {Event} */ e) => {
+    store.operator.value = fieldValue(e);
+    store.save("operator", store.operator.value);
+  };
+  return html`<label class="line"><span>Sound for questions</span>
+      <input type="checkbox" checked=${store.sound.value} onChange=${onSound} /></label>
+    <label class="line"><span>You answer as</span>
+      <input maxlength="60" placeholder="your name" value=${store.operator.value} onInput=${onName} /></label>`;
 }
 
 /** @param {{ page: Page }} props */

@@ -1,0 +1,159 @@
+"""Questions of missions on the page: answered by one, seen by all."""
+
+from __future__ import annotations
+
+import json
+import time
+import urllib.error
+import urllib.request
+
+import pytest
+
+ASKED = {
+    "text": "Delivery to lab: may I hand it over?",
+    "answers": ["yes", "no"],
+    "words": ["Yes, hand over", ""],
+    "default": "no",
+    "patience": 60.0,
+    "service": "operator/questions/q1",
+    "has_picture": False,
+}
+WAITS = [("Started", "/JOB"), ("Entered", "/JOB/A"), ("QuestionAsked", "/JOB/A", ASKED)]
+OPEN = ".question:not(.over)"
+
+
+def told(*events):
+    return [(kind, path, dict(*more)) for kind, path, *more in events]
+
+
+def wait_for(page, condition, timeout=10.0):
+    deadline = time.monotonic() + timeout
+    while not page.evaluate(f"() => Boolean({condition})"):
+        assert time.monotonic() < deadline, f"never true: {condition}"
+        page.wait_for_timeout(50)
+
+
+def post(view, command, token):
+    body = json.dumps(command).encode()
+    headers = {"origin": view.base.rstrip("/"), "x-smachpy-token": token}
+    request = urllib.request.Request(view.base + "api/control?machine=errand", body, headers)
+    try:
+        with urllib.request.urlopen(request, timeout=10) as answer:
+            return answer.status, json.loads(answer.read())
+    except urllib.error.HTTPError as error:
+        return error.code, json.loads(error.read())
+
+
+@pytest.fixture
+def no_leaks():
+    """Processes of this module's fixtures outlive single tests."""
+
+
+@pytest.mark.browser
+@pytest.mark.zenoh
+def test_a_question_is_answered_on_one_page_and_closes_on_all(errand, look):
+    """The mission itself takes no commands; its questions do."""
+    one, two = (look(f"{errand.base}?machine=errand#token={errand.token}") for _ in range(2))
+    one.evaluate("() => { smachpy.store.operator.value = 'ann'; }")
+    for page in (one, two):
+        page.wait_for_selector(OPEN)
+        assert "may I hand it over?" in page.text_content(f"{OPEN} h3")
+        assert page.title().startswith("(1) ERRAND")
+        assert page.text_content("[data-testid=status]") == "asks you"
+        buttons = page.locator(f"{OPEN} .answer")
+        assert buttons.all_text_contents() == ["No, come back", "Yes, hand over"]
+        wait_for(page, "document.querySelector('.question-picture').naturalWidth === 1")
+    assert one.evaluate("() => document.activeElement.tagName") == "H3"
+    one.click(f"{OPEN} .answer.primary")
+    for page in (one, two):
+        page.wait_for_selector(".question.over")
+        assert "answered yes by ann" in page.text_content(".question.over .hint")
+    wait_for(two, "!document.querySelector('.question.over')")
+    wait_for(two, f"document.querySelector('{OPEN}')")  # it asks again
+
+
+@pytest.mark.browser
+@pytest.mark.zenoh
+def test_of_two_answers_at_once_one_counts(errand, look):
+    page = look(f"{errand.base}?machine=errand#token={errand.token}")
+    page.wait_for_selector(OPEN)
+    answers = page.evaluate(
+        """async () => {
+          const [[path]] = Object.entries(smachpy.store.run.now.states).filter(([, s]) => s.question?.answered === null);
+          const give = (answer) => fetch("/api/control?machine=errand", {
+            method: "POST", headers: { "x-smachpy-token": sessionStorage.getItem("smachpy.token") },
+            body: JSON.stringify({ command: "answer", path, answer, by: answer }) }).then((r) => r.json());
+          return Promise.all(["yes", "no", "yes", "no"].map(give));
+        }"""
+    )
+    assert [one["ok"] for one in answers].count(True) == 1
+    (winner,) = (i for i, one in enumerate(answers) if one["ok"])
+    page.wait_for_selector(".question.over")
+    assert ("yes", "no")[winner % 2] in page.text_content(".question.over .hint")
+
+
+@pytest.mark.zenoh
+def test_nobody_answers_without_the_token(errand):
+    answer = {"command": "answer", "path": "/ERRAND/CONFIRM", "answer": "yes"}
+    assert post(errand, answer, "wrong")[0] == 403
+    status, told = post(
+        errand, {"command": "answer", "path": "/ERRAND/GO", "answer": "yes"}, errand.token
+    )
+    assert (status, "nobody asks" in told["text"]) == (409, True)
+    status, told = post(errand, {"command": "answer", "path": 7}, errand.token)
+    assert status == 409
+
+
+@pytest.mark.browser
+def test_the_buttons_do_nothing_without_a_token_or_in_the_past(served, look):
+    served.add("one", events=told(*WAITS))
+    page = look(served.start(token="t"))
+    page.wait_for_selector(OPEN)
+    assert page.locator(f"{OPEN} .answer:disabled").count() == 2
+    assert "smachpy answer" in page.text_content(OPEN)
+    page = look(f"{served.address}#token=t")
+    page.wait_for_selector(OPEN)
+    page.evaluate("() => smachpy.store.seek(smachpy.store.run.first())")
+    page.click(f"{OPEN} .answer:text('Back to live to answer')")
+    wait_for(page, "smachpy.store.cursor.value === null")
+    page.click(f"{OPEN} .answer.primary")
+    page.wait_for_selector(".notice.info")
+    (sent,) = served.commands
+    assert (sent["command"], sent["path"], sent["answer"]) == ("answer", "/JOB/A", "yes")
+    assert sent["by"].startswith("page at ")
+
+
+@pytest.mark.browser
+def test_a_breakpoint_lets_the_operator_decide(served, look):
+    events = told(*WAITS[:2], ("Paused", "/JOB/B", {"reason": "breakpoint"}))
+    served.add("one", events=events, control={"paused": True, "breakpoints": [["/JOB/B", None]]})
+    page = look(f"{served.start(token='t')}#token=t")
+    page.click(".question.held .answer:text('Resume')")
+    page.wait_for_selector(".notice.info")
+    assert [one["command"] for one in served.commands] == ["resume"]
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("text", ["<img src=x onerror=alert(1)>", "x" * 5000, "\u202e\u65e5\u672c"])
+def test_words_of_questions_are_only_text(served, look, text):
+    asked = {**ASKED, "text": text, "words": [text, text], "answers": ["yes", text]}
+    served.add("one", events=told(*WAITS[:2], ("QuestionAsked", "/JOB/A", asked)))
+    page = look(f"{served.start(token='t')}#token=t")
+    page.wait_for_selector(OPEN)
+    assert page.locator(f"{OPEN} img").count() == 0
+    assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
+
+
+@pytest.mark.browser
+def test_a_phone_shows_the_question_and_its_buttons_at_once(served, look):
+    served.add("one", events=told(*WAITS))
+    page = look(f"{served.start(token='t')}#token=t")
+    page.set_viewport_size({"width": 390, "height": 844})
+    page.wait_for_selector(OPEN)
+    wait_for(
+        page, "document.querySelector('.answer').getBoundingClientRect().bottom <= innerHeight"
+    )
+    sizes = page.evaluate(
+        "() => [...document.querySelectorAll('.answer')].map((b) => b.getBoundingClientRect().height)"
+    )
+    assert min(sizes) >= 48

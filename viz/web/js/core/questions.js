@@ -1,0 +1,67 @@
+// Questions of a mission to its operator: which to show, in which order their answers stand, how urgent they are.
+import { ms } from "#core/fold.js";
+
+const CLOSES_MS = 3000; // after an answer
+const URGENT_S = 10;
+
+/** @typedef {Question & { path: string, left: number, share: number, isOpen: boolean, ago: number }} ShownQuestion */
+
+/**
+ * Those that wait for an answer, the oldest first, and those that were answered a moment ago.
+ * @param {RunState} data
+ * @param {number} now [ms]
+ * @returns {ShownQuestion[]}
+ */
+export function questionsOf(data, now) {
+  const shown = [];
+  for (const [path, state] of Object.entries(data.states)) {
+    const { question } = state;
+    if (!question) continue;
+    const isOpen = state.since != null && question.answered === null;
+    const ago = question.answered === null ? Infinity : now - (ms(question.answered) ?? 0);
+    if (!isOpen && (data.ended != null || !(ago < CLOSES_MS))) continue;
+    const waited = (now - (ms(question.asked) ?? 0)) / 1000;
+    const left = Math.max(0, question.patience - waited);
+    shown.push({ ...question, path, left, share: Math.min(1, left / question.patience), isOpen, ago });
+  }
+  return shown.sort((a, b) => a.asked - b.asked || (a.path < b.path ? -1 : 1));
+}
+
+export const isUrgent = (/** @type {ShownQuestion} */ one) => one.isOpen && one.left <= URGENT_S;
+
+/**
+ * The answers with the words of their buttons: first the safe one, which counts when nobody answers, else the last.
+ * @param {Question} question
+ */
+export function buttonsOf({ answers, words, default: otherwise }) {
+  const safe = answers.includes(otherwise) ? otherwise : answers[answers.length - 1];
+  const all = answers.map((answer, i) => ({ answer, text: words[i] || answer, isFirst: answer === answers[0] }));
+  return [...all.filter((one) => one.answer === safe), ...all.filter((one) => one.answer !== safe)];
+}
+
+/** What became of it. @param {ShownQuestion} question */
+export function answerText({ answer, by, ago }) {
+  const seconds = `${Math.max(0, Math.round(ago / 1000))} s ago`;
+  return by ? `answered ${answer} by ${by}, ${seconds}` : `nobody answered: ${answer}, ${seconds}`;
+}
+
+/**
+ * The title of the page: how many questions wait, and every other second what the urgent one asks.
+ * @param {string} title
+ * @param {ShownQuestion[]} shown
+ * @param {number} elsewhere so many more wait, of other machines
+ */
+export function titleOf(title, shown, elsewhere) {
+  const waiting = shown.filter((one) => one.isOpen);
+  const urgent = waiting.find(isUrgent);
+  const count = waiting.length + elsewhere;
+  if (urgent && Math.floor(urgent.left) % 2) return `? ${urgent.text}`;
+  return count ? `(${count}) ${title}` : title;
+}
+
+/** States that a breakpoint holds back: the operator decides how it goes on. @param {RunState} data */
+export const heldStates = (data) =>
+  Object.entries(data.states)
+    .filter(([, state]) => state.since != null || state.waits != null)
+    .filter(([, state]) => state.waits === "breakpoint")
+    .map(([path]) => path);
