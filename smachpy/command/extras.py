@@ -21,6 +21,7 @@ EXTRAS: Final = {
     "uvicorn": "web",
     "textual": "tui",
     "mcap": "mcap",
+    "cronsim": "cron",
     "psycopg": "postgres",
 }
 OWN_PACKAGES: Final = ("actionlib_core", "viz", "missions")

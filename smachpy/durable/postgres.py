@@ -70,7 +70,7 @@ class PostgresStore(SqlStore):
         one_claimer="SELECT pg_advisory_xact_lock(1936550508)",  # "smjl", as in a file
     )
 
-    def __init__(self, url: str, *, patience: float = 30.0) -> None:
+    def __init__(self, url: str, *, patience: float = 8.0) -> None:
         super().__init__()
         self._patience = patience
         self._clock = RealClock()

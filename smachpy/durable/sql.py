@@ -43,7 +43,7 @@ VERSION: Final = 1
 
 _COLUMNS: Final = (
     "id, name, target, argv, status, outcome, robot, created, changed, owner, structure, version, "
-    "due, every, cancel"
+    "due, every, schedule, cancel"
 )
 
 
@@ -73,8 +73,8 @@ class Dialect:
             "id TEXT PRIMARY KEY, name TEXT NOT NULL, target TEXT NOT NULL, argv TEXT NOT NULL, "
             f"status TEXT NOT NULL, outcome TEXT, robot TEXT, created {self.real} NOT NULL, "
             f"changed {self.real} NOT NULL, owner TEXT, structure {self.blob} NOT NULL, "
-            f"version INTEGER NOT NULL, due {self.real}, every TEXT, cancel INTEGER NOT NULL, "
-            f"fence INTEGER NOT NULL, mark TEXT, lease_end {self.real}"
+            f"version INTEGER NOT NULL, due {self.real}, every TEXT, schedule TEXT, "
+            f"cancel INTEGER NOT NULL, fence INTEGER NOT NULL, mark TEXT, lease_end {self.real}"
         )
         entries = (
             "mission TEXT NOT NULL, n INTEGER NOT NULL, fence INTEGER NOT NULL, "
@@ -148,10 +148,6 @@ class SqlStore(ABC):
 
     def create(self, row: MissionRow) -> None:
         """As `Store.create`."""
-        values = [*(getattr(row, name) for name in _COLUMNS.split(", ")), 0]
-        values[3] = json.dumps(list(row.argv))
-        values[9] = None
-        values[-2] = int(row.cancel)
 
         def work(cursor: Cursor, again: bool) -> None:
             found = self._one(cursor, "SELECT created FROM smachpy_missions WHERE id = ?", row.id)
@@ -162,22 +158,19 @@ class SqlStore(ABC):
                     f"{self.where}: mission {row.id!r}: got an id that is taken; "
                     "expected a new one."
                 )
-            places = ", ".join("?" * len(values))
-            self._do(
-                cursor,
-                f"INSERT INTO smachpy_missions ({_COLUMNS}, fence) VALUES ({places})",
-                *values,
-            )
+            self._insert(cursor, row)
 
         self._transact(work)
 
-    def missions(self) -> list[MissionRow]:
+    def missions(self, *, open_only: bool = False) -> list[MissionRow]:
         """As `Store.missions`."""
+        which = f" WHERE status NOT IN {OVER}" if open_only else ""
 
         def work(cursor: Cursor, _: bool) -> list[MissionRow]:
             self._do(
                 cursor,
-                f"SELECT {_COLUMNS}, mark, lease_end FROM smachpy_missions ORDER BY created, id",
+                f"SELECT {_COLUMNS}, mark, lease_end FROM smachpy_missions{which} "
+                "ORDER BY created, id",
             )
             rows = cursor.fetchall()
             now = self._now(cursor)
@@ -353,6 +346,31 @@ class SqlStore(ABC):
 
         self._transact(work)
 
+    def begin_next(self, row: MissionRow, *, due: float | None, next_due: float) -> bool:
+        """As `Store.begin_next`."""
+
+        def work(cursor: Cursor, again: bool) -> bool:
+            if again:
+                found = self._one(cursor, "SELECT 1 FROM smachpy_missions WHERE id = ?", row.id)
+                if found is not None:
+                    return True
+            schedule = self._one(
+                cursor,
+                "SELECT status, due FROM smachpy_missions WHERE id = ?" + self.dialect.for_update,
+                row.schedule,
+            )
+            if schedule is None or tuple(schedule) != (QUEUED, due):
+                return False
+            self._insert(cursor, row)
+            self._do(
+                cursor,
+                "UPDATE smachpy_missions SET due = ?, changed = ? WHERE id = ?",
+                *(next_due, self._now(cursor), row.schedule),
+            )
+            return True
+
+        return self._transact(work)
+
     def request_cancel(self, id: str) -> None:  # noqa: A002
         """As `Store.request_cancel`."""
 
@@ -385,6 +403,17 @@ class SqlStore(ABC):
     def _one(self, cursor: Cursor, sql: str, *values: object) -> Any:
         self._do(cursor, sql, *values)
         return cursor.fetchone()
+
+    def _insert(self, cursor: Cursor, row: MissionRow) -> None:
+        columns = _COLUMNS.split(", ")
+        values = {name: getattr(row, name) for name in columns}
+        values.update(argv=json.dumps(list(row.argv)), owner=None, cancel=int(row.cancel))
+        places = ", ".join("?" * len(columns))
+        self._do(
+            cursor,
+            f"INSERT INTO smachpy_missions ({_COLUMNS}, fence) VALUES ({places}, 0)",
+            *values.values(),
+        )
 
     def _known(self, cursor: Cursor, id: str, columns: str) -> Any:  # noqa: A002
         """Return columns of a mission; what locks the row may follow them.

@@ -74,7 +74,9 @@ class MissionRow:
         structure: Its machine, as the journal's code writes it.
         version: Version of the entries.
         due: When it may begin, in seconds since the Unix epoch; None: at once.
-        every: A cron expression when it is queued again and again, else None.
+        every: Of a schedule, its cron expression: each time it is `due`, a mission like it is
+            put into the queue. It is never run itself.
+        schedule: The id of the schedule that it belongs to, else None.
         cancel: Whether `request_cancel` was called.
     """
 
@@ -92,6 +94,7 @@ class MissionRow:
     version: int
     due: float | None = None
     every: str | None = None
+    schedule: str | None = None
     cancel: bool = False
 
 
@@ -111,8 +114,12 @@ class Store(Protocol):
         """
         ...
 
-    def missions(self) -> list[MissionRow]:
-        """Return all missions, the oldest first."""
+    def missions(self, *, open_only: bool = False) -> list[MissionRow]:
+        """Return all missions, the oldest first.
+
+        Args:
+            open_only: Leave out those that have ended or were cancelled.
+        """
         ...
 
     def mission(self, id: str) -> MissionRow:  # noqa: A002  the word of the interface
@@ -184,6 +191,19 @@ class Store(Protocol):
 
         Raises:
             MissionInUseError: one that lives holds it.
+        """
+        ...
+
+    def begin_next(self, row: MissionRow, *, due: float | None, next_due: float) -> bool:
+        """Put one mission of a schedule into the queue, and set when the next one is due.
+
+        Args:
+            row: The mission; it is created.
+            due: When the schedule was due, as read; in seconds since the Unix epoch.
+            next_due: When it is due again.
+
+        Returns:
+            Whether that was done: False when another runner has, or the schedule is over.
         """
         ...
 
@@ -308,7 +328,8 @@ def open_store(
             the server is set up, but never with `synchronous_commit = off`.
         create: Whether to make a file that is missing. A folder is made, too.
         patience: How long a lock, and a server that is gone, are waited for [s]; None: 5 for
-            SQLite, 30 for PostgreSQL.
+            SQLite, 8 for PostgreSQL. It must be less than a lease minus the time between two
+            renewals: who cannot reach the store stops before another one takes over.
 
     Raises:
         StoreError: it cannot be opened; `reason` says why.
@@ -325,7 +346,7 @@ def open_store(
             )
         from smachpy.durable.postgres import PostgresStore
 
-        return PostgresStore(text, patience=30.0 if patience is None else patience)
+        return PostgresStore(text, patience=8.0 if patience is None else patience)
     from smachpy.durable.sqlite import SQLiteStore
 
     patience = 5.0 if patience is None else patience
