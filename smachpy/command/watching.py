@@ -13,6 +13,7 @@ from smachpy import IntrospectionServer
 from smachpy.command import runs_folder
 from smachpy.command.extras import load_view
 from smachpy.events.recording import Recorder
+from smachpy.network.robot_topics import RobotTopics
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -108,16 +109,23 @@ def watched(name: str, machine: Container, path: str, watching: Watching) -> Ite
         SmachError: the file exists, or the page cannot be served.
     """
     word = re.sub(r"[^A-Za-z0-9_]", "_", name)
-    server = IntrospectionServer(
-        word if word[:1].isalpha() else f"m_{word}", machine, path, control=watching.control
-    )
     with contextlib.ExitStack() as stack:
+        robot = stack.enter_context(RobotTopics())
+        server = IntrospectionServer(
+            word if word[:1].isalpha() else f"m_{word}",
+            machine,
+            path,
+            control=watching.control,
+            robot=robot,
+        )
         path_of_file = watching.record
         if path_of_file is None and watching.view:
             path_of_file = runs_folder.new_file(name, RealClock().time_ns())
         file = (
             None if path_of_file is None else stack.enter_context(Recorder(path_of_file, machine))
         )
+        if file is not None:
+            stack.callback(robot.listen(file.observe))
         if not watching.alone:
             server.start()
             stack.callback(server.stop)

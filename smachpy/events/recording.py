@@ -6,12 +6,18 @@ the first event, or null. Every further line is an event (`smachpy.events.to_rec
 `seq`. Where events are missing it jumps, and the next event has their number, `dropped`; what goes
 on in the end is told all the same (`events.tape`). A last line that was cut off by a crash is left
 out when reading.
+
+Lines of kind "Observed" are no events of the machine: they hold what the robot's topics told
+(`smachpy.network.observations`).
 """
 
 from __future__ import annotations
 
+import heapq
 import json
+from collections import deque
 from dataclasses import asdict, dataclass, field
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +35,10 @@ if TYPE_CHECKING:
 
 FORMAT = "smachpy-run"
 VERSION = 1
+OBSERVED = "Observed"
+WAITING_OBSERVED = 1_000
+"""So many records of the robot's topics wait to be written; of more, the oldest are left out."""
+
 WAITING_EVENTS = 100_000
 """So many entries of a tape wait to be written: when the disk hangs, or the machine is faster than
 its events become text. Further ones are thinned out and counted."""
@@ -76,6 +86,7 @@ class Recording:
         base: What happened before, None when it began with the run.
         events: The records.
         cut: Whether the file ends in the middle of a line.
+        observed: What the robot's topics told meanwhile, numbered from 1 in `n`.
     """
 
     path: Path
@@ -84,6 +95,7 @@ class Recording:
     base: dict[str, Any] | None
     events: list[dict[str, Any]] = field(default_factory=list)
     cut: bool = False
+    observed: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def dropped(self) -> int:
@@ -97,6 +109,7 @@ class Recording:
             "description": asdict(self.record),
             "base": self.base,
             "events": self.events,
+            "observed": self.observed,
             "problems": [],
             "control": None,
         }
@@ -122,7 +135,7 @@ class Recorder:
         self.path = Path(path)
         clock = current_clock()
         self._executor = SerialExecutor(clock, f"recording {self.path.name}")
-        self._failed = False
+        self._failed = self._closed = False
         self._unwritten = 0
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -135,6 +148,7 @@ class Recorder:
             ) from error
         except OSError as error:
             raise RecordingError(path, f"cannot write: {error.strerror or error}.") from error
+        self._observed: deque[dict[str, Any]] = deque(maxlen=WAITING_OBSERVED)
         self._tape = machine.tape(self._on_news, limit=WAITING_EVENTS)
 
     def __enter__(self) -> Self:
@@ -148,6 +162,7 @@ class Recorder:
 
         Blocks: 2 s at most.
         """
+        self._closed = True
         self._tape.close()
         self._on_news()
         in_time = self._executor.join(CLOSE_S)
@@ -176,12 +191,18 @@ class Recorder:
         """So many events were not written: there were too many at once, or the disk failed."""
         return self._tape.dropped + self._unwritten
 
+    def observe(self, record: dict[str, Any]) -> None:
+        """Write what a robot's topic told, a record of `RobotTopics`; nothing after `close`."""
+        if not self._closed:
+            self._observed.append(record)
+            self._on_news()
+
     def _on_news(self) -> None:
         self._executor.submit(self._write)
 
     def _write(self) -> None:
         """Write what was taken down, until there is no more."""
-        while records := self._tape.read():
+        while records := [*self._tape.read(), *self._take_observed()]:
             if self._failed:
                 self._unwritten += len(records)
                 continue
@@ -191,6 +212,9 @@ class Recorder:
             except OSError as error:
                 self._unwritten += len(records)
                 self._fail(error)
+
+    def _take_observed(self) -> list[dict[str, Any]]:
+        return [self._observed.popleft() for _ in range(len(self._observed))]
 
     def _fail(self, error: OSError) -> None:
         if not self._failed:
@@ -216,12 +240,16 @@ def event_line(record: dict[str, Any]) -> str:
 
 
 def recording_lines(
-    record: StateRecord, events: list[dict[str, Any]], base: dict[str, Any] | None
+    record: StateRecord,
+    events: list[dict[str, Any]],
+    base: dict[str, Any] | None,
+    observed: Iterable[dict[str, Any]] = (),
 ) -> Iterator[str]:
-    """Yield the lines of a file that holds these events."""
+    """Yield the lines of a file that holds these events, and what the robot's topics told."""
     stamp_ns = events[0]["stamp_ns"] if events else 0
     yield header_line(record, stamp_ns, base)
-    yield from map(event_line, _numbered(events))
+    by_time = heapq.merge(_numbered(events), observed, key=itemgetter("stamp_ns"))
+    yield from map(event_line, by_time)
 
 
 def _numbered(events: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
@@ -246,8 +274,10 @@ def read_recording(path: str | Path) -> Recording:
     recording = _read_header(path, lines[0])
     whole = lines[1:-1]  # what follows the last line's end was cut off, or is empty
     recording.cut = bool(lines[-1]) and len(lines) > 1
-    events = [_read_event(path, number, line) for number, line in enumerate(whole, 2)]
-    recording.events = list(_numbered(events))
+    records = [_read_event(path, number, line) for number, line in enumerate(whole, 2)]
+    recording.events = list(_numbered(one for one in records if one["kind"] != OBSERVED))
+    observed = (one for one in records if one["kind"] == OBSERVED)
+    recording.observed = [{**one, "n": number} for number, one in enumerate(observed, 1)]
     return recording
 
 

@@ -2,14 +2,16 @@
 
     <server>/smach/description   `smachpy.introspection.StateRecord`, latched      std_msgs/String
     <server>/smach/events        `smachpy.events` with sequence numbers `seq`      std_msgs/String
+    <server>/smach/observed      what the robot's topics tell (`observations`)     std_msgs/String
     <server>/smach/history       the run so far, for viewers that join late     std_srvs/Trigger
     <server>/smach/value         a userdata value in full (`smachpy.network.values`)
 
 The history is a JSON object: `epoch` (an id that changes when the machine's server restarts),
 `session` (id of the network session, which tells two servers of one name apart), `description`,
 `problems` (found by `smachpy.checks`), `base` (a `RunState` of the events that are no longer kept),
-`events` (the newest, as they were sent), `control` (paused and breakpoints; null if the server
-takes no commands), `now` (the server's time, nanoseconds since the Unix epoch).
+`events` (the newest, as they were sent), `observed` (what the robot's topics told, of late, as sent
+on <server>/smach/observed), `control` (paused and breakpoints; null if the server takes no
+commands), `now` (the server's time, nanoseconds since the Unix epoch).
 """
 
 from __future__ import annotations
@@ -25,20 +27,24 @@ from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import Trigger
 from actionlib_core.pubsub.service import Service
 from actionlib_core.pubsub.topic import Publisher
+from actionlib_core.wire.presence import Kind, token_pattern
 from smachpy.events import Started, record_text
 from smachpy.events.run_state import RunState
 from smachpy.introspection import describe
+from smachpy.network.robot_topics import RobotTopics
 from smachpy.network.values import serve_values
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from actionlib_core.node import Node
+    from actionlib_core.transport import Presence
     from smachpy.machines.container import Container
     from smachpy.network.remote_control import ControlServer
 
 EVENTS_TOPIC = "/smach/events"
 DESCRIPTION_TOPIC = "/smach/description"
+OBSERVED_TOPIC = "/smach/observed"
 HISTORY_SERVICE = "/smach/history"
 
 QUEUED_EVENTS = 20_000
@@ -65,6 +71,7 @@ class Feed:
         path: What to call it.
         node: Where to send.
         control: The server of commands; None if the machine takes none.
+        robot: Tells what the robot's topics say; None listens to those below `node`'s name space.
         on_paths: Called with path -> kind of its newest event, for the events that were just sent.
     """
 
@@ -76,6 +83,7 @@ class Feed:
         node: Node,
         *,
         control: ControlServer | None = None,
+        robot: RobotTopics | None = None,
         on_paths: Callable[[dict[str, str]], object] = lambda _kinds: None,
     ) -> None:
         self._machine = machine
@@ -101,6 +109,13 @@ class Feed:
         self._values = serve_values(server_name, machine, path, node)
         self._is_open = False  # the history may be asked for before the events are offered
         self._tape = machine.tape(self._on_news, limit=QUEUED_EVENTS, name=path)
+        self._robot = RobotTopics(node) if robot is None else robot
+        self._deaf: Callable[[], None] | None = None  # ends the listening to the robot
+        self._watchers: set[str] = set()
+        self._observed = Publisher(server_name + OBSERVED_TOPIC, String, node=node)
+        self._presence = node.transport.watch_alive(
+            token_pattern(Kind.SUBSCRIBER, self._observed.resolved_name), self._on_watcher
+        )
         self._history = Service(
             server_name + HISTORY_SERVICE, Trigger, self._answer, node=node, alone=False
         )
@@ -114,6 +129,9 @@ class Feed:
 
         Blocks: 2 s at most.
         """
+        self._presence.close()
+        self._watchers.clear()
+        self._executor.submit(self._listen)
         self._tape.close()
         self._on_news()
         if not self._executor.join(STOP_S):
@@ -124,6 +142,24 @@ class Feed:
         self._history.close()
         self._values.close()
         self._events.unregister()
+        self._observed.unregister()
+
+    def _on_watcher(self, presence: Presence) -> None:
+        """A viewer has come or gone: without one, nobody needs to know what the robot does."""
+        if presence.alive:
+            self._watchers.add(presence.key)
+        else:
+            self._watchers.discard(presence.key)
+        self._executor.submit(self._listen)
+
+    def _listen(self) -> None:
+        if self._watchers and self._deaf is None:
+            self._deaf = self._robot.listen(
+                lambda record: self._observed.publish(record_text(record))
+            )
+        elif not self._watchers and self._deaf is not None:
+            self._deaf()
+            self._deaf = None
 
     def _on_news(self) -> None:
         self._executor.submit(self._work)
@@ -183,6 +219,7 @@ class Feed:
         with self._lock:
             base = json.dumps(self._base.data)
             kept = [text for _, text in self._kept]
+        head["observed"] = self._robot.kept()
         text = json.dumps(head)[:-1]
         return True, f'{text}, "base": {base}, "events": [{", ".join(kept)}]}}'
 

@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from actionlib_core.transport import PublisherPort
     from smachpy.events.tape import Tape
     from smachpy.machines.state import State
+    from smachpy.network.robot_topics import RobotTopics
 
 __all__ = [
     "DESCRIPTION_TOPIC",
@@ -327,6 +328,8 @@ class IntrospectionServer:
         obey: Take commands that choose the initial state; False only shows.
         control: Take all the commands of `machine.control`, from everybody on the network.
         node: Where to send; the current node when None.
+        robot: Tells viewers what the robot's topics say; None: what is said below `node`'s name
+            space, while somebody looks.
 
     Raises:
         InvalidStateError: `state` is no container, or a name is no text.
@@ -344,8 +347,10 @@ class IntrospectionServer:
         obey: bool = True,
         control: bool = False,
         node: Node | None = None,
+        robot: RobotTopics | None = None,
     ) -> None:
         self._server_name = server_name
+        self._robot = robot
         self._state = _checked("IntrospectionServer", server_name, "state", state, path)
         self._path = path
         self._obey = obey
@@ -373,7 +378,9 @@ class IntrospectionServer:
             if self._controlled:
                 control = ControlServer(name, state, path, node)
                 parts.callback(control.close)
-            self._feed = Feed(name, state, path, node, control=control, on_paths=self._mark)
+            self._feed = Feed(
+                name, state, path, node, control=control, robot=self._robot, on_paths=self._mark
+            )
             parts.callback(self._feed.close)
             if self._obey:
                 commands = Subscriber(

@@ -1,4 +1,4 @@
-"""What a Nav2 robot tells and hears beside its actions: `odom`, `tf`, `scan`, `map`, `cmd_vel`.
+"""The topics of a Nav2 robot: `odom`, `tf`, `scan`, `plan`, `map`, `cmd_vel`.
 
 And the service by which programs wait for its start-up, `lifecycle_manager_navigation/is_active`.
 """
@@ -64,6 +64,10 @@ class Nav2Topics:
         self._odom = Publisher("odom", self._odometry, node=node)
         self._tf = Publisher("tf", message("tf2_msgs/TFMessage"), node=node)
         self._scan = Publisher("scan", self._laser_scan, node=node)
+        self._path = message("nav_msgs/Path")
+        self._stamped = message("geometry_msgs/PoseStamped")
+        self._plan = Publisher("plan", self._path, node=node)
+        self._way: tuple[tuple[float, float], ...] = ()  # the plan that was told
         grid = message("nav_msgs/OccupancyGrid")
         self._map = Publisher("map", grid, latch=True, node=node)
         self._publish_map(grid())
@@ -83,7 +87,7 @@ class Nav2Topics:
 
     def close(self) -> None:
         """Leave the network; a second call does nothing."""
-        for end in (self._odom, self._tf, self._scan, self._map, self._speeds):
+        for end in (self._odom, self._tf, self._scan, self._plan, self._map, self._speeds):
             end.unregister()
         self._active.close()
 
@@ -100,6 +104,7 @@ class Nav2Topics:
         if now - self._scanned > 1.0 / rate - _JUST_PAST and self.is_watched():
             self._scanned = now
             self._publish_scan()
+        self._report_plan()
 
     def _publish_odometry(self) -> None:
         body = self._robot.body
@@ -137,6 +142,22 @@ class Nav2Topics:
         )
         self.fill_header(scan.header, BASE_FRAME)
         self._scan.publish(scan)
+
+    def _report_plan(self) -> None:
+        """Publish the way that it follows when there is another one; none once it has ended."""
+        with self._stepper.lock:
+            follower = self._robot.follower
+            way = tuple(follower.points) if follower is not None else ()
+        if way == self._way or not self._plan.get_num_connections():
+            return
+        self._way = way
+        plan = self._path()
+        self.fill_header(plan.header, MAP_FRAME)
+        for x, y in way:
+            stamped = self._stamped(header=plan.header)
+            fill_pose(stamped.pose, Pose2D(x, y, 0.0))
+            plan.poses.append(stamped)
+        self._plan.publish(plan)
 
     def _publish_map(self, grid: Any) -> None:
         floor = self._robot.world.map

@@ -19,7 +19,7 @@ from actionlib_core.interfaces.geometry_msgs.msg import (
     Vector3,
 )
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseFeedback
-from actionlib_core.interfaces.nav_msgs.msg import Odometry
+from actionlib_core.interfaces.nav_msgs.msg import MapMetaData, OccupancyGrid, Odometry, Path
 from actionlib_core.interfaces.sensor_msgs.msg import BatteryState, LaserScan
 from actionlib_core.interfaces.std_msgs.msg import Header
 from actionlib_core.interfaces.std_srvs.srv import Empty, EmptyResponse
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseGoal
     from actionlib_core.node import Node
     from smachpy.sim.interfaces import ChargeGoal
+    from smachpy.sim.occupancy import OccupancyMap
     from smachpy.sim.world import Robot
 
 logger = logging.getLogger(__name__)
@@ -91,6 +92,8 @@ class RobotServer:
         self._odom = Publisher("odom", Odometry, latch=True, node=self._node)
         self._battery = Publisher("battery", BatteryState, latch=True, node=self._node)
         self._scan = Publisher("scan", LaserScan, node=self._node)
+        self._plan = Publisher("plan", Path, latch=True, node=self._node)
+        self._way: tuple[tuple[float, float], ...] = ()  # the plan that was told
         self._move = SimpleActionServer(
             "move_base", MoveBaseAction, self._drive, auto_start=False, node=self._node
         )
@@ -117,6 +120,8 @@ class RobotServer:
             self._odom,
             self._battery,
             self._scan,
+            self._plan,
+            *([map_publisher(self._robot.world.map, self._node)] if self._owns_stepper else ()),
             Subscriber("cmd_vel", Twist, self._on_cmd_vel, queue_size=1, node=self._node),
             Service("move_base/clear_costmaps", Empty, self._on_clear, node=self._node),
         ]
@@ -178,6 +183,7 @@ class RobotServer:
         if due or (moved and (self._robot.body.standing or self._odom.get_num_connections())):
             self._publish_odometry()
         self._report_scan(now)
+        self._report_plan()
         self._report_battery(now)
         with self._stepper.lock:
             ended = self._pilot.take_ends()
@@ -206,6 +212,17 @@ class RobotServer:
                 ranges=ranges,
             )
         )
+
+    def _report_plan(self) -> None:
+        """Publish the way that it follows when there is another one; none once it has ended."""
+        with self._stepper.lock:
+            follower = self._robot.follower
+            way = tuple(follower.points) if follower is not None else ()
+        if way != self._way and self._plan.get_num_connections():
+            self._way = way
+            header = self._header(MAP_FRAME)
+            poses = [PoseStamped(header, Pose(Point(x, y, 0.0), Quaternion(w=1.0))) for x, y in way]
+            self._plan.publish(Path(header, poses))
 
     # -- by hand -------------------------------------------------------------------------------
 
@@ -392,6 +409,24 @@ class RobotServer:
     def _header(self, frame: str) -> Header:
         stamp = Time(0, self._clock.time_ns())
         return Header(stamp=stamp, frame_id=frame)
+
+
+def map_publisher(floor: OccupancyMap, node: Node) -> Publisher:
+    """Show a floor on the topic `map`, for those who come later too; returns what ends that."""
+    stamp = Time(0, node.clock.time_ns())
+    publisher = Publisher("map", OccupancyGrid, latch=True, node=node)
+    publisher.publish(
+        header=Header(stamp=stamp, frame_id=MAP_FRAME),
+        info=MapMetaData(
+            map_load_time=stamp,
+            resolution=floor.resolution,
+            width=floor.width,
+            height=floor.height,
+            origin=_pose_message(floor.origin),
+        ),
+        data=floor.cells.ravel(),
+    )
+    return publisher
 
 
 def _pose_message(pose: Pose2D) -> Pose:

@@ -15,7 +15,7 @@ from smachpy.exceptions import MissionError
 from smachpy.sim.config import ControlConfig, load_config
 from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
 from smachpy.sim.occupancy import load_map
-from smachpy.sim.server import RobotServer
+from smachpy.sim.server import RobotServer, map_publisher
 from smachpy.sim.stepper import Stepper
 from smachpy.sim.world_file import WorldSpec, load_world, place_robots
 
@@ -151,14 +151,18 @@ class _Surroundings:
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
         self._doors: list[_DoorServer] = []
+        self._map: Publisher | None = None
 
     def start(self) -> None:
+        self._map = map_publisher(self._simulation.world.map, self._simulation.node)
         for door in self._simulation.world.doors.values():
             self._doors.append(_DoorServer(door, self._simulation))
 
     def close(self) -> None:
         for door in self._doors:
             door.close()
+        if self._map is not None:
+            self._map.unregister()
 
     def is_busy(self, now: float) -> bool:
         del now

@@ -2,8 +2,8 @@
 
     GET  /                    the page
     GET  /api/events          everything about one machine as server-sent events:
-                              snap, gap, facts, machines, actions, beat (the time here [ms]),
-                              and unnamed batches of events
+                              snap, gap, facts, machines, actions, observed (what the robot's
+                              topics told), beat (the time here [ms]), and unnamed batches of events
     GET  /api/model           structure of a machine
     GET  /api/picture         svg, png, pdf or dot; `theme` and the paths that are `active`
     GET  /api/export          the run as .html or .jsonl
@@ -25,6 +25,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import math
 import re
 import time
 from typing import TYPE_CHECKING, Any
@@ -56,6 +57,9 @@ COALESCE_S = 0.004
 LIST_S = 0.5
 ACTIONS_S = 0.15
 """Between two messages about goals that were sent from here."""
+
+OBSERVED_S = 0.1
+"""Between two messages about the robot."""
 
 BEAT_S = 2.0
 """A page hears so often at least; it takes the server for lost when it does not."""
@@ -301,11 +305,12 @@ class Viewer:
 
         if form == "jsonl":
             base, events = machine.history()
-            lines = recording_lines(machine.record, events, base)
+            lines = recording_lines(machine.record, events, base, machine.observed())
             return _download("".join(lines).encode(), "application/jsonl", "run.jsonl")
         run = {
             "model": page.model(machine.record),
             "snap": json.loads(machine.snapshot()[1]),
+            "observed": machine.observed(),
             "why": why(machine.record, machine.events()).to_json(),
         }
         text = await run_in_threadpool(page.standalone, run, machine.record.label)
@@ -407,6 +412,8 @@ class _Page:
         self._list = ""
         self._listed = 0.0
         self._beaten = 0.0
+        self._observed = 0  # number of the newest record of the robot's topics that was sent
+        self._observed_sent = 0.0
         self._actions = actions
         self._actions_revision = -1  # revision of the actions
         self._actions_sent = 0.0
@@ -419,7 +426,7 @@ class _Page:
             self.news.clear()
             machine = self._choose()
             if machine is not None:
-                for text in self._update(machine):
+                for text in (*self._update(machine), *self._tell_of_robot(machine, loop.time())):
                     yield text
             due = self._listed + LIST_S - loop.time()
             if due <= 0:
@@ -432,7 +439,7 @@ class _Page:
             if self._beaten + BEAT_S <= loop.time():
                 self._beaten = loop.time()
                 yield f"event: beat\ndata: {time.time_ns() // 1_000_000}\n\n"
-            due = min(due, self._beaten + BEAT_S - loop.time())
+            due = min(due, self._beaten + BEAT_S - loop.time(), self._robot_due(machine))
             if self._actions is not None and self._actions_revision != self._actions.revision:
                 wait = self._actions_sent + ACTIONS_S - loop.time()
                 if wait <= 0:
@@ -445,6 +452,19 @@ class _Page:
             except TimeoutError:
                 continue
             await asyncio.sleep(COALESCE_S)
+
+    def _tell_of_robot(self, machine: Machine, now: float) -> list[str]:
+        """What the robot's topics have told since the last time, unless that was just now."""
+        if self._observed == machine.observed_seq or now < self._observed_sent + OBSERVED_S:
+            return []
+        texts = machine.observed_since(self._observed)
+        self._observed, self._observed_sent = machine.observed_seq, now
+        return [f"event: observed\ndata: [{','.join(texts)}]\n\n"]
+
+    def _robot_due(self, machine: Machine | None) -> float:
+        """How long until more can be told of the robot [s]."""
+        waits = machine is not None and self._observed != machine.observed_seq
+        return OBSERVED_S if waits else math.inf
 
     def _actions_text(self, actions: Actions, now: float) -> str:
         self._actions_revision, self._actions_sent = actions.revision, now
@@ -463,6 +483,7 @@ class _Page:
         if behind is None or len(behind) > FARTHEST:
             missed, before = behind is not None, self._seq
             self._epoch = machine.epoch
+            self._observed = 0
             self._seq, snap = machine.snapshot(short=missed)
             texts.append(f"event: snap\nid: {self._epoch}:{self._seq}\ndata: {snap}\n\n")
             if missed:

@@ -92,6 +92,16 @@ def script_hash() -> str:
     return f"'sha256-{base64.b64encode(digest).decode()}'"
 
 
+_ON_THE_MAP = ["floor", "unknown", "wall", "halo", "hair-map", *(f"s{i}" for i in range(1, 9))]
+ON_THE_MAP = {
+    "light": "#ffffff #dfe5eb #3b4754 #ffb000 #e4eaf0"
+    " #4a57c9 #b0337f #0b7a85 #8a5a12 #5b7300 #7a49b8 #b3462f #47586b",
+    "dark": "#1a2531 #0b1118 #93a1b0 #ffc94d #27333f"
+    " #8f9bff #f07fc0 #3fc7d3 #d9a24a #a9c33a #c39bff #ff9076 #a9bacb",
+}
+"""Colours of the map, and of the tracks on it (s1 to s8), by theme: pictures have no map."""
+
+
 def theme_css() -> str:
     """Return the colours of the themes as CSS variables, by the system's taste or by choice."""
     light, dark = (_variables(THEMES[name]) for name in ("light", "dark"))
@@ -112,6 +122,7 @@ def _variables(theme: Theme) -> str:
         "edge": theme.edge,
         "border": theme.border,
         **{f"depth{depth}": theme.container(depth) for depth in range(12)},
+        **dict(zip(_ON_THE_MAP, ON_THE_MAP[theme.name].split(), strict=True)),
     }
     for name in ("inactive", "active", "success", "failure", "preempted", "other", "waiting"):
         swatch = getattr(theme, name)

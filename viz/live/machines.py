@@ -25,6 +25,9 @@ KEPT_EVENTS = 20_000
 KEPT_BYTES = 64_000_000
 """So much text of them at most."""
 
+KEPT_OBSERVED = 40_000
+"""So many records of the robot's topics are kept of a live machine, besides the newest maps."""
+
 KEPT_RUNS = 3
 """So many earlier programs of one machine can be looked at after it was started again."""
 
@@ -78,6 +81,14 @@ class Machine:
         self._bytes = 0
         self._seq = 0
         self._folded = 0  # number of the newest event that went before the kept ones
+        self._observed: deque[tuple[int, dict[str, Any], str]] = deque()
+        self._maps: dict[str, tuple[int, dict[str, Any], str]] = {}  # the newest of each robot
+        self._observed_seq = 0
+
+    @property
+    def observed_seq(self) -> int:
+        """Number of the newest record of the robot's topics."""
+        return self._observed_seq
 
     @property
     def seq(self) -> int:
@@ -105,6 +116,10 @@ class Machine:
                 self._folded = events[0]["seq"] - events[0].get("dropped", 0) - 1
             for event in events:
                 self._append(event, limit)
+            self._observed.clear()
+            self._maps.clear()
+            self._observed_seq = 0
+            self._observe(history.get("observed") or ())
         self._on_change(self)
 
     def _split_off(self) -> Machine:
@@ -117,6 +132,9 @@ class Machine:
             kept._base, kept._now, kept._bytes = self._base, self._now, self._bytes
             kept._seq, kept._folded = self._seq, self._folded
             kept._events, self._events = self._events, deque()
+            kept._observed, self._observed = self._observed, deque()
+            kept._maps, self._maps = self._maps, {}
+            kept._observed_seq = self._observed_seq
         return kept
 
     def describe(self, record: StateRecord) -> None:
@@ -141,6 +159,43 @@ class Machine:
                 self._append(record, KEPT_EVENTS)
         self._on_change(self)
         return True
+
+    def observe(self, records: Iterable[dict[str, Any]]) -> None:
+        """Take in what the robot's topics told, each with its number `n`; known ones are passed."""
+        with self._lock:
+            self._observe(records)
+        self._on_change(self)
+
+    def _observe(self, records: Iterable[dict[str, Any]]) -> None:
+        for record in records:
+            if record["n"] <= self._observed_seq:
+                continue
+            self._observed_seq = record["n"]
+            entry = record["n"], record, record_text(record)
+            if record["what"] == "map":
+                self._maps[record["robot"]] = entry
+            self._observed.append(entry)
+            while len(self._observed) > KEPT_OBSERVED and not self.recorded:
+                self._observed.popleft()
+
+    def observed(self) -> list[dict[str, Any]]:
+        """Return what is kept of what the robot's topics told, oldest first."""
+        with self._lock:
+            return [record for _, record, _ in self._all_observed()]
+
+    def observed_since(self, seq: int) -> list[str]:
+        """Return what is kept of what was told after number `seq`, as JSON texts."""
+        with self._lock:
+            if not seq:
+                return [text for _, _, text in self._all_observed()]
+            newer = itertools.takewhile(lambda one: one[0] > seq, reversed(self._observed))
+            texts = [text for _, _, text in newer]
+        texts.reverse()
+        return texts
+
+    def _all_observed(self) -> list[tuple[int, dict[str, Any], str]]:
+        first = self._observed[0][0] if self._observed else 0
+        return [*(one for one in self._maps.values() if one[0] < first), *self._observed]
 
     def set_stale(self, since: int | None) -> None:
         """Say since when nobody speaks for the machine."""

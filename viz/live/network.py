@@ -22,7 +22,7 @@ from actionlib_core.pubsub.service_proxy import ServiceProxy
 from actionlib_core.wire.encoding import encoding_of
 from actionlib_core.wire.presence import Kind, parse_token, token_key, token_pattern
 from smachpy.introspection import StateRecord
-from smachpy.network.feed import DESCRIPTION_TOPIC, EVENTS_TOPIC, HISTORY_SERVICE
+from smachpy.network.feed import DESCRIPTION_TOPIC, EVENTS_TOPIC, HISTORY_SERVICE, OBSERVED_TOPIC
 from smachpy.network.remote_control import STATE_TOPIC, CommandError, ControlClient
 from smachpy.network.values import VALUE_SERVICE, ReadValue
 from smachpy.states.questions import fetch_picture, give_answer
@@ -196,7 +196,7 @@ class _Subscription:
     def __init__(self, server: str, node: Node, on_sample: Callable[[str, Sample], None]) -> None:
         transport = node.transport
         self._parts: list[Closable] = []
-        for topic in (EVENTS_TOPIC, DESCRIPTION_TOPIC, STATE_TOPIC):
+        for topic in (EVENTS_TOPIC, DESCRIPTION_TOPIC, STATE_TOPIC, OBSERVED_TOPIC):
             name = server + topic
             end = node.endpoint(Kind.SUBSCRIBER, name, String._type, String._md5sum)
             self._parts += [
@@ -310,6 +310,9 @@ class Link:
         if sample.key.endswith(STATE_TOPIC):
             self._executor.submit(lambda: self._machine.set_control(json.loads(_text(sample))))
             return
+        if sample.key.endswith(OBSERVED_TOPIC):
+            self._executor.submit(lambda: self._machine.observe([json.loads(_text(sample))]))
+            return
         self._received.append(_text(sample))
         if len(self._received) == 1:  # the others go with the first
             self._executor.submit(self._add)
@@ -355,6 +358,7 @@ class Link:
             machine.set_stale(None)
             if history.get("control") is not None:
                 machine.set_control(history["control"])
+            machine.observe(history.get("observed") or ())
             if machine.add(history["events"]):
                 return
         machine.reset(history)

@@ -33,6 +33,7 @@ def standalone_page(recording: Recording, runs: Iterable[str | Path] = ()) -> st
     run = {
         "model": page.model(recording.record),
         "snap": json.loads(machine.snapshot()[1]),
+        "observed": recording.observed,
         "statistics": StatisticsOfFiles(runs).of(recording.record),
         "why": why(recording.record, recording.events).to_json(),
     }

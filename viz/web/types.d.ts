@@ -325,3 +325,65 @@ interface Why {
   steps: WhyStep[];
   text: string;
 }
+
+// What robots' topics told (smachpy.network.observations), and what the page makes of it (core/scene.js).
+interface Observed {
+  what: string;
+  robot: string;
+  stamp_ns: number;
+  n: number;
+  [field: string]: any;
+}
+interface Place extends Point {
+  yaw: number;
+}
+interface Pose extends Place {
+  t: number;
+}
+interface Scan {
+  t: number;
+  at: [number, number, number];
+  first: number;
+  step: number;
+  ranges: number[];
+}
+interface GridMap {
+  resolution: number;
+  width: number;
+  height: number;
+  origin: [number, number, number];
+  cells: string;
+}
+// A goal with a place; `visit` is when the state that sent it was entered.
+interface DrivenGoal extends Place {
+  id: string;
+  path: string;
+  visit: number;
+  t: number;
+  to: number | null;
+  status: string;
+  text: string;
+}
+interface Piece {
+  path: string | null;
+  visit: number | null;
+  poses: Pose[];
+}
+interface Robot {
+  poses: Pose[];
+  observed: number | null; // from then on its topics tell where it is
+  scans: Scan[];
+  plans: { t: number; points: [number, number][] }[];
+  goals: DrivenGoal[];
+  pieces: Piece[];
+  done: number; // so many poses are in pieces
+}
+interface Series {
+  name: string;
+  unit: string;
+  points: { t: number; value: number }[];
+}
+interface Visit {
+  path: string;
+  from: number;
+}

@@ -11,6 +11,7 @@ import { ActionsPage } from "#panels/actions.js";
 import { html } from "#panels/html.js";
 import { Inspector } from "#panels/inspector.js";
 import { listenToKeys } from "#panels/keys.js";
+import { MapPanel } from "#panels/map.js";
 import { Help, Laying, Legend, Notice, Overlay, TokenDialog } from "#panels/messages.js";
 import { TopBar } from "#panels/top_bar.js";
 import { Tree } from "#panels/tree.js";
@@ -21,6 +22,10 @@ const canvas = document.createElement("canvas");
 canvas.tabIndex = 0;
 canvas.setAttribute("role", "slider");
 canvas.setAttribute("aria-label", "time; arrow keys go from event to event");
+
+const floor = document.createElement("canvas");
+floor.tabIndex = 0;
+floor.setAttribute("role", "img");
 
 /** An element that is not of the virtual DOM. @param {{ element: Element }} props */
 function Mounted({ element }) {
@@ -66,6 +71,7 @@ function App() {
     store.cursor.value !== null && "past",
     store.treeOpen.value && "with-tree",
     store.asksNow.value && "asks",
+    store.hasMap.value && "with-map",
   ];
   return html`<div class=${classes.filter(Boolean).join(" ")}>
     <${TopBar} page=${page} />
@@ -78,6 +84,7 @@ function App() {
       <div class="strip"><${Legend} /><${ZoomButtons} /></div>
     </main>
     <footer class="timeline"><${Mounted} element=${canvas} /><${TimeTools} /></footer>
+    ${store.hasMap.value && html`<${MapPanel} page=${page}><${Mounted} element=${floor} /><//>`}
     <${Inspector} page=${page} />
     <${ActionsPage} />
     <div id="announced" class="hidden" aria-live="polite"></div>
@@ -88,7 +95,7 @@ function App() {
 }
 
 applyTheme();
-const page = new Page(/** @type {SVGSVGElement} */ (svg), /** @type {SVGSVGElement} */ (minimap), canvas);
+const page = new Page(/** @type {SVGSVGElement} */ (svg), /** @type {SVGSVGElement} */ (minimap), canvas, floor);
 listenToKeys(page);
 window.smachpy = { page, store }; // for tests and the curious
 render(html`<${App} />`, /** @type {HTMLElement} */ (document.getElementById("app")));

@@ -21,6 +21,8 @@ let token = null;
 /** @type {(events: RunEvent[]) => void} */
 let onEvents = () => {};
 let onMachine = () => {};
+/** @type {(records: Observed[]) => void} */
+let onObserved = () => {};
 /** @type {Why | null} */
 let whyOfFile = null;
 
@@ -35,20 +37,31 @@ async function unpack(id) {
   return new Response(plain).text();
 }
 
+/** The bytes of base64 of zlib. @param {string} text */
+export async function bytesOf(text) {
+  const packed = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  const plain = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Uint8Array(await new Response(plain).arrayBuffer());
+}
+
 export async function makeLayoutWorker() {
   if (!isFile()) return new Worker("/vendor/elk-worker.min.js");
   const code = await unpack("elk-data");
   return new Worker(URL.createObjectURL(new Blob([code], { type: "text/javascript" })));
 }
 
-/** @param {{ onEvents: (events: RunEvent[]) => void, onMachine: () => void }} handlers */
+/**
+ * @param {{ onEvents: (events: RunEvent[]) => void, onMachine: () => void,
+ *   onObserved: (records: Observed[]) => void }} handlers
+ */
 export async function connect(handlers) {
-  ({ onEvents, onMachine } = handlers);
+  ({ onEvents, onMachine, onObserved } = handlers);
   readToken();
   if (isFile()) {
     const run = JSON.parse(await unpack("run-data"));
     store.connection.value = "file";
     await takeSnapshot(run.snap, run.model);
+    onObserved(run.observed ?? []);
     store.statistics.value = run.statistics ?? null;
     whyOfFile = run.why ?? null;
     return;
@@ -137,6 +150,7 @@ function open() {
   });
   on("facts", takeFacts);
   on("snap", (snapshot) => takeSnapshot(snapshot));
+  on("observed", (/** @type {Observed[]} */ records) => onObserved(records));
   on("gap", (count) => {
     store.gap.value = count;
   });

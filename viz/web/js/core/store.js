@@ -3,6 +3,7 @@ import { batch, computed, signal } from "@preact/signals";
 import { emptyState, ms } from "#core/fold.js";
 import { Model } from "#core/model.js";
 import { Run } from "#core/run.js";
+import { Scene } from "#core/scene.js";
 import { shorten } from "#core/text.js";
 
 /** @template T @typedef {import("@preact/signals").Signal<T>} Signal */
@@ -61,6 +62,8 @@ export const implicit = signal(saved("implicit", false));
 export const numbers = signal("none"); // a key of statistics.MODES
 /** @type {Signal<Theme>} */
 export const theme = signal(saved("theme", "system"));
+/** @type {Signal<Visit | null>} */
+export const hovered = signal(null);
 /** @type {Signal<Set<string>>} */
 export const opened = signal(new Set()); // paths of containers
 export const help = signal(false);
@@ -95,17 +98,22 @@ const position = signal(null); // so many events have happened there: several ma
 export const instant = computed(() => [cursor.value, position.value]);
 
 export let run = new Run(emptyState(), []);
+export let scene = new Scene();
+export const hasMap = signal(false); // whether there is anything to show on one
 /** @type {RunState | null} */
 let stateAtCursor = null;
 
 /** @param {RunState | null} base @param {RunEvent[]} events */
 export function startRun(base, events) {
   run = new Run(base, events);
+  scene = new Scene();
+  scene.addEvents(events);
   stateAtCursor = null;
   batch(() => {
     cursor.value = null;
     position.value = null;
     gap.value = null;
+    hovered.value = null;
   });
 }
 
@@ -117,8 +125,18 @@ export const shown = () => (cursor.value === null ? run.now : (stateAtCursor ?? 
  */
 export function addEvents(events) {
   run.push(events);
+  scene.addEvents(events);
   const gone = run.trim(settings.value.kept ?? Infinity);
   if (gone && position.value !== null) position.value = Math.max(0, position.value - gone);
+}
+
+/** Take in what the robot's topics told. @param {Observed[]} records */
+export const addObserved = (records) => scene.addObserved(records);
+
+/** The visit that the pointer is on, in the timeline or the map. @param {Visit | null} visit */
+export function hover(visit) {
+  const before = hovered.value;
+  if (before?.path !== visit?.path || before?.from !== visit?.from) hovered.value = visit;
 }
 
 /** @param {number | null} t @param {number | null} count */

@@ -7,6 +7,7 @@ import * as store from "#core/store.js";
 import { Diagram } from "#drawing/diagram.js";
 import * as framing from "#drawing/framing.js";
 import { boxesOf, Layout } from "#drawing/layout.js";
+import { MapView } from "#drawing/map.js";
 import { applyTheme, systemIsDark } from "#drawing/theme.js";
 import { Timeline } from "#drawing/timeline.js";
 import { drag, Viewport } from "#drawing/viewport.js";
@@ -55,8 +56,14 @@ export class Page {
   /** @type {Layout | null} */
   layout = null;
 
-  /** @param {SVGSVGElement} svg @param {SVGSVGElement} minimap @param {HTMLCanvasElement} canvas */
-  constructor(svg, minimap, canvas) {
+  /**
+   * @param {SVGSVGElement} svg
+   * @param {SVGSVGElement} minimap
+   * @param {HTMLCanvasElement} canvas of the timeline
+   * @param {HTMLCanvasElement} floor of the map
+   */
+  constructor(svg, minimap, canvas, floor) {
+    this.map = new MapView(floor);
     this.diagram = new Diagram(svg, minimap);
     this.view = new Viewport(svg, this.diagram.world, () => this.diagram.showWindow(this.view));
     this.timeline = new Timeline(canvas, { onPick: (path) => this.goTo(path) });
@@ -71,10 +78,16 @@ export class Page {
       this.diagram.showWindow(this.view);
       this.timeline.draw();
     }).observe(svg);
-    systemIsDark.addEventListener("change", () => this.timeline.restyle());
+    systemIsDark.addEventListener("change", () => this.#restyle());
     store.instant.subscribe(() => {
       this.paintAll();
       this.timeline.draw();
+      this.map.draw();
+    });
+    store.hovered.subscribe((visit) => {
+      this.diagram.mark(visit ? [visit.path] : [], "linked");
+      this.timeline.draw();
+      this.map.draw();
     });
     store.serversSeen.subscribe(() => this.paintAll());
     store.facts.subscribe(() => this.paintAll());
@@ -85,7 +98,11 @@ export class Page {
     setInterval(() => this.#beat(), BEAT_MS);
     this.layout = new Layout(await makeLayoutWorker());
     await document.fonts.ready;
-    await connect({ onEvents: (events) => this.takeEvents(events), onMachine: () => this.showMachine() });
+    await connect({
+      onEvents: (events) => this.takeEvents(events),
+      onMachine: () => this.showMachine(),
+      onObserved: (records) => this.takeObserved(records),
+    });
   }
 
   // -- what happens -------------------------------------------------------------------------------
@@ -96,6 +113,7 @@ export class Page {
     framing.restart();
     this.layout?.clear();
     this.timeline.reset();
+    this.map.reset();
     if (isFile() || store.facts.value?.recorded) this.timeline.fitAll();
     if (store.settings.value.follow && !this.followIsSet) {
       store.follow.value = true;
@@ -114,6 +132,12 @@ export class Page {
     }
     store.addEvents(events);
     if (!events.length) this.paintAll();
+    this.#schedule();
+  }
+
+  /** @param {Observed[]} records */
+  takeObserved(records) {
+    store.addObserved(records);
     this.#schedule();
   }
 
@@ -151,6 +175,7 @@ export class Page {
     this.panelsDue = 0;
     this.panelsAt = moment;
     store.tick.value += 1;
+    store.hasMap.value = !store.scene.isEmpty;
     if (moment - this.textAt > TEXT_MS) {
       this.textAt = moment;
       store.slowTick.value += 1;
@@ -163,6 +188,7 @@ export class Page {
     this.mapsDue ||= setTimeout(() => {
       this.mapsDue = 0;
       this.timeline.draw();
+      this.map.draw();
       this.diagram.paintMinimap();
     }, PANELS_MS / 2);
     this.#announce(moment);
@@ -424,8 +450,14 @@ export class Page {
   setTheme(name) {
     store.theme.value = name;
     applyTheme();
+    this.#restyle();
+  }
+
+  #restyle() {
     this.timeline.restyle();
+    this.map.restyle();
     this.timeline.draw();
+    this.map.draw();
   }
 
   /** @param {string[]} paths */

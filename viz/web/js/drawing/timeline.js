@@ -1,6 +1,7 @@
 // The run over time: a lane per container, in it a row for each child of a concurrence; drag to seek.
 import { ms } from "#core/fold.js";
 import { outcomeClass } from "#core/outcomes.js";
+import { COLOURS } from "#core/scene.js";
 import * as store from "#core/store.js";
 import { askerText } from "#core/text.js";
 import { drag } from "#drawing/viewport.js";
@@ -55,9 +56,13 @@ export class Timeline {
     canvas.addEventListener("pointermove", (e) => {
       const span = this.#spanAt(e);
       canvas.title = span ? describe(span) : "";
+      store.hover(span ? { path: span.path, from: span.from } : null);
       this.#hover(e.offsetX);
     });
-    canvas.addEventListener("pointerleave", () => this.#hover(null));
+    canvas.addEventListener("pointerleave", () => {
+      this.#hover(null);
+      store.hover(null);
+    });
     canvas.addEventListener("keydown", (e) => this.#key(e));
   }
 
@@ -285,6 +290,13 @@ export class Timeline {
       g.lineWidth = 2;
       g.strokeRect(left - 1, top - 1, wide + 2, tall + 2);
     }
+    const driver = store.scene.colourOf(span.path);
+    if (driver >= 0) {
+      g.fillStyle = this.#colour(`s${1 + (driver % COLOURS)}`); // of its track on the map
+      g.fillRect(left + 2, bottom - 4, Math.max(0, wide - 4), 2.5);
+    }
+    const lit = store.hovered.value;
+    if (lit?.path === span.path && lit.from === span.from) this.#halo({ left, right, top, bottom });
     this.#mark(span.serviced, "preempted", x, now, { right, top, tall });
     this.#mark(span.abandoned, "failure", x, now, { right, top, tall });
     if (wide <= 26 || tall <= 8) return;
@@ -293,6 +305,21 @@ export class Timeline {
     g.textAlign = "left";
     this.#clipped(left, top, wide - 3, tall, () => g.fillText(name, left + 4, top + tall / 2 + 0.5));
     g.font = "11px Inter, Arial, sans-serif";
+  }
+
+  /** A ring around what the pointer is on here or in the map. @param {Omit<Hit, "span">} bar */
+  #halo({ left, right, top, bottom }) {
+    const g = this.context;
+    for (const [name, wide] of /** @type {[string, number][]} */ ([
+      ["ink", 4.5],
+      ["halo", 2.5],
+    ])) {
+      g.strokeStyle = this.#colour(name);
+      g.lineWidth = wide;
+      g.beginPath();
+      g.roundRect(left - 1, top - 1, right - left + 2, bottom - top + 2, 4);
+      g.stroke();
+    }
   }
 
   /**

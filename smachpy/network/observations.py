@@ -1,0 +1,285 @@
+"""What a robot's topics tell, as records for pages and recordings: without threads, time or I/O.
+
+A record has `kind` "Observed", `path` "", `stamp_ns` (when it came, by the mission's clock),
+`robot` and `what`. `robot` stands in front of the topics' names below the mission's own name space:
+"" for its own robot. Poses are [x, y, yaw] in the map frame [m, m, rad]:
+
+- "pose": `at`, a pose.
+- "scan": `at`, the pose of the scanner; `first` and `step` [rad]; `ranges` [cm], -1 for nothing.
+- "plan": `points`, [x, y] in the map frame [m]; none when there is no plan any more.
+- "map": `resolution` [m], `width`, `height`, `origin`, a pose; `cells`, base64 of zlib of one byte
+  a cell, row 0 at the bottom: 0 free, 1 occupied, 2 unknown.
+- "value": `name`, `value`, `unit`.
+"""
+
+from __future__ import annotations
+
+import base64
+import math
+import zlib
+from typing import TYPE_CHECKING, Any, Final
+
+from smachpy.events.recording import OBSERVED
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+KIND: Final = OBSERVED
+
+Pose = tuple[float, float, float]
+"""x, y [m], yaw [rad]."""
+
+TOPICS: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
+    "nav_msgs/OccupancyGrid": ("map", ("map",)),
+    "nav_msgs/Odometry": ("odometry", ("odom", "odometry/filtered")),
+    "geometry_msgs/PoseWithCovarianceStamped": ("pose", ("amcl_pose",)),
+    "tf2_msgs/TFMessage": ("tf", ("tf", "tf_static")),
+    "sensor_msgs/LaserScan": ("scan", ("scan",)),
+    "nav_msgs/Path": (
+        "plan",
+        ("plan", "move_base/NavfnROS/plan", "move_base/GlobalPlanner/plan"),
+    ),
+    "sensor_msgs/BatteryState": ("battery", ("battery", "battery_state")),
+}
+"""Type of a topic -> what it tells, and the names that it usually has."""
+
+POSE_S: Final = 0.2
+"""Between two poses of a robot that moves [s]."""
+SCAN_S: Final = 0.5
+VALUE_S: Final = 1.0
+MAP_S: Final = 2.0
+_NEAR_M, _NEAR_RAD = 0.01, 0.02  # a pose this near to the one before is the same
+_MOST_RAYS: Final = 181
+_MOST_POINTS: Final = 200  # of a plan
+_MOST_CELLS: Final = 4_000_000  # a larger map is made coarser
+_OCCUPIED, _FREE = 65, 25  # [%] as map_saver of ROS draws the line
+_STANDS: Final = 1e-3  # [m/s] and [rad/s]: slower is at rest
+_MOST_FRAMES: Final = 32  # between a frame and the map
+_MOST_SCOPES: Final = 1000
+
+
+def role_of(type_name: str, name: str) -> tuple[str, str] | None:
+    """Return what a topic tells and whose it is, None for a topic that is of no use here.
+
+    Args:
+        type_name: "nav_msgs/Odometry" or "nav_msgs/msg/Odometry".
+        name: Its name, no slash in front: "robot_0/odom".
+    """
+    role, names = TOPICS.get(type_name.replace("/msg/", "/"), ("", ()))
+    for usual in sorted(names, key=len, reverse=True):
+        if name == usual:
+            return role, ""
+        if name.endswith(f"/{usual}"):
+            return role, name.removesuffix(f"/{usual}")
+    return None
+
+
+class Observer:
+    """Turns messages of topics into records, and leaves out what says nothing new.
+
+    Poses are given in the map frame, as far as `tf` leads there; a frame of which `tf` says nothing
+    is taken for it.
+    """
+
+    def __init__(self) -> None:
+        self._frames: dict[str, dict[str, tuple[str, Pose]]] = {}  # robot -> child -> parent, pose
+        self._poses: dict[str, Pose] = {}
+        self._told: dict[tuple[str, str], tuple[int, Any]] = {}  # by what and robot
+        self._localized: set[str] = set()
+
+    def take(self, role: str, robot: str, message: Any, stamp_ns: int) -> list[dict[str, Any]]:
+        """Return the records that a message makes; of one that cannot be read, none.
+
+        Args:
+            role: What the topic tells, see `role_of`.
+            robot: Whose it is.
+            message: Of ROS 1 or ROS 2.
+            stamp_ns: When it came.
+        """
+        make = getattr(self, f"_take_{role}")
+        try:
+            records: list[dict[str, Any]] = [
+                {
+                    "kind": KIND,
+                    "path": "",
+                    "stamp_ns": stamp_ns,
+                    "what": what,
+                    "robot": robot,
+                    **facts,
+                }
+                for what, facts in make(robot, message, stamp_ns)
+            ]
+        except (ArithmeticError, ValueError):  # no finite number where one is needed
+            return []
+        return records
+
+    # -- one method for each role: they yield what is told, and its fields -----------------------
+
+    def _take_tf(self, robot: str, message: Any, _stamp_ns: int) -> Iterable[Any]:
+        if robot not in self._frames and len(self._frames) >= _MOST_SCOPES:
+            return ()
+        known = self._frames.setdefault(robot, {})
+        for stamped in message.transforms:
+            moved = stamped.transform.translation
+            x, y, yaw = _finite(moved.x, moved.y, _yaw(stamped.transform.rotation))
+            parent = _plain(stamped.header.frame_id)
+            known[_plain(stamped.child_frame_id)] = parent, (x, y, yaw)
+        return ()
+
+    def _take_pose(self, robot: str, message: Any, stamp_ns: int) -> Iterator[Any]:
+        self._localized.add(robot)
+        yield from self._pose(robot, _pose_of(message.pose.pose), stamp_ns, at_rest=True)
+
+    def _take_odometry(self, robot: str, message: Any, stamp_ns: int) -> Iterator[Any]:
+        pose, frame = _pose_of(message.pose.pose), _plain(message.header.frame_id)
+        placed = self._in_map(robot, frame, pose)
+        if placed is None and robot in self._localized:
+            return  # odometry drifts: without a transform, what localizes the robot knows better
+        twist = message.twist.twist
+        at_rest = max(abs(twist.linear.x), abs(twist.linear.y), abs(twist.angular.z)) < _STANDS
+        yield from self._pose(robot, placed or pose, stamp_ns, at_rest=at_rest)
+
+    def _pose(
+        self, robot: str, pose: Pose, stamp_ns: int, *, at_rest: bool
+    ) -> Iterator[tuple[str, dict[str, Any]]]:
+        """Where it stops is told at once, as nothing may come after it."""
+        self._poses[robot] = pose
+        told_ns, told = self._told.get(("pose", robot), (0, None))
+        if told is not None and _is_near(told, pose):
+            return
+        if told is not None and not at_rest and stamp_ns - told_ns < POSE_S * 0.95e9:
+            return
+        self._told["pose", robot] = stamp_ns, pose
+        yield "pose", {"at": _rounded(pose)}
+
+    def _take_scan(self, robot: str, message: Any, stamp_ns: int) -> Iterator[Any]:
+        if robot not in self._poses or not self._is_due("scan", robot, stamp_ns, SCAN_S):
+            return
+        every = max(1, math.ceil(len(message.ranges) / _MOST_RAYS))
+        first, step = _finite(message.angle_min, message.angle_increment * every)
+        low, high = message.range_min, message.range_max
+        ranges = [
+            round(r * 100) if math.isfinite(r) and low <= r <= high else -1
+            for r in message.ranges[::every]
+        ]
+        at = self._in_map(robot, _plain(message.header.frame_id), (0.0, 0.0, 0.0))
+        yield (
+            "scan",
+            {
+                "at": _rounded(at or self._poses[robot]),
+                "first": round(first, 5),
+                "step": round(step, 6),
+                "ranges": ranges,
+            },
+        )
+
+    def _take_plan(self, robot: str, message: Any, stamp_ns: int) -> Iterator[Any]:
+        poses, frame = list(message.poses), _plain(message.header.frame_id)
+        every = max(1, math.ceil(len(poses) / _MOST_POINTS))
+        kept = [*poses[:-1:every], *poses[-1:]]
+        points = []
+        for stamped in kept:
+            pose = _pose_of(stamped.pose)
+            x, y, _ = self._in_map(robot, frame, pose) or pose
+            points.append([round(x, 2), round(y, 2)])
+        if self._told.get(("plan", robot), (0, None))[1] != points:
+            self._told["plan", robot] = stamp_ns, points
+            yield "plan", {"points": points}
+
+    def _take_map(self, robot: str, message: Any, stamp_ns: int) -> Iterator[Any]:
+        facts = grid_facts(message)
+        told_ns, told = self._told.get(("map", robot), (0, None))
+        if facts != told and (told is None or stamp_ns - told_ns >= MAP_S * 1e9):
+            self._told["map", robot] = stamp_ns, facts
+            yield "map", facts
+
+    def _take_battery(self, robot: str, message: Any, stamp_ns: int) -> Iterator[Any]:
+        if self._is_due("battery", robot, stamp_ns, VALUE_S):
+            (part,) = _finite(message.percentage)
+            yield "value", {"name": "battery", "value": round(100 * part, 2), "unit": "%"}
+
+    def _is_due(self, what: str, robot: str, stamp_ns: int, seconds: float) -> bool:
+        told_ns, _ = self._told.get((what, robot), (None, None))
+        if told_ns is not None and stamp_ns - told_ns < seconds * 0.95e9:
+            return False
+        self._told[what, robot] = stamp_ns, None
+        return True
+
+    # -- frames ----------------------------------------------------------------------------------
+
+    def _in_map(self, robot: str, frame: str, pose: Pose) -> Pose | None:
+        """Return a pose of `frame` in the map frame, None when `tf` does not lead there."""
+        known = {**self._frames.get("", {}), **self._frames.get(robot, {})}
+        for _ in range(_MOST_FRAMES):
+            if frame == "map" or frame.endswith("/map"):
+                return pose
+            if frame not in known:
+                return None
+            frame, placed = known[frame]
+            pose = _compose(placed, pose)
+        return None
+
+
+def grid_facts(grid: Any) -> dict[str, Any]:
+    """Return the fields of a record of a nav_msgs/OccupancyGrid.
+
+    Raises:
+        ValueError: it has no cells, or another number of them than it says.
+    """
+    import numpy as np
+
+    info = grid.info
+    origin = _finite(info.origin.position.x, info.origin.position.y, _yaw(info.origin.orientation))
+    (resolution,) = _finite(info.resolution)
+    cells = np.asarray(grid.data, dtype=np.int8)
+    if resolution <= 0 or not cells.size or cells.size != info.width * info.height:
+        raise ValueError(f"map: {info.width} x {info.height} cells of {resolution} m, {cells.size}")
+    rows = cells.reshape(info.height, info.width)
+    classes = np.where(rows >= _OCCUPIED, 1, np.where((rows >= 0) & (rows <= _FREE), 0, 2))
+    every = math.ceil(math.sqrt(cells.size / _MOST_CELLS))
+    classes, resolution = classes[::every, ::every].astype(np.uint8), resolution * every
+    return {
+        "resolution": round(resolution, 6),
+        "width": int(classes.shape[1]),
+        "height": int(classes.shape[0]),
+        "origin": list(origin),
+        "cells": base64.b64encode(zlib.compress(classes.tobytes(), 9)).decode("ascii"),
+    }
+
+
+def _plain(frame: str) -> str:
+    return frame.removeprefix("/")
+
+
+def _finite(*values: float) -> tuple[float, ...]:
+    numbers = tuple(float(value) for value in values)
+    if not all(map(math.isfinite, numbers)):
+        raise ValueError(f"no finite numbers: {numbers}")
+    return numbers
+
+
+def _yaw(turn: Any) -> float:
+    """The turn about the vertical axis [rad] of a quaternion."""
+    x, y, z, w = turn.x, turn.y, turn.z, turn.w
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def _pose_of(message: Any) -> Pose:
+    x, y, yaw = _finite(message.position.x, message.position.y, _yaw(message.orientation))
+    return x, y, yaw
+
+
+def _compose(frame: Pose, pose: Pose) -> Pose:
+    """Return a pose that is given in a frame in the one in which the frame is given."""
+    x, y, yaw = frame
+    c, s = math.cos(yaw), math.sin(yaw)
+    return x + c * pose[0] - s * pose[1], y + s * pose[0] + c * pose[1], yaw + pose[2]
+
+
+def _is_near(one: Pose, other: Pose) -> bool:
+    turned = math.remainder(one[2] - other[2], math.tau)
+    return math.dist(one[:2], other[:2]) < _NEAR_M and abs(turned) < _NEAR_RAD
+
+
+def _rounded(pose: Pose) -> list[float]:
+    return [round(value, 3) for value in pose]

@@ -1,0 +1,224 @@
+"""Listens to the topics of the robots that a mission drives, for those who watch the mission."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import deque
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+
+from actionlib_core.clock import SerialExecutor
+from actionlib_core.exceptions import ActionlibError
+from actionlib_core.interfaces import get_message
+from actionlib_core.node import get_node
+from actionlib_core.pubsub.topic import Subscriber
+from actionlib_core.wire.presence import Kind, parse_token, token_pattern
+from smachpy.events import record_text
+from smachpy.network.observations import Observer, role_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Self
+
+    from actionlib_core.node import Node
+    from actionlib_core.transport import Closable, Presence
+    from actionlib_core.wire.presence import Endpoint
+
+logger = logging.getLogger("smachpy")
+
+KEPT: Final = 20_000
+"""So many records are kept for those who come later, besides the newest maps."""
+
+KEPT_BYTES: Final = 8_000_000
+"""So much text of them at most."""
+
+MOST_TOPICS: Final = 400
+"""So many topics are listened to at most."""
+
+
+CLOSE_S: Final = 1.0
+
+
+class RobotTopics:
+    """Tells what robots' topics say, while somebody wants to know: poses, scans, plans, maps, ...
+
+    It listens to topics with the types and names of `observations.TOPICS` below the node's name
+    space, and to `/map` and `/tf`, over every wire that the node's configuration names. A context
+    manager.
+
+    Args:
+        node: Where, and by whose clock; the node in force when None.
+
+    Threads: every method may be called from any thread. Listeners are called in threads of the
+        node's clock, one at a time; what one raises is given to `threading.excepthook`.
+    """
+
+    def __init__(self, node: Node | None = None) -> None:
+        self._node = get_node() if node is None else node
+        self._lock = threading.Lock()
+        self._telling = threading.Lock()  # around calls of listeners: records keep their order
+        self._executor = SerialExecutor(self._node.clock, "robot topics")
+        self._observer = Observer()
+        self._listeners: list[Callable[[dict[str, Any]], object]] = []
+        self._kept: deque[tuple[dict[str, Any], int]] = deque()
+        self._kept_bytes = 0
+        self._maps: dict[str, dict[str, Any]] = {}
+        self._count = 0
+        self._watches: list[Closable] = []
+        self._topics: dict[
+            str, tuple[Subscriber[Any], set[str]]
+        ] = {}  # by name, with its publishers
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self.close()
+
+    def listen(self, listener: Callable[[dict[str, Any]], object]) -> Callable[[], None]:
+        """Tell `listener` everything from now on; returns how to end that.
+
+        Records are numbered from 1 in `n`; see `observations` for their other fields, and `kept`.
+
+        Raises:
+            TransportError: the network of a ROS 2 robot cannot be joined.
+
+        Blocks: until such networks are joined.
+        """
+        with self._lock:
+            self._listeners.append(listener)
+            first = len(self._listeners) == 1
+        if first:
+            self._begin()
+        return partial(self._leave, listener)
+
+    def kept(self) -> list[dict[str, Any]]:
+        """Return the newest records, and the newest map of every robot, oldest first."""
+        with self._lock:
+            first = self._kept[0][0]["n"] if self._kept else self._count + 1
+            maps = sorted(self._maps.values(), key=lambda one: one["n"])
+            return [
+                *(one for one in maps if one["n"] < first),
+                *(record for record, _ in self._kept),
+            ]
+
+    def close(self) -> None:
+        """Listen to nothing any more; a second call does nothing.
+
+        Blocks: until what is under way is done, 1 s at most.
+        """
+        with self._lock:
+            self._listeners.clear()
+        self._end()
+        self._executor.join(CLOSE_S)
+
+    def _leave(self, listener: Callable[[dict[str, Any]], object]) -> None:
+        with self._lock:
+            if listener not in self._listeners:
+                return
+            self._listeners.remove(listener)
+            last = not self._listeners
+        if last:
+            self._end()
+
+    def _begin(self) -> None:
+        node = self._node
+        watches = [node.transport.watch_alive(token_pattern(Kind.PUBLISHER), self._on_presence)]
+        if node.config.ros2:
+            from actionlib_core.wire.ros2.ends import watch_ends
+
+            watches += watch_ends(node, self._on_end)
+        with self._lock:
+            self._watches += watches
+
+    def _end(self) -> None:
+        with self._lock:
+            watches, self._watches = self._watches, []
+            topics, self._topics = self._topics, {}
+        for watch in watches:
+            watch.close()
+        for subscriber, _ in topics.values():
+            subscriber.unregister()
+
+    def _on_presence(self, presence: Presence) -> None:
+        end = parse_token(presence.key)
+        if end is not None:
+            self._on_end(end, presence.key, presence.alive)
+
+    def _on_end(self, end: Endpoint, key: str, alive: bool) -> None:
+        """A publisher has come or gone; called on the network's threads, so nothing waits here."""
+        if end.kind is not Kind.PUBLISHER or self._scope(end) is None:
+            return
+        self._executor.submit(partial(self._change, end, key, alive=alive))
+
+    def _scope(self, end: Endpoint) -> tuple[str, str] | None:
+        """What a topic tells and of which robot, None if it is none of this mission's."""
+        space = self._node.namespace.strip("/")
+        inside = not space or end.name.startswith(f"{space}/")
+        if not inside and end.name not in {"map", "tf", "tf_static"}:
+            return None
+        return role_of(end.type, end.name.removeprefix(f"{space}/") if inside else end.name)
+
+    def _change(self, end: Endpoint, key: str, *, alive: bool) -> None:
+        scope = self._scope(end)
+        assert scope is not None
+        gone: Subscriber[Any] | None = None
+        with self._lock:
+            known = self._topics.get(end.name)
+            if known is not None:
+                known[1].add(key) if alive else known[1].discard(key)
+                if not known[1]:
+                    gone = self._topics.pop(end.name)[0]
+            wanted = known is None and alive and self._listeners and len(self._topics) < MOST_TOPICS
+        if gone is not None:
+            gone.unregister()
+        if not wanted:
+            return
+        try:
+            made = Subscriber(
+                f"/{end.name}",
+                self._class(end),
+                partial(self._on_message, *scope),
+                queue_size=20,
+                node=self._node,
+            )
+        except ActionlibError as error:
+            logger.warning("robot topics: %s", error)
+            return
+        with self._lock:
+            spare = made if end.name in self._topics or not self._listeners else None
+            if spare is None:
+                self._topics[end.name] = made, {key}
+        if spare is not None:
+            spare.unregister()
+
+    def _class(self, end: Endpoint) -> Any:
+        if end.type.count("/") > 1:
+            from actionlib_core.wire.ros2.ends import class_of
+
+            return class_of(self._node, end)
+        return get_message(end.type)
+
+    def _on_message(self, role: str, robot: str, message: Any) -> None:
+        stamp_ns = self._node.clock.time_ns()
+        with self._telling:
+            with self._lock:
+                records = self._observer.take(role, robot, message, stamp_ns)
+                for record in records:
+                    self._keep(record)
+                listeners = list(self._listeners)
+            for record in records:
+                for listener in listeners:
+                    listener(record)
+
+    def _keep(self, record: dict[str, Any]) -> None:
+        self._count += 1
+        record["n"] = self._count
+        if record["what"] == "map":
+            self._maps[record["robot"]] = record
+        size = len(record_text(record))
+        self._kept.append((record, size))
+        self._kept_bytes += size
+        while len(self._kept) > KEPT or self._kept_bytes > KEPT_BYTES:
+            self._kept_bytes -= self._kept.popleft()[1]

@@ -1,0 +1,185 @@
+"""The map beside the diagram: live, in recordings and in the one file; linked with the timeline."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from viz.live import machines
+
+pytestmark = pytest.mark.browser
+
+DATA = Path(__file__).parents[2] / "data"
+
+
+def stamped(x, y):
+    def message(kind, **fields):
+        return {"$msg": kind, "fields": fields}
+
+    turn = message("geometry_msgs/Quaternion", x=0.0, y=0.0, z=0.0, w=1.0)
+    pose = message(
+        "geometry_msgs/Pose",
+        position=message("geometry_msgs/Point", x=x, y=y, z=0.0),
+        orientation=turn,
+    )
+    header = message("std_msgs/Header", frame_id="map")
+    return message("geometry_msgs/PoseStamped", header=header, pose=pose)
+
+
+def goal(n, path, x, at):
+    facts = {"action": "move_base", "goal_id": str(n), "goal": {"target_pose": stamped(x, 1.0)}}
+    return ("GoalSent", path, {**facts, "at": at})
+
+
+def run():
+    """A drives from (1, 1) to (3, 1) in 4 s, then B back."""
+    return [
+        ("Started", "/JOB", {"at": 0.0}),
+        ("Entered", "/JOB/A", {"at": 1.0}),
+        goal(1, "/JOB/A", 3.0, 1.0),
+        ("GoalDone", "/JOB/A", {"action": "move_base", "goal_id": "1", "status": "SUCCEEDED",
+                                "text": "arrived", "result": None, "at": 5.0}),
+        ("Left", "/JOB/A", {"outcome": "ok", "at": 5.0}),
+        ("Entered", "/JOB/B", {"at": 5.0}),
+        goal(2, "/JOB/B", 1.0, 5.0),
+        ("Left", "/JOB/B", {"outcome": "ok", "at": 9.0}),
+        ("Finished", "/JOB", {"outcome": "done", "at": 9.0}),
+    ]  # fmt: skip
+
+
+def observed(served):
+    """A map, and poses ten times a second, there and back on another line."""
+
+    def record(n, seconds, what, **facts):
+        stamp = served.began + int(seconds * 1e9)
+        return {"kind": "Observed", "path": "", "n": n, "stamp_ns": stamp, "what": what,
+                "robot": "", **facts}  # fmt: skip
+
+    shared = json.loads((DATA / "observed.json").read_text(encoding="utf-8"))[0]
+    floor = {name: shared[name] for name in ("width", "height", "cells", "origin")}
+    told = [record(1, 0.0, "map", **{**floor, "resolution": 2.0, "origin": [0.0, 0.0, 0.0]})]
+    for n in range(81):
+        x = 1.0 + min(n, 40) / 20 - max(0, n - 40) / 20
+        y = 1.0 + (0.8 if n > 40 else 0.0)
+        told.append(record(n + 2, 1.0 + n / 10, "pose", at=[x, y, 0.0 if n < 40 else math.pi]))
+    return told
+
+
+@pytest.fixture
+def office(served):
+    served.add("one", events=run(), observed=observed(served))
+    return served
+
+
+AT = "([x, y]) => { const b = document.querySelector('.map-view canvas').getBoundingClientRect(); const [px, py] = smachpy.page.map.at({ x, y }); return [b.left + px, b.top + py]; }"
+
+
+def test_a_press_on_the_track_goes_to_its_instant(office, look):
+    page = look(office.start())
+    page.wait_for_selector(".map-view canvas")
+    page.mouse.click(*page.evaluate(AT, [2.0, 1.0]))
+    page.wait_for_selector(".banner.past")
+    assert page.evaluate("() => smachpy.store.instantText(smachpy.store.cursor.value)") == "00:03.0"
+    assert page.evaluate("() => smachpy.store.selected.value") == "/JOB/A"
+    # What comes later has not been driven yet.
+    page.mouse.move(*page.evaluate(AT, [2.0, 1.8]))
+    assert page.evaluate("() => smachpy.store.hovered.value") is None
+
+
+def test_hovering_is_linked_both_ways(office, look):
+    page = look(office.start())
+    page.wait_for_selector(".map-view canvas")
+    page.mouse.move(*page.evaluate(AT, [2.0, 1.8]))
+    page.wait_for_selector(".map-view .tip")
+    assert page.evaluate("() => smachpy.store.hovered.value.path") == "/JOB/B"
+    assert "00:05.0 \u2013 00:09.0, 4.0 s" in page.text_content(".map-view .tip")
+    page.wait_for_selector("g[data-path='/JOB/B'].linked")
+    bar = """() => { const t = smachpy.page.timeline, b = t.canvas.getBoundingClientRect(),
+      h = t.hits.find((one) => one.span.path === '/JOB/A'); return [b.left + h.left + 5, b.top + (h.top + h.bottom) / 2]; }"""
+    page.mouse.move(*page.evaluate(bar))
+    page.wait_for_selector("g[data-path='/JOB/A'].linked")
+    assert "ok 00:01.0 \u2013 00:05.0" in page.text_content(".map-view .tip")
+    page.mouse.move(5, 5)
+    page.wait_for_selector(".map-view .tip", state="detached")
+
+
+def test_the_floor_is_drawn_in_the_colours_of_the_theme(office, look):
+    page = look(office.start())
+    page.wait_for_selector(".map-view canvas")
+    colour = """([x, y]) => { const { map } = smachpy.page; const [px, py] = map.at({ x, y }), r = devicePixelRatio;
+      return [...map.context.getImageData(Math.round(px * r), Math.round(py * r), 1, 1).data].slice(0, 3); }"""
+    page.wait_for_function(f"() => String(({colour})([3.0, 0.3])) === '59,71,84'")  # --wall
+    assert page.evaluate(colour, [1.0, 0.3]) == [255, 255, 255]
+    page.evaluate("() => smachpy.page.setTheme('dark')")
+    page.wait_for_function(f"() => String(({colour})([3.0, 0.3])) === '147,161,176'")
+
+
+def test_a_page_hears_of_the_robot_while_it_moves(office, look, monkeypatch):
+    served = office
+    served.add("two", events=run()[:3])
+    page = look(f"{served.start()}?machine=two")
+    assert page.query_selector(".map-panel")  # its goal is a place
+    machine = served.machines.get("two")
+    told = observed(served)
+    for record in told:
+        machine.observe([record])
+    page.wait_for_function("() => smachpy.store.scene.robots.get('')?.poses.length === 81")
+    monkeypatch.setattr(machines, "KEPT_OBSERVED", 50)
+    last = told[-1]
+    machine.observe(
+        [*told, *({**last, "n": last["n"] + n} for n in range(1, 33))]
+    )  # most are known
+    assert len(machine.observed()) == 51  # and the map
+    late = look(f"{served.address}?machine=two")
+    late.wait_for_function("() => smachpy.store.scene.robots.get('')?.poses.length > 5")
+    assert late.evaluate("() => smachpy.store.scene.maps.length") == 1
+    assert page.evaluate("() => smachpy.store.scene.robots.get('').poses.length") == 81
+
+
+def test_a_machine_without_a_robot_has_no_map(served, look):
+    served.add("one", events=[("Started", "/JOB"), ("Entered", "/JOB/A")])
+    page = look(served.start())
+    assert page.query_selector(".map-panel") is None
+
+
+def test_values_that_are_no_map_hurt_nothing(served, look):
+    record = observed(served)[0]
+    bad = [
+        {**record, "n": 1, "cells": "no base64!"},
+        {**record, "n": 2, "cells": "AAAA"},
+        {**record, "n": 3, "width": 7},
+    ]
+    served.add(
+        "one",
+        events=run(),
+        observed=[*bad, *({**r, "n": r["n"] + 3} for r in observed(served)[1:])],
+    )
+    page = look(served.start())
+    page.mouse.click(*page.evaluate(AT, [2.0, 1.0]))
+    page.wait_for_selector(".banner.past")
+
+
+def test_the_one_file_has_the_map(office, look, tmp_path):
+    office.start()
+    import urllib.request
+
+    with urllib.request.urlopen(f"{office.address}api/export?machine=one&format=html") as answer:
+        (tmp_path / "run.html").write_bytes(answer.read())
+    page = look((tmp_path / "run.html").as_uri())
+    page.wait_for_selector(".map-view canvas")
+    page.mouse.click(*page.evaluate(AT, [2.0, 1.0]))
+    page.wait_for_selector(".banner.past")
+    with urllib.request.urlopen(f"{office.address}api/export?machine=one&format=jsonl") as answer:
+        lines = [json.loads(line) for line in answer.read().splitlines()]
+    assert sum(line.get("kind") == "Observed" for line in lines) == 82
+
+
+def test_a_phone_shows_the_map(office, look):
+    page = look(office.start())
+    page.set_viewport_size({"width": 390, "height": 844})
+    box = page.query_selector(".map-view canvas").bounding_box()
+    assert box["width"] > 330
+    assert box["height"] > 120

@@ -1,0 +1,328 @@
+// Where the robots are and were: their tracks by the visits that drove them, goals, scans, plans and maps.
+// From what their topics told (smachpy.network.observations), else from the feedback of their goals.
+// Times are milliseconds since the epoch; places are [m], angles [rad], in the map frame.
+import { own } from "#core/fold.js";
+
+export const COLOURS = 8; // of tracks; from the ninth state on they repeat, dashed
+const MOST_POSES = 60_000; // of one robot
+const MOST_SEEN = 4_000; // scans, and plans, of one robot
+const NEAR = 0.3; // [m] a goal this near to a named place has its name
+const ENDED = { Left: 1, Failed: 1, Finished: 1 };
+
+/** What stands in front of an action's name: the robot's. @param {unknown} action */
+export const robotOf = (action) =>
+  String(action ?? "")
+    .replace(/^\//, "")
+    .replace(/\/?[^/]*$/, "");
+
+/**
+ * The fields of a message in a record; a value of another kind has none.
+ * @param {any} value
+ * @returns {Record<string, any>}
+ */
+const fields = (value) => (value?.$msg ? value.fields : value) ?? {};
+
+/** @param {any} stamped a PoseStamped, or a Pose @returns {Place | null} */
+export function placeOf(stamped) {
+  const outer = fields(stamped);
+  const { position, orientation } = fields(outer.pose ?? stamped);
+  const { x, y } = fields(position);
+  if (!Number.isFinite(x) || !Number.isFinite(y)) return null;
+  const turn = fields(orientation);
+  const [qx, qy, qz, qw] = [turn.x, turn.y, turn.z, turn.w].map((v) => (Number.isFinite(v) ? v : 0));
+  const frame = fields(outer.header).frame_id ?? "map";
+  const yaw = Math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz));
+  return /(^|\/)map$/.test(String(frame)) ? { x, y, yaw } : null;
+}
+
+/** The first place among the fields of a message that usually hold one. @param {any} message @param {string[]} names */
+const placeIn = (message, names) =>
+  names.map((name) => placeOf(own(fields(message), name))).find((place) => place !== null) ?? null;
+const GOALS = ["target_pose", "pose", "goal_pose", "goal"];
+const FEEDBACK = ["base_position", "current_pose"];
+
+/** A place with a name that was written to userdata, as its text: Waypoint(name='dock', ...x=1.0, y=2.0...). */
+const NAMED = /name='([^']{1,40})'.*?\bx=(-?[\d.e+-]+).*?\by=(-?[\d.e+-]+)/;
+
+/**
+ * So many of some things, in order of their times, have happened by `t`.
+ * @param {{ t: number }[]} list
+ * @param {number} t
+ */
+export function countUntil(list, t) {
+  let low = 0;
+  let high = list.length;
+  while (low < high) {
+    const mid = (low + high) >> 1;
+    if (list[mid].t <= t) low = mid + 1;
+    else high = mid;
+  }
+  return low;
+}
+
+/** @returns {Robot} */
+const newRobot = () => ({ poses: [], observed: null, scans: [], plans: [], goals: [], pieces: [], done: 0 });
+
+export class Scene {
+  /** @type {Map<string, Robot>} */
+  robots = new Map();
+  /** @type {{ t: number, robot: string, map: GridMap }[]} */
+  maps = [];
+  /** @type {Map<string, Series>} values of topics, for plots */
+  series = new Map();
+  /** @type {Map<string, number>} since when a state is active */
+  entered = new Map();
+  /** @type {string[]} paths of the states that drive, by first appearance: their colours */
+  drivers = [];
+  /** @type {{ t: number, name: string, x: number, y: number }[]} */
+  names = [];
+  revision = 0; // counts the changes
+
+  /** @param {string} name */
+  #robot(name) {
+    let robot = this.robots.get(name);
+    if (!robot) {
+      robot = newRobot();
+      this.robots.set(name, robot);
+    }
+    return robot;
+  }
+
+  /** @param {RunEvent[]} events */
+  addEvents(events) {
+    for (const e of events) this.#event(e, e.stamp_ns / 1e6);
+    if (events.length) this.revision += 1;
+  }
+
+  /** @param {RunEvent} e @param {number} t */
+  #event(e, t) {
+    if (e.kind === "Entered" || e.kind === "Started") this.entered.set(e.path, t);
+    else if (Object.hasOwn(ENDED, e.kind)) this.entered.delete(e.path);
+    else if (e.kind === "UserdataWritten") {
+      const [, name, x, y] = NAMED.exec(typeof e.value === "string" ? e.value : "") ?? [];
+      if (name !== undefined) this.names.push({ t, name, x: Number(x), y: Number(y) });
+    } else if (e.kind === "GoalSent") this.#goalSent(e, t);
+    else if (e.kind === "GoalFeedback") {
+      const place = placeIn(e.feedback, FEEDBACK);
+      if (place) this.#pose(robotOf(e.action), { t, ...place }, false);
+    } else if (e.kind === "GoalDone") {
+      const robot = this.robots.get(robotOf(e.action));
+      const goal = robot?.goals.findLast((one) => one.id === e.goal_id);
+      if (goal) Object.assign(goal, { to: t, status: e.status, text: e.text });
+    }
+  }
+
+  /** @param {RunEvent} e @param {number} t */
+  #goalSent(e, t) {
+    const place = placeIn(e.goal, GOALS);
+    if (!place) return;
+    const robot = this.#robot(robotOf(e.action));
+    const from = this.entered.get(e.path) ?? t;
+    /** @type {DrivenGoal} */
+    const goal = { id: e.goal_id, path: e.path, visit: from, t, to: null, status: "ACTIVE", text: "", ...place };
+    robot.goals.push(goal);
+    if (!this.drivers.includes(e.path)) this.drivers.push(e.path);
+    if (robot.poses.length && robot.poses[robot.poses.length - 1].t > t) this.#again(robot); // it was heard late
+  }
+
+  /** @param {Robot} robot its pieces are to be made anew */
+  #again(robot) {
+    robot.pieces = [];
+    robot.done = 0;
+  }
+
+  /** @param {string} name @param {Pose} pose @param {boolean} observed */
+  #pose(name, pose, observed) {
+    const robot = this.#robot(name);
+    if (observed && robot.observed === null) {
+      robot.observed = pose.t; // what feedback told since then is told again
+      robot.poses.length = countUntil(robot.poses, pose.t);
+      this.#again(robot);
+    }
+    if (!observed && robot.observed !== null && pose.t >= robot.observed) return;
+    const last = robot.poses.at(-1);
+    if (last && last.t > pose.t) {
+      robot.poses.splice(countUntil(robot.poses, pose.t), 0, pose);
+      this.#again(robot);
+    } else if (!last || last.t < pose.t || last.x !== pose.x || last.y !== pose.y) robot.poses.push(pose);
+    if (robot.poses.length > MOST_POSES) {
+      robot.poses.splice(0, MOST_POSES / 4);
+      this.#again(robot);
+    }
+  }
+
+  /** @param {Observed[]} records */
+  addObserved(records) {
+    for (const record of records) {
+      const t = record.stamp_ns / 1e6;
+      const take = own(OBSERVERS, record.what);
+      take?.(this, record, t, this.#robot(record.robot));
+      if (record.what === "pose") {
+        const [x, y, yaw] = record.at;
+        this.#pose(record.robot, { t, x, y, yaw }, true);
+      }
+    }
+    if (records.length) this.revision += 1;
+  }
+
+  /** Whether there is anything to show on a map. */
+  get isEmpty() {
+    return !this.maps.length && ![...this.robots.values()].some((robot) => robot.poses.length || robot.goals.length);
+  }
+
+  /**
+   * The track of a robot, cut where another visit, or none, drives it.
+   * @param {Robot} robot
+   * @returns {Piece[]}
+   */
+  piecesOf(robot) {
+    for (; robot.done < robot.poses.length; robot.done++) {
+      const pose = robot.poses[robot.done];
+      const goal = robot.goals[countUntil(robot.goals, pose.t) - 1];
+      const drives = goal && (goal.to === null || pose.t <= goal.to);
+      const path = drives ? goal.path : null;
+      const visit = drives ? goal.visit : null;
+      const last = robot.pieces.at(-1);
+      if (last && last.path === path && last.visit === visit) last.poses.push(pose);
+      else {
+        const before = last?.poses.at(-1);
+        robot.pieces.push({ path, visit, poses: before ? [before, pose] : [pose] });
+      }
+    }
+    return robot.pieces;
+  }
+
+  /** The colour of a state's tracks, from 0 on; -1 when it has driven nowhere. @param {string} path */
+  colourOf(path) {
+    return this.drivers.indexOf(path);
+  }
+
+  /**
+   * Where a robot is at an instant; null: nobody knows yet.
+   * @param {Robot} robot
+   * @param {number} t
+   * @returns {Pose | null}
+   */
+  poseAt(robot, t) {
+    return robot.poses[countUntil(robot.poses, t) - 1] ?? null;
+  }
+
+  /** The map at an instant: before the first one came, that one. @param {number} t */
+  mapAt(t) {
+    return (this.maps[countUntil(this.maps, t) - 1] ?? this.maps[0])?.map ?? null;
+  }
+
+  /** What the place of a goal is called; "" when nobody said. @param {DrivenGoal} goal */
+  placeName(goal) {
+    const near = (/** @type {{ x: number, y: number }} */ one) => Math.hypot(one.x - goal.x, one.y - goal.y) < NEAR;
+    return this.names.findLast(near)?.name ?? "";
+  }
+
+  /** The newest goal of a visit. @param {string} path @param {number} visit @returns {DrivenGoal | null} */
+  goalOf(path, visit) {
+    for (const robot of this.robots.values()) {
+      const goal = robot.goals.findLast((one) => one.path === path && one.visit === visit);
+      if (goal) return goal;
+    }
+    return null;
+  }
+
+  /**
+   * The piece of a track nearest to a place, and when the robot was there.
+   * @param {number} x @param {number} y
+   * @param {number} within [m]
+   * @param {number} until what is later has not happened [ms]
+   * @returns {{ piece: Piece, t: number, far: number } | null}
+   */
+  nearest(x, y, within, until = Infinity) {
+    /** @type {{ piece: Piece, t: number, far: number } | null} */
+    let best = null;
+    for (const robot of this.robots.values())
+      for (const piece of this.piecesOf(robot))
+        for (let i = 0; i < piece.poses.length && piece.poses[i].t <= until; i++) {
+          const a = piece.poses[Math.max(0, i - 1)];
+          const b = piece.poses[i];
+          const { far, part } = toSegment(x, y, a, b);
+          // Of places where it was several times the newest, and the visit rather than the way between.
+          if (far > within || (best && far > best.far + 1e-6)) continue;
+          best = { piece, t: a.t + part * (b.t - a.t), far };
+        }
+    return best;
+  }
+
+  /** The box around all places, and the map. @param {number} t @returns {Box | null} */
+  extent(t) {
+    const xs = [];
+    const ys = [];
+    const map = this.mapAt(t);
+    if (map)
+      for (const [u, v] of [
+        [0, 0],
+        [map.width, 0],
+        [0, map.height],
+        [map.width, map.height],
+      ]) {
+        const place = cellAt(map, u, v);
+        xs.push(place.x);
+        ys.push(place.y);
+      }
+    else
+      for (const robot of this.robots.values())
+        for (const { x, y } of [...robot.poses, ...robot.goals]) {
+          xs.push(x);
+          ys.push(y);
+        }
+    if (!xs.length) return null;
+    const least = (/** @type {number[]} */ all) => all.reduce((a, b) => Math.min(a, b));
+    const most = (/** @type {number[]} */ all) => all.reduce((a, b) => Math.max(a, b));
+    const [x, y] = [least(xs), least(ys)];
+    return { x, y, w: Math.max(1, most(xs) - x), h: Math.max(1, most(ys) - y) };
+  }
+}
+
+/** Where a point of a map's grid lies. @param {GridMap} map @param {number} u column @param {number} v row */
+export function cellAt({ resolution, origin: [x, y, yaw] }, u, v) {
+  const [c, s] = [Math.cos(yaw) * resolution, Math.sin(yaw) * resolution];
+  return { x: x + c * u - s * v, y: y + s * u + c * v };
+}
+
+/** @param {number} x @param {number} y @param {Pose} a @param {Pose} b */
+function toSegment(x, y, a, b) {
+  const [dx, dy] = [b.x - a.x, b.y - a.y];
+  const long = dx * dx + dy * dy;
+  const part = long ? Math.max(0, Math.min(1, ((x - a.x) * dx + (y - a.y) * dy) / long)) : 1;
+  return { far: Math.hypot(a.x + part * dx - x, a.y + part * dy - y), part };
+}
+
+/** @template T @param {T[]} list @param {T} one */
+function pushLimited(list, one) {
+  list.push(one);
+  if (list.length > MOST_SEEN) list.splice(0, MOST_SEEN / 4);
+}
+
+/** @type {Record<string, (scene: Scene, record: Observed, t: number, robot: Robot) => void>} */
+const OBSERVERS = {
+  scan: (_scene, { at, first, step, ranges }, t, robot) => pushLimited(robot.scans, { t, at, first, step, ranges }),
+  plan: (_scene, { points }, t, robot) => pushLimited(robot.plans, { t, points }),
+  map(scene, { robot, resolution, width, height, origin, cells }, t) {
+    scene.maps.push({ t, robot, map: { resolution, width, height, origin, cells } });
+    if (scene.maps.length > 20) scene.maps.splice(1, 1);
+  },
+  value(scene, { robot, name, value, unit }, t) {
+    const key = [robot, name].filter(Boolean).join("/");
+    const known = scene.series.get(key);
+    if (known) pushLimited(known.points, { t, value });
+    else scene.series.set(key, { name: key, unit, points: [{ t, value }] });
+  },
+};
+
+/** The ends of a scan's rays that met something. @param {Scan} scan @returns {Point[]} */
+export function scanPoints({ at: [x, y, yaw], first, step, ranges }) {
+  /** @type {Point[]} */
+  const points = [];
+  ranges.forEach((cm, i) => {
+    const turn = yaw + first + i * step;
+    if (cm >= 0) points.push({ x: x + (cm / 100) * Math.cos(turn), y: y + (cm / 100) * Math.sin(turn) });
+  });
+  return points;
+}

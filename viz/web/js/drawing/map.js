@@ -1,0 +1,481 @@
+// The map: floor, tracks in the colours of the states that drove them, goals, plans, scans, robots.
+// A press on a track goes to the instant at which the robot was there.
+import { bytesOf } from "#core/connection.js";
+import { outcomeClass } from "#core/outcomes.js";
+import { COLOURS, cellAt, countUntil, scanPoints } from "#core/scene.js";
+import * as store from "#core/store.js";
+import { drag } from "#drawing/viewport.js";
+
+const MARGIN = 10; // around what is shown [px]
+const ROBOT_M = 8; // so much is shown around a robot
+const REACH = 9; // a pointer this near to a track is on it [px]
+const SCAN_MS = 1500; // an older scan is not shown
+const RADIUS_M = 0.25; // of a robot
+const SMALLEST = 6; // of a robot [px]
+const [CLOSEST, FARTHEST] = [400, 0.5]; // [px/m]
+const SCALES_M = [0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
+const FONT = "11px Inter, Arial, sans-serif";
+
+/** @typedef {import("#core/scene.js").Scene} Scene */
+
+export class MapView {
+  /** @type {string | null} the robot that stays in the middle; null: the whole map */
+  followed = null;
+  /** @type {{ k: number, x: number, y: number } | null} px per metre, and the place in the middle [m]; null: all */
+  view = null;
+  /** @type {Map<string, HTMLCanvasElement>} pictures of maps, by their cells and colours */
+  #pictures = new Map();
+  /** @type {Map<string, string>} */
+  #colours = new Map();
+  /** @type {{ left: number, top: number, right: number, bottom: number }[]} where names are, and marks of places */
+  #labels = [];
+  #scale = { k: 1, left: 0, bottom: 0 };
+
+  /** @param {HTMLCanvasElement} canvas */
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+    canvas.addEventListener("pointermove", (e) => this.#hover(e));
+    canvas.addEventListener("pointerleave", () => store.hover(null));
+    canvas.addEventListener("pointerdown", (e) => this.#down(e));
+    canvas.addEventListener("wheel", (e) => this.#wheel(e), { passive: false });
+    canvas.addEventListener("dblclick", () => this.show(null));
+    canvas.addEventListener("keydown", (e) => this.#key(e));
+    new ResizeObserver(() => this.draw()).observe(canvas);
+  }
+
+  /** Read the colours again. */
+  restyle() {
+    this.#colours.clear();
+    this.#pictures.clear();
+  }
+
+  /** Begin anew with another machine. */
+  reset() {
+    this.view = null;
+    this.followed = null;
+    this.#pictures.clear();
+  }
+
+  /** Show the whole map, or one robot. @param {string | null} robot */
+  show(robot) {
+    this.followed = robot;
+    this.view = null;
+    this.draw();
+  }
+
+  /** @param {string} name */
+  #colour(name) {
+    const known = this.#colours.get(name);
+    if (known !== undefined) return known;
+    const colour = getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+    this.#colours.set(name, colour);
+    return colour;
+  }
+
+  /** Where a place is drawn. @param {Point} place [m] @returns {[number, number]} [px] */
+  at({ x, y }) {
+    const { k, left, bottom } = this.#scale;
+    return [left + x * k, bottom - y * k];
+  }
+
+  /** @param {number} px @param {number} py @returns {Point} */
+  #placeAt(px, py) {
+    const { k, left, bottom } = this.#scale;
+    return { x: (px - left) / k, y: (bottom - py) / k };
+  }
+
+  /** @param {Scene} scene @param {number} now @param {number} width @param {number} height */
+  #frame(scene, now, width, height) {
+    const box = scene.extent(now);
+    const robot = this.followed === null ? null : scene.robots.get(this.followed);
+    const pose = robot && scene.poseAt(robot, now);
+    const whole = box
+      ? {
+          k: Math.min((width - 2 * MARGIN) / box.w, (height - 2 * MARGIN) / box.h),
+          x: box.x + box.w / 2,
+          y: box.y + box.h / 2,
+        }
+      : { k: 20, x: 0, y: 0 };
+    const view = this.view ?? whole;
+    const k = !this.view && pose ? Math.min(width, height) / ROBOT_M : view.k;
+    const middle = pose ?? view;
+    this.#scale = { k, left: width / 2 - middle.x * k, bottom: height / 2 + middle.y * k };
+  }
+
+  draw() {
+    const { canvas, context: g } = this;
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+    if (!width || !height) return;
+    const ratio = devicePixelRatio || 1;
+    const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
+    if (canvas.width !== w || canvas.height !== h) Object.assign(canvas, { width: w, height: h });
+    g.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const { scene } = store;
+    const now = store.nowMs();
+    this.#frame(scene, now, width, height);
+    const map = scene.mapAt(now);
+    g.fillStyle = this.#colour(map ? "unknown" : "floor");
+    g.fillRect(0, 0, width, height);
+    if (map) this.#floor(map, ratio);
+    else this.#grid(width, height);
+    const until = store.cursor.value ?? Infinity;
+    for (const robot of scene.robots.values()) this.#seen(robot, now, until);
+    for (const robot of scene.robots.values()) this.#tracks(scene, robot, until);
+    this.#goals(scene, until);
+    for (const [name, robot] of scene.robots) this.#robot(scene, name, robot, now);
+    this.#scaleBar(width, height);
+    canvas.setAttribute("aria-label", describe(scene, now));
+  }
+
+  /** @param {GridMap} map @param {number} ratio */
+  #floor(map, ratio) {
+    const picture = this.#picture(map);
+    if (!picture) return;
+    const g = this.context;
+    const { k } = this.#scale;
+    const [x, y] = this.at(cellAt(map, 0, 0));
+    g.save();
+    g.translate(x, y);
+    g.rotate(-map.origin[2]);
+    g.scale(k * map.resolution, k * map.resolution);
+    g.imageSmoothingEnabled = k * map.resolution * ratio < 2;
+    g.imageSmoothingQuality = "high";
+    g.drawImage(picture, 0, -map.height);
+    g.restore();
+  }
+
+  /** A map as a picture; null while it is being unpacked. @param {GridMap} map */
+  #picture(map) {
+    const colours = ["floor", "wall", "unknown"].map((name) => this.#colour(name));
+    const key = `${colours.join()} ${map.width} ${map.cells}`;
+    const known = this.#pictures.get(key);
+    if (known) return known.width ? known : null;
+    const made = document.createElement("canvas");
+    made.width = 0;
+    this.#pictures.clear(); // of an older map
+    this.#pictures.set(key, made);
+    bytesOf(map.cells)
+      .then((cells) => {
+        if (cells.length !== map.width * map.height) return; // a recording that was written by hand
+        Object.assign(made, { width: map.width, height: map.height });
+        const g = /** @type {CanvasRenderingContext2D} */ (made.getContext("2d"));
+        const image = g.createImageData(map.width, map.height);
+        const words = new Uint32Array(image.data.buffer);
+        const shades = colours.map(wordOf);
+        for (let row = 0; row < map.height; row++)
+          for (let i = 0, from = (map.height - 1 - row) * map.width; i < map.width; i++)
+            words[row * map.width + i] = shades[cells[from + i]] ?? shades[2];
+        g.putImageData(image, 0, 0);
+        this.draw();
+      })
+      .catch(() => {}); // it is no map: poses are shown without one
+    return null;
+  }
+
+  /** A metre's grid, where there is no map. @param {number} width @param {number} height */
+  #grid(width, height) {
+    const g = this.context;
+    const { k } = this.#scale;
+    const step = k > 6 ? 1 : 10;
+    const from = this.#placeAt(0, height);
+    const to = this.#placeAt(width, 0);
+    g.strokeStyle = this.#colour("hair-map");
+    g.lineWidth = 1;
+    g.beginPath();
+    for (let x = Math.ceil(from.x / step) * step; x < to.x; x += step) {
+      const [px] = this.at({ x, y: 0 });
+      g.moveTo(px, 0);
+      g.lineTo(px, height);
+    }
+    for (let y = Math.ceil(from.y / step) * step; y < to.y; y += step) {
+      const [, py] = this.at({ x: 0, y });
+      g.moveTo(0, py);
+      g.lineTo(width, py);
+    }
+    g.stroke();
+  }
+
+  /** What a robot sees and plans. @param {Robot} robot @param {number} now @param {number} until */
+  #seen(robot, now, until) {
+    const g = this.context;
+    const scan = robot.scans[countUntil(robot.scans, now) - 1];
+    const pose = store.scene.poseAt(robot, now);
+    if (scan && pose && now - scan.t < SCAN_MS) {
+      const points = scanPoints(scan).map((point) => this.at(point));
+      g.fillStyle = this.#colour("active");
+      g.globalAlpha = 0.1;
+      g.beginPath();
+      g.moveTo(...this.at({ x: scan.at[0], y: scan.at[1] }));
+      for (const point of points) g.lineTo(...point);
+      g.fill();
+      g.globalAlpha = 0.75;
+      for (const [x, y] of points) g.fillRect(x - 1, y - 1, 2, 2);
+      g.globalAlpha = 1;
+    }
+    const plan = robot.plans[countUntil(robot.plans, Math.min(now, until)) - 1];
+    if (!plan?.points.length) return;
+    g.strokeStyle = this.#colour("active");
+    g.lineWidth = 1.5;
+    g.setLineDash([2, 4]);
+    this.#line(plan.points.map(([x, y]) => ({ x, y })));
+    g.setLineDash([]);
+  }
+
+  /** @param {Point[]} points */
+  #line(points) {
+    const g = this.context;
+    g.lineCap = g.lineJoin = "round";
+    g.beginPath();
+    for (const point of points) g.lineTo(...this.at(point)); // the first one only begins
+    g.stroke();
+  }
+
+  /** @param {Scene} scene @param {Robot} robot @param {number} until */
+  #tracks(scene, robot, until) {
+    const g = this.context;
+    const { hovered } = store;
+    const lit = hovered.value;
+    const pieces = scene.piecesOf(robot);
+    const isLit = (/** @type {Piece} */ one) => lit !== null && one.path === lit.path && one.visit === lit.from;
+    const anyLit = pieces.some(isLit);
+    for (const piece of pieces) {
+      const count =
+        piece.poses[piece.poses.length - 1].t <= until ? piece.poses.length : countUntil(piece.poses, until);
+      if (count < 1) break;
+      const poses = count === piece.poses.length ? piece.poses : piece.poses.slice(0, count);
+      if (isLit(piece)) {
+        g.strokeStyle = this.#colour("ink");
+        g.lineWidth = 12;
+        this.#line(poses);
+        g.strokeStyle = this.#colour("halo");
+        g.lineWidth = 10;
+        this.#line(poses);
+      }
+      const number = piece.path === null ? -1 : scene.colourOf(piece.path);
+      g.strokeStyle = this.#colour(number < 0 ? "muted" : `s${1 + (number % COLOURS)}`);
+      g.lineWidth = number < 0 ? 1 : 2.5;
+      if (number >= COLOURS) g.setLineDash([6, 4]);
+      g.globalAlpha = anyLit && !isLit(piece) ? 0.4 : 0.9;
+      this.#line(poses);
+      g.globalAlpha = 1;
+      g.setLineDash([]);
+    }
+  }
+
+  /** Each place once, as its newest goal left it. @param {Scene} scene @param {number} until */
+  #goals(scene, until) {
+    const g = this.context;
+    /** @type {Map<string, DrivenGoal>} */
+    const places = new Map();
+    for (const robot of scene.robots.values())
+      for (const goal of robot.goals)
+        if (goal.t <= until) places.set(`${goal.x.toFixed(1)} ${goal.y.toFixed(1)}`, goal);
+    g.textBaseline = "middle";
+    this.#labels = [...places.values()].map((goal) => {
+      const [x, y] = this.at(goal);
+      return { left: x - 8, top: y - 8, right: x + 8, bottom: y + 8 };
+    });
+    for (const goal of places.values()) {
+      const [x, y] = this.at(goal);
+      const runs = goal.to === null || goal.to > until;
+      const kind = runs ? "active" : outcomeClass(goal.status);
+      g.fillStyle = this.#colour(runs ? "floor" : `${kind}-fill`);
+      g.strokeStyle = this.#colour(kind);
+      g.lineWidth = 1.75;
+      if (kind === "preempted") g.setLineDash([3, 2]);
+      g.beginPath();
+      g.arc(x, y, 7, 0, 7);
+      g.fill();
+      g.stroke();
+      g.setLineDash([]);
+      g.beginPath();
+      if (runs) {
+        g.fillStyle = this.#colour(kind);
+        g.arc(x, y, 3, 0, 7);
+        g.fill();
+      } else if (kind === "success") {
+        g.moveTo(x - 3, y);
+        g.lineTo(x - 1, y + 2.5);
+        g.lineTo(x + 3.5, y - 2.5);
+        g.stroke();
+      } else {
+        g.moveTo(x - 2.5, y - 2.5);
+        g.lineTo(x + 2.5, y + 2.5);
+        if (kind === "failure") {
+          g.moveTo(x + 2.5, y - 2.5);
+          g.lineTo(x - 2.5, y + 2.5);
+        }
+        g.stroke();
+      }
+      this.#label(scene.placeName(goal), x, y, runs);
+    }
+  }
+
+  /**
+   * A name beside a place, on a side where no other name is.
+   * @param {string} text @param {number} x @param {number} y @param {boolean} [strong]
+   */
+  #label(text, x, y, strong = false) {
+    if (!text) return;
+    const g = this.context;
+    g.font = strong ? `620 ${FONT}` : FONT;
+    const wide = g.measureText(text).width;
+    const sides = [
+      [x + 12, y],
+      [x - 12 - wide, y],
+      [x - wide / 2, y + 16],
+      [x - wide / 2, y - 16],
+    ].map(([left, middle]) => ({ left, top: middle - 7, right: left + wide, bottom: middle + 7 }));
+    const isFree = (/** @type {typeof sides[0]} */ a) =>
+      a.left > 2 &&
+      a.right < this.canvas.clientWidth - 2 &&
+      !this.#labels.some((b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom);
+    const side = sides.find(isFree) ?? sides[0];
+    this.#labels.push(side);
+    g.textAlign = "left";
+    g.strokeStyle = this.#colour("floor");
+    g.lineWidth = 3;
+    g.lineJoin = "round";
+    g.strokeText(text, side.left, side.top + 7);
+    g.fillStyle = this.#colour("ink");
+    g.fillText(text, side.left, side.top + 7);
+  }
+
+  /** @param {Scene} scene @param {string} name @param {Robot} robot @param {number} now */
+  #robot(scene, name, robot, now) {
+    const pose = scene.poseAt(robot, now);
+    if (!pose) return;
+    const g = this.context;
+    const [x, y] = this.at(pose);
+    const r = Math.max(SMALLEST, RADIUS_M * this.#scale.k);
+    g.save();
+    g.translate(x, y);
+    g.rotate(-pose.yaw);
+    g.fillStyle = this.#colour("active");
+    g.strokeStyle = this.#colour("floor");
+    g.lineWidth = 1.5;
+    g.beginPath();
+    g.arc(0, 0, r, 0, 7);
+    g.fill();
+    g.stroke();
+    g.fillStyle = this.#colour("floor");
+    g.beginPath();
+    g.moveTo(0.7 * r, 0);
+    g.lineTo(-0.35 * r, 0.5 * r);
+    g.lineTo(-0.35 * r, -0.5 * r);
+    g.fill();
+    g.restore();
+    if (scene.robots.size > 1) this.#label(name, x, y - r - 7, true);
+  }
+
+  /** @param {number} width @param {number} height */
+  #scaleBar(width, height) {
+    const g = this.context;
+    const { k } = this.#scale;
+    const metres = SCALES_M.find((m) => m * k >= 44) ?? 1000;
+    const long = metres * k;
+    const [x, y] = [width - long - 14, height - 10];
+    g.globalAlpha = 0.85;
+    g.fillStyle = this.#colour("floor");
+    g.fillRect(x - 6, y - 17, long + 12, 22);
+    g.globalAlpha = 1;
+    g.strokeStyle = g.fillStyle = this.#colour("ink");
+    g.lineWidth = 1.25;
+    g.beginPath();
+    g.moveTo(x, y - 3);
+    g.lineTo(x, y);
+    g.lineTo(x + long, y);
+    g.lineTo(x + long, y - 3);
+    g.stroke();
+    g.font = FONT;
+    g.textAlign = "center";
+    g.textBaseline = "middle";
+    g.fillText(`${metres} m`, x + long / 2, y - 9);
+  }
+
+  // -- what the user does -------------------------------------------------------------------------
+
+  /** @param {PointerEvent | MouseEvent} e */
+  #nearest(e) {
+    const { x, y } = this.#placeAt(e.offsetX, e.offsetY);
+    return store.scene.nearest(x, y, REACH / this.#scale.k, store.cursor.value ?? Infinity);
+  }
+
+  /** @param {PointerEvent} e */
+  #hover(e) {
+    const found = this.#nearest(e);
+    this.canvas.style.cursor = found ? "pointer" : "";
+    const { path, visit } = found?.piece ?? { path: null, visit: null };
+    store.hover(path === null || visit === null ? null : { path, from: visit });
+  }
+
+  /** A press goes to an instant, a drag moves the map. @param {PointerEvent} e */
+  #down(e) {
+    const found = this.#nearest(e);
+    const { k } = this.#scale;
+    const middle = this.#placeAt(this.canvas.clientWidth / 2, this.canvas.clientHeight / 2);
+    let dragged = false;
+    drag(
+      (m) => {
+        const [dx, dy] = [m.clientX - e.clientX, m.clientY - e.clientY];
+        if (!dragged && Math.hypot(dx, dy) < 4) return;
+        dragged = true;
+        this.followed = null;
+        this.view = { k, x: middle.x - dx / k, y: middle.y + dy / k };
+        this.draw();
+      },
+      () => {
+        if (dragged || !found) return;
+        store.seek(found.t);
+        if (found.piece.path) store.selected.value = found.piece.path;
+      },
+    );
+  }
+
+  /** @param {WheelEvent} e */
+  #wheel(e) {
+    e.preventDefault();
+    this.#zoom(Math.exp(-e.deltaY * 0.0016), e.offsetX, e.offsetY);
+  }
+
+  /** @param {number} factor @param {number} px @param {number} py the place that stays */
+  #zoom(factor, px = this.canvas.clientWidth / 2, py = this.canvas.clientHeight / 2) {
+    const held = this.#placeAt(px, py);
+    const k = Math.max(FARTHEST, Math.min(this.#scale.k * factor, CLOSEST));
+    const [w, h] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    this.view = { k, x: held.x + (w / 2 - px) / k, y: held.y - (h / 2 - py) / k };
+    this.draw();
+  }
+
+  /** @param {KeyboardEvent} e */
+  #key(e) {
+    const zoom = { "+": 1.25, "=": 1.25, "-": 0.8 }[e.key];
+    if (zoom) this.#zoom(zoom);
+    else if (e.key === "0") this.show(null);
+    else return;
+    e.preventDefault();
+    e.stopPropagation();
+  }
+}
+
+/** A colour as a pixel. @param {string} hex such as #1a2531 or #fff */
+function wordOf(hex) {
+  const full = hex.length === 4 ? [...hex.slice(1)].map((c) => c + c).join("") : hex.slice(1, 7);
+  const [r, g, b] = [0, 2, 4].map((i) => Number.parseInt(full.slice(i, i + 2), 16));
+  return ((255 << 24) | (b << 16) | (g << 8) | r) >>> 0;
+}
+
+/** The map in words. @param {Scene} scene @param {number} now */
+function describe(scene, now) {
+  const parts = [...scene.robots].flatMap(([name, robot]) => {
+    const pose = scene.poseAt(robot, now);
+    const goal = robot.goals.findLast((one) => one.t <= now && (one.to === null || one.to > now));
+    const to = goal ? `, on its way to ${scene.placeName(goal) || placeText(goal)}` : "";
+    return pose ? [`${name || "the robot"} at ${placeText(pose)}${to}`] : [];
+  });
+  return `map: ${parts.join("; ") || "no robot yet"}`;
+}
+
+/** @param {Point} place */
+const placeText = ({ x, y }) => `(${x.toFixed(1)}, ${y.toFixed(1)})`;

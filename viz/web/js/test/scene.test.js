@@ -1,0 +1,146 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { inflateSync } from "node:zlib";
+import { cellAt, placeOf, robotOf, Scene, scanPoints } from "#core/scene.js";
+import { fixture } from "./fixtures.js";
+
+const OBSERVED = fixture("observed.json");
+const message = (/** @type {string} */ type, /** @type {object} */ fields) => ({ $msg: type, fields });
+const stamped = (/** @type {unknown} */ x, /** @type {unknown} */ y, frame_id = "map") =>
+  message("geometry_msgs/PoseStamped", {
+    header: message("std_msgs/Header", { frame_id }),
+    pose: message("geometry_msgs/Pose", {
+      position: message("geometry_msgs/Point", { x, y, z: 0 }),
+      orientation: message("geometry_msgs/Quaternion", { x: 0, y: 0, z: 0, w: 1 }),
+    }),
+  });
+
+/** @param {number} t [s] @param {string} kind @param {string} path @param {object} [facts] */
+const at = (t, kind, path, facts = {}) => ({ kind, path, stamp_ns: t * 1e9, seq: 0, ...facts });
+const A = { action: "move_base", goal_id: "1" };
+const B = { action: "/robot_1/move_base", goal_id: "2" };
+const sent = (/** @type {number} */ x) => ({ goal: message("MoveBaseGoal", { target_pose: stamped(x, 0) }) });
+const fed = (/** @type {unknown} */ x) => ({ feedback: message("MoveBaseFeedback", { base_position: stamped(x, 0) }) });
+const DRIVE = [
+  at(1, "Entered", "/M/GO"),
+  at(1, "GoalSent", "/M/GO", { ...A, ...sent(4) }),
+  at(2, "GoalFeedback", "/M/GO", { ...A, ...fed(1) }),
+  at(3, "GoalFeedback", "/M/GO", { ...A, ...fed(2) }),
+  at(4, "GoalDone", "/M/GO", { ...A, status: "SUCCEEDED", text: "arrived" }),
+  at(4, "Left", "/M/GO", { outcome: "succeeded" }),
+  at(5, "Entered", "/M/BACK"),
+  at(5, "GoalSent", "/M/BACK", { ...A, goal_id: "3", ...sent(0) }),
+  at(6, "GoalFeedback", "/M/BACK", { ...A, goal_id: "3", ...fed(1) }),
+];
+
+/** @param {Scene} scene @param {string} [name] */
+const pieces = (scene, name = "") =>
+  scene
+    .piecesOf(/** @type {Robot} */ (scene.robots.get(name)))
+    .map(({ path, visit, poses }) => [path, visit, poses.map(({ t, x }) => [t / 1000, x])]);
+
+test("a robot is what stands in front of its actions", () => {
+  assert.deepEqual(["move_base", "/move_base", "/robot_0/move_base", "a/b/go"].map(robotOf), [
+    "",
+    "",
+    "robot_0",
+    "a/b",
+  ]);
+});
+
+test("feedback makes a track, cut by the visits that drove it", () => {
+  const scene = new Scene();
+  scene.addEvents(DRIVE);
+  assert.deepEqual(pieces(scene), [
+    ["/M/GO", 1000, [[2, 1], [3, 2]]],
+    ["/M/BACK", 5000, [[3, 2], [6, 1]]],
+  ]); // biome-ignore format: points
+  assert.deepEqual(scene.drivers, ["/M/GO", "/M/BACK"]);
+  assert.equal(scene.colourOf("/M/BACK"), 1);
+  assert.equal(scene.goalOf("/M/GO", 1000)?.status, "SUCCEEDED");
+  assert.equal(scene.goalOf("/M/GO", 2000), null);
+});
+
+test("what topics tell goes before feedback, in whichever order they come", () => {
+  for (const order of [0, 1]) {
+    const scene = new Scene();
+    if (order) scene.addEvents(DRIVE);
+    scene.addObserved(OBSERVED);
+    if (!order) scene.addEvents(DRIVE);
+    // Observed at 0, 2 and 3 s; from then on feedback is the same told twice.
+    assert.deepEqual(
+      pieces(scene).map(([path, , points]) => [path, points]),
+      [
+        [null, [[0, 1]]],
+        ["/M/GO", [[0, 1], [2, 2], [3, 3]]],
+      ], // biome-ignore format: points
+    );
+    assert.equal(scene.mapAt(0)?.width, 3);
+    assert.deepEqual(scene.series.get("battery")?.points, [{ t: 0, value: 75 }]);
+  }
+});
+
+test("a track leads to the instant and the visit", () => {
+  const scene = new Scene();
+  scene.addEvents(DRIVE);
+  const found = scene.nearest(1.5, 0.1, 0.5, 4000);
+  assert.equal(found?.t, 2500);
+  assert.equal(found?.piece.path, "/M/GO");
+  assert.equal(scene.nearest(1.5, 0.1, 0.5)?.piece.path, "/M/BACK", "the newest of equals");
+  assert.equal(scene.nearest(1.5, 3, 0.5), null);
+  assert.equal(scene.nearest(1.5, 0, 0.5, 0), null, "nothing has happened yet");
+});
+
+test("robots are kept apart, and goals that are no places are passed over", () => {
+  const scene = new Scene();
+  scene.addEvents([
+    ...DRIVE,
+    at(7, "GoalSent", "/M/GO", { ...B, ...sent(9) }),
+    at(8, "GoalFeedback", "/M/GO", { ...B, ...fed(8) }),
+    at(8, "GoalFeedback", "/M/GO", { ...B, ...fed("nan") }),
+    at(8, "GoalSent", "/M/X", { ...B, goal: null }),
+    at(8, "GoalSent", "/M/X", { ...B, goal: "some text" }),
+    at(8, "GoalSent", "/M/X", { ...B, goal: message("ChargeGoal", { until: 1 }) }),
+    at(8, "GoalSent", "/M/X", { ...B, goal: message("G", { target_pose: stamped(1, 0, "base_link") }) }),
+    at(8, "GoalDone", "/M/X", { action: "nobody/knows", goal_id: "9", status: "LOST", text: "" }),
+  ]);
+  assert.deepEqual([...scene.robots.keys()], ["", "robot_1"]);
+  assert.deepEqual(pieces(scene, "robot_1"), [["/M/GO", 7000, [[8, 8]]]]);
+  assert.deepEqual(scene.drivers, ["/M/GO", "/M/BACK"]);
+});
+
+test("places have the names that states wrote", () => {
+  const scene = new Scene();
+  scene.addEvents([
+    at(0, "UserdataWritten", "/M/NEXT", {
+      key: "waypoint",
+      value: "Waypoint(name='dock', pose=Pose2D(x=4.05, y=-0.1, yaw=0.0))",
+    }),
+    at(0, "UserdataWritten", "/M/NEXT", { key: "n", value: 3 }),
+    ...DRIVE,
+  ]);
+  const [go, back] = /** @type {Robot} */ (scene.robots.get("")).goals;
+  assert.deepEqual([scene.placeName(go), scene.placeName(back)], ["dock", ""]);
+});
+
+test("a message that is none has no place", () => {
+  for (const some of [null, undefined, 3, "x", {}, { $msg: "a/B" }, { pose: { position: { x: "1", y: 2 } } }])
+    assert.equal(placeOf(some), null);
+});
+
+test("a map's cells, its corners and a scan's points", () => {
+  const scene = new Scene();
+  scene.addObserved(OBSERVED);
+  const map = /** @type {GridMap} */ (scene.mapAt(0));
+  assert.deepEqual([...inflateSync(Buffer.from(map.cells, "base64"))], [0, 1, 2, 0, 2, 0]);
+  assert.deepEqual(scene.extent(0), { x: 1, y: 2, w: 1.5, h: 1 });
+  assert.deepEqual(cellAt({ ...map, origin: [1, 2, Math.PI / 2] }, 2, 0), { x: 1, y: 3 });
+  const points = scanPoints(/** @type {Robot} */ (scene.robots.get("")).scans[0]);
+  assert.deepEqual(
+    points.map(({ x, y }) => [x.toFixed(2), y.toFixed(2)]),
+    [
+      ["1.54", "0.16"],
+      ["3.50", "1.00"],
+    ],
+  );
+});
