@@ -187,7 +187,8 @@ class Observer:
             yield "plan", {"points": points}
 
     def _take_map(self, robot: str, message: Any, stamp_ns: int) -> Iterator[Any]:
-        facts = grid_facts(message)
+        info = message.info
+        facts = grid_facts(message.data, info.width, info.resolution, _pose_of(info.origin))
         told_ns, told = self._told.get(("map", robot), (0, None))
         if facts != told and (told is None or stamp_ns - told_ns >= MAP_S * 1e9):
             self._told["map", robot] = stamp_ns, facts
@@ -220,30 +221,47 @@ class Observer:
         return None
 
 
-def grid_facts(grid: Any) -> dict[str, Any]:
-    """Return the fields of a record of a nav_msgs/OccupancyGrid.
+def grid_facts(data: Any, width: int, resolution: float, origin: Pose) -> dict[str, Any]:
+    """Return the fields of a record of an occupancy grid.
+
+    Args:
+        data: The cells row by row from the bottom: 0 free to 100 occupied, -1 unknown.
+        width: Cells of a row.
+        resolution: Edge of a cell [m].
+        origin: Pose of the lower left corner in the map frame.
 
     Raises:
-        ValueError: it has no cells, or another number of them than it says.
+        ValueError: the cells are no whole rows, or a cell has no size.
     """
     import numpy as np
 
-    info = grid.info
-    origin = _finite(info.origin.position.x, info.origin.position.y, _yaw(info.origin.orientation))
-    (resolution,) = _finite(info.resolution)
-    cells = np.asarray(grid.data, dtype=np.int8)
-    if resolution <= 0 or not cells.size or cells.size != info.width * info.height:
-        raise ValueError(f"map: {info.width} x {info.height} cells of {resolution} m, {cells.size}")
-    rows = cells.reshape(info.height, info.width)
+    cells = np.asarray(data, dtype=np.int8)
+    (edge,) = _finite(resolution)
+    if edge <= 0 or not cells.size or width < 1 or cells.size % width:
+        raise ValueError(f"map: got {cells.size} cells of {edge} m in rows of {width}")
+    rows = cells.reshape(-1, width)
     classes = np.where(rows >= _OCCUPIED, 1, np.where((rows >= 0) & (rows <= _FREE), 0, 2))
     every = math.ceil(math.sqrt(cells.size / _MOST_CELLS))
-    classes, resolution = classes[::every, ::every].astype(np.uint8), resolution * every
+    classes = classes[::every, ::every].astype(np.uint8)
     return {
-        "resolution": round(resolution, 6),
+        "resolution": round(edge * every, 6),
         "width": int(classes.shape[1]),
         "height": int(classes.shape[0]),
-        "origin": list(origin),
+        "origin": _rounded(origin),
         "cells": base64.b64encode(zlib.compress(classes.tobytes(), 9)).decode("ascii"),
+    }
+
+
+def map_record(facts: dict[str, Any]) -> dict[str, Any]:
+    """Return the record of a map that holds from the beginning, until a topic tells another."""
+    return {
+        "kind": KIND,
+        "path": "",
+        "stamp_ns": 0,
+        "what": "map",
+        "robot": "",
+        **facts,
+        "n": 0,
     }
 
 

@@ -412,7 +412,7 @@ class _Page:
         self._list = ""
         self._listed = 0.0
         self._beaten = 0.0
-        self._observed = 0  # number of the newest record of the robot's topics that was sent
+        self._observed = -1  # number of the newest record of the robot's topics that was sent
         self._observed_sent = 0.0
         self._actions = actions
         self._actions_revision = -1  # revision of the actions
@@ -483,7 +483,7 @@ class _Page:
         if behind is None or len(behind) > FARTHEST:
             missed, before = behind is not None, self._seq
             self._epoch = machine.epoch
-            self._observed = 0
+            self._observed = -1
             self._seq, snap = machine.snapshot(short=missed)
             texts.append(f"event: snap\nid: {self._epoch}:{self._seq}\ndata: {snap}\n\n")
             if missed:

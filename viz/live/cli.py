@@ -6,6 +6,7 @@ import contextlib
 import os
 import sys
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.clock import SerialExecutor
@@ -25,6 +26,7 @@ EXAMPLES = """examples:
   smachpy view                         every machine on this network, and your private runs
   smachpy view --control               with pause, step, jump, preempt, and goals to actions
   smachpy view run.jsonl               a recorded run
+  smachpy view --map office.yaml       with this floor, where no topic tells it
   smachpy view --runs runs/            with the statistics of recorded runs on the graph
 """
 PORT = 8080
@@ -59,6 +61,12 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--runs", metavar="DIR", action="append", default=[], help="recorded runs for statistics"
     )
+    parser.add_argument(
+        "--map",
+        type=Path,
+        metavar="FILE",
+        help="the floor, a map_server YAML file, where no topic tells it",
+    )
     add_ros2_options(parser)
     parser.add_argument("--tui", action="store_true", help="show it in this terminal instead")
     parser.add_argument("--child", action="store_true", help=argparse.SUPPRESS)
@@ -78,9 +86,10 @@ def _run(args: argparse.Namespace) -> int:
     from viz.live.actions import Actions
     from viz.live.machines import Machines
     from viz.live.network import Network
+    from viz.runs.floor import read_floor
     from viz.runs.statistics import StatisticsOfFiles
 
-    machines = Machines()
+    machines = Machines(None if args.map is None else read_floor(args.map))
     _load(machines, args.files)
     runs = StatisticsOfFiles(args.runs)
     with ros2_of_options(args):

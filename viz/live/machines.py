@@ -40,6 +40,7 @@ class Machine:
         on_change: Called after every change, with the machine.
         keep: Called before it begins anew for another program, with the machine as it was; keeps it
             under the name that is returned.
+        floor: The map where the robot tells of none, a record of `smachpy.network.observations`.
 
     Attributes:
         record: Its structure; None until it is known.
@@ -59,8 +60,10 @@ class Machine:
         name: str,
         on_change: Callable[[Machine], object],
         keep: Callable[[Machine], str | None] = lambda _machine: None,
+        floor: dict[str, Any] | None = None,
     ) -> None:
         self.name = name
+        self._floor = floor
         self._keep = keep
         self.before: str | None = None
         self.after: str | None = None
@@ -124,7 +127,7 @@ class Machine:
 
     def _split_off(self) -> Machine:
         """Return another machine that has what this one has; this one is to begin anew."""
-        kept = Machine(self.name, self._on_change)
+        kept = Machine(self.name, self._on_change, floor=self._floor)
         with self._lock:
             kept.record, kept.revision, kept.problems = self.record, self.revision, self.problems
             kept.recorded, kept.node, kept.epoch = True, self.node, f"kept {self.epoch}"
@@ -186,7 +189,7 @@ class Machine:
     def observed_since(self, seq: int) -> list[str]:
         """Return what is kept of what was told after number `seq`, as JSON texts."""
         with self._lock:
-            if not seq:
+            if seq <= 0:
                 return [text for _, _, text in self._all_observed()]
             newer = itertools.takewhile(lambda one: one[0] > seq, reversed(self._observed))
             texts = [text for _, _, text in newer]
@@ -195,7 +198,10 @@ class Machine:
 
     def _all_observed(self) -> list[tuple[int, dict[str, Any], str]]:
         first = self._observed[0][0] if self._observed else 0
-        return [*(one for one in self._maps.values() if one[0] < first), *self._observed]
+        maps = [one for one in self._maps.values() if one[0] < first]
+        if self._floor is not None and not self._maps:
+            maps = [(0, self._floor, record_text(self._floor))]
+        return [*maps, *self._observed]
 
     def set_stale(self, since: int | None) -> None:
         """Say since when nobody speaks for the machine."""
@@ -325,10 +331,14 @@ def with_progress(record: dict[str, Any], goals: dict[str, Any]) -> dict[str, An
 class Machines:
     """All machines that a page can choose from.
 
+    Args:
+        floor: See `Machine`.
+
     Threads: every method may be called from any thread; listeners are called from any.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, floor: dict[str, Any] | None = None) -> None:
+        self._floor = floor
         self._lock = threading.Lock()
         self._machines: dict[str, Machine] = {}
         self._listeners: list[Callable[[Machine], object]] = []
@@ -347,7 +357,7 @@ class Machines:
         """Return the machine of that name, a new one if there is none."""
         with self._lock:
             if name not in self._machines:
-                self._machines[name] = Machine(name, self._changed, self._keep)
+                self._machines[name] = Machine(name, self._changed, self._keep, self._floor)
             return self._machines[name]
 
     def _keep(self, machine: Machine) -> str:

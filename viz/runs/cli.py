@@ -84,6 +84,12 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     export.add_argument(
         "--runs", metavar="DIR", action="append", default=[], help="runs for the page's statistics"
     )
+    export.add_argument(
+        "--map",
+        type=Path,
+        metavar="FILE",
+        help="the page's floor, a map_server YAML file, where the recording has none",
+    )
     export.set_defaults(run=_export)
 
 
@@ -281,7 +287,7 @@ def _export(args: argparse.Namespace) -> int:
     recording = read_recording(args.file)
     output = Path(args.output)
     try:
-        _write(recording, output, args.runs)
+        _write(recording, output, args.runs, args.map)
     except OSError as error:
         raise UsageError(
             f"smachpy runs export: {args.output!r}: cannot write: {error.strerror or error}."
@@ -290,11 +296,11 @@ def _export(args: argparse.Namespace) -> int:
     return 0
 
 
-def _write(recording: Recording, output: Path, runs: list[str]) -> None:
+def _write(recording: Recording, output: Path, runs: list[str], floor: Path | None) -> None:
     if output.suffix == ".html":
         from viz.runs.html import standalone_page
 
-        page = standalone_page(recording, runs)
+        page = standalone_page(recording, runs, floor)
         output.write_text(page, encoding="utf-8", errors="replace")
     elif output.suffix == ".mcap":
         from viz.runs.mcap import write_mcap

@@ -183,3 +183,16 @@ def test_a_phone_shows_the_map(office, look):
     box = page.query_selector(".map-view canvas").bounding_box()
     assert box["width"] > 330
     assert box["height"] > 120
+
+
+def test_a_floor_from_a_file_is_shown_until_a_topic_tells_one(served, look):
+    shared = json.loads((DATA / "observed.json").read_text(encoding="utf-8"))[0]
+    served.machines = machines.Machines({**shared, "stamp_ns": 0, "n": 0})
+    machine = served.add("one", events=run())
+    served.add("two", events=run(), observed=observed(served))
+    page = look(f"{served.start()}?machine=one")
+    page.wait_for_function("() => smachpy.store.scene.mapAt(Date.now())?.resolution === 0.5")
+    machine.observe(observed(served)[:1])
+    page.wait_for_function("() => smachpy.store.scene.mapAt(Date.now())?.resolution === 2")
+    other = look(f"{served.address}?machine=two")
+    other.wait_for_function("() => smachpy.store.scene.maps.length === 1")

@@ -739,3 +739,14 @@ def test_lists_and_statistics_for_programs(tmp_path, capsys):
     (told,) = map(json.loads, capsys.readouterr().out.splitlines())
     assert told["states"]["/TOP/A"]["outcomes"] == {"ok": 1}
     assert told["never_taken"] == [["/TOP/A", "no"]]
+
+
+def test_a_page_takes_the_floor_from_a_file_where_the_run_has_none(record, capsys, tmp_path):
+    from smachpy.command import main
+    from smachpy.sim.maps import OFFICE_MAP
+
+    run, page = str(record("run.jsonl")), str(tmp_path / "run.html")
+    assert main(["runs", "export", run, "-o", page, "--map", str(OFFICE_MAP)]) == 0
+    assert main(["runs", "export", run, "-o", page, "--map", str(tmp_path / "none.yaml")]) == 2
+    assert "none.yaml" in capsys.readouterr().err
+    assert main(["view", "--map", run]) == 2

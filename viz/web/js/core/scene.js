@@ -306,6 +306,7 @@ const OBSERVERS = {
   plan: (_scene, { points }, t, robot) => pushLimited(robot.plans, { t, points }),
   map(scene, { robot, resolution, width, height, origin, cells }, t) {
     scene.maps.push({ t, robot, map: { resolution, width, height, origin, cells } });
+    scene.maps.sort((a, b) => a.t - b.t);
     if (scene.maps.length > 20) scene.maps.splice(1, 1);
   },
   value(scene, { robot, name, value, unit }, t) {

@@ -1,0 +1,22 @@
+"""A floor from a file, for runs whose robot tells of none."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def read_floor(path: Path) -> dict[str, Any]:
+    """Return a map_server's YAML file and its image as a record of `smachpy.network.observations`.
+
+    Raises:
+        InputFileError: with every problem of the file.
+    """
+    from smachpy.network.observations import grid_facts, map_record
+    from smachpy.sim.occupancy import load_map
+
+    grid = load_map(path)
+    origin = grid.origin.x, grid.origin.y, grid.origin.yaw
+    return map_record(grid_facts(grid.cells.ravel(), grid.width, grid.resolution, origin))
