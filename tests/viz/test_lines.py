@@ -1,12 +1,14 @@
 from __future__ import annotations
 
+import colorsys
 from types import SimpleNamespace as Message
 
 import pytest
 
 from smachpy import events as ev
 from viz.model.history import History
-from viz.terminal.lines import EventLines
+from viz.pictures.theme import THEMES
+from viz.terminal.lines import RUNNING, STYLES, WAITING, EventLines
 
 GO = "/PATROL/WATCHED_DRIVE/DRIVE/GO_THERE"
 
@@ -93,3 +95,36 @@ def test_goals_side_by_side_have_a_line_each(tell):
         )
     )
     assert len(lines) == 2
+
+
+def test_narrow_lines_name_the_state_without_its_containers(patrol):
+    history = History()
+    lines_of = EventLines(patrol, history, panel=False, narrow=True)
+    history.on_event(ev.Started("/PATROL", 100.0, 0))
+    line = lines_of.line(ev.Left(GO, 102.0, 0, "succeeded"))
+    assert line.plain == "   2.0 GO_THERE succeeded \u2192 NEXT_WAYPOINT"
+
+
+def luminance(colour):
+    """WCAG 2.1, relative luminance."""
+    parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    r, g, b = (p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts)
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b
+
+
+SWATCHES = {
+    **{(theme.name, name): (style, getattr(theme, name).stroke)
+       for theme in THEMES.values()
+       for name, style in {**STYLES, "active": RUNNING, "waiting": WAITING}.items()},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("key", SWATCHES, ids="-".join)
+def test_the_terminals_colours_are_those_of_the_page(key):
+    ours, pages = SWATCHES[key]
+    hues = [colorsys.rgb_to_hls(*(int(c[i : i + 2], 16) / 255 for i in (1, 3, 5)))[0]
+            for c in (ours, pages)]  # fmt: skip
+    assert min(abs(hues[0] - hues[1]), 1 - abs(hues[0] - hues[1])) < 0.06
+    background = luminance(THEMES[key[0]].background)
+    light, dark = sorted((luminance(ours), background), reverse=True)
+    assert (light + 0.05) / (dark + 0.05) >= 3

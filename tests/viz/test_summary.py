@@ -9,9 +9,11 @@ from viz.model.history import History
 from viz.terminal.summary import summary
 
 
-def printed(record, history, outcome, rows=40):
+def printed(record, history, outcome, rows=40, width=100):
     file = io.StringIO()
-    Console(file=file, width=100).print(summary(record, history, outcome, rows))
+    Console(file=file, width=width).print(
+        summary(record, history, outcome, rows, narrow=width < 72)
+    )
     return [line.rstrip() for line in file.getvalue().splitlines()]
 
 
@@ -49,3 +51,12 @@ def test_a_long_table_leaves_the_innermost_levels_out(patrol):
 
 def test_a_mission_that_raised_says_so(patrol):
     assert printed(patrol, History(), None)[-1] == "PATROL: exception"
+
+
+def test_forty_columns_cut_no_outcome_and_no_time(patrol):
+    lines = printed(patrol, patrolled(), "succeeded", width=40)
+    text = " ".join(lines)
+    for words in ("CHARGE", "DOCK", "aborted", "succeeded", "3.0 s", "\u00d72"):
+        assert words in text
+    assert "\u2026" not in text
+    assert max(map(len, lines)) <= 40

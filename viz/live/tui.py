@@ -18,7 +18,7 @@ from smachpy.events.run_state import RunState
 from smachpy.exceptions import SmachError
 from smachpy.outcome_classes import outcome_class
 from viz.model.labels import GLYPHS, shorten
-from viz.terminal.lines import STYLES, answered
+from viz.terminal.lines import NARROW, RUNNING, STYLES, WAITING, answered
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 FRAME_S = 0.2
 BAR = 20
+WIDE = 100
+"""From this many columns on the names and bars of goals have all their room."""
 MOST_GOALS = 4
 MOST_VALUES = 100
 LOGGED_LINES = 500
@@ -63,7 +65,10 @@ class MissionApp(App[None]):
     #left { width: 45%; } Tree { height: 1fr; } #search { display: none; dock: bottom; }
     #goals { height: auto; max-height: 9; padding: 0 1; } DataTable { height: 1fr; }
     RichLog { height: 1fr; border-top: solid $panel; }
+    .-narrow Horizontal { layout: vertical; } .-narrow #left { width: 1fr; height: 40%; }
+    .-narrow #userdata { height: auto; max-height: 5; }
     """
+    HORIZONTAL_BREAKPOINTS: ClassVar = [(0, "-narrow"), (NARROW, "-wide")]
     BINDINGS: ClassVar = [
         ("q", "quit", "Quit"),
         ("n", "next", "Next machine"),
@@ -92,6 +97,7 @@ class MissionApp(App[None]):
         self._mark = 0, ""  # number of an earlier one, and the state after it
         self._state = RunState()
         self._places: dict[str, TreeNode[StateRecord]] = {}
+        self._targets: dict[tuple[str, str], str] = {}
         self._follow = True
         self._rung: set[str] = set()  # services of the questions that were heard of
 
@@ -114,6 +120,15 @@ class MissionApp(App[None]):
         """Begin to draw."""
         self.query_one(DataTable).add_columns("key", "value", "written by")
         self.set_interval(FRAME_S, self.refresh_view)
+
+    def on_resize(self) -> None:
+        """Wrap the log anew; it keeps the lines of the old width."""
+        self.call_after_refresh(self._wrap_anew)
+
+    def _wrap_anew(self) -> None:
+        if self._machine is not None and self.query(RichLog):
+            events = [e for e in self._machine.events() if e["seq"] <= self._seq]
+            self._write_anew(events, LOGGED_LINES if self._until is None else LOGGED_BACK)
 
     def refresh_view(self) -> None:
         """Draw what has changed."""
@@ -145,6 +160,12 @@ class MissionApp(App[None]):
         tree = self.query_one(Tree)
         tree.reset(Text(shorten(record.label)), record)
         self._places = {record.path: tree.root}
+        self._targets = {
+            (f"{state.path}/{edge.source}", edge.outcome): edge.target
+            for state in record.walk()
+            for edge in state.transitions
+            if not edge.target_is_outcome
+        }
         self._grow(tree.root, record)
         tree.root.expand()
         self._fold_anew(machine)
@@ -208,7 +229,8 @@ class MissionApp(App[None]):
     def _write(self, events: list[dict[str, Any]], most: int) -> None:
         log = self.query_one(RichLog)
         for event in [one for one in events if one["kind"] in LOGGED][-most:]:
-            log.write(_line(event))
+            target = self._targets.get((event["path"], event.get("outcome") or ""), "")
+            log.write(_line(event, target if event["kind"] == "Left" else ""))
 
     def _write_anew(self, events: list[dict[str, Any]], most: int) -> None:
         self.query_one(RichLog).clear()
@@ -228,17 +250,17 @@ class MissionApp(App[None]):
     def _draw_status(self, machine: Machine) -> None:
         data = self._state.data
         if self._until is not None:
-            word, style = f"event {self._until} of {machine.seq}", "yellow"
+            word, style = f"event {self._until} of {machine.seq}", STYLES["preempted"]
         elif machine.stale is not None and data["ended"] is None:
-            word, style = "stale", "magenta"
+            word, style = "stale", WAITING
         elif data["ended"] is not None:
             word, style = f"ended: {data['outcome']}", STYLES[outcome_class(data["outcome"])]
         elif machine.control and machine.control["paused"]:
-            word, style = "paused", "magenta"
+            word, style = "paused", WAITING
         elif self._state.holding_up():
-            word, style = "preempting", "yellow"
+            word, style = "preempting", STYLES["preempted"]
         else:
-            word, style = "running", "blue"
+            word, style = "running", RUNNING
         active = self._state.active()
         leaf = next((p for p in reversed(active) if not _inside(p, active)), "")
         trail = " \u203a ".join(shorten(name, 24) for name in leaf.strip("/").split("/"))
@@ -246,7 +268,7 @@ class MissionApp(App[None]):
             (f" {machine.name} ", "bold"), (f" {word} ", f"{style} reverse"), f"  {trail}"
         )
         if lost := data.get("dropped"):
-            text.append(f"  {lost} events missing", "yellow")
+            text.append(f"  {lost} events missing", STYLES["preempted"])
         self.query_one("#status", Static).update(text)
 
     def _draw_preempt(self, now: int) -> None:
@@ -259,8 +281,8 @@ class MissionApp(App[None]):
             return
         first = min((states[p] for p in states if _asked(states[p])), key=lambda s: s["preempt"])
         lines = Text.assemble(
-            ("preempt", "bold yellow"),
-            (f" by {_asker(first['asked'])}", "yellow"),
+            ("preempt", f"bold {STYLES['preempted']}"),
+            (f" by {_asker(first['asked'])}", STYLES["preempted"]),
             (f", {(now - first['preempt']) / 1e9:.1f} s ago", "dim"),
         )
         for path in holds[:4]:
@@ -289,7 +311,7 @@ class MissionApp(App[None]):
             self.bell()
         left = max(0.0, question["patience"] - (now - question["asked"]) / 1e9)
         lines = Text.assemble(
-            ("? ", "bold magenta"),
+            ("? ", f"bold {WAITING}"),
             (shorten(question["text"], 300), "bold"),
             (f"  {_name(path)}", "dim"),
         )
@@ -313,16 +335,17 @@ class MissionApp(App[None]):
         lines = Text()
         goals = list(self._state.data["goals"].values())
         goals.sort(key=lambda goal: goal["ended"] is None)  # those that run come last
+        name, bar = (20, BAR) if self.size.width >= WIDE else (14, BAR // 3)
         if len(goals) > MOST_GOALS and (hidden := _running(goals[:-MOST_GOALS])):
             lines.append(f"{hidden} more under way\n", "dim")
         for goal in goals[-MOST_GOALS:]:
             progress = goal.get("progress") or {}
             part = 1.0 if goal["status"] == "SUCCEEDED" else progress.get("fraction") or 0.0
-            filled = round(part * BAR)
-            style = "blue" if goal["ended"] is None else STYLES[outcome_class(goal["status"])]
-            lines.append(f"{shorten(goal['action'], 20):20} ", "bold")
+            filled = round(part * bar)
+            style = RUNNING if goal["ended"] is None else STYLES[outcome_class(goal["status"])]
+            lines.append(f"{shorten(goal['action'], name):{name}} ", "bold")
             lines.append("\u2501" * filled, style)
-            lines.append("\u2501" * (BAR - filled), "dim")
+            lines.append("\u2501" * (bar - filled), "dim")
             words = goal["text"] or progress.get("text") or ""
             lines.append(f" {part:4.0%} {goal['status'].lower()} {shorten(words, 40)}\n")
         widget = self.query_one("#goals", Static)
@@ -478,27 +501,27 @@ def _label(record: StateRecord, state: dict[str, Any] | None, now: int) -> Text:
     if state is None:
         return Text(name, "dim")
     if state["since"] is not None:
-        style = "bold yellow" if state.get("preempt") else "bold blue"
+        style = f"bold {STYLES['preempted']}" if state.get("preempt") else f"bold {RUNNING}"
         text = Text.assemble((name, style), (f"  {(now - state['since']) / 1e9:.1f} s", "dim"))
         if not state.get("preempt"):
             return text
         word = "preempt serviced" if state.get("serviced") else "asked to stop"
-        return text.append(f"  {word}", "yellow")
+        return text.append(f"  {word}", STYLES["preempted"])
     text = Text(name)
     if state["outcome"]:
         text.append(f"  {shorten(state['outcome'], 20)}", STYLES[outcome_class(state["outcome"])])
     return text.append(f" x{state['visits']}", "dim") if state["visits"] > 1 else text
 
 
-def _line(event: dict[str, Any]) -> Text:
+def _line(event: dict[str, Any], target: str) -> Text:
     words = event.get("outcome") or event.get("error") or event.get("status") or event["kind"]
     style = STYLES[outcome_class(str(words))]
     if event["kind"] == "PreemptRequested":
-        words, style = f"asked to stop by {_asker(event)}", "yellow"
+        words, style = f"asked to stop by {_asker(event)}", STYLES["preempted"]
     if event["kind"] == "QuestionAsked":
-        words, style = f"asks {event['text']}", "magenta"
+        words, style = f"asks {event['text']}", WAITING
     if event["kind"] == "QuestionAnswered":
-        words, style = answered(event["answer"], event["by"]), "magenta"
+        words, style = answered(event["answer"], event["by"]), WAITING
     words = {
         "PreemptServiced": "preempt serviced",
         "Abandoned": "abandoned",
@@ -507,5 +530,9 @@ def _line(event: dict[str, Any]) -> Text:
     clock = time.strftime("%H:%M:%S", time.localtime(event["stamp_ns"] / 1e9))
     name = shorten(event["path"].rpartition("/")[2])
     return Text.assemble(
-        (f"{clock}  ", "dim"), (name, "bold"), "  ", (shorten(str(words), 80), style)
+        (f"{clock}  ", "dim"),
+        (name, "bold"),
+        "  ",
+        (shorten(str(words), 80), style),
+        f" \u2192 {shorten(target)}" if target else "",
     )

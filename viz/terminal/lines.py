@@ -19,11 +19,16 @@ if TYPE_CHECKING:
     from viz.model.history import History
 
 STYLES: dict[OutcomeClass, str] = {
-    "success": "green",
-    "failure": "red",
-    "preempted": "yellow",
-    "other": "cyan",
+    "success": "#16906C",
+    "failure": "#D65A32",
+    "preempted": "#B07C00",
+    "other": "#7B8794",
 }
+"""The page's hues (`viz.pictures.theme`), as light as can be read on white and on black."""
+RUNNING = "#0082D4"
+WAITING = "#B065A3"
+NARROW = 72
+"""Below this many columns names stand without their containers, and bars are left out."""
 FEEDBACK_PERIOD = 5.0
 """Time between two lines about one goal's feedback [s]."""
 ERROR_LENGTH = 200
@@ -47,12 +52,16 @@ class EventLines:
         history: What happened before; an event gets its line before it is folded in.
         panel: The lines stand above a panel, which shows goals' feedback; else feedback is worth
             a line now and then, and no reason is cut.
+        narrow: Lines are short: names without their containers.
     """
 
-    def __init__(self, record: StateRecord, history: History, *, panel: bool) -> None:
+    def __init__(
+        self, record: StateRecord, history: History, *, panel: bool, narrow: bool = False
+    ) -> None:
         self._root = record.path
         self._history = history
         self._panel = panel
+        self._narrow = narrow
         self._feedback_lines: dict[str, float] = {}
         self._targets = {
             (f"{state.path}/{edge.source}", edge.outcome): edge
@@ -65,27 +74,34 @@ class EventLines:
             ev.Failed: self._failed,
             ev.Finished: self._finished,
             ev.PreemptRequested: lambda e: self._line(
-                e, Text(f"asked to stop by {self._reason(e.asker)}", "yellow")
+                e, Text(f"asked to stop by {self._reason(e.asker)}", STYLES["preempted"])
             ),
             ev.CallbackFailed: lambda e: self._line(
-                e, Text(f"callback {shorten(e.callback)}: {self._reason(e.error)}", "red")
+                e,
+                Text(f"callback {shorten(e.callback)}: {self._reason(e.error)}", STYLES["failure"]),
             ),
-            ev.TimedOut: lambda e: self._line(e, Text(f"timeout of {e.timeout:g} s", "yellow")),
+            ev.TimedOut: lambda e: self._line(
+                e, Text(f"timeout of {e.timeout:g} s", STYLES["preempted"])
+            ),
             ev.Retried: lambda e: self._line(
-                e, Text(f"again, attempt {e.attempt} ended with {self._reason(e.reason)}", "yellow")
+                e,
+                Text(
+                    f"again, attempt {e.attempt} ended with {self._reason(e.reason)}",
+                    STYLES["preempted"],
+                ),
             ),
             ev.Abandoned: lambda e: self._line(
-                e, Text(f"left behind: it ignored its preempt for {e.grace:g} s", "red")
+                e, Text(f"left behind: it ignored its preempt for {e.grace:g} s", STYLES["failure"])
             ),
             ev.Paused: lambda e: self._line(
-                e, Text(f"paused ({self._reason(e.reason)})", "yellow")
+                e, Text(f"paused ({self._reason(e.reason)})", STYLES["preempted"])
             ),
             ev.Resumed: lambda e: self._line(e, Text("resumed")),
             ev.QuestionAsked: lambda e: self._line(
-                e, Text(f"asks: {self._reason(e.text)}", "cyan")
+                e, Text(f"asks: {self._reason(e.text)}", RUNNING)
             ),
             ev.QuestionAnswered: lambda e: self._line(
-                e, Text(self._reason(answered(e.answer, e.by)), "cyan")
+                e, Text(self._reason(answered(e.answer, e.by)), RUNNING)
             ),
             ev.GoalFeedback: self._goal_feedback,
             ev.GoalDone: self._goal_done,
@@ -97,7 +113,9 @@ class EventLines:
         return None if make is None else make(event)
 
     def name(self, path: str) -> str:
-        """Return `path` without the root's name."""
+        """Return `path` without the root's name, in narrow lines its last name."""
+        if self._narrow:
+            return shorten(path.rpartition("/")[2], 24)
         return shorten(path.removeprefix(self._root).lstrip("/") or path.lstrip("/"), 70)
 
     def _left(self, event: ev.Left) -> Text:
@@ -109,7 +127,10 @@ class EventLines:
 
     def _failed(self, event: ev.Failed) -> Text:
         return self._line(
-            event, Text.assemble((self._reason(event.error), "bold red"), self._duration(event))
+            event,
+            Text.assemble(
+                (self._reason(event.error), f"bold {STYLES['failure']}"), self._duration(event)
+            ),
         )
 
     def _finished(self, event: ev.Finished) -> Text:
@@ -139,7 +160,7 @@ class EventLines:
         if event.status == "SUCCEEDED" or not event.text:
             return None
         words = f"{shorten(event.action)} {shorten(event.status)}: {self._reason(event.text)}"
-        return self._line(event, Text(words, "yellow"))
+        return self._line(event, Text(words, STYLES["preempted"]))
 
     def _reason(self, text: str) -> str:
         return shorten(text, ERROR_LENGTH) if self._panel else one_line(text)
@@ -152,5 +173,8 @@ class EventLines:
         started = self._history.started
         elapsed = 0.0 if started is None else event.t - started
         return Text.assemble(
-            (f"{elapsed:8.2f}  ", "dim"), (self.name(event.path), "bold"), "  ", words
+            (f"{elapsed:6.1f} " if self._narrow else f"{elapsed:8.2f}  ", "dim"),
+            (self.name(event.path), "bold"),
+            " " if self._narrow else "  ",
+            words,
         )

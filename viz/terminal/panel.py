@@ -36,7 +36,7 @@ from actionlib_core.clock import current_clock
 from viz.model.history import History
 from viz.model.labels import GLYPHS, shorten
 from viz.model.progress import progress_of, seconds_left, written_progress
-from viz.terminal.lines import EventLines
+from viz.terminal.lines import NARROW, RUNNING, STYLES, EventLines
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -55,8 +55,6 @@ BACKLOG = 2000
 """Most lines that wait for a slow terminal; the oldest go first."""
 PATIENCE = 2.0
 """Longest wait for a blocked terminal when the view closes [s]."""
-NARROW = 72
-"""Below this many columns the panel leaves the bars out."""
 MOST_KEYS = 5
 """Userdata keys in the panel: those that were written last."""
 VALUE_LENGTH = 60
@@ -101,7 +99,9 @@ class TerminalView:
         self._drawing = drawing or self._clock
         panel = self._console.is_terminal and not plain
         self._live = _live_panel(self._console) if panel else None
-        self._event_lines = EventLines(record, self.history, panel=panel)
+        self._event_lines = EventLines(
+            record, self.history, panel=panel, narrow=self._console.width < NARROW
+        )
         self._lock = threading.Lock()
         self._lines: deque[Text] = deque(maxlen=BACKLOG)
         self._lost = 0
@@ -153,7 +153,8 @@ class TerminalView:
         from viz.terminal.summary import summary
 
         self.close()
-        self._console.print(summary(self._record, self.history, outcome, MOST_ROWS))
+        narrow = self._console.width < NARROW
+        self._console.print(summary(self._record, self.history, outcome, MOST_ROWS, narrow=narrow))
 
     def _draw(self) -> None:
         """The drawing task: woken by events, at most ten times a second."""
@@ -194,7 +195,7 @@ class TerminalView:
         title = shorten(self._record.label)
         if started is not None:
             title += f"  {_span(now - started)}"
-        parts: list[RenderableType] = [Rule(Text(title, "bold"), align="left", style="blue")]
+        parts: list[RenderableType] = [Rule(Text(title, "bold"), align="left", style=RUNNING)]
         parts += [self._active(path, now - since) for path, since in self._running()]
         goals = self.history.goals()
         if goals:
@@ -220,7 +221,9 @@ class TerminalView:
         share, seconds = progress.fraction, progress.seconds_left
         cells: list[RenderableType] = [Text(f"  {shorten(key, 24)}", no_wrap=True)]
         if self._console.width >= NARROW and share is not None:
-            cells.append(ProgressBar(total=1.0, completed=share, width=20, complete_style="green"))
+            cells.append(
+                ProgressBar(total=1.0, completed=share, width=20, complete_style=STYLES["success"])
+            )
         cells.append(Text("" if share is None else f"{share:4.0%}"))
         cells.append(Text("" if seconds is None else f"~{_span(seconds)}", no_wrap=True))
         cells.append(Text(shorten(progress.text), no_wrap=True, overflow="ellipsis"))
@@ -240,9 +243,9 @@ class TerminalView:
         glyph = GLYPHS.get(self._kinds.get(path, ""), "\u25cf")
         trail = " \u203a ".join(names[:-1])
         line = Text.assemble(
-            (f"{glyph} ", "blue"),
+            (f"{glyph} ", RUNNING),
             (f"{trail} \u203a " if trail else "", "dim"),
-            (names[-1], "bold blue"),
+            (names[-1], f"bold {RUNNING}"),
             (f"  {_span(seconds)}", "dim"),
         )
         line.no_wrap = True
@@ -260,7 +263,9 @@ class TerminalView:
                 cells.append(
                     Text("")
                     if fraction is None
-                    else ProgressBar(total=1.0, completed=fraction, width=20, complete_style="blue")
+                    else ProgressBar(
+                        total=1.0, completed=fraction, width=20, complete_style=RUNNING
+                    )
                 )
                 cells.append(Text("" if fraction is None else f"{fraction:4.0%}"))
             left = "" if progress.distance is None else f"{progress.distance:.2f} m left"

@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rich.console import Group
+from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
 from smachpy.events.run_state import RAISED
 from viz.model.labels import shorten
-from viz.terminal.lines import outcome_text
+from viz.terminal.lines import RUNNING, outcome_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,7 +23,12 @@ if TYPE_CHECKING:
 
 
 def summary(
-    record: StateRecord, history: History, outcome: str | None, most_rows: int
+    record: StateRecord,
+    history: History,
+    outcome: str | None,
+    most_rows: int,
+    *,
+    narrow: bool = False,
 ) -> RenderableType:
     """Return the table of what the run visited and the line with the mission's outcome.
 
@@ -31,31 +37,38 @@ def summary(
         history: The run.
         outcome: The mission's; None when it raised.
         most_rows: Levels that would make the table longer are left out, innermost first.
+        narrow: A state's outcomes stand below its name.
     """
     visits = history.visits()
     states = [state for state in record.walk() if state.path in visits and state is not record]
     depth = _depth_that_fits([_depth(record, state) for state in states], most_rows)
     shown = [state for state in states if _depth(record, state) <= depth]
     table = Table(box=None, pad_edge=False, header_style="dim", padding=(0, 2, 0, 0))
-    table.add_column("state", no_wrap=True, overflow="ellipsis")
-    table.add_column("outcome", no_wrap=True)
-    table.add_column("duration", justify="right", no_wrap=True)
-    table.add_column("times", justify="right", no_wrap=True)
+    if narrow:
+        table.add_column("state and outcomes")
+        table.add_column("duration", justify="right", no_wrap=True)
+    else:
+        table.add_column("state", no_wrap=True, overflow="ellipsis")
+        table.add_column("outcome")
+        table.add_column("duration", justify="right", no_wrap=True, min_width=8)
+        table.add_column("times", justify="right", no_wrap=True)
     for state in shown:
-        _add(table, state, visits[state.path], _depth(record, state))
+        _add(table, state, visits[state.path], _depth(record, state), narrow=narrow)
     parts: list[RenderableType] = ["", table] if shown else []
     if len(shown) < len(states):
         parts.append(Text(f"({len(states) - len(shown)} deeper states left out)", "dim"))
     return Group(*parts, "", _verdict(record, visits, history, outcome))
 
 
-def _add(table: Table, state: StateRecord, visits: Visits, depth: int) -> None:
-    table.add_row(
-        Text("  " * (depth - 1) + shorten(state.label), "bold" if state.children else ""),
-        Text("running", "blue") if visits.since is not None else _outcomes(visits),
-        f"{visits.seconds:.2f} s",
-        f"\u00d7{visits.count}" if visits.count > 1 else "",
-    )
+def _add(table: Table, state: StateRecord, visits: Visits, depth: int, *, narrow: bool) -> None:
+    name = Text("  " * (depth - 1) + shorten(state.label), "bold" if state.children else "")
+    ended = Text("running", RUNNING) if visits.since is not None else _outcomes(visits)
+    times = f"\u00d7{visits.count}" if visits.count > 1 else ""
+    if narrow:
+        table.add_row(name, f"{visits.seconds:.1f} s")
+        table.add_row(Padding(ended, (0, 0, 0, 2 * depth)), times)
+    else:
+        table.add_row(name, ended, f"{visits.seconds:.2f} s", times)
 
 
 def _outcomes(visits: Visits) -> Text:

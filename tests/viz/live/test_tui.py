@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 
+import pytest
 from textual.widgets import DataTable, RichLog, Static, Tree
 
 from smachpy import CBState, StateMachine
@@ -333,3 +334,27 @@ def test_the_terminal_view_shows_a_question_and_takes_the_number_of_an_answer(se
         "yes",
     )
     assert command["by"].startswith("terminal of ")
+
+
+@pytest.mark.parametrize(("width", "stacked"), [(40, True), (80, False)])
+def test_narrow_terminals_stack_the_tree_and_the_log(tmp_path, clock, width, stacked):
+    machines = Machines()
+    machines.obtain("job").reset(recorded(tmp_path).history())
+    found = {}
+
+    async def look():
+        app = MissionApp(machines, None)
+        async with app.run_test(size=(width, 24)) as pilot:
+            app.refresh_view()
+            await pilot.pause()
+            for name in ("tree", "log"):
+                found[name] = app.query_one(f"#{name}").region
+            found["lines"] = [line.text for line in app.query_one(RichLog).lines]
+
+    asyncio.run(look())
+    tree, log = found["tree"], found["log"]
+    assert (tree.bottom <= log.y) == stacked
+    assert (tree.right <= log.x) != stacked
+    assert min(tree.height, log.height) >= 5
+    assert min(tree.width, log.width) >= 34
+    assert any("FIRST  succeeded \u2192 IN" in line for line in found["lines"])
