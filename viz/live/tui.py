@@ -68,7 +68,10 @@ class MissionApp(App[None]):
     .-narrow Horizontal { layout: vertical; } .-narrow #left { width: 1fr; height: 40%; }
     .-narrow #userdata { height: auto; max-height: 5; }
     """
-    HORIZONTAL_BREAKPOINTS: ClassVar = [(0, "-narrow"), (NARROW, "-wide")]
+    HORIZONTAL_BREAKPOINTS = [  # noqa: RUF012  not declared as a class variable there
+        (0, "-narrow"),
+        (NARROW, "-wide"),
+    ]
     BINDINGS: ClassVar = [
         ("q", "quit", "Quit"),
         ("n", "next", "Next machine"),
