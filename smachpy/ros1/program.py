@@ -176,6 +176,7 @@ def _build(path: Path, argv: Sequence[str], call: str, made: Session) -> str:
         returned = run_script(path, argv, call=call)
         if isinstance(returned, Container):
             made.stopped = Stop(returned)
+        made.settle()
     except LoadError as error:
         return error.problem
     except Stop:

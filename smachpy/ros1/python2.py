@@ -29,8 +29,8 @@ _GONE: Final = re.compile(
     r"\b(basestring|execfile|getcwdu|has_key|iteritems|iterkeys|itervalues|raw_input|unicode"
     r"|xrange|unichr|viewitems|viewkeys|viewvalues|StandardError|izip|imap|ifilter"
     r"|string\.(atof|atoi|atol|find|rfind|join|lower|replace|split|strip|upper)"
-    r"|Queue|ConfigParser|cPickle|StringIO|urllib2|Tkinter|tkMessageBox|thread|commands)\b"
-    r"|(?<!\.)\b(long|reduce|reload)\s*\(|\.next\(\)"
+    r"|Queue|ConfigParser|cPickle|StringIO|urllib2|Tkinter|tkMessageBox|thread|commands|setdefaultencoding)\b"
+    r"|(?<!\.)\b(cmp|long|reduce|reload)\s*\(|\.next\(\)"
 )
 _INDENT: Final = re.compile(r"^[ ]*\t[ \t]*", re.MULTILINE)
 _CODING: Final = re.compile(rb"^[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+)")
@@ -145,8 +145,8 @@ def _tool(names: tuple[str, ...] | None) -> tuple[Any, type[Exception]]:
 def _parse_as(text: str, converted: str, filename: str) -> ast.Module:
     """Parse the converted source, with the lines of the original in every node."""
     tree = ast.parse(converted, filename)
-    if "string" in text:
-        tree = _StringFunctions().visit(tree)
+    if any(word in text for word in ("string", "setdefaultencoding", "cmp")):
+        tree = _GoneFunctions(tree).visit(tree)
     before, after = text.splitlines(), converted.splitlines()
     if len(before) != len(after):
         lines = _line_map(before, after)
@@ -164,8 +164,12 @@ def _raise_on(*_args: Any, **_kwargs: Any) -> None:
     raise  # noqa: PLE0704  called where it was caught
 
 
-class _StringFunctions(ast.NodeTransformer):
-    """Calls methods of text in place of the functions that the module `string` had."""
+class _GoneFunctions(ast.NodeTransformer):
+    """Calls methods of text in place of the functions that the module `string` had.
+
+    `reload(sys); sys.setdefaultencoding("utf-8")` does nothing: text has no encoding any more.
+    `cmp` is there unless the module has one, also as an argument of `sorted` and `sort`.
+    """
 
     _METHODS = frozenset({
         *("capitalize", "center", "count", "expandtabs", "find", "index", "ljust", "lower"),
@@ -174,8 +178,36 @@ class _StringFunctions(ast.NodeTransformer):
     })  # fmt: skip
     _CONVERSIONS: ClassVar = {"atof": "float", "atoi": "int", "atol": "int"}
 
+    _COMPARE: Final = "lambda a, b: (a > b) - (a < b)"
+
+    def __init__(self, tree: ast.AST) -> None:
+        self._own = {
+            getattr(n, "id", getattr(n, "name", getattr(n, "arg", "")))
+            for n in ast.walk(tree)
+            if isinstance(n, ast.FunctionDef | ast.alias | ast.arg)
+            or (isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store))
+        }
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        if node.id != "cmp" or "cmp" in self._own or not isinstance(node.ctx, ast.Load):
+            return node
+        return _at(node, self._COMPARE)
+
+    def visit_Expr(self, node: ast.Expr) -> ast.AST:
+        call = re.sub(r"\b(imp|importlib)\.", "", ast.unparse(node.value))
+        if call == "reload(sys)" or call.startswith("sys.setdefaultencoding("):
+            return ast.copy_location(ast.Pass(), node)
+        return self.generic_visit(node)
+
     def visit_Call(self, node: ast.Call) -> ast.AST:
         self.generic_visit(node)
+        if ast.unparse(node.func).rpartition(".")[2] in {"sort", "sorted"}:
+            for keyword in node.keywords:
+                if keyword.arg == "cmp":
+                    wrap: Any = _at(keyword.value, "__import__('functools').cmp_to_key(None)")
+                    wrap.args = [keyword.value]
+                    keyword.arg, keyword.value = "key", wrap
+            return node
         function: Any = node.func
         if not (isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name)):
             return node
@@ -191,6 +223,14 @@ class _StringFunctions(ast.NodeTransformer):
             function.value = node.args[1] if len(node.args) > 1 else space
             function.attr, node.args = "join", node.args[:1]
         return node
+
+
+def _at(place: ast.expr, source: str) -> ast.expr:
+    """Parse an expression and give all of it the lines of another one."""
+    made = ast.parse(source, mode="eval").body
+    for node in ast.walk(made):
+        ast.copy_location(node, place)
+    return made
 
 
 def _line_map(before: list[str], after: list[str]) -> dict[int, int]:

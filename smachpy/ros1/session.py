@@ -27,6 +27,8 @@ T = TypeVar("T")
 
 DRY_LIMIT_S = 3600.0
 """Virtual time after which a dry program is taken to serve for ever [s]."""
+SETTLE_S = 1.0
+"""Virtual time that the threads of a dry program have left when it would wait or has ended [s]."""
 
 
 class Stop(SystemExit):
@@ -101,6 +103,11 @@ class Session:
             if self.stopped is None or (machine is not None and self.stopped.machine is None):
                 self.stopped = Stop(machine)
             raise self.stopped
+
+    def settle(self) -> None:
+        """Let the threads of a dry program get to where they run a machine; others go on."""
+        if self.dry and self.stopped is None:
+            current_clock().sleep(SETTLE_S)
 
     def check_time(self) -> None:
         """End a dry program that was stopped, or waits for what never comes.

@@ -5,7 +5,7 @@ import smach
 
 class Wait(smach.State):
     def __init__(self, seconds):
-        smach.State.__init__(self, outcomes=['done', 'preempted'])
+        smach.State.__init__(self, outcomes=["done", "preempted"])
         self.seconds = seconds
 
     def execute(self, ud):
@@ -13,29 +13,33 @@ class Wait(smach.State):
         while rospy.Time.now() < end:
             if self.preempt_requested():
                 self.service_preempt()
-                return 'preempted'
+                return "preempted"
             rospy.sleep(0.1)
-        return 'done'
+        return "done"
 
 
 def child_term_cb(outcome_map):
-    if outcome_map['FAST'] == 'done':
+    if outcome_map["FAST"] == "done":
         return True
     return False
 
 
 def out_cb(outcome_map):
-    if outcome_map['SLOW'] == 'preempted':
-        return 'first'
-    return 'both'
+    if outcome_map["SLOW"] == "preempted":
+        return "first"
+    return "both"
 
 
-rospy.init_node('concurrence')
-cc = smach.Concurrence(outcomes=['first', 'both'], default_outcome='both',
-                       child_termination_cb=child_term_cb, outcome_cb=out_cb)
+rospy.init_node("concurrence")
+cc = smach.Concurrence(
+    outcomes=["first", "both"],
+    default_outcome="both",
+    child_termination_cb=child_term_cb,
+    outcome_cb=out_cb,
+)
 with cc:
-    smach.Concurrence.add('FAST', Wait(1))
-    smach.Concurrence.add('SLOW', Wait(100))
+    smach.Concurrence.add("FAST", Wait(1))
+    smach.Concurrence.add("SLOW", Wait(100))
 start = rospy.get_time()
-assert cc.execute() == 'first'
+assert cc.execute() == "first"
 assert rospy.get_time() - start < 20

@@ -5,17 +5,21 @@ import rospy, smach
 
 class A(smach.State):
     def __init__(self):
-        smach.State.__init__(self, outcomes=['ok'])
+        smach.State.__init__(self, outcomes=["ok"])
 
     def execute(self, ud):
-        return 'ok'
+        return "ok"
 
 
-rospy.init_node('dup')
-cc = smach.Concurrence(outcomes=['done'], default_outcome='done', outcome_map={'done': {'TWO': 'ok'}, 'never': {'ONE': 'ok', 'TWO': 'bad'}})
+rospy.init_node("dup")
+cc = smach.Concurrence(
+    outcomes=["done"],
+    default_outcome="done",
+    outcome_map={"done": {"TWO": "ok"}, "never": {"ONE": "ok", "TWO": "bad"}},
+)
 a = A()
 with cc:
-    smach.Concurrence.add('ONE', A())
-    smach.Concurrence.add('ONE', a)
-    smach.Concurrence.add('TWO', A())
-assert cc.execute() == 'done'
+    smach.Concurrence.add("ONE", A())
+    smach.Concurrence.add("ONE", a)
+    smach.Concurrence.add("TWO", A())
+assert cc.execute() == "done"

@@ -15,32 +15,32 @@ def battery_cb(msg):
 
 class Patrol(smach.State):
     def __init__(self):
-        smach.State.__init__(self, outcomes=['low', 'go_on'])
+        smach.State.__init__(self, outcomes=["low", "go_on"])
 
     def execute(self, userdata):
         global battery
         pub.publish(Int32(battery - 30))
         rospy.sleep(1)
         rospy.loginfo("battery: %d", battery)
-        return 'low' if battery < 30 else 'go_on'
+        return "low" if battery < 30 else "go_on"
 
 
 class Dock(smach.State):
     def __init__(self):
-        smach.State.__init__(self, outcomes=['charged'])
+        smach.State.__init__(self, outcomes=["charged"])
 
     def execute(self, userdata):
         global battery
         battery = 100
-        return 'charged'
+        return "charged"
 
 
-if __name__ == '__main__':
-    rospy.init_node('blackboard')
-    pub = rospy.Publisher('/battery', Int32, queue_size=10)
-    rospy.Subscriber('/battery', Int32, battery_cb)
-    sm = smach.StateMachine(outcomes=['finished'])
+if __name__ == "__main__":
+    rospy.init_node("blackboard")
+    pub = rospy.Publisher("/battery", Int32, queue_size=10)
+    rospy.Subscriber("/battery", Int32, battery_cb)
+    sm = smach.StateMachine(outcomes=["finished"])
     with sm:
-        smach.StateMachine.add('PATROL', Patrol(), {'low': 'DOCK', 'go_on': 'PATROL'})
-        smach.StateMachine.add('DOCK', Dock(), {'charged': 'finished'})
-    assert sm.execute() == 'finished'
+        smach.StateMachine.add("PATROL", Patrol(), {"low": "DOCK", "go_on": "PATROL"})
+        smach.StateMachine.add("DOCK", Dock(), {"charged": "finished"})
+    assert sm.execute() == "finished"

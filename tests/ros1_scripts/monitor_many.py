@@ -15,14 +15,19 @@ def talk(event):
 
 
 talk.n = 0
-rospy.init_node('levels')
-talk.pub = rospy.Publisher('level', Float32, queue_size=5)
+rospy.init_node("levels")
+talk.pub = rospy.Publisher("level", Float32, queue_size=5)
 timer = rospy.Timer(rospy.Duration(0.2), talk)
-sm = smach.StateMachine(outcomes=['reached', 'failed'])
+sm = smach.StateMachine(outcomes=["reached", "failed"])
 sm.userdata.seen = []
 with sm:
-    smach.StateMachine.add('WATCH', MonitorState('level', Float32, above, max_checks=50, input_keys=['seen'], output_keys=['seen']),
-                           {'invalid': 'reached', 'valid': 'failed', 'preempted': 'failed'})
+    smach.StateMachine.add(
+        "WATCH",
+        MonitorState(
+            "level", Float32, above, max_checks=50, input_keys=["seen"], output_keys=["seen"]
+        ),
+        {"invalid": "reached", "valid": "failed", "preempted": "failed"},
+    )
 outcome = sm.execute()
 timer.shutdown()
-assert outcome == 'reached', outcome
+assert outcome == "reached", outcome

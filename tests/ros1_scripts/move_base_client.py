@@ -10,8 +10,8 @@ from geometry_msgs.msg import *
 
 class GoTo(smach.State):
     def __init__(self, x, y):
-        smach.State.__init__(self, outcomes=['succeeded', 'failed'])
-        self.client = actionlib.SimpleActionClient('move_base', MoveBaseAction)
+        smach.State.__init__(self, outcomes=["succeeded", "failed"])
+        self.client = actionlib.SimpleActionClient("move_base", MoveBaseAction)
         self.client.wait_for_server()
         self.x, self.y = x, y
 
@@ -25,17 +25,17 @@ class GoTo(smach.State):
         self.client.send_goal(goal, feedback_cb=self.feedback)
         self.client.wait_for_result(rospy.Duration.from_sec(120.0))
         if self.client.get_state() == actionlib.GoalStatus.SUCCEEDED:
-            return 'succeeded'
-        return 'failed'
+            return "succeeded"
+        return "failed"
 
     def feedback(self, fb):
         rospy.loginfo_throttle(1, "at %.1f" % fb.base_position.pose.position.x)
 
 
-if __name__ == '__main__':
-    rospy.init_node('go_there')
-    sm = smach.StateMachine(outcomes=['done', 'broken'])
+if __name__ == "__main__":
+    rospy.init_node("go_there")
+    sm = smach.StateMachine(outcomes=["done", "broken"])
     with sm:
-        smach.StateMachine.add('THERE', GoTo(11.0, 8.0), {'succeeded': 'BACK', 'failed': 'broken'})
-        smach.StateMachine.add('BACK', GoTo(10.0, 8.0), {'succeeded': 'done', 'failed': 'broken'})
+        smach.StateMachine.add("THERE", GoTo(11.0, 8.0), {"succeeded": "BACK", "failed": "broken"})
+        smach.StateMachine.add("BACK", GoTo(10.0, 8.0), {"succeeded": "done", "failed": "broken"})
     sm.execute()

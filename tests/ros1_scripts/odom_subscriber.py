@@ -11,9 +11,9 @@ from move_base_msgs.msg import *
 
 class Position(smach.State):
     def __init__(self):
-        smach.State.__init__(self, outcomes=['known', 'unknown'], output_keys=['x'])
+        smach.State.__init__(self, outcomes=["known", "unknown"], output_keys=["x"])
         self.msg = None
-        self.sub = rospy.Subscriber('odom', Odometry, self.callback)
+        self.sub = rospy.Subscriber("odom", Odometry, self.callback)
 
     def callback(self, msg):
         self.msg = msg
@@ -24,15 +24,15 @@ class Position(smach.State):
             if self.msg is not None:
                 ud.x = self.msg.pose.pose.position.x
                 self.sub.unregister()
-                return 'known'
+                return "known"
             r.sleep()
-        return 'unknown'
+        return "unknown"
 
 
-rospy.init_node('position')
-client = actionlib.SimpleActionClient('move_base', MoveBaseAction)
+rospy.init_node("position")
+client = actionlib.SimpleActionClient("move_base", MoveBaseAction)
 client.wait_for_server(rospy.Duration(30))
-sm = smach.StateMachine(outcomes=['known', 'unknown'])
+sm = smach.StateMachine(outcomes=["known", "unknown"])
 with sm:
-    smach.StateMachine.add('POSITION', Position())
-assert sm.execute() == 'known'
+    smach.StateMachine.add("POSITION", Position())
+assert sm.execute() == "known"

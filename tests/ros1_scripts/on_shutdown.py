@@ -10,7 +10,7 @@ called = []
 
 class Drive(smach.State):
     def __init__(self, pub):
-        smach.State.__init__(self, outcomes=['done'])
+        smach.State.__init__(self, outcomes=["done"])
         self.pub = pub
 
     def execute(self, userdata):
@@ -19,21 +19,21 @@ class Drive(smach.State):
         for _ in range(10):
             self.pub.publish(t)
             rospy.sleep(rospy.Duration(0, 100000000))
-        return 'done'
+        return "done"
 
 
 def stop():
     called.append(1)
     pub.publish(Twist())
-    rospy.loginfo('stopped')
+    rospy.loginfo("stopped")
 
 
-rospy.init_node('drive')
-pub = rospy.Publisher('cmd_vel', Twist, queue_size=1)
+rospy.init_node("drive")
+pub = rospy.Publisher("cmd_vel", Twist, queue_size=1)
 rospy.on_shutdown(stop)
-sm = smach.StateMachine(outcomes=['done'])
+sm = smach.StateMachine(outcomes=["done"])
 with sm:
-    smach.StateMachine.add('DRIVE', Drive(pub))
+    smach.StateMachine.add("DRIVE", Drive(pub))
 sm.execute()
-rospy.signal_shutdown('finished')
+rospy.signal_shutdown("finished")
 assert called == [1] and rospy.is_shutdown()

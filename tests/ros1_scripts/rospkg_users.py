@@ -8,19 +8,19 @@ import os
 
 class Find(smach.State):
     def __init__(self):
-        smach.State.__init__(self, outcomes=['found', 'not_found'])
+        smach.State.__init__(self, outcomes=["found", "not_found"])
 
     def execute(self, ud):
         try:
-            path = rospkg.RosPack().get_path('robot_that_nobody_has')
+            path = rospkg.RosPack().get_path("robot_that_nobody_has")
         except rospkg.ResourceNotFound:
-            return 'not_found'
-        return 'found'
+            return "not_found"
+        return "found"
 
 
-if __name__ == '__main__':
-    rospy.init_node('find')
-    sm = smach.StateMachine(outcomes=['done'])
+if __name__ == "__main__":
+    rospy.init_node("find")
+    sm = smach.StateMachine(outcomes=["done"])
     with sm:
-        smach.StateMachine.add('FIND', Find(), transitions={'found': 'done', 'not_found': 'done'})
+        smach.StateMachine.add("FIND", Find(), transitions={"found": "done", "not_found": "done"})
     sm.execute()

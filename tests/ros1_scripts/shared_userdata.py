@@ -12,29 +12,29 @@ class Order(object):
 
 class Take(smach.State):
     def __init__(self):
-        smach.State.__init__(self, outcomes=['taken'], input_keys=['orders'], output_keys=['order'])
+        smach.State.__init__(self, outcomes=["taken"], input_keys=["orders"], output_keys=["order"])
 
     def execute(self, userdata):
         userdata.order = Order(userdata.orders.pop())
-        return 'taken'
+        return "taken"
 
 
 class Serve(smach.State):
     def __init__(self):
-        smach.State.__init__(self, outcomes=['next', 'empty'], input_keys=['order', 'orders'])
+        smach.State.__init__(self, outcomes=["next", "empty"], input_keys=["order", "orders"])
 
     def execute(self, userdata):
-        userdata.order.history.append('served')
-        rospy.loginfo('served %s', userdata.order.what)
-        return 'next' if len(userdata.orders) > 0 else 'empty'
+        userdata.order.history.append("served")
+        rospy.loginfo("served %s", userdata.order.what)
+        return "next" if len(userdata.orders) > 0 else "empty"
 
 
-if __name__ == '__main__':
-    rospy.init_node('orders')
-    sm = smach.StateMachine(outcomes=['finished'])
-    sm.userdata.orders = ['tea', 'coffee']
+if __name__ == "__main__":
+    rospy.init_node("orders")
+    sm = smach.StateMachine(outcomes=["finished"])
+    sm.userdata.orders = ["tea", "coffee"]
     with sm:
-        smach.StateMachine.add('TAKE', Take(), {'taken': 'SERVE'})
-        smach.StateMachine.add('SERVE', Serve(), {'next': 'TAKE', 'empty': 'finished'})
-    assert sm.execute() == 'finished'
+        smach.StateMachine.add("TAKE", Take(), {"taken": "SERVE"})
+        smach.StateMachine.add("SERVE", Serve(), {"next": "TAKE", "empty": "finished"})
+    assert sm.execute() == "finished"
     assert sm.userdata.orders == []

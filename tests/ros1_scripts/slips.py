@@ -6,12 +6,12 @@ import smach
 
 class ReadsOnly(smach.State):
     def __init__(self):
-        smach.State.__init__(self, outcomes=['ok'], input_keys=['seen'])
+        smach.State.__init__(self, outcomes=["ok"], input_keys=["seen"])
 
     def execute(self, ud):
         ud.seen.append(1)
         ud.undeclared = 2
-        return 'ok'
+        return "ok"
 
 
 class NoInit(smach.State):
@@ -19,15 +19,15 @@ class NoInit(smach.State):
         self.count = 0
 
     def execute(self, ud):
-        return 'ok'
+        return "ok"
 
 
 class Duck(object):
     def execute(self, ud):
-        return 'ok'
+        return "ok"
 
     def get_registered_outcomes(self):
-        return ['ok']
+        return ["ok"]
 
     def get_registered_input_keys(self):
         return []
@@ -36,13 +36,13 @@ class Duck(object):
         return []
 
 
-rospy.init_node('slips')
-sm = smach.StateMachine(outcomes=['done'])
+rospy.init_node("slips")
+sm = smach.StateMachine(outcomes=["done"])
 sm.userdata.seen = []
 with sm:
-    smach.StateMachine.set_initial_state(sm, ['READS ONLY'], smach.UserData())
-    smach.StateMachine.add('READS ONLY', ReadsOnly(), {'ok': 'NO INIT'})
-    smach.StateMachine.add('NO INIT', NoInit(), {'ok': 'DUCK'})
-    smach.StateMachine.add('DUCK', Duck(), {'ok': 'done'})
-assert sm.execute() == 'done'
+    smach.StateMachine.set_initial_state(sm, ["READS ONLY"], smach.UserData())
+    smach.StateMachine.add("READS ONLY", ReadsOnly(), {"ok": "NO INIT"})
+    smach.StateMachine.add("NO INIT", NoInit(), {"ok": "DUCK"})
+    smach.StateMachine.add("DUCK", Duck(), {"ok": "done"})
+assert sm.execute() == "done"
 assert sm.userdata.seen == [1]

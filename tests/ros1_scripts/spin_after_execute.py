@@ -6,18 +6,18 @@ import smach_ros
 
 class Foo(smach.State):
     def __init__(self):
-        super(Foo, self).__init__(outcomes=['succeeded'])
+        super(Foo, self).__init__(outcomes=["succeeded"])
 
     def execute(self, userdata):
-        return 'succeeded'
+        return "succeeded"
 
 
 def main():
-    rospy.init_node('spinner')
-    sm = smach.StateMachine(outcomes=['succeeded'])
+    rospy.init_node("spinner")
+    sm = smach.StateMachine(outcomes=["succeeded"])
     with sm:
-        smach.StateMachine.add('FOO', Foo())
-    sis = smach_ros.IntrospectionServer('spinner', sm, '/SM_ROOT')
+        smach.StateMachine.add("FOO", Foo())
+    sis = smach_ros.IntrospectionServer("spinner", sm, "/SM_ROOT")
     sis.start()
     sm.execute()
     rate = rospy.Rate(10)
@@ -29,5 +29,5 @@ def main():
     sis.stop()
 
 
-if __name__ == '__main__':
+if __name__ == "__main__":
     main()

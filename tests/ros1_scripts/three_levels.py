@@ -5,8 +5,8 @@ import smach_ros
 
 
 class Step(smach.State):
-    def __init__(self, outcome='succeeded'):
-        smach.State.__init__(self, outcomes=['succeeded', 'aborted', 'preempted'])
+    def __init__(self, outcome="succeeded"):
+        smach.State.__init__(self, outcomes=["succeeded", "aborted", "preempted"])
         self.outcome = outcome
 
     def execute(self, ud):
@@ -14,19 +14,21 @@ class Step(smach.State):
 
 
 def nested(depth):
-    sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
+    sm = smach.StateMachine(outcomes=["succeeded", "aborted", "preempted"])
     with sm:
         if depth == 0:
-            smach.StateMachine.add('LEAF', Step())
+            smach.StateMachine.add("LEAF", Step())
         else:
-            smach.StateMachine.add('LEVEL_%d' % depth, nested(depth - 1), transitions={'succeeded': 'AFTER'})
-            smach.StateMachine.add('AFTER', Step('aborted' if depth > 5 else 'succeeded'))
+            smach.StateMachine.add(
+                "LEVEL_%d" % depth, nested(depth - 1), transitions={"succeeded": "AFTER"}
+            )
+            smach.StateMachine.add("AFTER", Step("aborted" if depth > 5 else "succeeded"))
     return sm
 
 
-rospy.init_node('levels')
+rospy.init_node("levels")
 top = nested(3)
-sis = smach_ros.IntrospectionServer('levels', top, '/LEVELS')
+sis = smach_ros.IntrospectionServer("levels", top, "/LEVELS")
 sis.start()
 top.execute()
 sis.stop()

@@ -190,6 +190,7 @@ def spin() -> None:
     Blocks: until then. In virtual time also until nothing can happen any more.
     """
     now = session()
+    now.settle()
     now.stop()
     if not now.name:
         raise ROSInitException("client code must call rospy.init_node() first")
