@@ -112,7 +112,8 @@ def _check_number(where: str, argument: str, value: object) -> float | None:
     if value is None:
         return None
     try:
-        seconds = float(to_seconds(value))  # type: ignore[call-overload]
+        is_number = isinstance(value, (float, int))
+        seconds = float(value if is_number else to_seconds(value))  # type: ignore[arg-type,call-overload]
     except (TypeError, ValueError):
         raise DurationTypeError(where, argument, value, SECONDS) from None
     if math.isnan(seconds):

@@ -702,10 +702,10 @@ class GoalManager:
         due = goal.due
         if session and goal.acknowledged:  # not one that knows of the cancel only
             goal.server = session
-        if path:
-            self._pass(handle, path)
         if goal.comm is not before:
             self._arm(due)
+        if path:
+            self._pass(handle, path)
 
     def _believes(self, session: str, handle: ClientGoalHandle) -> bool:
         """Tell whether a session that is no server may speak of a goal; report one that may not."""

@@ -246,7 +246,7 @@ class StatusPublisher:
             self._change_waits = False
             now = self._clock.now()
             self._published = now
-            listed = [goal.entry() for goal in self._goals.listed()]
+            listed = self._goals.list_statuses()
             self._arm(now + PERIOD_S)
         try:
             self._port.send_status(listed)
@@ -259,7 +259,7 @@ class StatusPublisher:
         if self._change_waits:  # the list is made after this is reset, so this change is in it
             return
         with self._lock:
-            due = self._published + GAP_S + GAP_PER_GOAL_S * len(self._goals)
+            due = self._published + GAP_S + GAP_PER_GOAL_S * len(self._goals.tracked)
             if due > self._clock.now():
                 if not self._closed:
                     self._change_waits = True
@@ -270,7 +270,7 @@ class StatusPublisher:
 
     def hurry(self) -> None:
         """Send a change that waits for others now, unless the list is long."""
-        if self._change_waits and len(self._goals) <= SHORT:
+        if self._change_waits and len(self._goals.tracked) <= SHORT:
             self.publish()
 
     def _arm(self, due: float) -> None:
@@ -598,7 +598,7 @@ class GoalKeeper:
     def list_goals(self) -> list[StatusEntry]:
         """Return the status list."""
         with self.lock:
-            return [goal.entry() for goal in self.goals.listed()]
+            return self.goals.list_statuses()
 
     def find_end(self, goal_id: str) -> tuple[StatusEntry, bytes | None]:
         """Return the status of a goal, and its result if it has one."""

@@ -447,9 +447,9 @@ class SimpleActionServer:
         come = self._clock.event(f"a goal for {self._name}")
         while True:
             with self.lock:
+                come.clear()
                 waiting = self._policy.waiting
                 self._idle = None if waiting else come
-                come.clear()
             if waiting:
                 self._run_next()
             elif self._stopping or not come.wait(LINGER_S):
@@ -463,8 +463,9 @@ class SimpleActionServer:
         """Accept the goal that waits and run it."""
         goal = self._take_next()
         if goal is not None and self.execute_callback is not None:
+            message = goal.get_goal()
             goal.set_accepted(TEXT_ACCEPTED)
-            self._run(goal, self.execute_callback, goal.get_goal())
+            self._run(goal, self.execute_callback, message)
 
     def _run(
         self, handle: ServerGoalHandle, execute: Callable[..., object], *arguments: Any

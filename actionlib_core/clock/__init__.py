@@ -7,13 +7,13 @@ mission with its action servers runs unchanged on `RealClock` (wall time) or `Vi
 
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core.clock._current import current_clock as current_clock
-from actionlib_core.clock._current import use_clock as use_clock
 from actionlib_core.clock._protocol import Clock as Clock
 from actionlib_core.clock._protocol import Event as Event
 from actionlib_core.clock._protocol import Task as Task
 from actionlib_core.clock._protocol import Timer as Timer
 from actionlib_core.clock._real import RealClock as RealClock
+from actionlib_core.clock._real import current_clock as current_clock
+from actionlib_core.clock._real import use_clock as use_clock
 from actionlib_core.clock._serial import SerialExecutor as SerialExecutor
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ import weakref
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core.clock._current import use_clock
+from actionlib_core.clock._real import use_clock
 from actionlib_core.clock._virtual_loop import VirtualLoop
 
 if TYPE_CHECKING:

@@ -1,22 +1,27 @@
-"""Wall time: threads from a cache, one timer thread on demand, events safe in signal handlers."""
+"""Wall time: threads from a cache, one timer thread on demand, events safe in signal handlers.
+
+It is the current clock unless `use_clock` says otherwise.
+"""
 
 from __future__ import annotations
 
 import _thread
 import contextlib
-import contextvars
 import heapq
 import itertools
 import math
 import threading
 import time
+from contextvars import Context, ContextVar, copy_context
 from typing import TYPE_CHECKING, TypeVar
 
 from actionlib_core.clock._protocol import check_seconds
 from actionlib_core.clock._serial import report_callback, report_thread_exception
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine
+    from collections.abc import Callable, Coroutine, Iterator
+
+    from actionlib_core.clock._protocol import Clock
 
 T = TypeVar("T")
 
@@ -101,7 +106,7 @@ class RealTask:
 
     def __init__(self, target: Callable[[], object], name: str) -> None:
         self._target = target
-        self._context = contextvars.copy_context()
+        self._context = copy_context()
         self._done = RealEvent()
         self._ident: int | None = None
         self.name = name
@@ -299,7 +304,7 @@ class RealClock:
         self._timers_run = True
         try:
             # An empty context: timers belong to the clock, not to who came first.
-            contextvars.Context().run(self.spawn, self._run_timers, name="clock-timers")
+            Context().run(self.spawn, self._run_timers, name="clock-timers")
         except BaseException:  # the system gives no thread: the next timer tries again
             self._timers_run = False
             raise
@@ -339,3 +344,22 @@ class RealClock:
 
         with asyncio.Runner() as runner:
             return runner.run(main)
+
+
+_REAL = RealClock()
+_clock: ContextVar[Clock] = ContextVar("clock", default=_REAL)
+
+
+def current_clock() -> Clock:
+    """Return the clock of this context: the one of `use_clock`, else the process's real clock."""
+    return _clock.get()
+
+
+@contextlib.contextmanager
+def use_clock(clock: Clock) -> Iterator[Clock]:
+    """Make `clock` the current one inside the `with` block, also for tasks spawned in it."""
+    token = _clock.set(clock)
+    try:
+        yield clock
+    finally:
+        _clock.reset(token)

@@ -87,6 +87,7 @@ class ServerGoals:
 
     Attributes:
         closed: No more goals are taken.
+        tracked: Id -> goal that runs, or whose end its client may not know.
 
     Threads: none of its own, no lock; the owner calls it under its lock.
     """
@@ -94,7 +95,7 @@ class ServerGoals:
     def __init__(self, name: str, *, result_timeout: float = RESULT_TIMEOUT_S) -> None:
         self.name = name
         self.result_timeout = result_timeout
-        self._goals: dict[str, ServerGoal] = {}
+        self.tracked: dict[str, ServerGoal] = {}
         # Status, when it was forgotten, whether acknowledged; plain numbers: nothing to collect.
         self._past: dict[str, tuple[int, float, bool]] = {}
         self._oldest: deque[str] = deque()  # its ids; a dict is slow to tell its first one
@@ -102,12 +103,9 @@ class ServerGoals:
         self._last_cancel_ns = 0
         self._steps = server_life_cycle()
 
-    def __len__(self) -> int:
-        return len(self._goals)
-
     def find(self, goal_id: str) -> ServerGoal | None:
         """Return the goal that is tracked under this id."""
-        goal = self._goals.get(goal_id)
+        goal = self.tracked.get(goal_id)
         return goal if goal is not None and goal.arrived else None
 
     def past_status(self, goal_id: str) -> Status | None:
@@ -122,14 +120,14 @@ class ServerGoals:
             What it is, and the goal as it is tracked; None for a repeat of one that ended long ago,
             and for one that comes too late.
         """
-        known = self._goals.get(arrived.id)
+        known = self.tracked.get(arrived.id)
         if known is not None and known.arrived:
             return Arrival.REPEAT, known
         if known is None and arrived.id in self._past:
             return Arrival.REPEAT, None
         if self.closed:
             return Arrival.LATE, None
-        self._goals[arrived.id] = arrived
+        self.tracked[arrived.id] = arrived
         if known is not None:
             text = TEXT_CANCEL_CAME_FIRST
         elif 0 < arrived.stamp_ns <= self._last_cancel_ns:
@@ -154,12 +152,12 @@ class ServerGoals:
         everything = not goal_id and not stamp_ns
         asked = [
             goal
-            for goal in self._goals.values()
+            for goal in self.tracked.values()
             if (everything or goal.id == goal_id or 0 < goal.stamp_ns <= stamp_ns)
             and self.request_cancel(goal)
         ]
-        if goal_id and goal_id not in self._goals and goal_id not in self._past:
-            self._goals[goal_id] = ServerGoal(
+        if goal_id and goal_id not in self.tracked and goal_id not in self._past:
+            self.tracked[goal_id] = ServerGoal(
                 goal_id, 0, Status.RECALLING, arrived=False, listed_until=now + LISTED_S
             )
         until_ns = stamp_ns if stamp_ns <= now_ns + FUTURE_NS else now_ns
@@ -170,7 +168,7 @@ class ServerGoals:
         """Ask the goals of a client that died to stop; return those that were not asked before."""
         return [
             goal
-            for goal in self._goals.values()
+            for goal in self.tracked.values()
             if goal.client == client and self.request_cancel(goal)
         ]
 
@@ -208,13 +206,13 @@ class ServerGoals:
     def on_acknowledged(self, goal_ids: Iterable[str], now: float) -> None:
         """Forget the results that their clients have."""
         for goal_id in goal_ids:
-            goal = self._goals.get(goal_id)
+            goal = self.tracked.get(goal_id)
             if goal is not None and goal.kept_until is not None:
                 self._forget(goal, now, acknowledged=True)
 
     def has_unacknowledged(self) -> bool:
         """Tell whether a result waits for its acknowledgement."""
-        return any(goal.kept_until is not None for goal in self._goals.values())
+        return any(goal.kept_until is not None for goal in self.tracked.values())
 
     def release(self, goal: ServerGoal, now: float) -> None:
         """Note that nobody will ever end this goal: it is LOST once its time in the list is up."""
@@ -230,7 +228,7 @@ class ServerGoals:
 
         Each with its id and status; None for one whose result is no longer kept.
         """
-        for goal in self._goals.values():
+        for goal in self.tracked.values():
             if goal.arrived:
                 yield goal.id, goal.status, goal
         for goal_id, (status, _, acknowledged) in self._past.items():
@@ -241,14 +239,18 @@ class ServerGoals:
         """Return the goals of the status list."""
         return [
             goal
-            for goal in self._goals.values()
+            for goal in self.tracked.values()
             if goal.listed_until is not None or goal.status not in TERMINAL
         ]
+
+    def list_statuses(self) -> list[StatusEntry]:
+        """Return the status list."""
+        return [goal.entry() for goal in self.listed()]
 
     def expire(self, now: float) -> float | None:
         """Forget what is past its time; return when the next thing is [s, clock]."""
         soonest: float | None = None
-        for goal in list(self._goals.values()):
+        for goal in list(self.tracked.values()):
             due = self._expire(goal, now)
             if due is not None and (soonest is None or due < soonest):
                 soonest = due
@@ -259,7 +261,7 @@ class ServerGoals:
         if goal.listed_until is not None and goal.listed_until <= now:
             goal.listed_until = None
             if not goal.arrived:
-                del self._goals[goal.id]
+                del self.tracked[goal.id]
                 return None
             if goal.status not in TERMINAL:
                 goal.status = Status.LOST
@@ -271,7 +273,7 @@ class ServerGoals:
         return goal.listed_until if goal.listed_until is not None else goal.kept_until
 
     def _forget(self, goal: ServerGoal, now: float, *, acknowledged: bool = False) -> None:
-        del self._goals[goal.id]
+        del self.tracked[goal.id]
         self._past[goal.id] = (int(goal.status), now, acknowledged)
         self._oldest.append(goal.id)
         if len(self._past) > MEMORY_GOALS:

@@ -296,19 +296,20 @@ class Frame:
 
     def emit(self, kind: Callable[..., Event], *fields: Any) -> None:
         """Publish an event about the state that runs now."""
-        self._emit(self.here, kind, fields)
+        if self.run.watched:
+            self._emit(self.here(), kind, fields)
 
     def emit_own(self, kind: Callable[..., Event], *fields: Any) -> None:
         """Publish an event about the container itself."""
-        self._emit(lambda: self.path, kind, fields)
+        if self.run.watched:
+            self._emit(self.path, kind, fields)
 
-    def _emit(self, path: Callable[[], str], kind: Callable[..., Event], fields: Any) -> None:
+    def _emit(self, path: str, kind: Callable[..., Event], fields: Any) -> None:
         run = self.run
-        if run.watched:
-            if run.pending:
-                run.flush()
-            clock = run.clock
-            self.publish(kind(path(), clock.now(), clock.time_ns(), *fields))
+        if run.pending:
+            run.flush()
+        clock = run.clock
+        self.publish(kind(path, clock.now(), clock.time_ns(), *fields))
 
     def note(self, path: str, kind: Callable[..., Event], *fields: Any) -> None:
         """Note an event while a lock is held; the next `Run.flush` or event publishes it."""

@@ -179,7 +179,9 @@ class Visit:
             self._start_timer(grace, Event.GRACE_OVER)
 
     def _publish_serviced(self) -> None:
-        self._frame.note(self._frame.here(), PreemptServiced)
+        frame = self._frame
+        if frame.run.watched:
+            frame.note(frame.here(), PreemptServiced)
 
     def _publish_abandoned(self) -> None:
         frame, clock = self._frame, self._frame.run.clock

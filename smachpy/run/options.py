@@ -142,8 +142,10 @@ def changed(options: Options, given: Mapping[str, Any], problems: Problems) -> O
 def retry_problems(options: Options, outcomes: Iterable[str]) -> list[str]:
     """Return what is wrong with `retry` for a state with these outcomes."""
     retry = options.retry
+    if retry is None:
+        return []
     known = {*outcomes, *options.made_outcomes(), "preempted"}
-    if retry is None or any(isinstance(one, type) or one in known for one in retry.on):
+    if any(isinstance(one, type) or one in known for one in retry.on):
         return []
     text = (
         f"retry: got {retry!r}; expected outcomes of the state that ask for another attempt, of "

@@ -138,7 +138,8 @@ class Root(Branch):
             data.control.attach(run)
         if data.listeners or data.tapes:
             run.watched = True
-        self.emit(Started, tuple(root.get_initial_states()))
+        if run.watched:
+            self.emit(Started, tuple(root.get_initial_states()))
         data.root = self  # from here on a request is one of this run
         if root._preempt_requested:
             token = REQUESTING.set(root)  # its own `request_preempt`, if any, was called then
@@ -160,7 +161,8 @@ class Root(Branch):
                 visit.service()
             return outcome
         finally:
-            forget_visit(self)
+            if self.visit is not None:
+                forget_visit(self)
             if data.root is self:
                 data.root = None
             self.emit(Finished, outcome)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from smachpy.events import UserdataWritten
 from smachpy.run.interrupt import Interruption
@@ -37,6 +37,7 @@ class Step:
         "_path",
         "_window",
         "execute",
+        "final",
         "interface",
         "label",
         "next",
@@ -44,13 +45,14 @@ class Step:
         "userdata",
         "writes",
     )
-    final: ClassVar[Literal[False]] = False
+    final: Literal[False]
 
     def __init__(
         self, label: str, state: Child, userdata: Any, execute: Callable[[Any], Any]
     ) -> None:
         data = state._smachpy
         self.label = label
+        self.final = False  # on the instance, where Python finds it faster; see `End`
         self.state = state
         self.execute = execute
         self.userdata = userdata

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -213,7 +213,7 @@ class End:
     """The container ends with this outcome."""
 
     outcome: str
-    final: ClassVar[Literal[True]] = True
+    final: Literal[True] = True  # on the instance, where Python finds it faster
 
 
 PREEMPTED = End("preempted")

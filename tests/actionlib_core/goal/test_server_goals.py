@@ -84,7 +84,7 @@ def test_result_is_kept_until_acknowledged_and_its_id_for_good():
     assert goals.find("a").result == b"result"
     goals.on_acknowledged(["a", "unknown"], 1.0)
     assert goals.find("a") is None
-    assert len(goals) == 0
+    assert not goals.tracked
     assert goals.on_goal(ServerGoal("a", 1), 2.0) == (Arrival.REPEAT, None)
     assert goals.past_status("a") is Status.SUCCEEDED
 
