@@ -286,7 +286,7 @@ def test_result_is_dropped_at_the_server_once_acknowledged():
         assert only(pair)[0] == "SUCCEEDED"
         pair.clock.sleep(0.2)
         assert pair.server.status_list == []
-        assert len(pair.server.keeper.goals) == 0
+        assert not pair.server.keeper.goals.tracked
 
 
 def test_result_comes_within_the_result_timeout_after_a_long_cut():
