@@ -392,6 +392,11 @@ def asker_text(source: str, by: str, why: str) -> str:
     return f"{who}: {why}" if why else who
 
 
+def answered_text(answer: str, by: str) -> str:
+    """Return how a question was answered, in one phrase for people."""
+    return f"answered {answer} by {by}" if by else f"nobody answered: {answer}"
+
+
 def to_record(event: Event) -> dict[str, Any]:
     """Return `event` as a dict of its fields and its `kind`, for JSON.
 

@@ -96,7 +96,7 @@ def test_the_child_that_stopped_the_others_of_a_concurrence_is_the_cause():
     watch, container, _ = found.steps
     assert "rule for low" in watch.reason
     assert container.reason == "leads to aborted"
-    assert watch.written == (("left", "3"),)
+    assert watch.written == (("left", "3", "3"),)
     assert watch.stamp_ns - found.began == 2_000_000_000
 
 
@@ -221,3 +221,37 @@ def test_a_function_that_is_no_state_tells_its_line_too():
     found = why(*ran(sm))
     assert "ZeroDivisionError" in found.steps[0].what
     assert "1 / 0" in found.steps[0].detail
+
+
+def test_what_was_written_on_the_way_says_what_it_was_before():
+    events = [
+        {"kind": "Started", "path": "/TOP", "stamp_ns": 1, "initial": ["A"]},
+        {"kind": "UserdataWritten", "path": "/TOP/B", "stamp_ns": 2, "key": "x", "value": 1},
+        {"kind": "UserdataWritten", "path": "/TOP/B", "stamp_ns": 2, "key": "other", "value": 1},
+        {"kind": "Entered", "path": "/TOP/A", "stamp_ns": 3},
+        {"kind": "UserdataWritten", "path": "/TOP/A", "stamp_ns": 4, "key": "x", "value": 2},
+        {"kind": "UserdataWritten", "path": "/TOP/A", "stamp_ns": 4, "key": "new", "value": None},
+        {"kind": "Left", "path": "/TOP/A", "stamp_ns": 5, "outcome": "aborted"},
+        {"kind": "Finished", "path": "/TOP", "stamp_ns": 5, "outcome": "aborted"},
+    ]
+    record = describe(machine([("A", Waits(1.0, "aborted"), {})]))
+    found = why(record, events)
+    first, last = found.steps
+    assert first.written == (("x", "2", "1"), ("new", "None", ""))
+    assert (first.outcome, last.outcome) == ("aborted", "aborted")
+    assert "wrote x = 2 (was 1)" in found.text()
+
+
+@pytest.mark.parametrize(
+    ("by", "what"), [("ann", "answered no by ann"), ("", "nobody answered: no")]
+)
+def test_an_answer_of_the_operator_is_a_cause(by, what):
+    events = [
+        {"kind": "Started", "path": "/TOP", "stamp_ns": 1, "initial": ["A"]},
+        {"kind": "Entered", "path": "/TOP/A", "stamp_ns": 3},
+        {"kind": "QuestionAnswered", "path": "/TOP/A", "stamp_ns": 4, "answer": "no", "by": by},
+        {"kind": "Left", "path": "/TOP/A", "stamp_ns": 5, "outcome": "aborted"},
+        {"kind": "Finished", "path": "/TOP", "stamp_ns": 5, "outcome": "aborted"},
+    ]
+    record = describe(machine([("A", Waits(1.0, "aborted"), {})]))
+    assert steps(why(record, events))[0] == ("/TOP/A", what)

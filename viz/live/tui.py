@@ -13,12 +13,12 @@ from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
 from textual.widgets import DataTable, Footer, Input, RichLog, Static, Tree
 
-from smachpy.events import asker_text
+from smachpy.events import answered_text, asker_text
 from smachpy.events.run_state import RunState
 from smachpy.exceptions import SmachError
 from smachpy.outcome_classes import outcome_class
 from viz.model.labels import GLYPHS, shorten
-from viz.terminal.lines import NARROW, RUNNING, STYLES, WAITING, answered
+from viz.terminal.lines import NARROW, RUNNING, STYLES, WAITING
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -524,7 +524,7 @@ def _line(event: dict[str, Any], target: str) -> Text:
     if event["kind"] == "QuestionAsked":
         words, style = f"asks {event['text']}", WAITING
     if event["kind"] == "QuestionAnswered":
-        words, style = answered(event["answer"], event["by"]), WAITING
+        words, style = answered_text(event["answer"], event["by"]), WAITING
     words = {
         "PreemptServiced": "preempt serviced",
         "Abandoned": "abandoned",

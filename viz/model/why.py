@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from smachpy.events import asker_text
+from smachpy.events import answered_text, asker_text
 from smachpy.events.run_state import RAISED
 from smachpy.outcome_classes import is_good, outcome_class
 from viz.model.labels import shorten
@@ -38,7 +38,9 @@ class Step:
         kind: Class of the outcome it is or led to, as `smachpy.outcome_classes` has it.
         reason: Why, or where it led to; may be "".
         detail: More lines, such as those of a traceback; may be "".
-        written: Pairs (key, value as text) that the state wrote on the way.
+        written: What the state wrote on the way: key, value, and the value before, "" when there
+            was none; as texts.
+        outcome: The outcome, when the step is the end of a state; else "".
     """
 
     path: str
@@ -47,7 +49,8 @@ class Step:
     kind: str
     reason: str = ""
     detail: str = ""
-    written: tuple[tuple[str, str], ...] = ()
+    written: tuple[tuple[str, str, str], ...] = ()
+    outcome: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +93,9 @@ class Why:
             reason = f": {step.reason}" if step.reason else ""
             lines.append(f"{number:3}. {at:8.2f}  {step.path} {step.what}{reason}")
             lines += [f"               {line}" for line in step.detail.splitlines()]
-            lines += [f"               wrote {key} = {value}" for key, value in step.written]
+            for key, value, before in step.written:
+                was = f" (was {before})" if before else ""
+                lines.append(f"               wrote {key} = {value}{was}")
         return "\n".join(lines)
 
 
@@ -164,7 +169,8 @@ class _Reader:
 
     def _step(self, path: str, at: int, what: str, reason: str = "", **more: Any) -> Step:
         kind = "failure" if what == RAISED else outcome_class(what)
-        return Step(path, self._run[at]["stamp_ns"], shorten(what, LONGEST), kind, reason, **more)
+        stamp = self._run[at]["stamp_ns"]
+        return Step(path, stamp, shorten(what, LONGEST), kind, reason, outcome=what, **more)
 
     def _outcome(self, end: int) -> str:
         return self._run[end].get("outcome") or RAISED
@@ -179,14 +185,24 @@ class _Reader:
         found = (i for i in range(begin, end) if _is(self._run[i], kind, path))
         return next(found, None)
 
-    def _written(self, path: str, begin: int, end: int) -> tuple[tuple[str, str], ...]:
+    def _written(self, path: str, begin: int, end: int) -> tuple[tuple[str, str, str], ...]:
         values = {
             event["key"]: event["value"]
             for event in self._run[begin:end]
             if _is(event, "UserdataWritten", path)
         }
-        pairs = [(shorten(key, 80), shorten(_plain(value), 120)) for key, value in values.items()]
-        return tuple(pairs[-MOST_WRITTEN:])
+        container = path.rpartition("/")[0]
+        before = {
+            event["key"]: event["value"]
+            for event in self._run[:begin]
+            if event["kind"] == "UserdataWritten"
+            and event["path"].rpartition("/")[0] == container
+            and event["key"] in values
+        }
+        return tuple(
+            (shorten(key, 80), _short(value), _short(before[key]) if key in before else "")
+            for key, value in [*values.items()][-MOST_WRITTEN:]
+        )
 
     def _request(self, at: int) -> tuple[Step, ...]:
         """Who asked a state to stop: a sibling whose end did is followed further."""
@@ -299,6 +315,7 @@ _CAUSES: dict[str, Any] = {
     "OutcomeForced": lambda e: ("ended by an operator", f"with {e['outcome']!r}", ""),
     "Failed": lambda e: (f"raised {e['error']}", "", e.get("trace") or ""),
     "Abandoned": lambda e: (f"ignored its preempt for {e['grace']:g} s", "abandoned", e["stack"]),
+    "QuestionAnswered": lambda e: (answered_text(e["answer"], e["by"]), "", ""),
     "TimedOut": lambda e: (f"ran into its timeout of {e['timeout']:g} s", "", ""),
     "GoalDone": _goal,
     "Retried": lambda e: ("tried again", shorten(str(e["reason"]), LONGEST), ""),
@@ -310,6 +327,10 @@ _CAUSES: dict[str, Any] = {
     ),
 }
 """What an event says of why its state ended: (what, reason, more lines); the strongest first."""
+
+
+def _short(value: Any) -> str:
+    return shorten(_plain(value), 120)
 
 
 def _plain(value: Any) -> str:

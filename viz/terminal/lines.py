@@ -39,11 +39,6 @@ def outcome_text(outcome: str) -> Text:
     return Text(shorten(outcome), STYLES[outcome_class(outcome)])
 
 
-def answered(answer: str, by: str) -> str:
-    """Return how a question was answered, for people."""
-    return f"answered {answer} by {by}" if by else f"nobody answered: {answer}"
-
-
 class EventLines:
     """Turns events into lines.
 
@@ -101,7 +96,7 @@ class EventLines:
                 e, Text(f"asks: {self._reason(e.text)}", RUNNING)
             ),
             ev.QuestionAnswered: lambda e: self._line(
-                e, Text(self._reason(answered(e.answer, e.by)), RUNNING)
+                e, Text(self._reason(ev.answered_text(e.answer, e.by)), RUNNING)
             ),
             ev.GoalFeedback: self._goal_feedback,
             ev.GoalDone: self._goal_done,

@@ -315,7 +315,8 @@ interface WhyStep {
   kind: OutcomeClass;
   reason: string;
   detail: string;
-  written: [string, string][];
+  written: [string, string, string][]; // key, value, value before or ""
+  outcome: string; // of the end of a state; else ""
 }
 interface Why {
   label: string;

@@ -301,6 +301,41 @@ def test_why_it_ended_so_and_a_step_goes_there(served, look):
     wait_for(page, "!document.querySelector('.why')")
 
 
+def test_the_way_to_the_end_is_opened_and_drawn_thick(served, look):
+    """From the state that failed through the transition and each container's outcome."""
+    inner = StateMachine(outcomes=["aborted", "done"], input_keys=["x"], output_keys=["x"])
+    with inner:
+        go = CBState(lambda _: "aborted", outcomes=["aborted"], output_keys=["x"])
+        StateMachine.add("GO", go, {"aborted": "aborted"})
+    sm = StateMachine(outcomes=["aborted", "done"], name="JOB")
+    with sm:
+        StateMachine.add("IN", inner, {"done": "NEXT", "aborted": "aborted"})
+        StateMachine.add("NEXT", CBState(lambda _: "done", outcomes=["done"]))
+    events = [
+        ("Started", "/JOB", {"initial": ["IN"]}),
+        ("Entered", "/JOB/IN"),
+        ("UserdataWritten", "/JOB/IN/NEXT", {"key": "x", "value": 1}),
+        ("Entered", "/JOB/IN/GO"),
+        ("UserdataWritten", "/JOB/IN/GO", {"key": "x", "value": 2}),
+        ("Left", "/JOB/IN/GO", {"outcome": "aborted"}),
+        ("Left", "/JOB/IN", {"outcome": "aborted"}),
+        ("Finished", "/JOB", {"outcome": "aborted"}),
+    ]
+    served.add("one", sm=sm, events=told(*events))
+    page = look(served.start())
+    page.evaluate("async () => { smachpy.page.setDepth(1); await smachpy.page.drawing; }")
+    assert page.locator('g[data-path="/JOB/IN/GO"]').count() == 0
+    page.click(".why-button")
+    for path in ("/JOB/IN/GO", "/JOB/IN", "/JOB"):
+        page.wait_for_selector(f'g.on-way[data-path="{path}"]')
+    assert page.locator("g.on-way[data-path='/JOB/NEXT']").count() == 0
+    assert page.locator("path.edge.on-way").count() == 2
+    assert page.locator(".pill.on-way").all_text_contents() == ["aborted", "aborted"]
+    assert "wrote x 2 (was 1)" in " ".join(page.locator(".why p").all_text_contents())
+    page.keyboard.press("w")
+    page.wait_for_selector(".on-way", state="detached")
+
+
 def test_a_run_in_one_file_says_why_too(served, look, tmp_path):
     ended = [
         ("Left", "/JOB/A", {"outcome": "aborted", "at": 2.0}),

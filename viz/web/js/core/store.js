@@ -5,6 +5,7 @@ import { Model } from "#core/model.js";
 import { Run } from "#core/run.js";
 import { Scene } from "#core/scene.js";
 import { shorten } from "#core/text.js";
+import { wayOf } from "#core/why.js";
 
 /** @template T @typedef {import("@preact/signals").Signal<T>} Signal */
 
@@ -74,6 +75,8 @@ export const operator = signal(saved("operator", "")); // the name under which a
 export const tokenAsked = signal(false); // the viewer does not take the token that this page has
 /** @type {Signal<Why | null>} */
 export const why = signal(null); // why the run ended so, while that is shown
+/** The ends of states that led to it. */
+export const wayShown = computed(() => wayOf(why.value));
 export const treeOpen = signal(false); // on small screens, where it lies over the page
 export const overview = signal(false); // so many states are open that they are tiles, without arrows
 /** @type {Signal<{ done: number, all: number } | null>} */

@@ -44,6 +44,8 @@ export class Diagram {
   /** @type {Map<string, Box>} */
   boxes = new Map();
   /** @type {Map<string, SVGElement>} */
+  pills = new Map(); // by path of the container and outcome
+  /** @type {Map<string, SVGElement>} */
   minimapRects = new Map();
   /** @type {Map<string, boolean>} */
   minimapDue = new Map(); // what the minimap does not show yet: whether states are active
@@ -70,8 +72,8 @@ export class Diagram {
    * @param {Problem[]} problems
    */
   draw(layout, model, problems) {
-    for (const map of [this.states, this.arrows, this.joins, this.boxes, this.minimapRects, this.minimapDue])
-      map.clear();
+    const { states, arrows, joins, boxes, pills, minimapRects, minimapDue } = this;
+    for (const map of [states, arrows, joins, boxes, pills, minimapRects, minimapDue]) map.clear();
     this.problems = groupByPath(problems);
     const isCompared = model.order.some((n) => n.change || n.note || n.edges.some((e) => e.change || e.note));
     this.svg.classList.toggle("compared", isCompared);
@@ -133,7 +135,11 @@ export class Diagram {
           el("title", {}, join.text),
         ),
       );
-    for (const pill of layout.pills) into.append(outcomePill(node, pill, x, y));
+    for (const pill of layout.pills) {
+      const drawn = outcomePill(node, pill, x, y);
+      this.pills.set(node.path + SEP + pill.outcome, drawn);
+      into.append(drawn);
+    }
   }
 
   /** @param {StateNode} node @param {string} className */
@@ -419,6 +425,21 @@ export class Diagram {
         this.flashing.delete(line);
       }
     return this.flashing.size > 0;
+  }
+
+  /**
+   * Draw the way thick that led to the end of a run, and no other.
+   * @param {{ path: string, outcome: string }[]} ends
+   */
+  showWay(ends) {
+    this.mark(
+      ends.map((one) => one.path),
+      "on-way",
+    );
+    for (const { path, outcome } of ends) {
+      for (const { line } of this.arrows.get(path + SEP + outcome) ?? []) line.classList.add("on-way");
+      this.pills.get(path + SEP + outcome)?.classList.add("on-way");
+    }
   }
 
   /** Give these states, and no others, a class. @param {string[]} paths @param {string} name */

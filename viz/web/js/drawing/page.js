@@ -91,6 +91,7 @@ export class Page {
     });
     store.serversSeen.subscribe(() => this.paintAll());
     store.facts.subscribe(() => this.paintAll());
+    store.wayShown.subscribe(() => this.#showWay());
   }
 
   /** Begin when the elements are in the document, so that their fonts are loading. */
@@ -244,7 +245,15 @@ export class Page {
     this.diagram.mark(pathsOf(stops.filter(([, outcome]) => outcome === null)), "stopped");
     this.diagram.mark(pathsOf(stops.filter(([, outcome]) => outcome !== null)), "stopped-after");
     this.diagram.mark(store.selected.value ? [store.selected.value] : [], "selected");
+    this.diagram.showWay(store.wayShown.value);
     this.#showNumbers();
+  }
+
+  /** Open what is on the way that led to the end of the run, and draw that thick. */
+  #showWay() {
+    const closed = store.wayShown.value.map(({ path }) => store.reveal(path)).some(Boolean);
+    if (closed) this.relayout({ frame: true });
+    else if (this.diagram.size) this.diagram.showWay(store.wayShown.value);
   }
 
   #showNumbers() {

@@ -39,5 +39,8 @@ function Step({ step, began, first, page }) {
       <time>${((step.stamp_ns - began) / 1e9).toFixed(2)}</time></button>
     ${step.reason && html`<p>${step.reason}</p>`}
     ${step.detail && html`<pre>${step.detail}</pre>`}
-    ${step.written.map(([key, value]) => html`<p>wrote <b>${key}</b> ${value}</p>`)}</li>`;
+    ${step.written.map(
+      ([key, value, before]) =>
+        html`<p>wrote <b>${key}</b> ${value}${before && html` <small>(was ${before})</small>`}</p>`,
+    )}</li>`;
 }
