@@ -21,6 +21,7 @@ from smachpy.pnp.problems import PlanError, PlanProblem, raise_errors
 from smachpy.pnp.reading import find_plan, read_net
 from smachpy.run.child import ContainerData
 from smachpy.run.visit import End
+from smachpy.userdata.typed import CheckedDict
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from smachpy.machines.state import StateOptions
     from smachpy.pnp.knowledge import Events
     from smachpy.run.frame import Frame
+    from smachpy.userdata.typed import Fields
     from smachpy.userdata.user_data import UserData
 
 __all__ = ["PetriNetPlan", "load"]
@@ -101,6 +103,19 @@ class _Noting(dict[str, Any]):
         if self.on_write is not None:
             self.on_write()
 
+    def __delitem__(self, key: str) -> None:
+        super().__delitem__(key)
+        if self.on_write is not None:
+            self.on_write()
+
+
+class _NotingChecked(_Noting, CheckedDict):
+    """The same of typed userdata."""
+
+    def __init__(self, fields: Fields) -> None:
+        self.on_write = None
+        CheckedDict.__init__(self, fields)
+
 
 class Parameters(NamedTuple):
     """How a plan and its sub-plans run; see `PetriNetPlan`."""
@@ -162,6 +177,7 @@ class PetriNetPlan(Container):
 
     plan: Shown[Plan] = Shown(lambda self: self._smachpy.net_plan)
     problems: Shown[tuple[PlanProblem, ...]] = Shown(lambda self: self._smachpy.net_plan.problems)
+    dropped_events: Shown[int] = Shown(lambda self: self._smachpy.knowledge.dropped)
 
     def __init__(
         self,
@@ -194,14 +210,14 @@ class PetriNetPlan(Container):
         )
         data = self._smachpy
         data.net_plan = plan
-        values = self.userdata._data  # noqa: SLF001  one machinery
-        if userdata_type is None:
-            values = _Noting(values)
-            object.__setattr__(self.userdata, "_data", values)
+        before = self.userdata._data  # noqa: SLF001  one machinery
+        checked = before if isinstance(before, CheckedDict) else None
+        values = _Noting(before) if checked is None else _NotingChecked(checked.fields)
+        object.__setattr__(self.userdata, "_data", values)
         data.knowledge = Knowledge(
             conditions, lambda: self.userdata, events=events, life=event_life
         )
-        if isinstance(values, _Noting) and any(map(callable, data.knowledge.sources.values())):
+        if any(map(callable, data.knowledge.sources.values())):
             values.on_write = data.knowledge.changed
         problems = Problems(type(self).__name__)
         subs = problems.mapping("sub_plans", sub_plans, "name -> plan")

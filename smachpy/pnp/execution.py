@@ -10,6 +10,7 @@ from smachpy.events import Fired, HeldBack, Preempted
 from smachpy.exceptions import SmachError
 from smachpy.pnp.actions import take_apart
 from smachpy.run.branches import ChildBranch, Group
+from smachpy.run.callback import call_bounded
 from smachpy.run.child import on_preempt
 from smachpy.run.grace import ask_child, end_visit, unknown_outcome
 from smachpy.run.interrupt import Interruption
@@ -38,6 +39,7 @@ class Branches(Group):
     def begin(self, step: Step) -> ChildBranch:
         """Start a child in a thread of its own."""
         branch = ChildBranch(self, step)
+        self.started = True
         with self.frame.run.lock:
             self.branches.append(branch)
             self._left += 1
@@ -192,7 +194,10 @@ class Execution:
         due = self._due(name)
         if due is not None:
             return now >= due
-        return self._knowledge.value(name, self._frame.path, now)
+        arguments = name, self._frame.path, now
+        if self._knowledge.is_code(name):
+            return bool(call_bounded(self._machine, self._frame, self._knowledge.value, arguments))
+        return self._knowledge.value(*arguments)
 
     def _due(self, name: str) -> float | None:
         """Return when a `timeout_ACTION_SECONDS` comes true; None for other names."""

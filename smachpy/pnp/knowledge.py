@@ -16,6 +16,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 
+from smachpy import log
 from smachpy.exceptions import InvalidUserCodeError
 from smachpy.machines.problems import Problems
 
@@ -154,6 +155,9 @@ class Knowledge:
     Raises:
         InvalidStateError: an argument is wrong; all problems at once.
 
+    Attributes:
+        dropped: Events that were dropped because so many waited for a guard.
+
     Threads: `post`, `set` and `subscribe` from any thread; `value` from the plan's and from those
         of its actions.
     """
@@ -183,6 +187,7 @@ class Knowledge:
         problems.raise_all()
         self._events = events
         self._userdata = userdata
+        self.dropped = 0
         self._lock = threading.Lock()
         self._posted: deque[tuple[str, float | None]] = deque(maxlen=_MOST_EVENTS)
         self._set: dict[str, bool] = {}
@@ -210,7 +215,16 @@ class Knowledge:
             self.set(name, value=True)
             return
         with self._lock:
+            full = len(self._posted) == _MOST_EVENTS
+            oldest = self._posted[0][0] if full else ""
+            self.dropped += full
+            first = full and self.dropped == 1
             self._posted.append((name, None if clock is None else clock.now()))
+        if first:
+            log.logwarn(
+                f"event {name!r}: {_MOST_EVENTS} events wait for a guard: the oldest are dropped, "
+                f"{oldest!r} first. Try events='lasting', or post what guards ask for."
+            )
         self.changed()
 
     def set(self, name: str, value: bool | None) -> None:
@@ -275,6 +289,11 @@ class Knowledge:
             if source is not None and callable(source):
                 return source, tuple(parts[count:])
         return None
+
+    def is_code(self, name: str) -> bool:
+        """Tell whether code of the user answers for a name."""
+        found = self.source_of(name)
+        return found is not None and not isinstance(found[0], (bool, Expression))
 
     def every(self, name: str) -> float | None:
         """Return how often a name is to be asked for [s]; None when its changes are told."""

@@ -30,9 +30,21 @@ def read_net(file: Path | str) -> tuple[Net, tuple[PlanProblem, ...]]:
         return read_pnml(path)
     beside = path.with_suffix(".er")
     rules = parse_rules(_text(beside), file=str(beside)) if beside.is_file() else ()
+    ignored = [
+        PlanProblem(
+            "comment",
+            "warning",
+            f"{rule.ignored!r} means nothing, as in PNP's generators.",
+            f"rule for {rule.action!r}",
+            str(beside),
+            rule.line,
+        )
+        for rule in rules
+        if rule.ignored
+    ]
     name = path.name.partition(".")[0]
     parse = parse_pddl if path.suffix == ".pddlout" else parse_plan
-    return parse(_text(path), rules, name=name, file=str(file)), ()
+    return parse(_text(path), rules, name=name, file=str(file)), tuple(ignored)
 
 
 def find_plan(folder: Path | str, name: str) -> Path | None:

@@ -38,10 +38,14 @@ class ExecutionRule(NamedTuple):
     Attributes:
         action: Name of the action, without parameters.
         rule: What interrupts it.
+        line: Of the file.
+        ignored: What of the line means nothing, "" for nothing.
     """
 
     action: str
     rule: Rule
+    line: int = 0
+    ignored: str = ""
 
 
 class _Token(NamedTuple):
@@ -110,7 +114,8 @@ def parse_rules(text: str, *, file: str = "") -> tuple[ExecutionRule, ...]:
         except PlanError as error:
             problems += error.found
             continue
-        found.append(ExecutionRule(match[4].partition("_")[0], rule))
+        ignored = "" if match[7] is None else f"*x* {match[7]}"
+        found.append(ExecutionRule(match[4].partition("_")[0], rule, number, ignored))
     if problems:
         raise PlanError(problems)
     return tuple(found)

@@ -1,13 +1,19 @@
 """What a plan does when it runs: PNP's rules of firing, and the contract of every container."""
 
 import contextlib
+import dataclasses
 
 import pytest
 
 import smachpy
 from actionlib_core.clock import VirtualClock, use_clock
 from smachpy import State, StateMachine, events
-from smachpy.exceptions import InconsistentMachineError, InvalidStateError, InvalidUserCodeError
+from smachpy.exceptions import (
+    InconsistentMachineError,
+    InvalidStateError,
+    InvalidUserCodeError,
+    UserDataTypeError,
+)
 from smachpy.pnp import Expression, Function, PetriNetPlan, Polled, TopicCondition
 from tests.smachpy.pnp.nets import net_of
 
@@ -244,6 +250,70 @@ def test_conditions_on_userdata_are_looked_at_when_it_is_written():
     with virtual_time() as clock:
         assert plan.execute() == "goal"
         assert clock.now() == pytest.approx(3.0)
+
+
+@dataclasses.dataclass
+class Robot:
+    battery: float = 100.0
+
+
+def test_conditions_on_typed_userdata_are_looked_at_when_it_is_written():
+    conditions = {"low": Expression("battery < 20")}
+    plan = PetriNetPlan(net_of("init* -> goal : [low]"), conditions=conditions, userdata_type=Robot)
+
+    def write():
+        with pytest.raises(UserDataTypeError):
+            plan.userdata.battery = "empty"
+        plan.userdata.battery = 10.0
+
+    with virtual_time() as clock:
+        clock.call_later(3.0, write)
+        assert plan.execute() == "goal"
+        assert clock.now() == pytest.approx(3.0)
+
+
+def test_a_key_that_is_deleted_is_seen():
+    plan = PetriNetPlan(
+        net_of("init* -> goal : [not there]"), conditions={"there": lambda ud: "x" in ud}
+    )
+    plan.userdata.x = 1
+    with virtual_time() as clock:
+        clock.call_later(3.0, lambda: plan.userdata.__delitem__("x"))
+        assert plan.execute() == "goal"
+        assert clock.now() == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize("more", ["", "init* -> A.exec : A.start\n"], ids=["alone", "beside A"])
+def test_a_condition_that_blocks_is_bounded_by_the_grace(more):
+    asked = []
+
+    def blocks(ud):
+        asked.append(clock.now())
+        clock.sleep(1000.0)
+
+    text = more + "first* -> goal : [blocks]"
+    plan = plan_of(
+        text, seconds={"A": (500.0,)}, conditions={"blocks": blocks}, preempt_timeout=2.0
+    )
+    with virtual_time() as clock:
+        clock.call_later(5.0, plan.request_preempt)
+        assert plan.execute() == "preempted"
+        assert clock.now() == pytest.approx(7.0)
+        assert asked == [0.0]
+    assert not plan.is_running()
+
+
+def test_events_that_nobody_reads_are_bounded_and_said(caplog):
+    plan = PetriNetPlan(net_of("init* -> goal : [last]"))
+    for number in range(1000):
+        plan.post(f"e{number}")
+    assert plan.dropped_events == 0
+    for _ in range(3):
+        plan.post("last")
+    assert plan.dropped_events == 3
+    assert sum("'e0' first" in record.getMessage() for record in caplog.records) == 1
+    with virtual_time():
+        assert plan.execute() == "goal"
 
 
 def test_a_polled_condition():

@@ -54,6 +54,14 @@ def test_check_run_and_render(folder, capsys):
     assert "goto_kitchen" in Path("fetch.txt").read_text()
 
 
+def test_what_a_rule_says_in_vain_is_a_warning(folder):
+    Path("tour.plan").write_text("goto_x; goto_y")
+    Path("tour.er").write_text("# a rule\n*if* obstacle *during* goto *do* goal *x* 3\n")
+    (problem,) = load("tour.plan").problems
+    assert (problem.severity, problem.line, problem.file) == ("warning", 2, "tour.er")
+    assert "*x* 3" in problem.message
+
+
 def test_the_picture_is_the_net(folder):
     assert main(["render", "fetch.pnml", "-o", "fetch.svg"]) == 0
     ids = {e.get("id") for e in ET.parse("fetch.svg").iter() if e.get("id")}
