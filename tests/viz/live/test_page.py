@@ -492,7 +492,7 @@ def test_every_key_does_what_the_help_says(delivery, look):
     page.keyboard.press("-")
     page.keyboard.press("-")
     assert page.evaluate(view)[2] == pytest.approx(k * 0.8)
-    page.keyboard.press("f")
+    page.keyboard.press("0")
     wait_for(page, f"Math.abs(smachpy.page.view.k - {k}) < 0.01")
     page.keyboard.press("/")
     assert page.evaluate("() => document.activeElement.id") == "search"

@@ -2,7 +2,7 @@
 import "@preact/signals";
 import { render } from "preact";
 import { useEffect, useLayoutEffect, useRef } from "preact/hooks";
-import { isFile, messageOf } from "#core/connection.js";
+import { messageOf } from "#core/connection.js";
 import * as store from "#core/store.js";
 import { Page } from "#drawing/page.js";
 import { el } from "#drawing/svg.js";
@@ -13,6 +13,7 @@ import { Inspector } from "#panels/inspector.js";
 import { listenToKeys } from "#panels/keys.js";
 import { MapPanel } from "#panels/map.js";
 import { Help, Laying, Legend, Notice, Overlay, TokenDialog } from "#panels/messages.js";
+import { PlayBar } from "#panels/play.js";
 import { TopBar } from "#panels/top_bar.js";
 import { Tree } from "#panels/tree.js";
 
@@ -40,22 +41,14 @@ function TimeTools() {
     timeline.fitAll();
     timeline.draw();
   };
-  const end = isFile() || store.facts.value?.recorded ? "End" : "Live";
-  return html`<div class="time-tools">
-    <button title="one event back (,)" aria-label="one event back" onClick=${() => store.seekEvent(-1)}>\u2039</button>
-    <button title="one event forward (.)" aria-label="one event forward"
-      onClick=${() => store.seekEvent(1)}>\u203a</button>
-    <button title="show the whole run" onClick=${showAll}>All</button>
-    <button title="back to now (l)" class=${store.cursor.value === null ? "on" : ""}
-      onClick=${() => timeline.live()}>${end}</button>
-  </div>`;
+  return html`<div class="time-tools"><button title="show the whole run" onClick=${showAll}>All</button></div>`;
 }
 
 function ZoomButtons() {
   return html`<span class="zoom">
     <button title="smaller (-)" aria-label="zoom out" onClick=${() => page.view.zoom(0.8)}>\u2212</button>
     <button title="larger (+)" aria-label="zoom in" onClick=${() => page.view.zoom(1.25)}>+</button>
-    <button title="show everything (f)" onClick=${() => page.refit()}>Fit</button></span>`;
+    <button title="show everything (0)" onClick=${() => page.refit()}>Fit</button></span>`;
 }
 
 function App() {
@@ -86,6 +79,7 @@ function App() {
     <footer class="timeline"><${Mounted} element=${canvas} /><${TimeTools} /></footer>
     ${store.hasMap.value && html`<${MapPanel} page=${page}><${Mounted} element=${floor} /><//>`}
     <${Inspector} page=${page} />
+    <${PlayBar} page=${page} />
     <${ActionsPage} />
     <div id="announced" class="hidden" aria-live="polite"></div>
     <${Notice} />

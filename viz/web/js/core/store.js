@@ -2,6 +2,7 @@
 import { batch, computed, signal } from "@preact/signals";
 import { emptyState, ms } from "#core/fold.js";
 import { Model } from "#core/model.js";
+import { instantAt, Marks } from "#core/playback.js";
 import { Run } from "#core/run.js";
 import { Scene } from "#core/scene.js";
 import { shorten } from "#core/text.js";
@@ -102,21 +103,33 @@ export const instant = computed(() => [cursor.value, position.value]);
 
 export let run = new Run(emptyState(), []);
 export let scene = new Scene();
+export let marks = new Marks(); // what one may jump to
 export const hasMap = signal(false); // whether there is anything to show on one
 /** @type {RunState | null} */
 let stateAtCursor = null;
+
+/** @type {Signal<number>} */
+export const rate = signal(saved("rate", 1)); // of playing
+/** @type {Signal<{ t: number, since: number, rate: number } | null>} */
+export const playing = signal(null);
+/** @type {Signal<string | null>} */
+export const followedKey = signal(null); // whose changes one may jump to
 
 /** @param {RunState | null} base @param {RunEvent[]} events */
 export function startRun(base, events) {
   run = new Run(base, events);
   scene = new Scene();
   scene.addEvents(events);
+  marks = new Marks();
+  marks.push(events);
   stateAtCursor = null;
   batch(() => {
     cursor.value = null;
     position.value = null;
     gap.value = null;
     hovered.value = null;
+    playing.value = null;
+    followedKey.value = null;
   });
 }
 
@@ -129,7 +142,9 @@ export const shown = () => (cursor.value === null ? run.now : (stateAtCursor ?? 
 export function addEvents(events) {
   run.push(events);
   scene.addEvents(events);
+  marks.push(events);
   const gone = run.trim(settings.value.kept ?? Infinity);
+  if (gone) marks.forget(gone);
   if (gone && position.value !== null) position.value = Math.max(0, position.value - gone);
 }
 
@@ -153,19 +168,22 @@ function show(t, count) {
   });
 }
 
-/** Show the instant t [ms]; null: now. @param {number | null} t */
+/** Show the instant t [ms]; null: now. What plays goes on from there. @param {number | null} t */
 export function seek(t) {
   if (t === null) {
+    playing.value = null;
     show(null, null);
     return;
   }
   const within = Math.max(run.first() ?? t, Math.min(t, run.last() ?? t));
+  if (playing.value) playing.value = { t: within, since: performance.now(), rate: rate.value };
   show(within, run.indexAt(within));
 }
 
 /** Show what the first `count` events add up to. @param {number} count */
 export function seekTo(count) {
   const event = run.events[count - 1];
+  playing.value = null;
   if (event) show(event.stamp_ns / 1e6, count);
 }
 
@@ -174,6 +192,48 @@ export function seekEvent(step) {
   const to = Math.max(1, eventsShown() + step);
   if (to >= run.events.length && step > 0) seek(null);
   else seekTo(Math.min(to, run.events.length));
+}
+
+/** Hold the picture, or let it go on: from the beginning when it stands at the end of a run that is over. */
+export function togglePlaying() {
+  if (playing.value) playing.value = null;
+  else if (goes.value) seek(nowMs());
+  else {
+    const t = cursor.value ?? run.first();
+    if (t === null) return;
+    playing.value = { t, since: performance.now(), rate: rate.value };
+    seek(t);
+  }
+}
+
+/** Show the instant that has come while playing; at the end that is now. @param {number} moment [ms] */
+export function playOn(moment) {
+  if (!playing.value) return;
+  const t = instantAt(playing.value, moment);
+  if (t >= (run.last() ?? t)) seek(null);
+  else show(t, run.indexAt(t));
+}
+
+/** @param {number} factor */
+export function setRate(factor) {
+  rate.value = factor;
+  save("rate", factor);
+  if (playing.value) seek(cursor.value);
+}
+
+/**
+ * So many events have happened at the next mark, or the one before; live, the newest one is the next.
+ * @param {string} name @param {number} step
+ */
+export const jumpOf = (name, step) =>
+  marks.find(name, eventsShown(), step, model.value) ??
+  (step > 0 && cursor.value === null ? marks.find(name, run.events.length + 1, -1, model.value) : null);
+
+/** Go to a mark; where there is none, say so. @param {string} name of `Marks.find` @param {number} step */
+export function jump(name, step) {
+  const count = jumpOf(name, step);
+  if (count !== null) seekTo(count);
+  else notify(`No ${name.replace(/^kind |^key /, "")} ${step > 0 ? "ahead" : "before"}`);
 }
 
 /** So many of the kept events have happened by what is shown. */
@@ -221,9 +281,19 @@ export function liveMs() {
   return ended ? (run.last() ?? robot) : Math.max(robot, run.last() ?? 0);
 }
 
+/** Whether the picture moves on by itself: it plays, or the run goes on and one looks at now. */
+export const goes = computed(() => {
+  tick.value;
+  const isOver = run.now.ended != null || facts.value?.recorded || facts.value?.stale != null;
+  return playing.value !== null || (cursor.value === null && !isOver && connection.value !== "file");
+});
+
+/** When the run that is shown began [ms]. */
+export const began = () => ms(shown().started) ?? run.first();
+
 /** An instant as time since the run began, such as 00:32.0. @param {number} t [ms] */
 export function instantText(t) {
-  const seconds = (t - (ms(shown().started) ?? run.first() ?? t)) / 1000;
+  const seconds = (t - (began() ?? t)) / 1000;
   const tenths = Math.round(Math.abs(seconds) * 10);
   const two = (/** @type {number} */ n) => String(Math.floor(n)).padStart(2, "0");
   const hours = Math.floor(tenths / 36_000);

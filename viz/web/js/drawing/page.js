@@ -19,6 +19,7 @@ const BUSY = 15; // events in a second from which transitions do not fade one by
 const ANNOUNCE_MS = 1000;
 const READABLE = 0.55; // the scale below which fewer levels are opened at first
 const SLOW_MS = 300; // a layout that takes longer shows how far it is
+const PLAY_MS = 45; // between two pictures of a run that is played
 const BURST = 500; // so many events at once are a snapshot, whose delay is not measured
 
 export class Page {
@@ -27,6 +28,8 @@ export class Page {
   /** @type {RunEvent[]} */
   flashes = []; // transitions to flash
   frame = 0; // of the browser, that is asked for
+  playFrame = 0; // the same while a run is played
+  playedAt = 0; // [ms]
   /** @type {Promise<void> | null} */
   drawing = null; // the layout that is under way
   drawAgain = false;
@@ -83,6 +86,9 @@ export class Page {
       this.paintAll();
       this.timeline.draw();
       this.map.draw();
+    });
+    store.playing.subscribe((playing) => {
+      if (playing && !this.playFrame) this.playFrame = requestAnimationFrame((moment) => this.#play(moment));
     });
     store.hovered.subscribe((visit) => {
       this.diagram.mark(visit ? [visit.path] : [], "linked");
@@ -162,6 +168,16 @@ export class Page {
     if (this.diagram.endFlashes(moment)) this.#schedule();
     if (moment - this.panelsAt > PANELS_MS) this.#panels(moment);
     else this.panelsDue ||= setTimeout(() => this.#panels(performance.now()), PANELS_MS);
+  }
+
+  /** @param {number} moment */
+  #play(moment) {
+    this.playFrame = 0;
+    if (!store.playing.value) return;
+    this.playFrame = requestAnimationFrame((next) => this.#play(next));
+    if (moment - this.playedAt < PLAY_MS) return;
+    this.playedAt = moment;
+    store.playOn(performance.now());
   }
 
   #measureLatency() {

@@ -113,6 +113,14 @@ export class Timeline {
     return [end - this.length, end];
   }
 
+  /** What is played stays in view. */
+  #keepInView() {
+    const at = store.cursor.value;
+    if (this.end === null || at === null || !store.playing.value) return;
+    if (at > this.end - 0.02 * this.length) this.end = at + 0.8 * this.length;
+    else if (at < this.end - this.length) this.end = at + 0.95 * this.length;
+  }
+
   /** @param {number} px */
   #timeAt(px) {
     const [from, to] = this.#range();
@@ -160,6 +168,7 @@ export class Timeline {
     g.font = "11px Inter, Arial, sans-serif";
     g.textBaseline = "middle";
     this.#makeLanes(model, store.run.spans);
+    this.#keepInView();
     const [from, to] = this.#range();
     const x = (/** @type {number} */ t) => this.names + ((t - from) / (to - from)) * (width - this.names - RIGHT);
     const scale = { from, to, x };

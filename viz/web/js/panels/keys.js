@@ -11,13 +11,29 @@ const ON_ACTIONS = ["a", "d", "?", "Escape"]; // the keys that work while the ac
 /** @type {Record<string, [number, number]>} */
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
+/** Go to a change of the key of userdata that is chosen. @param {number} step */
+function jumpToChange(step) {
+  const key = store.followedKey.value ?? [...store.marks.keys].sort()[0];
+  if (key !== undefined) store.jump(`key ${key}`, step);
+}
+
 /** @param {Page} page */
 export function listenToKeys(page) {
   /** @type {Record<string, () => unknown>} */
   const actions = {
     "/": () => document.getElementById("search")?.focus(),
-    f: () => page.refit(),
-    F: () => page.refit(),
+    0: () => page.refit(),
+    f: () => store.jump("kind failure", 1),
+    F: () => store.jump("kind failure", -1),
+    p: () => store.jump("kind preempt", 1),
+    P: () => store.jump("kind preempt", -1),
+    g: () => store.jump("kind goal", 1),
+    G: () => store.jump("kind goal", -1),
+    k: () => jumpToChange(1),
+    K: () => jumpToChange(-1),
+    Home: () => store.seek(store.run.first()),
+    End: () => page.timeline.live(),
+    m: () => page.map.canvas.focus(),
     w: () => showWhy(),
     t: () => {
       store.treeOpen.value = !store.treeOpen.value;
@@ -42,7 +58,11 @@ export function listenToKeys(page) {
       else if (store.treeOpen.value) store.treeOpen.value = false;
       else page.select(null);
     },
-    " ": () => control() && command(control()?.paused ? "resume" : "pause"),
+    " ": () => {
+      const paused = control()?.paused;
+      if (paused === undefined || store.cursor.value !== null) store.togglePlaying();
+      else command(paused ? "resume" : "pause");
+    },
     s: () => control() && command("step"),
   };
   // A button that was clicked is not pressed by a later Space, which pauses; one that Tab has reached is.

@@ -21,7 +21,10 @@ const LEGEND = [
 /** @type {[string, string][]} */
 const KEYS = [
   ["/", "search"],
-  ["f", "fit everything"],
+  ["0", "fit everything"],
+  ["f p g k", "next failure, preempt, goal, change of a key; with Shift the one before"],
+  ["Home End", "the beginning, the end"],
+  ["m", "the map: + \u2212 zoom, 0 shows all"],
   ["o", "follow the running states"],
   ["+ \u2212", "zoom"],
   ["\u2190 \u2191 \u2192 \u2193", "move the view, or select a neighbour of the selected state"],
@@ -34,7 +37,7 @@ const KEYS = [
   ["i", "implicit transitions"],
   ["a", "actions"],
   ["d", "dark or light"],
-  ["Space", "pause or resume (with control)"],
+  ["Space", "play or hold; pause or resume the mission (with control)"],
   ["s", "step (with control)"],
   ["Esc", "select nothing"],
 ];

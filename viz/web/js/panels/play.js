@@ -1,0 +1,101 @@
+// The play bar: where in the run one looks, how fast it is played, and what one may jump to.
+import { isFile } from "#core/connection.js";
+import { parseInstant, RATES } from "#core/playback.js";
+import * as store from "#core/store.js";
+import { shorten } from "#core/text.js";
+import { fieldValue, html } from "#panels/html.js";
+
+/** @typedef {import("#drawing/page.js").Page} Page */
+
+/** @type {Record<string, string>} drawn in a box of 16 x 16 */
+const ICONS = {
+  begin: "M4 3v10M13 3 6 8l7 5Z",
+  back: "M11 3 5 8l6 5Z",
+  play: "M5 3l8 5-8 5Z",
+  pause: "M5 3v10M11 3v10",
+  forward: "M5 3l6 5-6 5Z",
+  end: "M12 3v10M3 3l7 5-7 5Z",
+};
+/** @type {[string, string, string][]} kind, sign, key */
+const KINDS = [
+  ["failure", "\u2715", "F"],
+  ["preempt", "\u2298", "P"],
+  ["goal", "\u25ce", "G"],
+];
+
+/** @param {{ name: string, title: string, onClick: () => void, [attribute: string]: any }} props */
+const IconButton = ({ name, title, ...more }) =>
+  html`<button class="icon-button" title=${title} aria-label=${title} ...${more}>
+    <svg viewBox="0 0 16 16" aria-hidden="true"><path d=${ICONS[name]} /></svg></button>`;
+
+/** @param {{ page: Page }} props */
+export function PlayBar({ page }) {
+  store.tick.value;
+  const first = store.run.first();
+  if (first === null) return null;
+  const goes = store.goes.value;
+  const live = store.cursor.value === null;
+  const end = isFile() || store.facts.value?.recorded ? "End" : "Live";
+  return html`<div class="play" role="region" aria-label="play bar">
+    <span class="group">
+      <${IconButton} name="begin" title="to the beginning (Home)" onClick=${() => store.seek(first)} />
+      <${IconButton} name="back" title="one event back (,)" onClick=${() => store.seekEvent(-1)} />
+      <${IconButton} name=${goes ? "pause" : "play"} title=${goes ? "hold the picture" : "play"} id="play"
+        onClick=${() => store.togglePlaying()} />
+      <${IconButton} name="forward" title="one event forward (.)" onClick=${() => store.seekEvent(1)} />
+      <${IconButton} name="end" title="to the end (End)" onClick=${() => page.timeline.live()} /></span>
+    <${Clock} />
+    <label class="rate"><span class="hidden">speed</span>
+      <select value=${store.rate.value} title="speed"
+        onChange=${(/** @type {Event} */ e) => store.setRate(Number(fieldValue(e)))}>
+        ${RATES.map((rate) => html`<option value=${rate}>${rate} \u00d7</option>`)}</select></label>
+    <${Jumps} />
+    <span class="spread"></span>
+    <button title="back to now (l)" class=${`live-button ${live ? "on" : ""}`} aria-pressed=${live}
+      onClick=${() => page.timeline.live()}>${end}</button>
+  </div>`;
+}
+
+/** The instant shown, to read and to type. */
+function Clock() {
+  const last = store.run.last() ?? 0;
+  const onChange = (/** @type {Event} */ e) => {
+    const seconds = parseInstant(fieldValue(e));
+    if (seconds === null) store.notify(`Instant: got ${shorten(fieldValue(e), 30)}; expected such as 01:32.5`, "error");
+    else store.seek((store.began() ?? 0) + seconds * 1000);
+    /** @type {HTMLInputElement} */ (e.target).blur();
+  };
+  return html`<span class="clock"><input value=${store.instantText(store.nowMs())} onChange=${onChange} size="9"
+      aria-label="instant shown; type another one" title="type an instant to go there" autocomplete="off"
+      onFocus=${(/** @type {Event} */ e) => /** @type {HTMLInputElement} */ (e.target).select()} />
+    <small>/ ${store.instantText(Math.max(last, store.nowMs()))}</small></span>`;
+}
+
+function Jumps() {
+  store.slowTick.value;
+  const keys = [...store.marks.keys].sort();
+  const key = store.followedKey.value ?? keys[0];
+  const choose = (/** @type {Event} */ e) => {
+    store.followedKey.value = fieldValue(e);
+  };
+  return html`<span class="jumps" role="group" aria-label="go to the next"><span class="hint">Next</span>
+    ${KINDS.map(
+      ([kind, sign, letter]) =>
+        html`<${Jump} name=${`kind ${kind}`} letter=${letter}><i class=${`to-${kind}`}>${sign}</i> ${kind}<//>`,
+    )}
+    ${
+      keys.length > 0 &&
+      html`<select value=${key} onChange=${choose} aria-label="key of userdata" title="key of userdata">
+        ${keys.map((one) => html`<option value=${one}>${shorten(one, 24)}</option>`)}</select>
+      <${Jump} name=${`key ${key}`} letter="K">change<//>`
+    }</span>`;
+}
+
+/** @param {{ name: string, letter: string, children?: any }} props */
+function Jump({ name, letter, children }) {
+  const ahead = store.jumpOf(name, 1) !== null;
+  const title = `${ahead ? "go there" : "none ahead"} (${letter.toLowerCase()}); before it: Shift+${letter}`;
+  return html`<button class=${ahead ? "" : "none"} aria-disabled=${!ahead} title=${title}
+    onClick=${(/** @type {MouseEvent} */ e) => store.jump(name, e.shiftKey ? -1 : 1)}>${children}
+    <kbd>${letter}</kbd></button>`;
+}

@@ -1,0 +1,75 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { instantAt, Marks, parseInstant } from "#core/playback.js";
+import { event } from "./fixtures.js";
+
+test("an instant is typed as it is shown, or in seconds", () => {
+  const read = ["32.5", " 00:32.0 ", "01:02", "1:02:03.25", "90:00", "0"].map(parseInstant);
+  assert.deepEqual(read, [32.5, 32, 62, 3723.25, 5400, 0]);
+  for (const text of ["", "now", "-1", "1:2:3:4", "1e5", "0x10", "NaN", ":30", "1.", `${"9".repeat(30)}`])
+    assert.equal(parseInstant(text), text === "1." ? 1 : null, text);
+});
+
+test("what plays runs at its rate", () => {
+  assert.equal(instantAt({ t: 1000, since: 50, rate: 4 }, 300), 2000);
+  assert.equal(instantAt({ t: 1000, since: 50, rate: 0.25 }, 450), 1100);
+});
+
+/** @type {any} */
+const MODEL = {
+  get: (/** @type {string} */ path) =>
+    ({
+      "/M": { kind: "machine", children: [1] },
+      "/M/GO": { kind: "action", children: [] },
+      "/M/WATCH": { kind: "monitor", children: [] },
+    })[path],
+};
+
+function run() {
+  const { stamp_ns } = event("Started", "/M");
+  const at = (/** @type {number} */ s, /** @type {string} */ kind, /** @type {string} */ path, facts = {}) =>
+    event(kind, path, { ...facts, stamp_ns: stamp_ns + s * 1e9 });
+  return [
+    at(0, "Started", "/M"), // 1
+    at(1, "GoalSent", "/M/GO"), // 2
+    at(2, "Left", "/M/WATCH", { outcome: "invalid" }), // 3: what a monitor finds is no failure
+    at(3, "PreemptRequested", "/M/GO"), // 4
+    at(3, "PreemptRequested", "/M/WATCH"), // 5: the same preempt
+    at(4, "GoalDone", "/M/GO", { status: "ABORTED" }), // 6
+    at(5, "Left", "/M/GO", { outcome: "aborted" }), // 7
+    at(5, "Left", "/M", { outcome: "aborted" }), // 8: hands on what failed in it
+    at(6, "UserdataWritten", "/M/GO", { key: "constructor" }), // 9
+    at(7, "UserdataWritten", "/M/GO", { key: "constructor" }), // 10
+    at(8, "Failed", "/M/GO", { error: "x" }), // 11
+  ];
+}
+
+/** @param {Marks} marks @param {string} name @param {number} from @param {number} step */
+function all(marks, name, from, step) {
+  const found = [];
+  for (let at = marks.find(name, from, step, MODEL); at !== null; at = marks.find(name, at, step, MODEL))
+    found.push(at);
+  return found;
+}
+
+test("one goes from mark to mark, and back", () => {
+  const marks = new Marks();
+  marks.push(run());
+  assert.deepEqual(all(marks, "kind failure", 0, 1), [6, 7, 11]);
+  assert.deepEqual(all(marks, "kind failure", 12, -1), [11, 7, 6]);
+  assert.deepEqual(all(marks, "kind preempt", 0, 1), [4]);
+  assert.deepEqual(all(marks, "kind goal", 0, 1), [2]);
+  assert.deepEqual(all(marks, "key constructor", 0, 1), [9, 10]);
+  assert.deepEqual(all(marks, "key toString", 0, 1), []);
+  assert.deepEqual([...marks.keys], ["constructor"]);
+});
+
+test("what the run has forgotten is no mark any more", () => {
+  const marks = new Marks();
+  marks.push(run());
+  marks.forget(5);
+  assert.deepEqual(all(marks, "kind failure", 0, 1), [1, 2, 6]);
+  assert.deepEqual(all(marks, "kind goal", 0, 1), []);
+  marks.push([event("GoalSent", "/M/GO")]);
+  assert.deepEqual(all(marks, "kind goal", 0, 1), [7]);
+});
