@@ -174,7 +174,8 @@ def _run(args: argparse.Namespace) -> int:
         stack.enter_context(ros2_of_options(args))
         if args.json:  # whatever a mission prints: events are alone
             stack.enter_context(contextlib.redirect_stdout(sys.stderr))
-        if args.start_robot:  # its module, once imported, may join a network
+        shown = args.time.virtual and args.view
+        if args.start_robot or shown:  # its module, once imported, may join a network
             _use_own_network(args, stack)
         return _run_mission(args, events, stack)
 
@@ -184,7 +185,8 @@ def _use_own_network(args: argparse.Namespace, stack: contextlib.ExitStack) -> N
     from actionlib_core.node import has_node
     from actionlib_core.private_network import network_is_chosen, private_network
 
-    if not (args.share or args.time.virtual or network_is_chosen() or has_node()):
+    alone = args.time.virtual and not args.view
+    if not (args.share or alone or network_is_chosen() or has_node()):
         domain = stack.enter_context(private_network())
         print(f"network of this run: SMACHPY_DOMAIN={domain}", file=sys.stderr)
 

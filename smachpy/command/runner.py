@@ -93,10 +93,10 @@ def run_mission(target: Target, options: RunOptions) -> int:
             f"--time {options.pace}: mission {target.name!r} needs real time: {needs.real_time}. "
             "Try --time real."
         )
-    if options.pace.virtual and options.watching.view:
+    if options.pace.virtual and options.watching.view and options.watching.control:
         raise MissionError(
-            f"--view: got it beside --time {options.pace}, where nobody else can look in; expected "
-            "real time. Try --record FILE, and 'smachpy view FILE' afterwards."
+            f"--control: got it beside --time {options.pace}, where a mission that is paused would "
+            "hold up all time; expected real time. Try without --control."
         )
     with contextlib.ExitStack() as stack:
         ending = stack.enter_context(shutdown.handle_signals())

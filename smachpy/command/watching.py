@@ -7,7 +7,8 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core.clock import RealClock
+from actionlib_core.clock import RealClock, use_clock
+from actionlib_core.node import Node
 from actionlib_core.output import printable
 from smachpy import IntrospectionServer
 from smachpy.command import runs_folder
@@ -34,7 +35,7 @@ class Watching:
         view_for: How long after its end [s]; None: until the program is to end.
         port: Of that page; 0 takes any.
         control: Obey pause, step, jump and the like from viewers.
-        alone: Nobody can look in, as the mission is on no network that others are on.
+        alone: The mission is on no network that others are on: it is shown to `view` only.
     """
 
     record: Path | None = None
@@ -86,7 +87,8 @@ class Watch:
         how = "raised an exception" if outcome is None else f"ended: {printable(outcome)}"
         left = "" if self._stay is None else f" for {self._stay:g} s"
         print(f"{how}; still at {self._viewer.address}{left} (Ctrl-C ends it)", flush=True)
-        cancel = ending.on_shutdown(self._over.set)
+        with use_clock(self._clock):  # the mission's may stand still by now
+            cancel = ending.on_shutdown(self._over.set)
         self.viewer_ended()
         self._over.wait(self._stay)
         cancel()
@@ -111,11 +113,15 @@ def watched(name: str, machine: Container, path: str, watching: Watching) -> Ite
     word = re.sub(r"[^A-Za-z0-9_]", "_", name)
     with contextlib.ExitStack() as stack:
         robot = stack.enter_context(RobotTopics())
+        node = None
+        if watching.alone and watching.view:  # viewers are on another network, in real time
+            node = stack.enter_context(Node("mission", clock=RealClock()))
         server = IntrospectionServer(
             word if word[:1].isalpha() else f"m_{word}",
             machine,
             path,
-            control=watching.control,
+            control=watching.control and not watching.alone,
+            node=node,
             robot=robot,
         )
         path_of_file = watching.record
@@ -126,12 +132,12 @@ def watched(name: str, machine: Container, path: str, watching: Watching) -> Ite
         )
         if file is not None:
             stack.callback(robot.listen(file.observe))
-        if not watching.alone:
+        if watching.view or not watching.alone:
             server.start()
             stack.callback(server.stop)
         viewer = None
         if watching.view:
-            control = ("--control",) if watching.control else ()
+            control = ("--control",) if watching.control and not watching.alone else ()
             viewer = load_view("viewer")(("--auto-focus", "--port", str(watching.port), *control))
         watch = Watch(file, viewer, watching.view_for)
         if viewer is not None:

@@ -21,7 +21,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core.clock import SerialExecutor, current_clock
+from actionlib_core.clock import RealClock, SerialExecutor, current_clock
 from smachpy import log
 from smachpy.events import record_text
 from smachpy.exceptions import SmachError
@@ -87,6 +87,7 @@ class Recording:
         events: The records.
         cut: Whether the file ends in the middle of a line.
         observed: What the robot's topics told meanwhile, numbered from 1 in `n`.
+        made_ns: When it really began; `stamp_ns` is another date if the mission's time was virtual.
     """
 
     path: Path
@@ -96,6 +97,7 @@ class Recording:
     events: list[dict[str, Any]] = field(default_factory=list)
     cut: bool = False
     observed: list[dict[str, Any]] = field(default_factory=list)
+    made_ns: int = 0
 
     @property
     def dropped(self) -> int:
@@ -140,7 +142,8 @@ class Recorder:
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._file: TextIO = self.path.open("x", encoding="utf-8")
-            self._file.write(header_line(describe(machine), clock.time_ns()))
+            made_ns = RealClock().time_ns()
+            self._file.write(header_line(describe(machine), clock.time_ns(), made_ns=made_ns))
             self._file.flush()
         except FileExistsError as error:
             raise RecordingError(
@@ -222,14 +225,21 @@ class Recorder:
             log.logerr(f"recording {str(self.path)!r}: ends here: {error.strerror or error}.")
 
 
-def header_line(record: StateRecord, stamp_ns: int, base: dict[str, Any] | None = None) -> str:
-    """Return the first line of a file."""
+def header_line(
+    record: StateRecord,
+    stamp_ns: int,
+    base: dict[str, Any] | None = None,
+    *,
+    made_ns: int | None = None,
+) -> str:
+    """Return the first line of a file; `made_ns` is the real date where time is virtual."""
     header = {
         "format": FORMAT,
         "version": VERSION,
         "stamp_ns": stamp_ns,
         "machine": asdict(record),
         "base": base,
+        "made_ns": stamp_ns if made_ns is None else made_ns,
     }
     return json.dumps(header) + "\n"
 
@@ -292,7 +302,9 @@ def _read_header(path: Path, line: str) -> Recording:
             for name in ("states", "goals", "userdata"):
                 for facts in base[name].values():
                     dict(facts)
-        return Recording(path, record, _check_stamp(int(header["stamp_ns"])), base)
+        stamp_ns = _check_stamp(int(header["stamp_ns"]))
+        made_ns = _check_stamp(int(header.get("made_ns", stamp_ns)))  # older files have none
+        return Recording(path, record, stamp_ns, base, made_ns=made_ns)
     except _MALFORMED as error:
         raise RecordingError(
             path, f"line 1: got no header ({error}); expected a file of `smachpy run --record`."

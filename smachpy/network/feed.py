@@ -22,7 +22,7 @@ import uuid
 from collections import deque
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core.clock import SerialExecutor
+from actionlib_core.clock import SerialExecutor, current_clock
 from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import Trigger
 from actionlib_core.pubsub.service import Service
@@ -106,6 +106,7 @@ class Feed:
         self._describe()
         self._session = node.transport.session_id
         self._node = node
+        self._clock = current_clock()  # the machine's, by which its events are stamped
         self._values = serve_values(server_name, machine, path, node)
         self._is_open = False  # the history may be asked for before the events are offered
         self._tape = machine.tape(self._on_news, limit=QUEUED_EVENTS, name=path)
@@ -214,7 +215,7 @@ class Feed:
             "description": json.loads(self._description),
             "problems": self._problems,
             "control": None if self._control is None else self._control.state(),
-            "now": self._node.clock.time_ns(),
+            "now": self._clock.time_ns(),
         }
         with self._lock:
             base = json.dumps(self._base.data)

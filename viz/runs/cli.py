@@ -119,7 +119,7 @@ def _facts(recording: Recording) -> dict[str, Any]:
     return {
         "file": str(recording.path),
         "machine": recording.record.label,
-        "began_ns": recording.stamp_ns,
+        "began_ns": recording.made_ns,
         "seconds": (events[-1]["stamp_ns"] - events[0]["stamp_ns"]) / 1e9 if events else 0.0,
         "outcome": ends[-1] if ends else None,
         "events": len(events),

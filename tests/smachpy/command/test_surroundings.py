@@ -157,7 +157,7 @@ def test_a_signal_ends_it(nap, capsys, pace, number, code):
         (["demo_action.client"], "the mission calls ['demo_action'], which nobody in this process"),
         (["fleet"], "mission 'fleet' needs real time: its robots are processes of their own"),
         (["patrol", "move_base:=mb"], "which the simulated robot does not serve under that name"),
-        (["patrol", "--view"], "--view: got it beside --time virtual"),
+        (["patrol", "--view", "--control"], "--control: got it beside --time virtual"),
         (["patrol", "--robot", "robot 7"], "invalid robot name: ' ' is not allowed"),
         (["patrol", "--pose", "0", "0", "0"], "Try --pose X Y YAW"),
         (["patrol", "--map", "nowhere.yaml"], "nowhere.yaml: got"),

@@ -127,6 +127,22 @@ def test_the_page_stays_after_the_end_until_ctrl_c(run, tmp_path):
     assert process.wait(20) == 0  # as the mission ended
 
 
+def test_a_run_in_faster_time_is_seen_and_keeps_the_real_date(run, tmp_path):
+    process = run("--time", "2x", "--view", "--port", "0")
+    address = read_until(process, "watch it at")[-1].split()[-1]
+    read_until(process, "still at")
+    deadline = time.monotonic() + 20
+    while (one := summary_at(address))["outcome"] is None:
+        assert time.monotonic() < deadline
+    assert one["outcome"] == "succeeded"
+    (kept,) = (tmp_path / "kept").iterdir()
+    recording = read_recording(kept)
+    assert abs(recording.made_ns / 1e9 - time.time()) < 600
+    assert recording.stamp_ns == recording.events[0]["stamp_ns"] != recording.made_ns
+    process.send_signal(signal.SIGINT)
+    assert process.wait(20) == 0
+
+
 def test_the_page_stays_for_the_time_that_was_said(run):
     process = run("--view", "--view-for", "0.3s", "--port", "0")
     assert "for 0.3 s" in read_until(process, "still at")[-1]
