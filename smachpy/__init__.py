@@ -78,6 +78,8 @@ if TYPE_CHECKING:
     from smachpy.checks import check as check
     from smachpy.durable.codec import NotDurableError as NotDurableError
     from smachpy.durable.codec import register_type as register_type
+    from smachpy.durable.mission import run_durable as run_durable
+    from smachpy.durable.once import once as once
     from smachpy.network.client import IntrospectionClient as IntrospectionClient
     from smachpy.network.server import IntrospectionServer as IntrospectionServer
 
@@ -128,7 +130,9 @@ __all__ = [
     "logwarn",
     "mission",
     "n_of",
+    "once",
     "register_type",
+    "run_durable",
     "set_loggers",
     "set_options",
     "set_preempt_handler",
@@ -147,7 +151,9 @@ _LAZY: dict[str, str] = {
     "ServiceState": "smachpy.actions.service_state",
     "SimpleActionState": "smachpy.actions.simple_action_state",
     "check": "smachpy.checks",
+    "once": "smachpy.durable.once",
     "register_type": "smachpy.durable.codec",
+    "run_durable": "smachpy.durable.mission",
 }
 
 

@@ -109,6 +109,7 @@ class ClientGoalHandle:
         on_state: Called under the manager's lock with each state passed; must only note it.
         on_feedback: The same, when feedback has come; None when nobody wants any.
         feedback: The feedback that nobody has taken; guarded by the manager's lock.
+        keeps_result: The server is to keep the result until `acknowledge` is called.
         calls_back: The goal has callbacks, for which `settled` waits.
         settled: Set when the goal is over and its last callback has returned, or nobody follows it.
         ended: Set when the goal is over or nobody follows it; made when somebody waits for that.
@@ -130,6 +131,7 @@ class ClientGoalHandle:
         "ended_at",
         "feedback",
         "goal",
+        "keeps_result",
         "last_call",
         "manager",
         "on_feedback",
@@ -149,6 +151,7 @@ class ClientGoalHandle:
         self.ended: Event | None = None
         self.ended_at: float | None = None
         self.last_call = False
+        self.keeps_result = False
         self.asking = False
         self._shown: CommState | None = None
         self._shown_to = 0
@@ -238,6 +241,10 @@ class ClientGoalHandle:
         return f"<ClientGoalHandle {self.goal.id} {self.goal.comm.name} {self.goal.status.name}>"
 
     # -- for whoever follows the goal ----------------------------------------------------------
+
+    def acknowledge(self) -> None:
+        """Let the server forget a result that it was to keep (`keeps_result`)."""
+        self.manager.acknowledge(self.goal.id)
 
     @property
     def forgotten(self) -> bool:
@@ -758,7 +765,7 @@ class GoalManager:
         handle = self._goals.get(entry.id)
         if handle is None:
             if entry.id in self._ended:
-                self._acknowledge(entry.id)
+                self.acknowledge(entry.id)
             return
         may_speak = answered or self._servers.may_speak(session)
         if not may_speak and not self._believes(session, handle):
@@ -798,9 +805,11 @@ class GoalManager:
             if session:
                 goal.server = session
             self._pass(handle, goal.on_result(status, text, result, self.clock.now()))
-        self._acknowledge(goal.id)
+        if not handle.keeps_result:
+            self.acknowledge(goal.id)
 
-    def _acknowledge(self, goal_id: str) -> None:
+    def acknowledge(self, goal_id: str) -> None:
+        """Tell the server, soon, that a result has arrived."""
         with self.lock:
             if self._closed:
                 return

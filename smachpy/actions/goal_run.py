@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from actionlib_core.clock import Timer
     from actionlib_core.goal.states import CommState
     from smachpy.actions.wakeup import Wakeup
-    from smachpy.run.frame import Scope
+    from smachpy.run.frame import Frame, Scope
 
 SUCCEEDED = "succeeded"
 ABORTED = "aborted"
@@ -34,7 +34,7 @@ OUTCOMES = (SUCCEEDED, ABORTED, PREEMPTED)
 
 INTERRUPTED = "a callback of the state did not return; nobody waits for the goal any more"
 STOPPED_S = 0.2  # a goal that this state has cancelled is over: so much longer for its feedback
-_STOPPED = frozenset({"PREEMPTED", "RECALLED", "LOST"})
+STOPPED = frozenset({"PREEMPTED", "RECALLED", "LOST"})
 
 
 class Step(enum.Enum):
@@ -103,12 +103,12 @@ class GoalRun:
             return math.inf
         return max(0.0, self.taken_at + self.exec_timeout - now)
 
-    def on_taken(self, now: float) -> None:
-        """Note that a server has the goal; from then on `exec_timeout` counts."""
+    def on_taken(self, at: float) -> None:
+        """Note when a server took the goal [s]; from then on `exec_timeout` counts."""
         if self.taken_at is None:
-            self.taken_at = now
+            self.taken_at = at
             if self.exec_timeout is not None and not self.cancelling:
-                self._deadline = now + self.exec_timeout
+                self._deadline = at + self.exec_timeout
 
     def on_preempt(self) -> None:
         """Note that the state is to stop."""
@@ -157,7 +157,7 @@ class GoalRun:
         """
         if self.status == "SUCCEEDED":
             return SUCCEEDED
-        if self.preempted and self.status in _STOPPED:
+        if self.preempted and self.status in STOPPED:
             return PREEMPTED
         return ABORTED
 
@@ -188,6 +188,7 @@ class GoalExchange:
             maybe more than once, in any thread.
         wants_feedback: Somebody besides the listeners wants the feedback: without either, feedback
             does not wake the state's thread.
+        frame: Where the state runs; a journal of its run hears of the goal before anybody does.
 
     Attributes:
         run: See above.
@@ -209,6 +210,7 @@ class GoalExchange:
         *,
         on_late: Callable[[], object] | None = None,
         wants_feedback: bool = True,
+        frame: Frame | None = None,
     ) -> None:
         self.run = run
         self.goal_id = ""
@@ -218,6 +220,10 @@ class GoalExchange:
         self._preempt_requested = preempt_requested
         self._on_late = on_late
         self._wants_feedback = wants_feedback
+        self._frame = frame
+        self._journal = None if frame is None else frame.run.journal
+        self._is_taken_kept = False
+        self._kept_result: Any = None
         self._handle: ClientGoalHandle | None = None
         self._lock = threading.Lock()  # guards `run` and the timer
         self._inside = False  # the state's thread is in foreign code, or about to be
@@ -233,7 +239,9 @@ class GoalExchange:
     def result(self) -> Any:
         """See the class."""
         handle = self._handle
-        return None if handle is None or self.run.abandoned else handle.goal.result
+        if handle is None:
+            return self._kept_result
+        return None if self.run.abandoned else handle.goal.result
 
     @property
     def unanswered(self) -> bool:
@@ -248,7 +256,32 @@ class GoalExchange:
             TypeMismatchError: the server is of another type.
             TransportError: the node is closed.
         """
-        handle = self._handle = self._client.make_goal(goal, ack_timeout)
+        handle = self._client.make_goal(goal, ack_timeout)
+        if self._journal is not None and self._frame is not None:
+            self._journal.goal_sent(self._frame, self._client.ns, handle.goal.id)
+        self._begin(handle, goal)
+
+    def adopt(self, kept: Any, *, ack_timeout: float | None) -> None:
+        """Follow a goal that an earlier process has sent, as `send` does a new one.
+
+        Args:
+            kept: What the journal knows of it.
+            ack_timeout: When no server knows of it within so long [s] it is LOST.
+        """
+        if kept["taken_ns"] is not None:
+            clock = self._wake.clock
+            self.run.on_taken(clock.now() - (clock.time_ns() - kept["taken_ns"]) / 1e9)
+            self._is_taken_kept = True
+        if kept["status"]:  # it had ended
+            self.goal_id = kept["id"]
+            self.run.on_end(kept["status"], kept["text"])
+            self._kept_result = kept["result"]
+            return
+        self._begin(self._client.find_goal(kept["id"], ack_timeout), None)
+
+    def _begin(self, handle: ClientGoalHandle, goal: Any) -> None:
+        self._handle = handle
+        handle.keeps_result = self._journal is not None
         handle.on_state = self._note_state
         handle.on_feedback = self._note_feedback
         handle.manager.begin(handle)
@@ -257,6 +290,10 @@ class GoalExchange:
         self._act()
         self._emit(GoalSent, self.goal_id, goal)
         self._inside = False
+
+    def call_off(self, goal_id: str) -> None:
+        """Let the server recall a goal that it does not know, should it still come."""
+        self._client.manager.port.send_cancel(goal_id, 0)
 
     def follow(self, on_feedback: Callable[[Any], object]) -> None:
         """Wait until the goal has ended or is abandoned.
@@ -278,6 +315,7 @@ class GoalExchange:
             feedback = handle.take_feedback()
             self._inside = feedback is not None  # from here on `hurry` acts if this thread is busy
             step = self._act()
+            self._keep_taken(handle)
             if step is not Step.WAIT:
                 break
             if feedback is not None:
@@ -301,9 +339,27 @@ class GoalExchange:
                 break
             else:
                 self._wake.wait_until(self.run.deadline)
+        self._keep_end(handle)
         self._emit(GoalDone, self.goal_id, self.run.status, self.run.text, self.result)
         if failure is not None:
             raise failure
+
+    def _keep_taken(self, handle: ClientGoalHandle) -> None:
+        """Write, once, that a server has the goal."""
+        if self._is_taken_kept or not handle.goal.acknowledged:
+            return
+        if self._journal is not None and self._frame is not None:
+            self._is_taken_kept = True
+            self._journal.goal_taken(self._frame, self.goal_id)
+
+    def _keep_end(self, handle: ClientGoalHandle) -> None:
+        """Write how the goal ended; only then may the server forget it."""
+        handle.keeps_result = False
+        if self._journal is not None and self._frame is not None:
+            run = self.run
+            self._journal.goal_done(self._frame, self.goal_id, run.status, run.text, self.result)
+            if handle.goal.over and run.status != "LOST":
+                handle.acknowledge()
 
     def cancel(self) -> None:
         """Ask the server to end the goal, if it was sent and has not ended."""

@@ -10,13 +10,13 @@ from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.node import get_node
 from actionlib_core.wire.action_messages import ActionTypes
 from smachpy import log
-from smachpy.actions.goal_run import ABORTED, OUTCOMES, PREEMPTED, GoalExchange, GoalRun
+from smachpy.actions.goal_run import ABORTED, OUTCOMES, PREEMPTED, STOPPED, GoalExchange, GoalRun
 from smachpy.actions.interface import adopt_interface
 from smachpy.actions.messages import Incoming, Outgoing, UserCallback
 from smachpy.actions.wakeup import Wakeup
 from smachpy.context import current_frame
 from smachpy.machines.problems import Problems
-from smachpy.machines.state import Shown, State
+from smachpy.machines.state import Shown, State, get_options
 from smachpy.run.child import on_preempt
 from smachpy.run.frame import current_scope
 from smachpy.run.grace import inherited_grace
@@ -59,6 +59,9 @@ class ActionStateOptions(TypedDict, total=False):
     on_exception: Mapping[type[BaseException], str] | None
     on_enter: Callable[[Any], object] | None
     on_exit: Callable[[Any, str], object] | None
+    resume: str | Callable[[Any], str | None] | None
+    on_resume: Callable[[Any], object] | None
+    idempotent: bool
 
 
 class SimpleActionState(State):
@@ -231,13 +234,47 @@ class SimpleActionState(State):
 
     def __execute(self, ud: Any, limit: Timeout | None) -> str:
         """Do it; when `exec_timeout` is over while foreign code runs, `limit` is told."""
+        frame: Frame | None = current_frame()
+        journal = None if frame is None else frame.run.journal
+        kept = None if journal is None or frame is None else journal.goal_of(frame)
+        if kept is not None and frame is not None:
+            outcome = self.__resume(ud, limit, frame, kept)
+            if outcome is not None:
+                return outcome
+        exchange = self.__exchange_goal(ud, limit, frame, None)
+        return PREEMPTED if exchange is None else self.__finish(ud, exchange)
+
+    def __resume(self, ud: Any, limit: Timeout | None, frame: Frame, kept: Any) -> str | None:
+        """Follow the goal that an earlier process has sent; None: a new one is to be sent."""
+        journal = frame.run.journal
+        assert journal is not None
+        exchange = self.__exchange_goal(ud, limit, frame, kept)
+        assert exchange is not None
+        status = exchange.run.status
+        if kept["stopped"] and status in STOPPED and not self._preempt_requested:
+            return None  # the end of that process had stopped it
+        if not exchange.unanswered or kept["status"] or self._preempt_requested:
+            return self.__finish(ud, exchange)
+        exchange.call_off(kept["id"])
+        options = get_options(self)
+        if options.resume is not None:
+            decided: str | None = journal.decide(frame, ud)
+            return decided
+        if options.idempotent or kept["taken_ns"] is None:
+            return None
+        return self.__finish(ud, exchange)
+
+    def __exchange_goal(
+        self, ud: Any, limit: Timeout | None, frame: Frame | None, kept: Any
+    ) -> GoalExchange | None:
+        """Send a goal, or follow the one that was `kept`, to its end; None: it was called off."""
         with Wakeup(self) as wake:
-            if self.__is_preempted():
-                return PREEMPTED
-            goal = self.__goal.build(ud)
+            if kept is None and self.__is_preempted():
+                return None
+            goal = self.__goal.build(ud) if kept is None else None
             client = self.__get_client()
-            if self.__is_preempted():
-                return PREEMPTED
+            if kept is None and self.__is_preempted():
+                return None
             own = self._smachpy.options.preempt_timeout
             grace = _shorter(inherited_grace(current_frame())) if own == "inherit" else own
             run = GoalRun(exec_timeout=self.__exec_s, preempt_timeout=grace)
@@ -254,23 +291,31 @@ class SimpleActionState(State):
                 is_asked,
                 on_late=None if limit is None else limit.over,
                 wants_feedback=wanted,
+                frame=frame,
             )
             self.__exchange = exchange
             forget = on_preempt(self, exchange.hurry)
             wait_s = self.__server_wait_s
             wait_s = None if wait_s is None else max(wait_s, SHORTEST_ACK_S)
             try:
-                exchange.send(goal, ack_timeout=wait_s)
-                exchange.follow(lambda feedback: self.__on_feedback(ud, feedback))
-            except BaseException:  # KeyboardInterrupt and the like: nobody waits for the goal now
-                exchange.cancel()
+                if kept is None:
+                    exchange.send(goal, ack_timeout=wait_s)
+                else:
+                    exchange.adopt(kept, ack_timeout=wait_s)
+                if not run.status:  # else it had ended before the resume
+                    exchange.follow(lambda feedback: self.__on_feedback(ud, feedback))
+            except (
+                BaseException
+            ) as error:  # KeyboardInterrupt and the like: nobody waits for it now
+                if frame is None or frame.run.journal is None or _is_of_run(error):
+                    exchange.cancel()
                 raise
             finally:
                 forget()
                 exchange.close()
             if limit is not None and not run.preempted:  # for `result_cb`
                 limit.start(run.left(wake.clock.now()))
-        return self.__finish(ud, exchange)
+        return exchange
 
     def _smachpy_grace(self, inherited: Grace) -> Grace:
         own: Grace = self._smachpy.options.preempt_timeout
@@ -355,6 +400,11 @@ class SimpleActionState(State):
             if seconds is not None:
                 own.append((name, f"{seconds:g} s"))
         return kind, (*own, *details)
+
+
+def _is_of_run(error: BaseException) -> bool:
+    """Tell whether an exception ends the state, not the process: goals may be followed later."""
+    return isinstance(error, (Exception, Interruption))
 
 
 def _shorter(inherited: Grace) -> float:

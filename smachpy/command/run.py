@@ -13,6 +13,8 @@ from actionlib_core.names import check_name
 from actionlib_core.output import printable
 from actionlib_core.ros2_options import add_ros2_options, ros2_of_options
 from smachpy.command.arguments import Text, parameters_of, read_words, usage, wants_help
+from smachpy.command.durable import add_options as add_durable_options
+from smachpy.command.durable import durable_options
 from smachpy.command.robot import add_robot_options
 from smachpy.command.ros1_options import add_options as add_ros1_options
 from smachpy.command.ros1_options import options_of
@@ -99,6 +101,7 @@ def register(subparsers: Any) -> None:
         help="how long to wait for the mission's action servers [s] (default: %(default)g)",
     )
     _add_watching(parser)
+    add_durable_options(parser)
     add_ros2_options(parser)
     add_ros1_options(parser, loads=False)
     add_ros1_robot(parser)
@@ -252,6 +255,7 @@ def _options(
         success=tuple(args.success),
         server_timeout=args.server_timeout,
         debug=args.debug,
+        durable=durable_options(args),
         watching=Watching(
             record=args.record,
             view=args.view,

@@ -15,6 +15,7 @@ from actionlib_core.names import NameArguments
 from actionlib_core.output import printable, tell
 from smachpy import InvalidUserCodeError, describe
 from smachpy.command.arguments import MisfitError, fit, parameters_of, read_words
+from smachpy.command.durable import DurableOptions, kept
 from smachpy.command.extras import load_view
 from smachpy.command.out_folder import OutFolder
 from smachpy.command.surroundings import REAL_TIME, Pace, RobotOptions, open_surroundings
@@ -59,6 +60,7 @@ class RunOptions:
         server_timeout: How long to wait for the action servers that the mission needs [s].
         debug: Show the traceback of a mission that raises.
         watching: Who else may see it, and the file that it is written to.
+        durable: How it is kept, so that it survives its process; None: it is not.
     """
 
     inputs: Mapping[str, object] = field(default_factory=dict)
@@ -74,6 +76,7 @@ class RunOptions:
     server_timeout: float = 10.0
     debug: bool = False
     watching: Watching = field(default_factory=Watching)
+    durable: DurableOptions | None = None
 
 
 def run_mission(target: Target, options: RunOptions) -> int:
@@ -120,7 +123,8 @@ def run_mission(target: Target, options: RunOptions) -> int:
         show = show_run(record, options)
         stack.enter_context(show)
         stack.callback(machine.subscribe(show.on_event))
-        outcome = _execute(machine, show, options)
+        with kept(target, machine, options.durable):
+            outcome = _execute(machine, show, options)
         surroundings.over()
         good = outcome in good_outcomes(record, options)
         code = EXIT_SUCCESS if good else EXIT_OTHER_OUTCOME

@@ -227,6 +227,15 @@ class Control:
             return
         self._hold(frame, path, reason)
 
+    def hold(self, frame: Frame, path: str, reason: str) -> None:
+        """Pause, and hold the state at `path`, which runs, until an operator says what to do.
+
+        Blocks: as `pass_gate`.
+        """
+        self._watch()
+        self._pause()
+        self._hold(frame, path, reason)
+
     def release(self, path: str) -> None:
         """Let the state at `path` look again whether it is called off, if a pause holds it back."""
         event = self._waiting.get(path)

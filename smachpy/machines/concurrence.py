@@ -292,7 +292,8 @@ class Concurrence(Container):
         each = bool(self._smachpy.child_termination_cb or self._smachpy.transition_cbs)
         group = frame.group = Group(frame, plan.steps, each=each)
         try:
-            if self._smachpy.start_cbs:
+            journal = frame.run.journal
+            if self._smachpy.start_cbs and (journal is None or not journal.resumes(frame)):
                 self.call_start_cbs()
             if self._preempt_requested:
                 frame.answered = True

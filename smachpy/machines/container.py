@@ -280,7 +280,9 @@ class Container(Openable, Callbacks, State):
             data.frame = frame.first.innermost = frame
             if data.listeners or data.tapes:
                 frame.run.watched = True
-            if data.input_keys and parent_ud is not None:
+            journal = frame.run.journal
+            resumed = journal is not None and journal.resumes(frame)
+            if data.input_keys and parent_ud is not None and not resumed:
                 self.__copy_input_keys(parent_ud, self.userdata)
             try:
                 outcome = self._smachpy_run_children(frame, plan)

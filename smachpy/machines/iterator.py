@@ -299,7 +299,8 @@ class Iterator(Container):
         return _Plan(self, self._smachpy_make_step(label), self.__breaks())
 
     def _smachpy_run_children(self, frame: Frame, plan: _Plan) -> str:
-        if self._smachpy.start_cbs:
+        journal = frame.run.journal
+        if self._smachpy.start_cbs and (journal is None or not journal.resumes(frame)):
             self.call_start_cbs()
         outcome = self.__loop(frame, plan.step)
         outcome = self._smachpy.final_outcome_map.get(outcome, outcome)
@@ -315,9 +316,8 @@ class Iterator(Container):
 
     def __loop(self, frame: Frame, step: Step) -> str:
         """Run the child for item after item; return its last outcome, or that of the end."""
-        run, label = frame.run, self._smachpy.items_label
-        for index, item in enumerate(self.__iterate(frame)):
-            self.userdata[label] = item
+        run = frame.run
+        for index in self.__numbers(frame):
             frame.step = step  # first the mark, then the look: see `smachpy.run.grace.ask`
             if self._preempt_requested:
                 return self.__preempted(frame, step)
@@ -337,6 +337,21 @@ class Iterator(Container):
             if self._smachpy.transition_cbs:
                 self.call_transition_cbs()
         return self._smachpy.exhausted_outcome
+
+    def __numbers(self, frame: Frame) -> IteratorOf[int]:
+        """Put item after item into the userdata; yield the number of each.
+
+        A run that goes on after the end of its process passes over those that were done.
+        """
+        journal, index = frame.run.journal, -1
+        for index, item in enumerate(self.__iterate(frame)):
+            place = 1 if journal is None else journal.item(frame, index)
+            if place > 0:
+                self.userdata[self._smachpy.items_label] = item
+            if place >= 0:
+                yield index
+        if journal is not None:
+            journal.check_items(frame, index + 1)
 
     def __visit(self, frame: Frame, step: Step) -> tuple[str, Why]:
         """Run the child once; return its outcome, or an operator's, and what comes of it."""

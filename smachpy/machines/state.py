@@ -66,6 +66,13 @@ class StateOptions(TypedDict, total=False):
         on_exception: Exception type -> outcome; the outcomes are registered by themselves.
         on_enter: Called with the userdata before the state runs.
         on_exit: Called with the userdata and the outcome after it ran.
+        resume: In a durable run that goes on after the end of its process, what takes the place of
+            executing this state, if it was active, again: "skip:OUTCOME" ends it so, "ask" holds
+            the machine until an operator says what to do, `resume(userdata)` returns the outcome or
+            None to execute it. See docs/durable_missions.md, also for the next three.
+        on_resume: Called with the userdata before it goes on there; with its own if a container.
+        idempotent: Of an action state: its goal may be sent anew when the server does not know it.
+        transient: Of a container: keys of its userdata that are not kept.
     """
 
     timeout: float | None
@@ -75,6 +82,10 @@ class StateOptions(TypedDict, total=False):
     on_exception: Mapping[type[BaseException], str] | None
     on_enter: Callable[[Any], object] | None
     on_exit: Callable[[Any, str], object] | None
+    resume: str | Callable[[Any], str | None] | None
+    on_resume: Callable[[Any], object] | None
+    idempotent: bool
+    transient: Iterable[str]
 
 
 class DataOf(Generic[Data_co]):
@@ -371,11 +382,16 @@ def make_step(label: str, state: State, window: Any) -> Step:
     return Step(label, state, window, run)
 
 
+_HOOKS = (("on_enter", 2), ("on_exit", 3), ("resume", 2), ("on_resume", 2))
+"""Methods that are options, and how many arguments they take."""
+
+
 def get_options(state: State) -> Options:
     """Return the options of `state`, hooks that are methods of its class included.
 
-    A method `on_enter(self, userdata)` or `on_exit(self, userdata, outcome)` is a hook; a method of
-    one of these names with other arguments is the state's own.
+    A method `on_enter(self, userdata)` or `on_exit(self, userdata, outcome)` is a hook, and so are
+    `resume(self, userdata)` and `on_resume(self, userdata)`; a method of one of these names with
+    other arguments is the state's own.
     """
     data = state._smachpy
     known, options = data.with_hooks, data.options
@@ -383,7 +399,7 @@ def get_options(state: State) -> Options:
         return known[1]  # looking for methods takes longer than running a small machine
     hooks = {
         name: getattr(state, name)
-        for name, count in (("on_enter", 2), ("on_exit", 3))
+        for name, count in _HOOKS
         if getattr(options, name) is None and _is_hook(type(state), name, count)
     }
     found = dataclasses.replace(options, **hooks) if hooks else options

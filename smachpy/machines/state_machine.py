@@ -341,10 +341,11 @@ class StateMachine(Container):
         return _Plan(self.userdata, steps, self._smachpy.outcomes, self.__child_specs())
 
     def _smachpy_run_children(self, frame: Frame, plan: _Plan) -> str:
-        if self._smachpy.start_cbs:
-            self.call_start_cbs()
         data = self._smachpy
-        label, data.next_initial = data.next_initial or data.initial, None
+        resumed = None if frame.run.journal is None else frame.run.journal.resumed_label(frame)
+        if data.start_cbs and resumed is None:
+            self.call_start_cbs()
+        label, data.next_initial = resumed or data.next_initial or data.initial, None
         assert label is not None
         logged = frame.run.logged
         if logged:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from actionlib_core.clock import Event as ClockEvent
     from smachpy.events import Event
     from smachpy.events.tape import Tape
-    from smachpy.run.frame import Frame, Gate
+    from smachpy.run.frame import Frame, Gate, RunJournal
     from smachpy.run.options import Options
     from smachpy.run.visit import Origin
 
@@ -105,6 +105,7 @@ class ContainerData(StateData):
         listeners: Called at each event of it and of all below it.
         tapes: Take these events down.
         control: The operator's control, once somebody asked for it.
+        journal: Keeps its next run as a root; None: nobody does.
         callback: Runs its callback or hook, while there is one.
         answered: Its last run ended because a request to stop was taken up.
         origin: Who asked it to stop before it ran.
@@ -121,6 +122,7 @@ class ContainerData(StateData):
         "end_waiters",
         "frame",
         "is_passing_on",
+        "journal",
         "listeners",
         "open_tokens",
         "origin",
@@ -149,6 +151,7 @@ class ContainerData(StateData):
         self.listeners: tuple[Callable[[Event], object], ...] = ()
         self.tapes: tuple[Tape, ...] = ()
         self.control: Gate | None = None
+        self.journal: RunJournal | None = None
         self.callback: Any = None  # a smachpy.run.callback.CallbackFrame
         self.answered = False
         self.origin: Origin | None = None

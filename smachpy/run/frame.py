@@ -45,6 +45,97 @@ class Gate(Protocol):
         """Pause after `step` if there is a breakpoint on this outcome of it."""
 
 
+class RunJournal(Protocol):
+    """What a run needs of its journal, if it has one: `smachpy.durable`.
+
+    What a visit does is written before it is done or told. A run that goes on in another process
+    is entered down to the states that were active; for the containers and states on the way the
+    journal says where they were.
+    """
+
+    def attach(self, root: Frame) -> None:
+        """Keep the run that begins in `root`, or go on with it."""
+
+    def finish(self, outcome: str) -> None:
+        """Write that the run ends."""
+
+    def enter(self, frame: Frame, step: Any) -> str | None:
+        """Write that `step` begins; return its outcome if it had ended before the resume."""
+
+    def execute(self, frame: Frame, step: Any, userdata: Any) -> Any:
+        """Execute `step`, or what its option `resume` says; return the outcome."""
+
+    def leave(self, frame: Frame, step: Any, outcome: Any) -> None:
+        """Write that `step` has ended."""
+
+    def resumes(self, frame: Frame) -> bool:
+        """Tell whether the container of `frame` goes on with children that had begun."""
+        ...
+
+    def resumed_label(self, frame: Frame) -> str | None:
+        """Return the child with which the state machine of `frame` goes on; None: anew."""
+        ...
+
+    def item(self, frame: Frame, number: int) -> int:
+        """Return where this item of the iterator of `frame` stands.
+
+        Below 0: it was done before the resume. 0: it was the current one, which the userdata holds.
+        Above 0: it is new.
+        """
+        ...
+
+    def check_items(self, frame: Frame, count: int) -> None:
+        """Check that there were not fewer items than before the resume."""
+
+    def began_inside(self, frame: Frame) -> bool:
+        """Tell whether what `frame` runs is a container whose children had begun."""
+        ...
+
+    def attempt(self, frame: Frame) -> tuple[int, float]:
+        """Return the number of the first attempt, and what is left of the pause before it [s]."""
+        ...
+
+    def time_left(self, frame: Frame, seconds: float) -> float:
+        """Return what is left of a timeout that began with the attempt [s]."""
+        ...
+
+    def goes_on(self, frame: Frame) -> bool:
+        """Tell whether what `frame` runs has something to go on with: children, or a goal."""
+        ...
+
+    def retried(self, frame: Frame, attempt: int, wait: float, reason: str) -> None:
+        """Write that attempt number `attempt` has ended, and the next begins in `wait` [s]."""
+
+    def asked(self, frame: Frame, origin: tuple[str, str, str]) -> None:
+        """Write that somebody asked the container of `frame` to stop."""
+
+    def check_value(self, frame: Frame, path: str, key: str, value: Any) -> None:
+        """Raise if the state at `path` may not write `value`, as it cannot be kept."""
+
+    def decide(self, frame: Frame, userdata: Any) -> Any:
+        """Return the outcome that the option `resume` gives what `frame` runs; None: execute it."""
+
+    def goal_of(self, frame: Frame) -> dict[str, Any] | None:
+        """Return the goal that the state had sent before the resume, or None.
+
+        Its id, action, taken_ns (when a server took it [ns since the epoch]), status, text and
+        result (if it had ended), and stopped: the end of the process had cancelled it.
+        """
+        ...
+
+    def goal_sent(self, frame: Frame, action: str, goal_id: str) -> None:
+        """Write that a goal is about to be sent."""
+
+    def goal_taken(self, frame: Frame, goal_id: str) -> None:
+        """Write that a server has the goal."""
+
+    def goal_done(self, frame: Frame, goal_id: str, status: str, text: str, result: Any) -> None:
+        """Write how the goal ended."""
+
+    def once(self, frame: Frame, key: str, call: Callable[[], Any]) -> Any:
+        """Return what `call` returned for `key` in this visit; call it if it has not."""
+
+
 class Group(Protocol):
     """The children of a concurrence while they run."""
 
@@ -66,6 +157,7 @@ class Run:
         logged: Transitions go to the log.
         has_shutdown_check: `set_shutdown_check` was called.
         control: The operator's control, once somebody asked for it.
+        journal: Keeps the run, so that another process can go on with it; None: nobody does.
         lock: Held while a request to stop is passed on, and by whoever ends a child; one for all
             frames, so that requests that begin at different containers cannot wait for each other.
             Re-entrant, because a signal handler may come in between.
@@ -78,6 +170,7 @@ class Run:
         "clock",
         "control",
         "has_shutdown_check",
+        "journal",
         "lock",
         "logged",
         "pending",
@@ -90,6 +183,7 @@ class Run:
         self.has_shutdown_check = has_shutdown_check()
         self.watched = self.careful = self.logged or self.has_shutdown_check
         self.control: Gate | None = None
+        self.journal: RunJournal | None = None
         self.lock = threading.RLock()
         self.pending: deque[Callable[[], object]] = deque()
 

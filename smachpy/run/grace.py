@@ -425,6 +425,8 @@ def request(container: Parent, only: Frame | None = None) -> Run | None:
         with frame.run.lock:
             if data.is_passing_on or (only is not None and only is not frame):
                 return None
+            if frame.run.journal is not None:
+                frame.run.journal.asked(frame, origin)
             if frame is data.root:
                 ask(frame)
             elif frame is data.frame or frame is data.callback:

@@ -80,6 +80,10 @@ class Options:
         on_exception: Exception type -> outcome.
         on_enter: Called before the state runs, or None.
         on_exit: Called after it ran, or None.
+        resume: What a durable run that goes on does in place of executing it again, or None.
+        on_resume: Called before it goes on in a durable run, or None.
+        idempotent: Its goal may be sent again when nobody knows whether it was done.
+        transient: Keys of a container that a durable run does not keep.
     """
 
     timeout: float | None = None
@@ -89,13 +93,26 @@ class Options:
     on_exception: Mapping[type[BaseException], str] = dataclasses.field(default_factory=dict)
     on_enter: Callable[[Any], object] | None = None
     on_exit: Callable[[Any, str], object] | None = None
+    resume: str | Callable[[Any], Any] | None = None
+    on_resume: Callable[[Any], object] | None = None
+    idempotent: bool = False
+    transient: tuple[str, ...] = ()
 
     def made_outcomes(self) -> tuple[str, ...]:
         """Return the outcomes that these options give a state."""
         own = () if self.timeout is None else (self.timeout_outcome,)
-        return (*own, *self.on_exception.values())
+        skipped = () if self.skipped is None else (self.skipped,)
+        return (*own, *self.on_exception.values(), *skipped)
+
+    @property
+    def skipped(self) -> str | None:
+        """The outcome of `resume="skip:OUTCOME"`; None when it is something else."""
+        is_skip = isinstance(self.resume, str) and self.resume.startswith(SKIP)
+        return str(self.resume)[len(SKIP) :] if is_skip else None
 
 
+SKIP = "skip:"
+ASK = "ask"
 NO_OPTIONS = Options()
 NAMES = tuple(field.name for field in dataclasses.fields(Options))
 
@@ -178,6 +195,26 @@ def _on_exception(problems: Problems, name: str, given: Any) -> dict[type[BaseEx
     return dict(given or {})
 
 
+def _resume(problems: Problems, name: str, given: Any) -> Any:
+    if given is None or given == ASK:
+        return given
+    if isinstance(given, str) and given.startswith(SKIP) and given != SKIP:
+        return given
+    if isinstance(given, str) or not callable(given):
+        problems.add(
+            f"{name}: got {given!r}; expected 'skip:OUTCOME', 'ask', or a function "
+            "resume(userdata)."
+        )
+        return None
+    return problems.function(name, given, "resume(userdata)", 1)
+
+
+def _flag(problems: Problems, name: str, given: Any) -> bool:
+    if not isinstance(given, bool):
+        problems.add(f"{name}: got {given!r}; expected True or False.")
+    return given is True
+
+
 _CHECKS: dict[str, Callable[[Problems, str, Any], Any]] = {
     "timeout": Problems.seconds,
     "timeout_outcome": Problems.word,
@@ -186,4 +223,8 @@ _CHECKS: dict[str, Callable[[Problems, str, Any], Any]] = {
     "on_exception": _on_exception,
     "on_enter": lambda p, name, f: p.function(name, f, "on_enter(userdata)", 1),
     "on_exit": lambda p, name, f: p.function(name, f, "on_exit(userdata, outcome)", 2),
+    "resume": _resume,
+    "on_resume": lambda p, name, f: p.function(name, f, "on_resume(userdata)", 1),
+    "idempotent": _flag,
+    "transient": Problems.names,
 }

@@ -134,6 +134,8 @@ class Root(Branch):
         """Run the root and publish its start and end."""
         run, step, root = self.run, self.step, self.container
         data = root._smachpy
+        if data.journal is not None:
+            data.journal.attach(self)
         if data.control is not None:
             data.control.attach(run)
         if data.listeners or data.tapes:
@@ -151,7 +153,7 @@ class Root(Branch):
         outcome: str | None = None
         try:
             try:
-                outcome = step.execute(step.userdata)
+                outcome = self._execute(step)
             except Interruption:  # one of its own hooks did not listen
                 if self.dead:
                     raise
@@ -166,6 +168,15 @@ class Root(Branch):
             if data.root is self:
                 data.root = None
             self.emit(Finished, outcome)
+
+    def _execute(self, step: Step) -> str:
+        journal = self.run.journal
+        if journal is None:
+            outcome: str = step.execute(step.userdata)
+            return outcome
+        outcome = journal.execute(self, step, step.userdata)
+        journal.finish(outcome)
+        return outcome
 
     def end(self, outcome: str | None, error: BaseException | None) -> None:
         """Let the caller of `execute` go on."""

@@ -172,7 +172,8 @@ class _WithOptions:
         options = self._options
         frame: Frame | None = current_frame()
         assert frame is not None  # a container runs it
-        if options.on_enter is not None:
+        journal = frame.run.journal
+        if options.on_enter is not None and (journal is None or not journal.began_inside(frame)):
             _call_hook(frame, self._state, options.on_enter, userdata)
         outcome = self._attempts(frame, userdata)
         if options.on_exit is not None:
@@ -181,16 +182,24 @@ class _WithOptions:
 
     def _attempts(self, frame: Frame, userdata: Any) -> Any:
         """Run until an attempt is good, or the last one was made, or somebody asks it to stop."""
-        state, options, attempt = self._state, self._options, 1
+        state, attempt = self._state, 1
+        if frame.run.journal is not None:
+            attempt, wait = frame.run.journal.attempt(frame)
+            if wait and _waits_in_vain(state, wait):
+                return "preempted"
+        return self._try(frame, userdata, attempt)
+
+    def _try(self, frame: Frame, userdata: Any, attempt: int) -> Any:
+        state, options = self._state, self._options
         while True:
-            timer = None
+            timer, passed = None, False
             if options.timeout is not None:
                 timer = Timeout(frame, options.timeout)
-                timer.start(options.timeout)
+                passed = timer.begin()
             result: Any = None
             timed_out = False
             try:
-                result = self._execute(userdata)
+                result = "preempted" if passed else self._execute(userdata)
             except (Exception, Interruption) as error:
                 if frame.dead:
                     raise
@@ -204,7 +213,7 @@ class _WithOptions:
             )
             if isinstance(decision, Again):
                 wait, result = decision
-                frame.emit(Retried, attempt, _reason(result))
+                _tell_retried(frame, attempt, wait, _reason(result))
                 if not (wait and _waits_in_vain(state, wait)):
                     attempt += 1
                     continue
@@ -214,6 +223,12 @@ class _WithOptions:
             if isinstance(decision, BaseException):
                 raise decision
             return decision
+
+
+def _tell_retried(frame: Frame, attempt: int, wait: float, reason: str) -> None:
+    if frame.run.journal is not None:
+        frame.run.journal.retried(frame, attempt, wait, reason)
+    frame.emit(Retried, attempt, reason)
 
 
 def _call_hook(frame: Frame, state: Any, hook: Callable[..., object], *arguments: Any) -> None:
@@ -251,6 +266,16 @@ class Timeout:
         self._passed = False
         self._ended = False  # both are changed with the run's lock held
         self._timer: Timer | None = None
+
+    def begin(self) -> bool:
+        """Let the time begin; tell whether it passed before this process, with nothing to go on."""
+        journal, frame = self._frame.run.journal, self._frame
+        left = self._seconds if journal is None else journal.time_left(frame, self._seconds)
+        if left > 0.0:
+            self.start(left)
+            return False
+        self.over()
+        return journal is not None and not journal.goes_on(frame)
 
     def start(self, left: float) -> None:
         """Let the time be over in `left` seconds."""
@@ -325,12 +350,21 @@ def run_watched(frame: Frame, step: Step) -> Any:
     run = frame.run
     clock = run.clock
     path = step.path_in(frame)
+    journal = run.journal
+    if journal is not None:
+        ended = journal.enter(frame, step)
+        if ended is not None:
+            return ended
     if run.pending:
         run.flush()
     frame.publish(_new(Entered, (path, clock.now(), clock.time_ns())))
     try:
         window = step.watched_userdata(frame) if step.writes else step.userdata
-        outcome = step.execute(window)
+        if journal is None:
+            outcome = step.execute(window)
+        else:
+            outcome = journal.execute(frame, step, window)
+            journal.leave(frame, step, outcome)
     except BaseException as error:
         publish_raised(frame, error)
         raise

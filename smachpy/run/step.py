@@ -119,8 +119,10 @@ class _WatchedRemapper(Remapper):
         set_slot(self, "_scope_of", (frame, path))
 
     def __setitem__(self, key: str, item: Any) -> None:
-        super().__setitem__(key, item)
         frame, path = self._scope_of
+        if frame.run.journal is not None and key in self._output:
+            frame.run.journal.check_value(frame, path, self._output[key], item)
+        super().__setitem__(key, item)
         if frame.run.watched and key in self._output:  # else it was dropped
             clock = frame.run.clock
             fields = (path, clock.now(), clock.time_ns(), self._output[key], item)

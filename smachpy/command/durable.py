@@ -1,0 +1,210 @@
+"""`smachpy run --durable`: the mission's journal, and which mission of it is meant."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from smachpy.exceptions import MissionError
+from smachpy.mission_info import mission_info
+from smachpy.sim.geometry import finite
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from smachpy.command.targets import Target
+    from smachpy.durable.mission import Outage
+    from smachpy.durable.store import MissionRow, Store
+    from smachpy.machines.container import Container
+
+JOURNAL: Final = "./.smachpy/journal.db"
+
+
+@dataclass(frozen=True, slots=True)
+class DurableOptions:
+    """How a mission is kept.
+
+    Attributes:
+        journal: A path, or a URL of PostgreSQL.
+        mission: The mission's id; None finds it by what is run.
+        target: What was given to `smachpy run`; a file by its whole path.
+        argv: The arguments that belong to the mission.
+        robot: The robot that it needs, or None.
+        outage: Whether deadlines go on while no process runs it.
+        max_outage: How old the journal may be [s]; None: what the mission says.
+        migrate: Old path -> new path.
+    """
+
+    journal: str
+    mission: str | None
+    target: str
+    argv: tuple[str, ...]
+    robot: str | None
+    outage: Outage
+    max_outage: float | None
+    migrate: dict[str, str]
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add `--durable` and what goes with it."""
+    group = parser.add_argument_group("a mission that survives (docs/durable_missions.md)")
+    group.add_argument(
+        "--durable",
+        nargs="?",
+        const=JOURNAL,
+        metavar="JOURNAL",
+        help=f"keep it in a file (default: {JOURNAL}) or at postgresql://HOST/DATABASE; go on "
+        "with it if it has begun",
+    )
+    group.add_argument("--mission", metavar="ID", help="which one, where it is to have a name")
+    group.add_argument(
+        "--outage",
+        choices=("counts", "pauses"),
+        default="counts",
+        help="whether timeouts go on while no process runs it (default: %(default)s)",
+    )
+    group.add_argument(
+        "--max-outage",
+        type=_seconds,
+        metavar="S",
+        help="do not go on with a journal that is older [s] (default: what the mission says)",
+    )
+    group.add_argument(
+        "--migrate",
+        action="append",
+        default=[],
+        type=_pair,
+        metavar="OLD=NEW",
+        help="what has become of a state's path since the mission began",
+    )
+
+
+def durable_options(args: argparse.Namespace) -> DurableOptions | None:
+    """Return what was given; None without `--durable`.
+
+    Raises:
+        MissionError: options that go with it were given without it.
+    """
+    if args.durable is None:
+        given = [
+            name
+            for name, is_given in (
+                ("--mission", args.mission is not None),
+                ("--outage", args.outage != "counts"),
+                ("--max-outage", args.max_outage is not None),
+                ("--migrate", bool(args.migrate)),
+            )
+            if is_given
+        ]
+        if given:
+            raise MissionError(f"{given[0]}: got it without --durable; expected both.")
+        return None
+    if args.time.virtual:
+        raise MissionError(
+            f"--durable: got it beside --time {args.time}; expected real time, in which there are "
+            "outages."
+        )
+    place, colon, attribute = args.target.partition(":")
+    is_file = place.endswith(".py") or "/" in place
+    target = f"{Path(place).resolve()}{colon}{attribute}" if is_file else args.target
+    inputs = [word for key, text in args.input for word in ("--input", f"{key}={text}")]
+    words = ["--", *args.words] if args.words else []
+    return DurableOptions(
+        journal=args.durable,
+        mission=args.mission,
+        target=target,
+        argv=(*inputs, *words),
+        robot=args.robot or None,
+        outage=args.outage,
+        max_outage=args.max_outage,
+        migrate=dict(args.migrate),
+    )
+
+
+@contextlib.contextmanager
+def kept(target: Target, machine: Container, options: DurableOptions | None) -> Iterator[None]:
+    """Keep the run of `machine` in the block, if that was asked for, or go on with one.
+
+    Raises:
+        SmachError: as `smachpy.run_durable` does.
+    """
+    if options is None:
+        yield
+        return
+    from smachpy.durable.mission import kept_mission
+    from smachpy.durable.store import open_store
+
+    info = mission_info(target.thing)
+    limit = info.max_outage if options.max_outage is None else options.max_outage
+    with contextlib.closing(open_store(options.journal)) as store:
+        row = find_or_create(store, machine, options)
+        begun = "goes on" if row.changed > row.created else "begins"
+        print(f"mission {row.id} {begun}; journal: {store_name(options.journal)}", file=sys.stderr)
+        migrate: Any = options.migrate or info.migrations
+        with kept_mission(
+            machine, store, row.id, outage=options.outage, max_outage=limit, migrate=migrate
+        ):
+            yield
+
+
+def find_or_create(store: Store, machine: Container, options: DurableOptions) -> MissionRow:
+    """Return the mission that is to go on, or a new one.
+
+    Raises:
+        MissionError: the one that has begun has other arguments.
+    """
+    from smachpy.durable.mission import new_mission
+    from smachpy.durable.store import OVER
+
+    open_ones = [row for row in store.missions() if row.status not in OVER]
+    if options.mission is not None:
+        for row in open_ones:
+            if row.id == options.mission:
+                return row
+    else:
+        alike = [
+            row for row in open_ones if (row.target, row.robot) == (options.target, options.robot)
+        ]
+        same = [row for row in alike if row.argv == options.argv]
+        if same:
+            return same[-1]
+        if alike:
+            row = alike[-1]
+            raise MissionError(
+                f"{options.target}: arguments: got {list(options.argv)}, but mission {row.id!r} "
+                f"has begun with {list(row.argv)}; expected the same. Try 'smachpy missions resume "
+                f"{row.id}', 'smachpy missions forget {row.id}', or --mission NAME for another one."
+            )
+    row = new_mission(
+        machine,
+        mission=options.mission,
+        target=options.target,
+        argv=options.argv,
+        robot=options.robot,
+    )
+    store.create(row)
+    return row
+
+
+def store_name(journal: str) -> str:
+    """Return what to call a journal, without the password of its URL."""
+    scheme, mark, rest = journal.partition("://")
+    return f"{scheme}{mark}{rest.rpartition('@')[2]}" if mark else journal
+
+
+def _seconds(text: str) -> float:
+    seconds = finite(text)
+    if seconds <= 0:
+        raise argparse.ArgumentTypeError(f"got {text!r}; expected seconds above 0")
+    return seconds
+
+
+def _pair(text: str) -> tuple[str, str]:
+    old, equals, new = text.partition("=")
+    if not (equals and old.startswith("/") and new.startswith("/")):
+        raise argparse.ArgumentTypeError(f"got {text!r}; expected /OLD/PATH=/NEW/PATH")
+    return old, new

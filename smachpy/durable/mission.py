@@ -1,0 +1,281 @@
+"""One mission with a journal: begun, or gone on with, kept, and ended."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import uuid
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+from actionlib_core.clock import current_clock
+from smachpy.durable import structure
+from smachpy.durable.journal import Journal, read_position
+from smachpy.durable.position import VERSION, Position
+from smachpy.durable.processes import this_runner
+from smachpy.durable.recorder import Recorder
+from smachpy.durable.store import INTERRUPTED, OVER, QUEUED, MissionRow, open_store
+from smachpy.exceptions import MissionError
+from smachpy.machines.container import below
+from smachpy.run.grace import request_soon
+from smachpy.run.origin import asking
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from smachpy.durable.store import Lease, Store
+    from smachpy.machines.container import Container
+
+Outage = Literal["counts", "pauses"]
+Migrations = "Mapping[str, str] | Callable[[list[str]], Mapping[str, str] | None]"
+
+LEASE_S: Final = 15.0
+"""How long a runner that says nothing holds its mission [s]."""
+
+
+class MachineChangedError(MissionError):
+    """A journal is of another machine than the one that is to go on.
+
+    Attributes:
+        mission: The mission's id.
+        differences: One text for each difference.
+    """
+
+    def __init__(self, mission: str, differences: list[str], way_out: str) -> None:
+        self.mission = mission
+        self.differences = tuple(differences)
+        lines = "".join(f"\n  - {difference}" for difference in differences)
+        super().__init__(
+            f"mission {mission!r}: machine: got another one than that of the journal; expected the "
+            f"same.{lines}\n{way_out}"
+        )
+
+
+class OutageError(MissionError):
+    """A journal is older than the mission allows.
+
+    Attributes:
+        mission: The mission's id.
+        outage: How old it is [s].
+        max_outage: How old it may be [s].
+    """
+
+    def __init__(self, mission: str, outage: float, max_outage: float) -> None:
+        self.mission = mission
+        self.outage = outage
+        self.max_outage = max_outage
+        super().__init__(
+            f"mission {mission!r}: outage: got {outage:.0f} s since the journal was written last; "
+            f"expected {max_outage:g} at most: a person is to look first. Try 'smachpy missions "
+            f"resume {mission}', or 'smachpy missions forget {mission}'."
+        )
+
+
+def new_mission(
+    machine: Container,
+    *,
+    mission: str | None = None,
+    target: str = "",
+    argv: tuple[str, ...] = (),
+    robot: str | None = None,
+) -> MissionRow:
+    """Return the row of a mission that has not begun; `Store.create` takes it."""
+    name = machine.name or "SM_ROOT"
+    now = current_clock().time_ns() / 1e9
+    return MissionRow(
+        id=mission or f"{name.lower()}-{uuid.uuid4().hex[:6]}",
+        name=name,
+        target=target,
+        argv=argv,
+        status=QUEUED,
+        outcome=None,
+        robot=robot,
+        created=now,
+        changed=now,
+        owner=None,
+        structure=structure.to_bytes(structure.shape_of(machine)),
+        version=VERSION,
+    )
+
+
+def run_durable(
+    machine: Container,
+    journal: str | Path | Store,
+    *,
+    mission: str | None = None,
+    outage: Outage = "counts",
+    max_outage: float | None = None,
+    migrate: Any = None,
+) -> str:
+    """Run a machine so that another process can go on with it, and return its outcome.
+
+    A mission of this id that has begun and not ended goes on where it was; else it begins.
+
+    Args:
+        machine: The root, built by the same code each time.
+        journal: A path, a URL of PostgreSQL, or a store.
+        mission: The mission's id; None: the machine's name.
+        outage: Whether timeouts and pauses between attempts go on while no process runs the mission
+            ("counts"), or stand still ("pauses").
+        max_outage: How old the journal may be [s]; None: any age.
+        migrate: What has become of paths: old path -> new path; or a function that gets the
+            differences as texts and returns that, or None to refuse.
+
+    Raises:
+        MissionInUseError: a living process runs it.
+        MachineChangedError: the journal is of another machine, and `migrate` does not say how.
+        OutageError: the journal is older than `max_outage`.
+        NotDurableError: a value of the userdata cannot be kept.
+        StoreError, FencedError: the journal could not be written: the machine was preempted.
+        SmachError: as `execute` does.
+
+    Blocks: as `execute` does.
+    """
+    with contextlib.ExitStack() as stack:
+        if isinstance(journal, (str, os.PathLike)):
+            store = open_store(journal)
+            stack.callback(store.close)
+        else:
+            store = journal
+        name = mission or machine.name or "SM_ROOT"
+        known = {row.id: row for row in store.missions()}
+        if name in known and known[name].status in OVER:
+            store.forget(name)
+            del known[name]
+        if name not in known:
+            store.create(new_mission(machine, mission=name))
+        with kept_mission(
+            machine, store, name, outage=outage, max_outage=max_outage, migrate=migrate
+        ):
+            return machine.execute()
+
+
+@contextlib.contextmanager
+def kept_mission(
+    machine: Container,
+    store: Store,
+    mission: str,
+    *,
+    outage: Outage = "counts",
+    max_outage: float | None = None,
+    migrate: Any = None,
+) -> Iterator[Recorder]:
+    """Let the one run of `machine` within the block be kept as `mission`, which the store has.
+
+    The arguments, and what is raised, are those of `run_durable`.
+    """
+    row = store.mission(mission)
+    _refuse_plans(machine)
+    lease = store.claim(mission, this_runner(), seconds=LEASE_S)
+    status = QUEUED if row.status == QUEUED else INTERRUPTED
+    try:
+        position = read_position(store, mission)
+        goes_on = bool(position.visits)
+        shift_ns = 0
+        if goes_on:
+            position = _fitted(machine, row, position, migrate)
+            gone_ns = current_clock().time_ns() - position.data["last_ns"]
+            if max_outage is not None and gone_ns > max_outage * 1e9:
+                raise OutageError(mission, gone_ns / 1e9, max_outage)
+            shift_ns = max(0, gone_ns) if outage == "pauses" else 0
+        recorder = Recorder(
+            machine,
+            Journal(store, lease, position),
+            goes_on=goes_on,
+            shift_ns=shift_ns,
+        )
+        if goes_on:
+            recorder.restore()
+        status = INTERRUPTED
+        data = machine._smachpy
+        data.journal = recorder
+        try:
+            with _renewing(store, lease, machine, recorder, asked=row.cancel):
+                yield recorder
+        except Exception as error:
+            if recorder.broken is None:
+                recorder.fail(error)
+            raise
+        finally:
+            data.journal = None
+        if recorder.broken is not None:
+            raise recorder.broken
+    finally:
+        with contextlib.suppress(MissionError):  # fenced, or the store is gone: said above
+            if store.mission(mission).status not in OVER:
+                store.release(lease, status)
+
+
+def _refuse_plans(machine: Container) -> None:
+    plans = [type(each).__name__ for each in below(machine) if each._smachpy_kind == "plan"]
+    if plans:
+        raise MissionError(
+            f"/{machine.name or 'SM_ROOT'}: durable: got a {plans[0]} in it, whose marking is not "
+            "kept; expected state machines, sequences, concurrences and iterators."
+        )
+
+
+def _fitted(machine: Container, row: MissionRow, position: Position, migrate: Any) -> Position:
+    """Return the position as it is in `machine`."""
+    old = structure.from_bytes(row.structure)
+    new = structure.shape_of(machine)
+    found = structure.differences(old, new)
+    if not found:
+        return position
+    names = migrate(found) if callable(migrate) else migrate
+    if not names:
+        raise MachineChangedError(
+            row.id,
+            found,
+            "Try the code that the mission began with, '--migrate OLD_PATH=NEW_PATH' to say what "
+            f"has become of a state, or 'smachpy missions forget {row.id}'.",
+        )
+    unknown = sorted(path for path in names.values() if path not in new)
+    if unknown:
+        raise MissionError(
+            f"mission {row.id!r}: migrate: got the paths {unknown}; expected paths of the machine, "
+            f"of {sorted(new)}."
+        )
+    moved = position.renamed(names)
+    missing = structure.missing_paths(moved.visits, new)
+    if missing:
+        raise MachineChangedError(
+            row.id,
+            [f"{path}: was active and is no more" for path in missing],
+            "Try '--migrate OLD_PATH=NEW_PATH' for each of them.",
+        )
+    return moved
+
+
+@contextlib.contextmanager
+def _renewing(
+    store: Store, lease: Lease, machine: Container, recorder: Recorder, *, asked: bool
+) -> Iterator[None]:
+    """Renew the lease, and hear of a wish to cancel, while the block runs."""
+    clock = current_clock()
+    over = clock.event(f"the end of mission {lease.mission}")
+
+    def cancel() -> None:
+        with asking("operator", "smachpy missions", "cancel"):
+            request_soon(machine)
+
+    def renew() -> None:
+        told = False
+        while not over.wait(LEASE_S / 3):
+            try:
+                wanted = store.renew(lease, seconds=LEASE_S)
+            except MissionError as error:
+                recorder.stop(error)
+                return
+            if wanted and not told:
+                told = True
+                cancel()
+
+    if asked:
+        cancel()
+    task = clock.spawn(renew, name=f"lease of {lease.mission}")
+    try:
+        yield
+    finally:
+        over.set()
+        task.join()

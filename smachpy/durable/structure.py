@@ -1,0 +1,90 @@
+"""What a machine looks like to its journal, and how two of them differ; pure."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from smachpy.introspection import describe
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from smachpy.introspection import Described, StateRecord
+
+Shape = dict[str, dict[str, Any]]
+"""Path -> what a position depends on: kind, outcomes, and of a container children and edges."""
+
+
+def shape_of(machine: Described) -> Shape:
+    """Return the shape of a machine.
+
+    What may change between two processes is left out: timeouts, texts, classes, callbacks.
+    """
+    return {record.path: _facts(record) for record in describe(machine).walk()}
+
+
+def _facts(record: StateRecord) -> dict[str, Any]:
+    facts: dict[str, Any] = {
+        "kind": record.kind if record.is_container or record.kind == "action" else "state",
+        "outcomes": sorted(record.outcomes),
+        "keys": sorted({*record.input_keys, *record.output_keys}),
+    }
+    action = dict(record.details).get("action") if record.kind == "action" else None
+    if action is not None:
+        facts["action"] = action
+    if record.is_container:
+        facts["children"] = [child.label for child in record.children]
+        facts["edges"] = {
+            f"{edge.source} -{edge.outcome}->": edge.target for edge in record.transitions
+        }
+        facts["rules"] = sorted(f"{rule.outcome}: {rule.text}" for rule in record.rules)
+    return facts
+
+
+def to_bytes(shape: Shape) -> bytes:
+    """Return a shape as the store keeps it."""
+    return json.dumps(shape, separators=(",", ":"), sort_keys=True).encode()
+
+
+def from_bytes(data: bytes) -> Shape:
+    """Return the shape that a store keeps.
+
+    Raises:
+        ValueError: it is none.
+    """
+    shape = json.loads(data)
+    if not isinstance(shape, dict) or not all(isinstance(facts, dict) for facts in shape.values()):
+        raise ValueError(f"structure: got {shape!r:.80}; expected path -> facts.")
+    return shape
+
+
+def differences(old: Shape, new: Shape) -> list[str]:
+    """Return in words how `new` differs from `old`, one text for each difference."""
+    found = [f"{path}: is no more" for path in old if path not in new]
+    found += [f"{path}: is new" for path in new if path not in old]
+    for path in old.keys() & new.keys():
+        was, now = old[path], new[path]
+        for fact in sorted({*was, *now}):
+            found += _changes(f"{path}: {fact}", was.get(fact), now.get(fact))
+    return sorted(found)
+
+
+def _changes(where: str, was: Any, now: Any) -> Iterable[str]:
+    if was == now:
+        return
+    if isinstance(was, dict) and isinstance(now, dict):
+        for name in sorted({*was, *now}):
+            if was.get(name) != now.get(name):
+                yield f"{where}: {name} {was.get(name)!r}, now {now.get(name)!r}"
+    else:
+        yield f"{where}: {was!r}, now {now!r}"
+
+
+def missing_paths(visits: Mapping[str, Mapping[str, Any]], shape: Shape) -> list[str]:
+    """Return the paths that a position needs and a machine does not have, or as something else."""
+    containers = {visit["in"] for visit in visits.values()} - {""}
+    return sorted(
+        {path for path in visits if path not in shape}
+        | {path for path in containers if "children" not in shape.get(path, {})}
+    )
