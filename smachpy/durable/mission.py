@@ -192,10 +192,6 @@ def kept_mission(
         try:
             with _renewing(store, lease, machine, recorder, asked=row.cancel):
                 yield recorder
-        except Exception as error:
-            if recorder.broken is None:
-                recorder.fail(error)
-            raise
         finally:
             data.journal = None
         if recorder.broken is not None:

@@ -204,13 +204,6 @@ class Recorder:
         """As `RunJournal.finish`."""
         self._write("Finished", self._root, outcome=outcome)
 
-    def fail(self, error: Exception) -> None:
-        """Write that the run ended because `error` was raised."""
-        if self._run is not None:
-            self._write(
-                "Finished", self._root, outcome=None, error=f"{type(error).__name__}: {error}"
-            )
-
     def enter(self, frame: Frame, step: Step) -> str | None:
         """As `RunJournal.enter`."""
         if frame.path not in self._containers:
@@ -320,7 +313,8 @@ class Recorder:
             return
         facts: dict[str, Any] = {"outcome": outcome}
         target = step.next.get(outcome)
-        asked = frame.is_asked() or visit is not None or state._preempt_requested
+        asked = visit is not None or state._preempt_requested
+        asked = asked or frame.container._preempt_requested
         if target is None:
             if not asked:
                 return  # no such outcome: an error, and nothing that could be followed
