@@ -134,12 +134,7 @@ class Root(Branch):
         """Run the root and publish its start and end."""
         run, step, root = self.run, self.step, self.container
         data = root._smachpy
-        if data.journal is not None:
-            data.journal.attach(self)
-        if data.control is not None:
-            data.control.attach(run)
-        if data.listeners or data.tapes:
-            run.watched = True
+        self._attach()
         if run.watched:
             self.emit(Started, tuple(root.get_initial_states()))
         data.root = self  # from here on a request is one of this run
@@ -168,6 +163,16 @@ class Root(Branch):
             if data.root is self:
                 data.root = None
             self.emit(Finished, outcome)
+
+    def _attach(self) -> None:
+        """Let a journal, an operator and those who watch have their part in the run."""
+        run, data = self.run, self.container._smachpy
+        if data.journal is not None:
+            data.journal.attach(self)
+        if data.control is not None:
+            data.control.attach(run)
+        if data.listeners or data.tapes:
+            run.watched = True
 
     def _execute(self, step: Step) -> str:
         journal = self.run.journal
