@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
 
 Marking: TypeAlias = tuple[int, ...]
 
@@ -185,14 +185,6 @@ class Net:
             for _ in range(weight):
                 insort(tokens, place)
         return tuple(tokens)
-
-    def marking_of(self, ids: Iterable[str]) -> Marking:
-        """Return the marking with one token for each id.
-
-        Raises:
-            KeyError: there is no such place.
-        """
-        return tuple(sorted(self.place_numbers[name] for name in ids))
 
     def words(self, marking: Marking) -> str:
         """Return a marking for people: "{ready, item(2)}"."""

@@ -46,10 +46,6 @@ class Reachable:
             step = self.came[step[0]]
         return tuple(reversed(run))
 
-    def run_to_place(self, place: int, tokens: int = 1) -> Marking | None:
-        """Return the nearest marking in which a place holds so many tokens."""
-        return next((m for m in self.came if m.count(place) >= tokens), None)
-
 
 def explore(net: Net, *, limit: int = MOST_MARKINGS) -> Reachable:
     """Find the reachable markings of `net`, breadth first.

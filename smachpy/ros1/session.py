@@ -188,8 +188,3 @@ def end(made: Session) -> None:
 def forget_loaded() -> None:
     """Take the sessions of machines that were loaded out of force."""
     _sessions[:] = [made for made in _sessions if not made.loaded]
-
-
-def is_dry() -> bool:
-    """Tell whether the program only builds its machine."""
-    return bool(_sessions) and _sessions[-1].dry
