@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from smachpy import log
 from smachpy.events import Preempted
 from smachpy.exceptions import (
-    InconsistentMachineError,
     InvalidConstructionError,
     InvalidStateError,
     InvalidTransitionError,
@@ -282,10 +281,7 @@ class Concurrence(Container):
 
     # -- running -------------------------------------------------------------------------------
 
-    def _smachpy_compile(self, frame: Frame) -> _Plan:
-        problems = self.find_problems(frame.path)
-        if problems:
-            raise InconsistentMachineError(f"{type(self).__name__} {frame.path!r}", problems)
+    def _smachpy_compile(self) -> _Plan:
         return _Plan(self, [self._smachpy_make_step(label) for label in self._smachpy.children])
 
     def _smachpy_run_children(self, frame: Frame, plan: _Plan) -> str:

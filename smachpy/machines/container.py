@@ -20,7 +20,7 @@ from smachpy.exceptions import (
 from smachpy.machines.callbacks import Callbacks
 from smachpy.machines.construction import Openable
 from smachpy.machines.problems import Problems, takes
-from smachpy.machines.state import DataOf, Shown, State, get_options, make_step
+from smachpy.machines.state import CBState, DataOf, Shown, State, get_options
 from smachpy.run.child import EPOCH, ContainerData, on_preempt
 from smachpy.run.frame import Frame, clock_of_run
 from smachpy.run.grace import forget_visit, request, request_soon
@@ -28,6 +28,8 @@ from smachpy.run.interrupt import Interruption
 from smachpy.run.options import retry_problems
 from smachpy.run.origin import REQUESTING, asking, signal_being_handled
 from smachpy.run.root import execute_root
+from smachpy.run.runner import runner_of
+from smachpy.run.step import Step
 from smachpy.run.visit import Origin
 from smachpy.slips import accepts
 from smachpy.userdata.typed import CheckedDict
@@ -39,7 +41,6 @@ if TYPE_CHECKING:
 
     from smachpy.events.control import Control
     from smachpy.machines.state import StateOptions
-    from smachpy.run.step import Step
 
 __all__ = ["Container"]
 
@@ -345,23 +346,25 @@ class Container(Openable, Callbacks, State):
         )
 
     def __current_plan(self, frame: Frame, plan: Any) -> Any:
-        """Return a plan for the states as they are now."""
+        """Return a plan for the states as they are now.
+
+        Raises:
+            InconsistentMachineError: the container does not hold together.
+        """
         epoch = EPOCH.value
         if plan is None or plan.userdata is not self.userdata or plan.is_stale():
+            where = frame.path
             is_root = self._smachpy.root is not None
-            problems = [*self.__own_problems(frame.path)] if is_root else []
+            problems = [*self.__own_problems(where)] if is_root else []
+            problems += self.find_problems(where)
             if problems:
-                raise InconsistentMachineError(f"{type(self).__name__} {frame.path!r}", problems)
-            plan = self._smachpy_compile(frame)
+                raise InconsistentMachineError(f"{type(self).__name__} {where!r}", problems)
+            plan = self._smachpy_compile()
         plan.epoch = epoch
         return plan
 
-    def _smachpy_compile(self, frame: Frame) -> Any:
-        """Return this container's plan.
-
-        Raises:
-            InconsistentMachineError: it does not hold together.
-        """
+    def _smachpy_compile(self) -> Any:
+        """Return the plan of this container, which holds together."""
         raise NotImplementedError
 
     def _smachpy_run_children(self, frame: Frame, plan: Any) -> str:
@@ -369,10 +372,20 @@ class Container(Openable, Callbacks, State):
         raise NotImplementedError
 
     def _smachpy_make_step(self, label: str) -> Step:
+        """Return a child ready to run: its `execute`, with its options around it."""
         state, names = self._smachpy.children[label], self._smachpy.remappings[label]
         data = state._smachpy
+        execute: Any = state.execute
+        callback = data.code[0] if isinstance(state, CBState) else None
+        is_async = inspect.iscoroutinefunction(execute) or inspect.iscoroutinefunction(callback)
+        kind: Any = type(state)
+        is_own = kind._smachpy_is_container and (
+            kind.execute is not kind._smachpy_execute or "execute" in vars(state)
+        )
         window = Remapper(self.userdata, data.input_keys, data.output_keys, names)
-        return make_step(label, state, window)
+        options = get_options(state)
+        run = runner_of(state, options, execute, is_async=is_async, is_callback=is_own)
+        return Step(label, state, window, run)
 
     def __leave(self, frame: Frame) -> None:
         """Forget the run; with it ends the preempt that belonged to it."""

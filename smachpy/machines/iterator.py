@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from smachpy.events import Iterated, Preempted
 from smachpy.exceptions import (
-    InconsistentMachineError,
     InvalidStateError,
     InvalidUserCodeError,
     SmachError,
@@ -290,10 +289,7 @@ class Iterator(Container):
 
     # -- running -------------------------------------------------------------------------------
 
-    def _smachpy_compile(self, frame: Frame) -> _Plan:
-        problems = self.find_problems(frame.path)
-        if problems:
-            raise InconsistentMachineError(f"{type(self).__name__} {frame.path!r}", problems)
+    def _smachpy_compile(self) -> _Plan:
         label = self.__label
         assert label is not None
         return _Plan(self, self._smachpy_make_step(label), self.__breaks())

@@ -27,8 +27,6 @@ from smachpy.run.frame import clock_of_run, current_scope
 from smachpy.run.grace import PreemptNotice, mark_preempt, note_serviced
 from smachpy.run.options import NAMES, NO_OPTIONS, Options, Retry, changed
 from smachpy.run.origin import REQUESTING
-from smachpy.run.runner import runner_of
-from smachpy.run.step import Step
 from smachpy.slips import accepts
 from smachpy.util import has_smach_interface
 
@@ -367,19 +365,6 @@ class State:
         data = self._smachpy
         data.options = changed(data.options, options, problems)
         data.outcomes = tuple(dict.fromkeys((*data.outcomes, *data.options.made_outcomes())))
-
-
-def make_step(label: str, state: State, window: Any) -> Step:
-    """Return a child ready to run: its `execute`, with its options around it."""
-    execute: Callable[[Any], Any] = state.execute
-    callback = state._smachpy.code[0] if isinstance(state, CBState) else None
-    is_async = inspect.iscoroutinefunction(execute) or inspect.iscoroutinefunction(callback)
-    kind: Any = type(state)
-    is_own = kind._smachpy_is_container and (
-        kind.execute is not kind._smachpy_execute or "execute" in vars(state)
-    )
-    run = runner_of(state, get_options(state), execute, is_async=is_async, is_callback=is_own)
-    return Step(label, state, window, run)
 
 
 _HOOKS = (("on_enter", 2), ("on_exit", 3), ("resume", 2), ("on_resume", 2))

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
 from smachpy import log
 from smachpy.events import Jumped, Preempted
 from smachpy.exceptions import (
-    InconsistentMachineError,
     InvalidConstructionError,
     InvalidStateError,
     InvalidTransitionError,
@@ -62,21 +61,19 @@ class _Plan:
         userdata: UserData,
         steps: dict[str, Step],
         outcomes: Iterable[str],
-        children: Iterable[ChildSpec],
+        transitions: Mapping[str, Mapping[str, str | None]],
     ) -> None:
         self.epoch = 0
         self.userdata = userdata
         self.steps = steps
         ends = {outcome: End(outcome) for outcome in outcomes}
-        for child in children:
-            following: dict[str, Following] = {}
-            for outcome, target in child.targets().items():
-                where = target or outcome
-                if where in steps and target:
-                    following[outcome] = steps[where]
-                elif where in ends:
-                    following[outcome] = ends[where]
-            steps[child.label].next = following
+        for label, step in steps.items():
+            for outcome in step.state._smachpy.outcomes:
+                target = transitions[label].get(outcome)
+                if target in steps:
+                    step.next[outcome] = steps[target]
+                elif (target or outcome) in ends:
+                    step.next[outcome] = ends[target or outcome]
 
     def is_stale(self) -> bool:
         return any(step.is_stale() for step in self.steps.values())
@@ -333,12 +330,9 @@ class StateMachine(Container):
 
     # -- running -------------------------------------------------------------------------------
 
-    def _smachpy_compile(self, frame: Frame) -> _Plan:
-        problems = self.find_problems(frame.path)
-        if problems:
-            raise InconsistentMachineError(f"{type(self).__name__} {frame.path!r}", problems)
+    def _smachpy_compile(self) -> _Plan:
         steps = {label: self._smachpy_make_step(label) for label in self._smachpy.children}
-        return _Plan(self.userdata, steps, self._smachpy.outcomes, self.__child_specs())
+        return _Plan(self.userdata, steps, self._smachpy.outcomes, self._smachpy.transitions)
 
     def _smachpy_run_children(self, frame: Frame, plan: _Plan) -> str:
         data = self._smachpy

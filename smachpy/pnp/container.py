@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-from smachpy.exceptions import InconsistentMachineError, InvalidStateError, did_you_mean
+from smachpy.exceptions import InvalidStateError, did_you_mean
 from smachpy.introspection import NetRecord, NetTransitionRecord, PlaceRecord, Structure
 from smachpy.machines.container import Container, below
 from smachpy.machines.problems import Problems
@@ -392,10 +392,7 @@ class PetriNetPlan(Container):
 
     # -- running -------------------------------------------------------------------------------
 
-    def _smachpy_compile(self, frame: Frame) -> _Compiled:
-        problems = self.find_problems(frame.path)
-        if problems:
-            raise InconsistentMachineError(f"{type(self).__name__} {frame.path!r}", problems)
+    def _smachpy_compile(self) -> _Compiled:
         return _Compiled(self)
 
     def _smachpy_run_children(self, frame: Frame, plan: _Compiled) -> str:
