@@ -63,7 +63,9 @@ T = TypeVar("T")
 
 log = logging.getLogger(__name__)
 
-FOREVER_S = 1e8  # for the network, which wants a number: three years
+# As ROS 2's own. A question that ends unanswered is asked again; the network keeps something of each
+# until its time is over, also of those that were answered.
+ANSWER_S = 600.0
 AT_ONCE = 8  # goals on their way: a ROS 2 server's queue holds 10 requests and drops the oldest
 PAUSE_S = 0.1  # before a question that was not answered is asked again; then twice as long
 LONGEST_S = 2.0
@@ -535,7 +537,7 @@ class RosClientPort:
                 request,
                 attachment=end.attachment(),
                 best=True,
-                timeout=FOREVER_S,
+                timeout=ANSWER_S,
                 on_reply=take,
                 on_done=done,
             )

@@ -22,7 +22,7 @@ from actionlib_core.node import Node
 from actionlib_core.transport.faulty import FaultyTransport
 from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.wire.ros2.action_messages import pack_accepted
-from actionlib_core.wire.ros2.client_port import AT_ONCE
+from actionlib_core.wire.ros2.client_port import ANSWER_S, AT_ONCE
 from actionlib_core.wire.ros2.goal_exchange import SETTLED_S
 from actionlib_core.wire.ros2.graph import RosNode
 from actionlib_core.wire.ros2.names import Kind, goal_uuid
@@ -504,7 +504,7 @@ def test_busy_server_whose_link_is_there_is_left_in_peace(world):
     handle, uuid, _ = begin(server, client)
     server.set_state(uuid, 2)
     requests = len(server._seen)
-    world.clock.sleep(600.0)  # it says nothing, and nothing is asked of its executor
+    world.clock.sleep(300.0)  # it says nothing, and nothing is asked of its executor
     assert handle.get_comm_state() == CommState.ACTIVE
     assert len(server._seen) == requests
     server.end(uuid, 4)
@@ -589,3 +589,16 @@ def test_client_of_move_base_drives_by_navigate_to_pose(world):
     assert handle.wait(5.0)
     assert [message.base_position.pose.position.x for message in seen] == [1.5]
     assert handle.get_result() == MoveBaseResult()
+
+
+def test_question_for_the_result_of_a_long_goal_is_asked_again(world):
+    server, client = world.server(), world.client()
+    handle, uuid, _ = begin(server, client)
+    server.set_state(uuid, 2)
+    world.clock.sleep(3 * ANSWER_S)
+    assert 3 <= len(server.asked[uuid]) <= 4
+    server.end(uuid, 4)
+    assert handle.wait(5.0)
+    assert handle.get_goal_status() == Status.SUCCEEDED
+    assert server.sent == [uuid]
+    assert server.problems == []
