@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, MutableMapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
 
-from actionlib_core.config import Config, Mapped, Ros2
+from actionlib_core.config import ALL_NAMES, Config, Mapped, Ros2
 from actionlib_core.exceptions import ConfigError
 from actionlib_core.suggest import did_you_mean
 from actionlib_core.yaml_text import YamlTextError, load_yaml
@@ -35,7 +35,10 @@ def read_config_file(path: Path) -> Config:
         where = f"line {error.line}: " if error.line else ""
         raise ConfigError(str(path), f"{where}not YAML: {error.reason}.") from error
     reader = _Reader(path.parent)
+    names = reader.take_wire(data) if isinstance(data, MutableMapping) else ()
     config = Config() if data is None else reader.read_record(Config, data, "")
+    if isinstance(config, Config) and names:
+        config = reader.put_on_ros2(config, names)
     if reader.problems:
         raise ConfigError(str(path), *reader.problems)
     assert isinstance(config, Config)
@@ -48,7 +51,45 @@ class _Reader:
     def __init__(self, folder: Path) -> None:
         self.problems: list[str] = []
         self._folder = folder
-        self._line = 1
+        self._line = self._wire_line = 1
+
+    def take_wire(self, data: MutableMapping[str, Any]) -> tuple[str, ...]:
+        """Take `wire` out of the file: which names are on ROS 2, another way to say `ros2.names`.
+
+        It is `ros2` for every name of a program, or a mapping of names to `ros2`.
+        """
+        if "wire" not in data:
+            return ()
+        self._go_to(data, "wire")
+        self._wire_line = self._line
+        wire = data.pop("wire")
+        if wire == "ros2":
+            return (ALL_NAMES,)
+        if not isinstance(wire, Mapping) or not wire:
+            self._report("wire", "unknown", wire, "'ros2', or lines of 'name: ros2'")
+            return ()
+        for name, value in wire.items():
+            self._go_to(wire, name)
+            if value != "ros2":
+                self._report(f"wire.{name}", "unknown", value, "'ros2'")
+        return tuple(str(name) for name in wire)
+
+    def put_on_ros2(self, config: Config, names: tuple[str, ...]) -> Config:
+        """Add names to those of the file's only network of ROS 2, the program's own without one."""
+        self._line = self._wire_line
+        if len(config.ros2) > 1:
+            count = f"{len(config.ros2)} networks of ROS 2"
+            self._report("wire", "ambiguous", count, "one. Try 'names' or 'robot' in each")
+            return config
+        network = config.ros2[0] if config.ros2 else Ros2()
+        try:
+            network = dataclasses.replace(network, names=(*network.names, *names))
+        except ConfigError as error:
+            place = f"line {self._line}: "
+            self.problems += [
+                f"{place}{text.replace('names', 'wire', 1)}" for text in error.problems
+            ]
+        return dataclasses.replace(config, ros2=(network,))
 
     def read_record(self, kind: type, data: object, where: str, **given: str) -> object:
         """Return a `kind` made from `data`, and `given`, None when a problem was found."""
@@ -64,7 +105,8 @@ class _Reader:
             if key in hints:
                 values[key] = self._read(hints[key], value, path)
             else:
-                self._report_unknown(path, str(key), sorted(hints))
+                known = [*hints, "wire"] if kind is Config else hints
+                self._report_unknown(path, str(key), sorted(known))
         for name in _required(kind) - {*data, *given}:
             self._report(f"{where}.{name}", "missing", None, "a value")
         if len(self.problems) > before:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from actionlib_core.config import AccessRule, Config, Tls, load_config
+from actionlib_core.config import AccessRule, Config, Ros2, Tls, load_config
 from actionlib_core.exceptions import ConfigError
 from actionlib_core.transport._access import Permissions, decode_permissions, find_permissions
 from actionlib_core.transport._zenoh_config import zenoh_settings
@@ -228,3 +228,38 @@ def test_who_is_named():
     assert find_permissions(RULES, "alice", "").who == "user 'alice'"
     assert find_permissions(RULES, "", "robot_2").who == "certificate 'robot_2'"
     assert find_permissions((), "", "") == Permissions("anybody", (), ())
+
+
+@pytest.mark.parametrize(
+    ("text", "networks"),
+    [
+        ("wire: ros2\n", (Ros2(names=("**",)),)),
+        ("wire: ros2\nros2: {domain: 4}\n", (Ros2(domain=4, names=("**",)),)),
+        (
+            "ros2: {domain: 4, names: [a]}\nwire: {move_base: ros2, 'robot1/**': ros2}\n",
+            (Ros2(domain=4, names=("a", "move_base", "robot1/**")),),
+        ),
+    ],
+)
+def test_wire_says_which_names_are_on_ros_2(write, text, networks):
+    assert load_config(write(text)).ros2 == networks
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [
+        ("namespace: a\nwire: ros1\n", ["line 2: wire: "]),
+        ("wire: [move_base]\n", ["line 1: wire: "]),
+        ("wire: {}\n", ["line 1: wire: "]),
+        ("wire:\n  a: ros2\n  b: smachpy\n", ["line 3: wire.b: "]),
+        ("wire: {'a//b': ros2}\n", ["line 1: wire"]),
+        ("ros2:\n- {robot: a}\n- {robot: b}\nwire: ros2\n", ["line 4: wire: "]),
+        ("wires: ros2\n", ["line 1: wires: "]),
+    ],
+)
+def test_wire_that_says_something_else_is_told(write, text, lines):
+    with pytest.raises(ConfigError) as caught:
+        load_config(write(text))
+    assert [
+        problem[: len(line)] for problem, line in zip(caught.value.problems, lines, strict=True)
+    ] == lines
