@@ -63,8 +63,8 @@ T = TypeVar("T")
 
 log = logging.getLogger(__name__)
 
-# As ROS 2's own. A question that ends unanswered is asked again. The network keeps something of each
-# question until its time is over, also when it was answered.
+# As ROS 2's own. A question that ends unanswered is asked again. The network keeps something of
+# each question until its time is over, also when it was answered.
 ANSWER_S = 600.0
 AT_ONCE = 8  # goals on their way: a ROS 2 server's queue holds 10 requests and drops the oldest
 PAUSE_S = 0.1  # before a question that was not answered is asked again; then twice as long
