@@ -3,16 +3,21 @@
 Topics of the machine MACHINE: /MACHINE/smach/container_structure (of every container),
 /MACHINE/smach/container_status (whenever it changes) and /MACHINE/smach/events (std_msgs/String,
 every event as JSON); of its actions: /ACTION/goal, /feedback and /result with the types that ROS's
-actionlib has for them (`MoveBaseActionGoal`, ...), and /ACTION/status. A recording keeps at most
-1,000 elements of a list, cuts long texts and does not tell of cancels, so neither does the file:
-messages that cannot be made from it are left out and counted.
+actionlib has for them (`MoveBaseActionGoal`, ...), and /ACTION/status; of the robots what `scene`
+makes: /tf, /pose, /scan, /plan, /map and values; and for panels of states and plots,
+/CONTAINER/state (the name of the state that runs) and /MACHINE/userdata/KEY of numbers. A recording
+keeps at most 1,000 elements of a list, cuts long texts and does not tell of cancels, so neither
+does the file: messages that cannot be made from it are left out and counted.
 """
 
 from __future__ import annotations
 
 import ast
+import heapq
 import json
+import zlib
 from collections import Counter
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.exceptions import ActionlibError
@@ -23,8 +28,10 @@ from actionlib_core.interfaces.std_msgs.msg import Header, String
 from actionlib_core.time import Time
 from smachpy import log
 from smachpy.events import was_cut
+from smachpy.events.recording import OBSERVED
 from smachpy.events.run_state import RunState
 from smachpy.userdata.json_text import dumps
+from viz.runs.scene import Scene
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -36,6 +43,7 @@ GOAL_PARTS = {"GoalSent": "goal", "GoalFeedback": "feedback", "GoalDone": "resul
 _NO_NUMBERS = {"nan", "inf", "-inf"}
 _FLOATS = {"float32", "float64"}
 _OCTETS = {"uint8", "char"}
+_MISSHAPEN = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError, zlib.error)
 
 
 def write_mcap(recording: Recording, path: Path) -> None:
@@ -65,6 +73,7 @@ class _Export:
         self._state = RunState(recording.base)
         self._containers = {s.path: s for s in recording.record.walk() if s.is_container}
         self._server = f"/{recording.record.label}"
+        self._scene = Scene(recording.record, self._server)
         self._ids: dict[str, Any] = {}
         self._statuses: dict[str, dict[str, Any]] = {}  # action -> goal id -> GoalStatus
         self._ended: set[tuple[str, str]] = set()  # action and goal id
@@ -75,8 +84,13 @@ class _Export:
             message = _structure(container, self._recording.stamp_ns)
             topic = f"{self._server}/smach/container_structure"
             self._write(topic, message, self._recording.stamp_ns)
-        for event in self._recording.events:
+        recording = self._recording
+        records = heapq.merge(recording.events, recording.observed, key=itemgetter("stamp_ns"))
+        for event in records:
             stamp = event["stamp_ns"]
+            if event["kind"] == OBSERVED:
+                self._write_observed(event)
+                continue
             self._state.fold(event)
             text = json.dumps(event)
             self._write(f"{self._server}/smach/events", String(data=text), stamp)
@@ -86,6 +100,18 @@ class _Export:
             if parent is not None and event["kind"] != "GoalFeedback":
                 message = self._status(parent, event)
                 self._write(f"{self._server}/smach/container_status", message, stamp)
+            for topic, message in self._scene.told(event, self._state):
+                self._write(topic, message, stamp)
+
+    def _write_observed(self, record: dict[str, Any]) -> None:
+        try:
+            messages = list(self._scene.observed(record))
+        except (*_MISSHAPEN, ActionlibError) as error:
+            why = f"of another shape ({error})"
+            self.left_out[f"what {record.get('what')!r} of a robot told", why] += 1
+            return
+        for topic, message in messages:
+            self._write(topic, message, record["stamp_ns"])
 
     def _write(self, topic: str, message: Any, stamp_ns: int) -> None:
         key = topic, message._type
