@@ -13,6 +13,7 @@ import { Inspector } from "#panels/inspector.js";
 import { listenToKeys } from "#panels/keys.js";
 import { MapPanel } from "#panels/map.js";
 import { Help, Laying, Legend, Notice, Overlay, TokenDialog } from "#panels/messages.js";
+import { NoteDialog, ShareButtons } from "#panels/notes.js";
 import { PlayBar } from "#panels/play.js";
 import { TopBar } from "#panels/top_bar.js";
 import { Tree } from "#panels/tree.js";
@@ -74,7 +75,7 @@ function App() {
       <${Overlay} page=${page} />
       <${Laying} />
       <${Mounted} element=${minimap} />
-      <div class="strip"><${Legend} /><${ZoomButtons} /></div>
+      <div class="strip"><${Legend} /><${ShareButtons} page=${page} /><${ZoomButtons} /></div>
     </main>
     <footer class="timeline"><${Mounted} element=${canvas} /><${TimeTools} /></footer>
     ${store.hasMap.value && html`<${MapPanel} page=${page}><${Mounted} element=${floor} /><//>`}
@@ -85,6 +86,7 @@ function App() {
     <${Notice} />
     <${Help} />
     <${TokenDialog} />
+    <${NoteDialog} />
   </div>`;
 }
 

@@ -74,14 +74,17 @@ export async function connect(handlers) {
 
 /** The token stands in the fragment of the address, which no server is sent. */
 function readToken() {
-  const given = new URLSearchParams(location.hash.slice(1)).get("token");
+  const words = new URLSearchParams(location.hash.slice(1));
+  const given = words.get("token");
+  words.delete("token");
   try {
     if (given) sessionStorage.setItem("smachpy.token", given);
     token = given ?? sessionStorage.getItem("smachpy.token");
   } catch {
     token = given; // a file has no storage
   }
-  if (given) history.replaceState(null, "", location.pathname + location.search);
+  const rest = String(words);
+  if (given) history.replaceState(null, "", location.pathname + location.search + (rest && `#${rest}`));
 }
 
 export const hasToken = () => token !== null && store.settings.value.control;

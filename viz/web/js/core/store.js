@@ -1,6 +1,7 @@
 // What the page knows and what its user chose. Panels read signals; the diagram reads `shown()`.
 import { batch, computed, signal } from "@preact/signals";
 import { emptyState, ms } from "#core/fold.js";
+import { withNotes } from "#core/links.js";
 import { Model } from "#core/model.js";
 import { instantAt, Marks } from "#core/playback.js";
 import { Run } from "#core/run.js";
@@ -238,6 +239,46 @@ export function jump(name, step) {
 
 /** So many of the kept events have happened by what is shown. */
 export const eventsShown = () => position.value ?? run.events.length;
+
+// -- notes ------------------------------------------------------------------------------------
+
+const NOTED_RUNS = 30; // so many programs' notes are kept in the browser
+
+/** @type {Signal<import("#core/links.js").Note[]>} */
+export const notes = signal([]);
+/** @type {Signal<number | null>} */
+export const noteAt = signal(null); // instant of the note that is being written [ms]
+
+export function askForNote() {
+  if (run.first() !== null) noteAt.value = nowMs();
+}
+
+/** @returns {{ epoch: string, notes: import("#core/links.js").Note[] }[]} */
+const notedRuns = () => {
+  const all = saved("notes", []);
+  return Array.isArray(all) ? all : [];
+};
+
+/** Take up the notes of the machine shown. */
+export function loadNotes() {
+  const { notes: kept } = notedRuns().find((one) => one?.epoch === facts.value?.epoch) ?? {};
+  notes.value = Array.isArray(kept) ? kept : [];
+}
+
+/** @param {import("#core/links.js").Note[]} next */
+function setNotes(next) {
+  const epoch = facts.value?.epoch;
+  notes.value = next;
+  if (!epoch) return;
+  const others = notedRuns().filter((one) => one?.epoch !== epoch);
+  save("notes", [...others, ...(next.length ? [{ epoch, notes: next }] : [])].slice(-NOTED_RUNS));
+}
+
+/** @param {import("#core/links.js").Note[]} more */
+export const addNotes = (more) => setNotes(withNotes(notes.value, more));
+
+/** @param {import("#core/links.js").Note} note */
+export const removeNote = (note) => setNotes(notes.value.filter((one) => one !== note));
 
 // -- clocks -------------------------------------------------------------------------------------
 

@@ -2,6 +2,7 @@
 // their own pace. What the user does comes in by the methods below.
 import { connect, isFile, makeLayoutWorker, messageOf } from "#core/connection.js";
 import { containerOf } from "#core/fold.js";
+import { fragmentOf, viewOf } from "#core/links.js";
 import { numbersFor } from "#core/statistics.js";
 import * as store from "#core/store.js";
 import { Diagram } from "#drawing/diagram.js";
@@ -20,6 +21,7 @@ const ANNOUNCE_MS = 1000;
 const READABLE = 0.55; // the scale below which fewer levels are opened at first
 const SLOW_MS = 300; // a layout that takes longer shows how far it is
 const PLAY_MS = 45; // between two pictures of a run that is played
+const ADDRESS_MS = 300; // from a change to the address that says so
 const BURST = 500; // so many events at once are a snapshot, whose delay is not measured
 
 export class Page {
@@ -40,6 +42,10 @@ export class Page {
   /** @type {import("#drawing/viewport.js").View | null} */
   fitted = null; // the view that showed everything
   followIsSet = false;
+  /** @type {import("#core/links.js").LinkedView | null} */
+  linked = viewOf(location.hash); // what the address asked for, until it is shown
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  addressDue;
   panelsAt = 0; // when they were drawn [ms]
   textAt = 0;
   announcedAt = 0;
@@ -81,6 +87,14 @@ export class Page {
       this.diagram.showWindow(this.view);
       this.timeline.draw();
     }).observe(svg);
+    for (const one of [store.selected, store.opened, store.instant, store.notes])
+      one.subscribe(() => this.#writeAddress());
+    store.notes.subscribe(() => this.timeline.draw());
+    addEventListener("hashchange", () => {
+      this.linked = viewOf(location.hash);
+      this.#showLinked();
+      this.relayout({ frame: true });
+    });
     systemIsDark.addEventListener("change", () => this.#restyle());
     store.instant.subscribe(() => {
       this.paintAll();
@@ -120,13 +134,61 @@ export class Page {
     framing.restart();
     this.layout?.clear();
     this.timeline.reset();
+    store.loadNotes();
     this.map.reset();
     if (isFile() || store.facts.value?.recorded) this.timeline.fitAll();
     if (store.settings.value.follow && !this.followIsSet) {
       store.follow.value = true;
       this.followIsSet = true;
     }
+    this.#showLinked();
     this.relayout({ frame: true });
+  }
+
+  // -- the address ------------------------------------------------------------------------------
+
+  /** The address of what is shown. */
+  address() {
+    const address = new URL(location.href);
+    const name = store.facts.value?.name;
+    if (name && !isFile()) address.searchParams.set("machine", name);
+    address.hash = this.#fragment();
+    return String(address);
+  }
+
+  #fragment() {
+    const { cursor, selected, opened, notes } = store;
+    return fragmentOf({ at: cursor.value, selected: selected.value, opened: [...opened.value], notes: notes.value });
+  }
+
+  /** Let the address say what is shown, a moment after the last change. */
+  #writeAddress() {
+    clearTimeout(this.addressDue);
+    this.addressDue = setTimeout(() => {
+      if (store.model.value && !this.linked) history.replaceState(null, "", `#${this.#fragment()}`);
+    }, ADDRESS_MS);
+  }
+
+  /** Show what the address asks for, as far as it is there. */
+  #showLinked() {
+    const model = store.model.value;
+    const view = this.linked;
+    this.linked = null;
+    if (!view || !model) return;
+    const known = view.opened?.filter((path) => model.get(path)?.children.length);
+    if (known?.length) store.keepOpened(new Set(known));
+    if (view.notes.length) store.addNotes(view.notes);
+    const first = store.run.first();
+    const isKept = first !== null && view.at !== null && view.at >= first && view.at <= (store.run.last() ?? first) + 1;
+    if (isKept) {
+      this.timeline.fitAll();
+      store.seek(view.at);
+    } else if (view.at !== null) store.notify("The instant of this link is not in this run", "error");
+    if (view.selected === null) return;
+    if (model.get(view.selected)) {
+      store.selected.value = view.selected;
+      store.reveal(view.selected);
+    } else store.notify("The state of this link is not in this machine", "error");
   }
 
   /** @param {RunEvent[]} events */

@@ -14,6 +14,7 @@ const FOOT = 26; // the axis, with the buttons at its left
 const LANE = 19;
 const ROW = 13;
 const MOST_ROWS = 6; // of a concurrence that are given room
+const NOTE = 130; // the text of a note at most
 const THINNEST = 0.5;
 const LIVE_MS = 30_000; // shown at first
 const SHORTEST_MS = 200; // that can be zoomed to
@@ -186,7 +187,31 @@ export class Timeline {
         y += tall;
       }
     });
+    this.#notes(x, width, height);
     this.#cursor(x, height);
+  }
+
+  /**
+   * A pin at each note, with its text.
+   * @param {(t: number) => number} x @param {number} width @param {number} height
+   */
+  #notes(x, width, height) {
+    const g = this.context;
+    for (const { at, text } of store.notes.value) {
+      const px = x(at);
+      if (px < this.names || px > width - RIGHT) continue;
+      g.fillStyle = this.#colour("ink");
+      g.fillRect(px - 0.5, 0, 1, height - FOOT);
+      const wide = Math.min(NOTE, g.measureText(text).width + 10);
+      const left = px + wide > width - RIGHT ? px - wide : px;
+      const top = height - FOOT - 16;
+      g.beginPath();
+      g.roundRect(left, top, wide, 15, 3);
+      g.fill();
+      g.fillStyle = this.#colour("background");
+      g.textAlign = "left";
+      this.#clipped(left, top, wide - 4, 15, () => g.fillText(text, left + 5, top + 8));
+    }
   }
 
   /** @param {number} x @param {number} y @param {number} w @param {number} h @param {() => void} paint */

@@ -5,6 +5,7 @@ import { Differences } from "#panels/comparison.js";
 import { Goals } from "#panels/goals.js";
 import { html, StateLink } from "#panels/html.js";
 import { Log } from "#panels/log.js";
+import { Notes } from "#panels/notes.js";
 import { Numbers } from "#panels/numbers.js";
 import { Preempts } from "#panels/preempts.js";
 import { Questions } from "#panels/questions.js";
@@ -29,6 +30,7 @@ export function Inspector({ page }) {
     <${SelectedState} ...${shared} model=${model} />
     <${Differences} page=${page} />
     <${Preempts} ...${shared} />
+    <${Notes} />
     <${Goals} ...${shared} />
     <${Userdata} ...${shared} />
     <${Changes} page=${page} />

@@ -35,6 +35,7 @@ export function listenToKeys(page) {
     End: () => page.timeline.live(),
     m: () => page.map.canvas.focus(),
     w: () => showWhy(),
+    n: () => store.askForNote(),
     t: () => {
       store.treeOpen.value = !store.treeOpen.value;
     },

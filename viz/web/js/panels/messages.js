@@ -33,6 +33,7 @@ const KEYS = [
   ["l", "back to now"],
   ["1 \u2026 9", "levels to open"],
   ["w", "why it ended so"],
+  ["n", "note at the instant shown"],
   ["t", "states, on a small screen"],
   ["i", "implicit transitions"],
   ["a", "actions"],
