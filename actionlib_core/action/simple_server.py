@@ -232,7 +232,7 @@ class SimpleActionServer:
 
     def is_new_goal_available(self) -> bool:
         """Tell whether a goal waits to be accepted."""
-        return self._policy.waiting
+        return bool(self._policy.waiting)
 
     def is_preempt_requested(self) -> bool:
         """Tell whether the current goal is asked to stop, by a cancel or a newer goal."""
@@ -448,7 +448,7 @@ class SimpleActionServer:
         while True:
             with self.lock:
                 come.clear()
-                waiting = self._policy.waiting
+                waiting = bool(self._policy.waiting)
                 self._idle = None if waiting else come
             if waiting:
                 self._run_next()

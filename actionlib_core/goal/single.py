@@ -56,6 +56,7 @@ class SingleGoal(Generic[G]):
     Attributes:
         current: The goal that was accepted last.
         preempt_requested: It was asked to stop.
+        waiting: The goals that wait to be accepted.
 
     Threads: none of its own, no lock; the owner calls it under its lock.
     """
@@ -67,18 +68,13 @@ class SingleGoal(Generic[G]):
         self.current: G | None = None
         self.preempt_requested = False
         self._running = False
-        self._waiting: deque[_Waiting[G]] = deque()
+        self.waiting: deque[_Waiting[G]] = deque()
         self._current_stamp_ns = 0
-
-    @property
-    def waiting(self) -> bool:
-        """Whether a goal waits to be accepted."""
-        return bool(self._waiting)
 
     @property
     def next(self) -> G | None:
         """The goal that is accepted next."""
-        return self._waiting[0].goal if self._waiting else None
+        return self.waiting[0].goal if self.waiting else None
 
     @property
     def running(self) -> bool:
@@ -87,39 +83,39 @@ class SingleGoal(Generic[G]):
 
     def find(self, goal: G) -> G:
         """Return the object known here that equals `goal`, else `goal`."""
-        known = [self.current, *(waiting.goal for waiting in self._waiting)]
+        known = [self.current, *(waiting.goal for waiting in self.waiting)]
         return next((entry for entry in known if entry is not None and entry == goal), goal)
 
     def withdraw(self) -> G | None:
         """Take the goal out that waits to be accepted next; None when none waits."""
-        return self._waiting.popleft().goal if self._waiting else None
+        return self.waiting.popleft().goal if self.waiting else None
 
     def on_stop(self) -> list[G]:
         """Note that everything ends; return the goals that wait, which wait no more."""
         self.preempt_requested = self._running
-        waiting = [entry.goal for entry in self._waiting]
-        self._waiting.clear()
+        waiting = [entry.goal for entry in self.waiting]
+        self.waiting.clear()
         return waiting
 
     def on_goal(self, goal: G, stamp_ns: int) -> Decision[G]:
         """Take a goal that arrived."""
         if self.policy == "queue":
-            self._waiting.append(_Waiting(goal, stamp_ns))
+            self.waiting.append(_Waiting(goal, stamp_ns))
             return ANNOUNCE
         if self.policy == "reject":
-            if self._running or self._waiting:
+            if self._running or self.waiting:
                 return Decision(reject=goal)
-            self._waiting.append(_Waiting(goal, stamp_ns))
+            self.waiting.append(_Waiting(goal, stamp_ns))
             return ANNOUNCE
-        newest = self._waiting[-1].stamp_ns if self._waiting else 0
+        newest = self.waiting[-1].stamp_ns if self.waiting else 0
         if stamp_ns < newest or stamp_ns < self._current_stamp_ns:
             return Decision(recall=(goal,))
-        if not self._waiting and not self._running:
-            self._waiting.append(_Waiting(goal, stamp_ns))
+        if not self.waiting and not self._running:
+            self.waiting.append(_Waiting(goal, stamp_ns))
             return ANNOUNCE
-        older = tuple(waiting.goal for waiting in self._waiting)
-        self._waiting.clear()
-        self._waiting.append(_Waiting(goal, stamp_ns))
+        older = tuple(waiting.goal for waiting in self.waiting)
+        self.waiting.clear()
+        self.waiting.append(_Waiting(goal, stamp_ns))
         self.preempt_requested = self.preempt_requested or self._running
         return Decision(recall=older, preempt=self._running, announce=True)
 
@@ -134,10 +130,10 @@ class SingleGoal(Generic[G]):
         if goal is self.current and self._running:
             self.preempt_requested = True
             return Decision(preempt=True)
-        for entry in self._waiting:
+        for entry in self.waiting:
             if entry.goal is goal:
                 if recall_waiting:
-                    self._waiting.remove(entry)
+                    self.waiting.remove(entry)
                     return Decision(recall=(goal,))
                 entry.cancelled = True
         return Decision()
@@ -148,10 +144,10 @@ class SingleGoal(Generic[G]):
         Returns:
             The goal to accept, None when none waits; and the one it pushes aside, if any runs.
         """
-        if not self._waiting:
+        if not self.waiting:
             return None, None
         pushed = self.current if self._running else None
-        new = self._waiting.popleft()
+        new = self.waiting.popleft()
         self.current, self._current_stamp_ns = new.goal, new.stamp_ns
         self._running = True
         self.preempt_requested = new.cancelled
