@@ -244,6 +244,8 @@ class HeldBack(NamedTuple):
     Attributes:
         transitions: Ids.
         guards: Their guards, in the same order, as text.
+        truths: What the names in each guard are worth, in the same order: "low is true, there is
+            false"; "" when that is not known.
     """
 
     path: str
@@ -251,6 +253,7 @@ class HeldBack(NamedTuple):
     stamp_ns: int
     transitions: tuple[str, ...]
     guards: tuple[str, ...]
+    truths: tuple[str, ...] = ()
 
 
 class QuestionAsked(NamedTuple):

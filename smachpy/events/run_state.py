@@ -18,6 +18,8 @@ _NOT_ASKED = {"preempt": None, "asked": None, "serviced": None, "abandoned": Non
 
 _OF_QUESTION = ("text", "answers", "words", "default", "patience", "service", "has_picture")
 
+_OF_VISIT = ("question", "marking", "fired", "held")
+
 CUT_SHORT = "a new run began before it ended"
 """Text of a LOST goal whose run was cut short."""
 
@@ -39,7 +41,9 @@ class RunState:
             waits (why it is held back), question (of its newest visit, if it has asked one: `text`,
             `answers`, `words`, `default`, `patience`, `service` and `has_picture` of the
             QuestionAsked, `asked`, when, and `answer`, `by` and `answered` of the
-            QuestionAnswered, None until then);
+            QuestionAnswered, None until then); of a plan that has fired, since it was entered:
+            marking (ids of the places that hold tokens, one with two twice), fired (id of its
+            newest transition), held (while it waits: id of a transition -> why its guard is false);
             goals: by goal id: path, action, since, goal, feedback, first_feedback, status, text,
             result, ended; userdata: by "container key": key, value, writer, at, container;
             dropped: number of events that are missing, by which counts are too low; absent when 0.
@@ -67,6 +71,8 @@ class RunState:
             "PreemptServiced": lambda r: self._on_answer(r, "serviced"),
             "Abandoned": lambda r: self._on_answer(r, "abandoned"),
             "Retried": lambda r: self._set(r, attempt=r["attempt"] + 1),
+            "Fired": self._on_fired,
+            "HeldBack": self._on_held_back,
             "Iterated": lambda r: self._set(r, item=r["number"]),
             "Paused": lambda r: self._set(r, waits=r["reason"]),
             "Resumed": lambda r: self._set(r, waits=None),
@@ -127,7 +133,8 @@ class RunState:
     def _on_entered(self, record: dict[str, Any]) -> None:
         state = self._state(record["path"])
         state["visits"] += 1
-        state.pop("question", None)
+        for fact in _OF_VISIT:
+            state.pop(fact, None)
         state.update(since=record["stamp_ns"], waits=None, error=None, attempt=1, **_NOT_ASKED)
 
     def _on_failed(self, record: dict[str, Any]) -> None:
@@ -136,6 +143,7 @@ class RunState:
 
     def _leave(self, record: dict[str, Any], outcome: str) -> None:
         state = self._state(record["path"])
+        state.pop("held", None)
         if state["since"] is not None:
             state["seconds"] += (record["stamp_ns"] - state["since"]) / 1e9
         state.update(since=None, left=record["stamp_ns"], outcome=outcome, waits=None, **_NOT_ASKED)
@@ -160,6 +168,16 @@ class RunState:
             if state["since"] is not None and state.get("preempt")
         ]
         return [path for path in asked if not any(one.startswith(f"{path}/") for one in asked)]
+
+    def _on_fired(self, record: dict[str, Any]) -> None:
+        self._set(record, marking=list(record["marking"]), fired=record["transition"])
+        self._state(record["path"]).pop("held", None)
+
+    def _on_held_back(self, record: dict[str, Any]) -> None:
+        guards = [f"{guard} is false" for guard in record["guards"]]
+        truths = record.get("truths") or guards  # recordings of before have none
+        pairs = zip(record["transitions"], truths, guards, strict=False)
+        self._set(record, held={number: truth or guard for number, truth, guard in pairs})
 
     def _on_question(self, record: dict[str, Any]) -> None:
         question = {name: record[name] for name in _OF_QUESTION}

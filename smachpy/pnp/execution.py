@@ -21,6 +21,7 @@ from smachpy.run.visit import Why
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from smachpy.pnp.conditions import Condition
     from smachpy.pnp.container import PetriNetPlan
     from smachpy.pnp.firing import Jump, Moment, Table
     from smachpy.pnp.knowledge import Knowledge
@@ -104,6 +105,7 @@ class Execution:
         self._since: dict[str, float] = {}
         self._begin_again: set[str] = set()
         self._told: object = None
+        self._values: dict[str, bool] = {}  # what the guards were told last
         self.moment = table.moment(self._net.initial)
         self.branches = Branches(frame)
         self.orders: deque[tuple[str, str]] = deque()
@@ -184,6 +186,7 @@ class Execution:
                 values[name] = self._value(name)
             return values[name]
 
+        self._values = values
         return tuple([guard is None or guard.holds(value) for guard in moment.guards])
 
     def _value(self, name: str) -> bool:
@@ -366,10 +369,11 @@ class Execution:
         return min((wait for wait in waits if wait is not None), default=None)
 
     def _tell_waiting(self, moment: Moment) -> None:
-        """Say which guards hold the plan up, once for each place where it waits."""
+        """Say which guards hold the plan up, again when what they ask has changed."""
         run = self._frame.run
-        if run.watched and self._told is not moment:
-            self._told = moment
+        said = id(moment), tuple(self._values.items())
+        if run.watched and self._told != said:
+            self._told = said
             self._tell_held_back(moment)
 
     def _tell_fired(self, jump: Jump) -> None:
@@ -386,13 +390,26 @@ class Execution:
         """Publish and log which guards are false where the plan waits."""
         net, frame, guards = self._net, self._frame, self._table.plan.guards
         texts = tuple(str(guards[number]) for number in moment.candidates)
-        frame.emit_own(HeldBack, tuple(net.transitions[n].id for n in moment.candidates), texts)
+        truths = tuple(self._truth_of(guards[number]) for number in moment.candidates)
+        ids = tuple(net.transitions[n].id for n in moment.candidates)
+        frame.emit_own(HeldBack, ids, texts, truths)
         if frame.run.logged:
             false = ", ".join(
                 f"{net.transition_name(number)!r}: [{text}] is false"
                 for number, text in zip(moment.candidates, texts, strict=True)
             )
             log.loginfo(f"{frame.path}: waits in {net.words(moment.marking)}; {false or 'ends'}")
+
+    def _truth_of(self, guard: Condition | None) -> str:
+        """Return what the names in a guard are worth: "low is true, there is false"."""
+        values: dict[str, bool] = {}
+        for name in () if guard is None else guard.atoms():
+            asks = self._table.asks.get(name)
+            if asks is not None:  # it tells of actions, and asking changes nothing
+                values[name] = asks.holds(self._ended.get(asks.label))
+            elif name in self._values:
+                values[name] = self._values[name]
+        return ", ".join(f"{name} is {str(value).lower()}" for name, value in values.items())
 
     def _await_all(self) -> None:
         """Wait until no child runs; all were asked to stop, and each has its grace."""

@@ -44,6 +44,9 @@ interface StateRun {
   serviced?: number | null;
   abandoned?: number | null;
   question?: Question; // of its newest visit
+  marking?: string[]; // of a plan: ids of its places that hold tokens
+  fired?: string; // id of its newest transition
+  held?: Record<string, string>; // id of a transition -> why it does not fire
 }
 
 interface Question {

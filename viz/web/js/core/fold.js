@@ -6,6 +6,9 @@ const CUT_SHORT = "a new run began before it ended"; // text of a LOST goal
 const ENDED_GOALS = 20; // so many goals that have ended are kept
 const NO_PREEMPT = { preempt: null, asked: null, serviced: null, abandoned: null };
 
+/** @type {("question" | "marking" | "fired" | "held")[]} */
+const OF_VISIT = ["question", "marking", "fired", "held"];
+
 /** @returns {RunState} */
 export const emptyState = () => ({
   run: 0,
@@ -95,6 +98,18 @@ const RULES = {
   Retried(data, e) {
     stateOf(data, e.path).attempt = e.attempt + 1;
   },
+  Fired(data, e) {
+    const state = stateOf(data, e.path);
+    Object.assign(state, { marking: [...e.marking], fired: e.transition });
+    delete state.held;
+  },
+  HeldBack(data, e) {
+    /** @type {Record<string, string>} */
+    const held = {};
+    for (const [i, transition] of e.transitions.entries())
+      put(held, transition, e.truths?.[i] || `${e.guards[i]} is false`);
+    stateOf(data, e.path).held = held;
+  },
   Iterated(data, e) {
     stateOf(data, e.path).item = e.number;
   },
@@ -174,13 +189,14 @@ function stateOf(data, path) {
 function enter(data, e) {
   const state = stateOf(data, e.path);
   state.visits += 1;
-  delete state.question;
+  for (const fact of OF_VISIT) delete state[fact];
   Object.assign(state, { since: e.stamp_ns, waits: null, error: null, attempt: 1, ...NO_PREEMPT });
 }
 
 /** @param {RunState} data @param {RunEvent} e @param {string} outcome */
 function leave(data, e, outcome) {
   const state = stateOf(data, e.path);
+  delete state.held;
   if (state.since != null) state.seconds += (e.stamp_ns - state.since) / 1e9;
   Object.assign(state, { since: null, left: e.stamp_ns, outcome, waits: null, ...NO_PREEMPT });
   put(state.outcomes, outcome, (own(state.outcomes, outcome) ?? 0) + 1);

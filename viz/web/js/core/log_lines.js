@@ -21,10 +21,7 @@ const LINES = {
   Resumed: () => ["resumed", "active"],
   Jumped: (e) => [`jump to ${e.label}`, "waiting"],
   Fired: (e) => [`${e.transition} fired`, "other"],
-  HeldBack: (e) => [
-    `waits: ${e.guards.map((/** @type {string} */ guard) => `[${guard}]`).join(", ")} false`,
-    "waiting",
-  ],
+  HeldBack: (e) => [`waits: ${heldText(e)}`, "waiting"],
   QuestionAsked: (e) => [`asks ${e.text}`.trim(), "waiting"],
   QuestionAnswered: (e) => [e.by ? `answered ${e.answer} by ${e.by}` : `nobody answered: ${e.answer}`, "waiting"],
   OutcomeForced: (e) => [`forced: ${e.outcome}`, "waiting"],
@@ -32,6 +29,13 @@ const LINES = {
   GoalDone: (e) => [`${e.action}: ${e.status.toLowerCase()} ${e.text}`.trim(), outcomeClass(e.status)],
   UserdataWritten: (e) => [`${e.key} = ${brief(e.value).slice(0, 60)}`, "other"],
 };
+
+/** @param {RunEvent} e */
+function heldText({ guards, truths }) {
+  /** @type {(guard: string, i: number) => string} */
+  const text = (guard, i) => `[${guard}] is false${truths?.[i] ? ` (${truths[i]})` : ""}`;
+  return guards.map(text).join(", ");
+}
 
 /** @param {RunEvent} e */
 function requestText(e) {

@@ -52,8 +52,7 @@ export class Model {
   /** @param {StateNode} node @param {StateNode | null} parent @param {number} depth */
   #index(node, parent, depth) {
     Object.assign(node, { parent, depth, number: this.order.length });
-    const tokens = node.tokens ? ` ${"\u25cf".repeat(Math.min(node.tokens, 3))}` : "";
-    node.name = shorten(node.caption || node.label) + tokens;
+    node.name = shorten(node.caption || node.label);
     node.shown = signed(node.change, node.name);
     this.byPath.set(node.path, node);
     this.order.push(node);

@@ -165,7 +165,9 @@ export class Diagram {
     this.boxes.set(node.path, { x, y, w, h });
     const closed = node.children.length > 0;
     const group = this.#group(node, `leaf ${node.kind}${closed ? " closed" : ""}`);
-    const frame = el("rect", { class: "frame", x, y, width: w, height: h, rx: 7 });
+    const isNet = isPartOfNet(node);
+    const rx = isNet ? (node.kind === "transition" ? 0 : h / 2) : 7;
+    const frame = el("rect", { class: "frame", x, y, width: w, height: h, rx });
     group.append(frame);
     if (closed)
       group.append(el("rect", { class: "inner", x: x + 2.5, y: y + 2.5, width: w - 5, height: h - 5, rx: 5 }));
@@ -177,8 +179,8 @@ export class Diagram {
     const spare = closed ? 20 + measure(String(node.total - 1), 9) : 0;
     const left = place.hasRows ? x + 10 : x + (w - nameWidth - spare) / 2;
     const middle = y + h / 2;
-    group.append(icon(node.kind, left, middle - 5));
-    group.append(el("text", { class: "name", x: left + 14, y: middle + 3.9 }, node.shown));
+    if (!isNet) group.append(icon(node.kind, left, middle - 5));
+    group.append(el("text", { class: "name", x: left + (isNet ? 7 : 14), y: middle + 3.9 }, node.shown));
     if (closed) {
       const inside = `\u229e ${node.total - 1}`;
       group.append(el("text", { class: "inside", x: left + nameWidth + 7, y: middle + 3.4 }, inside));
@@ -343,7 +345,7 @@ export class Diagram {
    */
   paint(path, state, now, goal, noServer = false) {
     const view = this.states.get(path);
-    if (!view) return;
+    if (!view || isPartOfNet(view.node)) return;
     const active = state?.since != null;
     const asked = active && Boolean(state?.preempt);
     const kind = state?.outcome != null ? outcomeClass(state.outcome) : null;
@@ -390,6 +392,47 @@ export class Diagram {
       }
       if (text) write(text, joinText(join, come));
     }
+  }
+
+  /**
+   * Show the tokens of a plan where they are, and beside a transition that waits why it does not fire.
+   * @param {string} path
+   * @param {StateRun | undefined} state
+   */
+  paintNet(path, state) {
+    const plan = this.states.get(path)?.node;
+    if (plan?.kind !== "plan") return;
+    const tokensOf = tokensIn(plan, state);
+    for (const child of plan.children) {
+      const view = this.states.get(child.path);
+      if (!view || !isPartOfNet(child)) continue;
+      const isTransition = child.kind === "transition";
+      const tokens = isTransition ? 0 : tokensOf(child.label);
+      const held = isTransition ? own(state?.held, child.label) : undefined;
+      const isFired = isTransition && state?.since != null && state.fired === child.label;
+      view.group.classList.toggle("marked", tokens > 0);
+      view.group.classList.toggle("waiting", held !== undefined);
+      view.group.classList.toggle("fired", isFired);
+      write(view.badge, held ?? (tokens > 3 ? `\u25cf${tokens}` : "\u25cf".repeat(tokens)));
+      const lacks = isTransition && held === undefined ? lackOf(plan, child, tokensOf) : "";
+      const facts = [held, lacks, tokens ? `${tokens} token${tokens > 1 ? "s" : ""}` : "", isFired ? "fired" : ""];
+      const label = [child.name, KIND_NAMES[child.kind], ...facts].filter(Boolean).join(", ");
+      if (view.label === label) continue;
+      view.label = label;
+      view.group.setAttribute("aria-label", label);
+      this.minimapDue.set(child.path, tokens > 0);
+    }
+  }
+
+  /** Show which arrows tokens have just gone along. @param {string} path @param {string} fired @param {number} now */
+  flashFired(path, fired, now) {
+    const transition = `${path}/${fired}`;
+    const arrows = [...this.arrows.values()].flat();
+    for (const { line, edge } of arrows)
+      if (edge.source === transition || (edge.link?.target === fired && containerOf(edge.source) === path)) {
+        line.classList.add("taken");
+        this.flashing.set(line, now + FLASH_MS);
+      }
   }
 
   /** The minimap follows a few times a second: drawing it at every event costs as much as the rest. */
@@ -483,6 +526,35 @@ function outcomePill(node, pill, x, y) {
     el("rect", place),
     el("text", centre, pill.outcome),
   );
+}
+
+/** Whether a box is no state, but a place or a transition of a plan. @param {StateNode} node */
+const isPartOfNet = ({ kind }) => kind === "transition" || kind.endsWith("place");
+
+/**
+ * How many tokens the places of a plan hold; those where an action runs, 1 while it does.
+ * @param {StateNode} plan
+ * @param {StateRun | undefined} state
+ */
+function tokensIn(plan, state) {
+  /** @type {Map<string, number>} */
+  const counts = new Map();
+  if (state?.marking) for (const place of state.marking) counts.set(place, (counts.get(place) ?? 0) + 1);
+  else for (const child of plan.children) counts.set(child.label, child.tokens ?? 0);
+  return (/** @type {string} */ label) => counts.get(label) ?? 0;
+}
+
+/**
+ * Which places a transition lacks tokens in, in words; "" for none.
+ * @param {StateNode} plan
+ * @param {StateNode} transition
+ * @param {(label: string) => number} tokensOf
+ */
+function lackOf(plan, transition, tokensOf) {
+  const inputs = plan.links.filter((link) => link.target === transition.label).map((link) => link.source);
+  const empty = plan.children.filter((child) => inputs.includes(child.label) && !tokensOf(child.label));
+  const places = empty.filter(isPartOfNet).map((child) => child.name);
+  return places.length ? `lacks tokens in ${places.join(", ")}` : "";
 }
 
 /** @param {Problem[]} problems */

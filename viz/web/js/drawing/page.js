@@ -196,7 +196,7 @@ export class Page {
     const live = store.cursor.value === null;
     for (const e of events) {
       this.changed.add(e.path);
-      if (live && (e.kind === "Left" || e.kind === "Failed")) this.flashes.push(e);
+      if (live && ["Left", "Failed", "Fired"].includes(e.kind)) this.flashes.push(e);
       if (live && events.length < BURST) this.arrived.push(e.stamp_ns / 1e6);
     }
     store.addEvents(events);
@@ -221,7 +221,9 @@ export class Page {
       const now = store.nowMs();
       for (const path of this.changed) this.#paint(path, store.run.now, now);
       this.changed.clear();
-      for (const e of this.flashes.splice(0)) this.diagram.flash(e.path, e.outcome ?? "exception", moment);
+      for (const e of this.flashes.splice(0))
+        if (e.kind === "Fired") this.diagram.flashFired(e.path, e.transition, moment);
+        else this.diagram.flash(e.path, e.outcome ?? "exception", moment);
       if (this.arrived.length) {
         this.painting.push(...this.arrived.splice(0));
         this.paintPort.port2.postMessage(0);
@@ -302,6 +304,7 @@ export class Page {
   #paint(path, data, now) {
     this.diagram.paintJoins(path, data.states);
     this.diagram.paintJoins(containerOf(path), data.states);
+    this.diagram.paintNet(path, data.states[path]);
     if (!this.diagram.states.has(path)) return;
     const goal = Object.values(data.goals).findLast((one) => one.path === path && one.ended == null);
     this.diagram.paint(path, data.states[path], now, goal, store.hasNoServer(goal));
@@ -318,6 +321,7 @@ export class Page {
       this.diagram.paint(path, data.states[path], now, goal, store.hasNoServer(goal));
     }
     for (const path of this.diagram.joins.keys()) this.diagram.paintJoins(path, data.states);
+    for (const path of this.diagram.boxes.keys()) this.diagram.paintNet(path, data.states[path]);
     const stops = store.facts.value?.control?.breakpoints ?? [];
     const pathsOf = (/** @type {typeof stops} */ some) => some.map(([path]) => path);
     this.diagram.mark(pathsOf(stops.filter(([, outcome]) => outcome === null)), "stopped");
