@@ -318,6 +318,18 @@ class IllegalTransitionError(ActionException):
         )
 
 
+class DurableGoalsError(ActionException):
+    """The file of a durable action server cannot be used; nothing in it was changed.
+
+    Attributes:
+        file: The file.
+    """
+
+    def __init__(self, file: str, problem: str) -> None:
+        self.file = file
+        super().__init__(f"{file}: {problem}")
+
+
 class ServerConflictError(ActionException):
     """Two action servers have one name; this one has stopped, so that no goal runs twice.
 

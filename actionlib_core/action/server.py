@@ -39,7 +39,9 @@ from actionlib_core.wire.ports import make_server_port
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
+    from actionlib_core.action._durable import GoalFile
     from actionlib_core.clock import Clock, Event, Timer
     from actionlib_core.goal.ports import ServerPort
     from actionlib_core.node import Node
@@ -58,7 +60,10 @@ GAP_PER_GOAL_S = 100e-6  # a long list is sent less often
 TEXT_STOPPED = "The action server was stopped"
 TEXT_CLIENT_LOST = "The client that sent this goal is gone"
 
+TEXT_RESTARTED = "The action server was restarted while it ran this goal"
+
 OnClientLost = Literal["continue", "cancel"]
+OnRestart = Literal["abort", "resume"]
 
 
 class ServerGoalHandle:
@@ -76,11 +81,12 @@ class ServerGoalHandle:
         record: See above.
         begun: The goal callback has begun with it.
         cancel_waits: It was asked to stop before that.
+        resumed: An earlier server, which was killed, had accepted it already.
 
     Threads: every method may be called from any thread and any callback.
     """
 
-    __slots__ = ("__weakref__", "_content", "_keeper", "begun", "cancel_waits", "record")
+    __slots__ = ("__weakref__", "_content", "_keeper", "begun", "cancel_waits", "record", "resumed")
 
     def __init__(self, keeper: GoalKeeper, record: ServerGoal, content: Any) -> None:
         self._keeper = keeper
@@ -88,6 +94,7 @@ class ServerGoalHandle:
         self.record = record
         self.begun = False
         self.cancel_waits = False
+        self.resumed = False
 
     @property
     def goal(self) -> Any:
@@ -307,6 +314,8 @@ class GoalKeeper:
         deliver_goal: Called with the handle of each new goal, on the network's thread.
         deliver_cancel: Called with the handle of each goal that is asked to stop, likewise.
         on_stopped: Called when the server has stopped by itself.
+        durable: The file in which the goals are kept, None for nowhere.
+        resumes: Goals that an earlier server had accepted are run again; else they are ABORTED.
 
     Attributes:
         lock: Guards the goals.
@@ -329,6 +338,8 @@ class GoalKeeper:
         deliver_goal: Callable[[ServerGoalHandle], object],
         deliver_cancel: Callable[[ServerGoalHandle], object],
         on_stopped: Callable[[], object],
+        durable: str | Path | None = None,
+        resumes: bool = False,
     ) -> None:
         self.node = node
         self.name = name
@@ -347,6 +358,67 @@ class GoalKeeper:
         self._on_stopped = on_stopped
         self._ids = GoalIDGenerator(f"/{node.full_name}", clock=node.clock)
         self._drained: Event | None = None
+        self._durable = durable
+        self._file: GoalFile | None = None
+        self._resumes = resumes
+
+    # -- what an earlier server left -----------------------------------------------------------
+
+    def restore(self) -> list[ServerGoalHandle]:
+        """Take over the goals in the file; return those that `settle` is to deal with.
+
+        Raises:
+            DurableGoalsError: it cannot be opened or read.
+        """
+        if self._durable is None:
+            return []
+        from actionlib_core.action._durable import GoalFile
+
+        self._file = GoalFile(self._durable, self.name, self.types)
+        goals, past = self._file.load(self._clock.time_ns() / 1e9)
+        now = self._clock.now()
+        handles = []
+        with self.lock:
+            for goal_id, status in past.items():
+                self.goals.restore_past(goal_id, status, now)
+            for kept in goals:
+                handle = ServerGoalHandle(self, kept.record, kept.content)
+                handle.resumed = kept.begun
+                kept.record.tag = handle
+                self.goals.restore(kept.record, now)
+                if kept.record.status not in TERMINAL:
+                    handles.append(handle)
+        return handles
+
+    def settle(self, handles: list[ServerGoalHandle]) -> None:
+        """Run, or end, the goals that an earlier server did not end.
+
+        One that was never accepted is as new. One that was asked to stop is not begun again.
+        """
+        for handle in handles:
+            record = handle.record
+            if record.status is Status.RECALLING:
+                self.finish(handle, "cancel", "the restart of its server", None, TEXT_RESTARTED)
+            elif record.status is Status.PREEMPTING or (handle.resumed and not self._resumes):
+                self.give_up(handle, TEXT_RESTARTED)
+            else:
+                with self.lock:
+                    record.status = Status.PENDING  # its server accepts it again
+                self._deliver_goal(handle)
+        if handles:
+            self.status.on_change()
+
+    def close_file(self) -> None:
+        """Keep nothing more."""
+        file, self._file = self._file, None
+        if file is not None:
+            file.close()
+
+    def _keep(self, record: ServerGoal) -> None:
+        """Write down how a goal stands, before anybody is told of it."""
+        file = self._file
+        if file is not None:
+            file.update(record, self._clock.time_ns() / 1e9)
 
     # -- what the server's code does -----------------------------------------------------------
 
@@ -356,6 +428,7 @@ class GoalKeeper:
         with self.lock:
             now = self._clock.now()
             self.goals.step(handle.record, "accept", "set_accepted()", now, text)
+        self._keep(handle.record)
         self.port.send_accepted(handle.record.entry())
         self.status.on_change()
 
@@ -364,6 +437,7 @@ class GoalKeeper:
         with self.lock:
             changed = self.goals.request_cancel(handle.record)
         if changed:
+            self._keep(handle.record)
             self.status.on_change()
         return changed
 
@@ -400,6 +474,7 @@ class GoalKeeper:
             self.goals.step(record, event, call, self._clock.now(), text)
             record.result = body
             stopped = self.stopped
+        self._keep(record)
         if not stopped:
             self.port.send_result(record.entry(), body, wait=wait)
             self.status.on_change()
@@ -512,6 +587,7 @@ class GoalKeeper:
         try:
             self.port.close()
         finally:
+            self.close_file()
             self.left.set()
 
     # -- what arrives (on the network's thread) ------------------------------------------------
@@ -536,7 +612,15 @@ class GoalKeeper:
             if arrival is Arrival.RECALLED:
                 record.result = self._pack_result(None, "the cancel that came first")
             past = None if known is not None else self.goals.past_status(goal_id)
+        unkept = None
+        file = self._file
+        if file is not None and arrival in {Arrival.NEW, Arrival.RECALLED}:
+            unkept = file.add(record, content)
         if arrival is Arrival.NEW:
+            if unkept is not None:  # it could be run twice: better not at all
+                log.error("goal %s on '%s' cannot be kept: %s", goal_id, self.name, unkept)
+                self.finish(handle, "reject", "its file", None, unkept, wait=False)
+                return True
             self._deliver_goal(handle)
             return True
         if known is None:
@@ -573,6 +657,7 @@ class GoalKeeper:
 
     def _cancel(self, asked: list[ServerGoal]) -> None:
         for goal in asked:
+            self._keep(goal)
             if isinstance(goal.tag, ServerGoalHandle):
                 self._deliver_cancel(goal.tag)
         self.status.on_change()
@@ -583,6 +668,9 @@ class GoalKeeper:
             self.goals.on_acknowledged(goal_ids, self._clock.now())
             if self._drained is not None and self._is_drained():
                 self._drained.set()
+        file = self._file
+        if file is not None:
+            file.forget(goal_ids, self._clock.time_ns() / 1e9)
 
     def on_conflict(self, error: ServerConflictError) -> None:
         """Leave the name to the older server."""
@@ -632,6 +720,11 @@ class ActionServer:
         result_timeout: How long a result waits for a client that lost its link [s]; 0 or more.
         direct: The callbacks take no time and may be called on the network's thread.
         on_stopped: Called when the server has stopped by itself; must take no time either.
+        durable: A file in which goals and results survive the end of the process; servers may share
+            one. None: they are in memory only.
+        on_restart: With `durable`, what becomes of a goal that was accepted when the process was
+            killed: "abort" ends it ABORTED, with the reason; "resume" calls `goal_cb` again, whose
+            handle is `resumed`. A goal that was not yet accepted is as new with both.
 
     Attributes:
         lock: Guards the server's data. Holding it keeps goals as they are; never wait with it.
@@ -641,6 +734,7 @@ class ActionServer:
         ActionException: `ActionSpec` is not an action class.
         ActionlibError: a callback is no function, or `result_timeout` no length of time.
         InvalidNameError: the name breaks the ROS rules.
+        DurableGoalsError: the file cannot be used (from `start`).
         ServerConflictError: the name has a server already (from `start`).
         TransportError: the network session is closed.
 
@@ -662,7 +756,13 @@ class ActionServer:
         result_timeout: float | Duration = RESULT_TIMEOUT_S,
         direct: bool = False,
         on_stopped: Callable[[], object] | None = None,
+        durable: str | Path | None = None,
+        on_restart: OnRestart = "abort",
     ) -> None:
+        if on_restart not in {"abort", "resume"}:
+            raise ActionException(
+                f"action {ns!r}: on_restart: got {on_restart!r}; expected 'abort' or 'resume'."
+            )
         if on_client_lost not in {"continue", "cancel"}:
             raise ActionException(
                 f"action {ns!r}: on_client_lost: got {on_client_lost!r}; "
@@ -687,6 +787,8 @@ class ActionServer:
             deliver_goal=goal_cb if direct else self._deliver_goal,
             deliver_cancel=cancel_cb if direct else self._deliver_cancel,
             on_stopped=self._note_stopped,
+            durable=durable,
+            resumes=on_restart == "resume",
         )
         self._on_stopped = on_stopped
         self.lock = self.keeper.lock
@@ -724,7 +826,13 @@ class ActionServer:
 
     def initialize(self) -> None:
         """Declare the action's keys; `start` does it."""
-        self.keeper.port.open(self.keeper)
+        try:
+            kept = self.keeper.restore()
+            self.keeper.port.open(self.keeper)
+        except BaseException:
+            self.keeper.close_file()
+            raise
+        self.keeper.settle(kept)
 
     def stop(self) -> None:
         """End all goals (ABORTED, or REJECTED when not yet accepted) and leave the name.

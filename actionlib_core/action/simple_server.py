@@ -6,7 +6,7 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core._arguments import check_delay, check_function
-from actionlib_core.action.server import TEXT_STOPPED, ActionServer, OnClientLost
+from actionlib_core.action.server import TEXT_STOPPED, ActionServer, OnClientLost, OnRestart
 from actionlib_core.exceptions import ActionException
 from actionlib_core.goal.server import FUTURE_NS, RESULT_TIMEOUT_S
 from actionlib_core.goal.single import ANNOUNCE, Policy, SingleGoal
@@ -14,6 +14,7 @@ from actionlib_core.goal.states import TERMINAL, Status
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
     from actionlib_core.action.server import ServerGoalHandle
     from actionlib_core.clock import Event, Task
@@ -53,6 +54,10 @@ class SimpleActionServer:
         on_client_lost: What happens to the goal of a client that died: "continue" as in ROS, or
             "cancel", as if the client had cancelled it.
         result_timeout: How long a result waits for a client that lost its link [s]; 0 or more.
+        durable: A file in which goals and results survive the end of the process; see
+            `ActionServer`.
+        on_restart: With `durable`, what becomes of a goal that ran when the process was killed:
+            "abort" ends it ABORTED, with the reason; "resume" runs it again: `is_resumed` tells.
 
     Attributes:
         action_server: The `ActionServer` beneath.
@@ -80,6 +85,8 @@ class SimpleActionServer:
         policy: Policy = "preempt",
         on_client_lost: OnClientLost = "continue",
         result_timeout: float | Duration = RESULT_TIMEOUT_S,
+        durable: str | Path | None = None,
+        on_restart: OnRestart = "abort",
     ) -> None:
         check_function(f"action {name!r}", "execute_cb", execute_cb)
         self.execute_callback = execute_cb
@@ -102,6 +109,8 @@ class SimpleActionServer:
             result_timeout=result_timeout,
             direct=True,
             on_stopped=self._ask_to_stop,
+            durable=durable,
+            on_restart=on_restart,
         )
         self._keeper = self.action_server.keeper
         self._clock = self.action_server.node.clock
@@ -332,6 +341,11 @@ class SimpleActionServer:
                 "accepted."
             )
         goal.publish_feedback(feedback)
+
+    def is_resumed(self) -> bool:
+        """Tell whether an earlier process had begun the current goal already."""
+        goal = self._policy.current
+        return goal is not None and goal.resumed
 
     def get_default_result(self) -> Any:
         """Return a new result message with default values."""

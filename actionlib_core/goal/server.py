@@ -219,6 +219,19 @@ class ServerGoals:
         if goal.status not in TERMINAL:
             goal.listed_until = now + LISTED_S
 
+    def restore(self, goal: ServerGoal, now: float) -> None:
+        """Track a goal that an earlier server of this name had taken."""
+        self._goals[goal.id] = goal
+        if goal.status in TERMINAL:
+            goal.listed_until = now + LISTED_S
+            goal.kept_until = now + self.result_timeout
+
+    def restore_past(self, goal_id: str, status: int, now: float) -> None:
+        """Remember how a goal of an earlier server ended, so that a late copy of it is dropped."""
+        if goal_id not in self._past:
+            self._past[goal_id] = (status, now, True)
+            self._oldest.append(goal_id)
+
     def close(self) -> None:
         """Take no more goals."""
         self.closed = True
