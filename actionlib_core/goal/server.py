@@ -221,7 +221,7 @@ class ServerGoals:
 
     def restore(self, goal: ServerGoal, now: float) -> None:
         """Track a goal that an earlier server of this name had taken."""
-        self._goals[goal.id] = goal
+        self.tracked[goal.id] = goal
         if goal.status in TERMINAL:
             goal.listed_until = now + LISTED_S
             goal.kept_until = now + self.result_timeout
