@@ -7,6 +7,7 @@ network, time and callbacks together, under one lock.
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 import threading
@@ -62,6 +63,7 @@ TICK_S = 0.05  # repetitions and acknowledgements due within this time go out to
 ACK_AT = 64  # or as soon as so many acknowledgements wait
 REMEMBERED = 1024  # ids of ended goals whose result may come again
 FEEDBACK_S = 0.5  # a feedback callback that takes longer after the goal's end gets no more feedback
+ABSENT_S = 3.0  # who has waited so long for a server is told where it was looked for
 CALLBACKS_S = 1.0  # waiting for a goal's end waits no longer for callbacks that do not return
 
 UNSURE = " and had not acknowledged the goal, which may or may not have begun"
@@ -413,10 +415,20 @@ class GoalManager:
         Blocks: until then or until the client is stopped, `timeout` [s] at most; None: no limit,
             but until the program is to end.
         """
-        deadline = None if timeout is None else self.clock.now() + timeout
+        started = self.clock.now()
+        if timeout is None or timeout > ABSENT_S + 1.0:  # looking around takes up to a second
+            if self._await_server(started + ABSENT_S, ends=timeout is None):
+                return True
+            if not (self._closed or (timeout is None and current_shutdown().requested())):
+                self._tell_absence()
+        deadline = None if timeout is None else started + timeout
+        return self._await_server(deadline, ends=timeout is None)
+
+    def _await_server(self, deadline: float | None, *, ends: bool) -> bool:
+        """Wait for a server until `deadline` [s, clock]; `ends`: or until the program is to end."""
         changed = self.clock.event()
         ending = current_shutdown()
-        forget = ending.on_shutdown(changed.set) if timeout is None else None
+        forget = ending.on_shutdown(changed.set) if ends else None
         try:
             while True:
                 with self.lock:
@@ -431,7 +443,7 @@ class GoalManager:
                     if changed not in self._waiters:
                         self._waiters.append(changed)
                 left = None if deadline is None else deadline - self.clock.now()
-                over = ending.requested() if left is None else left <= 0
+                over = (ends and ending.requested()) or (left is not None and left <= 0)
                 if over or (not changed.wait(left) and left is not None):
                     with self.lock:
                         if changed in self._waiters:
@@ -440,6 +452,13 @@ class GoalManager:
         finally:
             if forget is not None:
                 forget()
+
+    def _tell_absence(self) -> None:
+        """Say where a server was looked for in vain, where the network knows more of it."""
+        with contextlib.suppress(TransportError):  # the session is closed: the wait ends with it
+            why = self.port.explain_absence()
+            if why:
+                log.warning("action '%s': no server after %g s: %s", self.name, ABSENT_S, why)
 
     def begin(self, handle: ClientGoalHandle) -> None:
         """Follow a goal: send it, or ask for one that was sent before.

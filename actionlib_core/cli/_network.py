@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import os
+import sys
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from actionlib_core.cli import UsageError
-from actionlib_core.cli._ros2 import is_ros2, merged, typed, watching
+from actionlib_core.cli._ros2 import explain_absence, is_ros2, merged, typed, watching
 from actionlib_core.exceptions import InterfaceError
 from actionlib_core.output import tell
 from actionlib_core.suggest import did_you_mean
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from actionlib_core.transport import Presence, Reply
     from actionlib_core.wire.presence import Endpoint
 
+ABSENT_S = 3.0  # who waits longer for an action server is told where it is looked for
 FIND_S = 2.0  # a name that is not there then may still come within this: a busy machine is slow
 ASK_S = 2.0
 
@@ -114,10 +116,17 @@ def find_by_name(
     watch = node.transport.watch_alive(token_pattern(None, full), on_presence)
     try:
         with watching(node, on_end):
+            if timeout is None and Kind.ACTION_SERVER in kinds and not came.wait(ABSENT_S):
+                _tell_absence(node, full)
             came.wait(timeout)
     finally:
         watch.close()
     return there() or late
+
+
+def _tell_absence(node: Node, full: str) -> None:
+    if why := explain_absence(node, full):
+        print(f"actionlib: action '/{full}': no server yet: {why}", file=sys.stderr)
 
 
 def find_ends(
@@ -139,6 +148,8 @@ def find_ends(
             missing = "got no server" + ("" if timeout is None else f" within {timeout:g} s")
             way_out = f"Try 'actionlib {listing}', or start its server."
         there = which_there_are(full, list_names(node, kinds))
+        if what == "action" and (why := explain_absence(node, full)):
+            there, way_out = "expected one.", f"{why[0].upper()}{why[1:]}"
         raise UsageError(f"{what} '/{full}': {missing}; {there} {way_out}")
     return found
 

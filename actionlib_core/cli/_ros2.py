@@ -6,7 +6,7 @@ import contextlib
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.cli import UsageError
-from actionlib_core.exceptions import InterfaceError
+from actionlib_core.exceptions import ConfigError, InterfaceError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
@@ -64,6 +64,25 @@ def watching(node: Node, on_end: Callable[[Endpoint], object]) -> Iterator[None]
         for watch in _ends().watch_ends(node, on_change) if node.config.ros2 else ():
             stack.callback(watch.close)
         yield
+
+
+def explain_absence(node: Node, full: str) -> str:
+    """Return where the server of an action was looked for in vain on ROS 2, and what to try.
+
+    "" without a network of ROS 2 that may have the name. Blocks: as `list_ros2_ends`.
+    """
+    if not node.config.ros2:
+        return ""
+    from actionlib_core.wire.ros2 import diagnosis
+    from actionlib_core.wire.ros2.network import ros_network
+
+    try:
+        network = ros_network(node, full)
+    except ConfigError:  # the name is on none of them
+        return ""
+    settings, there = network.settings, network.name(full)
+    others = network.ros.list_others()
+    return diagnosis.explain_absence(there, others, settings.domain, settings.router)
 
 
 def subscribe_to_bytes(node: Node, full: str, callback: Callable[[Sample], None]) -> list[Closable]:

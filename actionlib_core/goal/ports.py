@@ -59,6 +59,12 @@ class ClientPort(Protocol):
     def is_heard(self) -> bool:
         """Return whether anybody listens for goals."""
 
+    def explain_absence(self) -> str:
+        """Return why there may be no server and what to try; "" when nothing is known of it.
+
+        Blocks: until the network has said who there is, 1 s at most.
+        """
+
     def pack_goal(self, goal: Any) -> bytes:
         """Return the bytes of a goal message.
 

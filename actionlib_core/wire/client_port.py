@@ -111,6 +111,9 @@ class ActionClientPort:
     def is_heard(self) -> bool:
         return self._goals.matching()
 
+    def explain_absence(self) -> str:
+        return ""
+
     def pack_goal(self, goal: Any) -> bytes:
         body: bytes = goal.to_bytes()
         return body

@@ -22,9 +22,10 @@ _SAME_PLACE = 0.05  # [m] a goal this near to a named waypoint has its name
 class TrackRecorder:
     """Listens to a mission and can draw its track; for `machine.subscribe(recorder.on_event)`.
 
-    The track is made of the poses that `move_base` reports as feedback, and other actions whose
-    feedback has a field `base_position`. A goal is named after the waypoint that a state wrote to
-    userdata, that is anything with a `name` and a `pose`, else after the state that sent it.
+    The track is made of the poses that `move_base` and Nav2 report as feedback, and other actions
+    whose feedback has a field `base_position` or `current_pose`. A goal is named after the waypoint
+    that a state wrote to userdata, that is anything with a `name` and a `pose`, else after the
+    state that sent it.
 
     Threads: `on_event` may be called from any thread.
 
@@ -101,7 +102,7 @@ class TrackRecorder:
         dock = getattr(event.goal, "dock", None)
         if dock is not None:
             self._docks[dock.position.x, dock.position.y] = _pose(dock)
-        target = getattr(event.goal, "target_pose", None)
+        target = _find_place(event.goal, "target_pose", "pose")
         if target is not None and target.header.frame_id.removeprefix("/") == "map":
             label = event.path.rpartition("/")[2].replace("_", " ").lower()
             self._goals[event.goal_id] = _pose(target.pose), label, False
@@ -114,7 +115,7 @@ class TrackRecorder:
             self._lost.add(_robot(event.action))
 
     def _on_feedback(self, robot: str, feedback: Any) -> None:
-        base = getattr(feedback, "base_position", None)
+        base = _find_place(feedback, "base_position", "current_pose")
         if base is not None:
             track = self.tracks.setdefault(robot, [])
             place = (base.pose.position.x, base.pose.position.y)
@@ -131,6 +132,15 @@ class TrackRecorder:
 def _robot(action: str) -> str:
     """Return what stands in front of an action's name: the robot's."""
     return action.lstrip("/").rpartition("/")[0]
+
+
+def _find_place(message: Any, *fields: str) -> Any:
+    """Return the PoseStamped in the first of some fields: those of move_base and of Nav2."""
+    for field in fields:
+        place = getattr(message, field, None)
+        if hasattr(place, "header") and hasattr(place, "pose"):
+            return place
+    return None
 
 
 def _pose(message: Any) -> Pose2D:

@@ -32,6 +32,7 @@ from actionlib_core.wire.ros2.action_messages import (
     unpack_with_id,
 )
 from actionlib_core.wire.ros2.attachment import unpack_attachment
+from actionlib_core.wire.ros2.diagnosis import explain_absence
 from actionlib_core.wire.ros2.goal_exchange import GoalExchange, Step
 from actionlib_core.wire.ros2.goal_states import CancelCode
 from actionlib_core.wire.ros2.graph import ActionServers
@@ -236,6 +237,11 @@ class RosClientPort:
 
     def is_heard(self) -> bool:
         return any(error is None for error in self._there.values())
+
+    def explain_absence(self) -> str:
+        settings = self._network.settings
+        others = self._network.ros.list_others()
+        return explain_absence(self._servers.name, others, settings.domain, settings.router)
 
     def pack_goal(self, goal: Any) -> bytes:
         body: bytes = self._on_ros2.to_goal(goal).to_cdr()

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from actionlib_core.exceptions import InterfaceError
 from actionlib_core.interfaces import ros2
+from actionlib_core.suggest import did_you_mean
 from actionlib_core.wire.ros2.names import (
     HASH_NOT_SUPPORTED,
     Kind,
@@ -77,10 +78,38 @@ def diagnose_nodes(tokens: Iterable[Token], domain: int) -> Finding:
     return Finding(
         Level.PROBLEM,
         "nodes",
-        "none in any domain, though the router answers",
+        "none in any domain",
         "Is RMW_IMPLEMENTATION=rmw_zenoh_cpp set where they are started, and do they use this "
         "router? A node of another middleware does not show here.",
     )
+
+
+def explain_absence(action: str, tokens: Iterable[Token], domain: int, router: str) -> str:
+    """Return where the server of an action was looked for in vain, who is there, and what to try.
+
+    Args:
+        action: Its full name there.
+        tokens: Of all domains, without our own.
+        domain: The one that is used.
+        router: Its endpoint; "" for the network that the program has joined anyway.
+    """
+    tokens = list(tokens)
+    nodes = diagnose_nodes(tokens, domain)
+    where = f"router {router}" if router else "the program's own network"
+    said = f"looked at {where} in domain {domain}: "
+    if nodes.level is not Level.OK:
+        return f"{said}nodes: {nodes.text}. {nodes.way_out}"
+    names = {
+        action_of(token.name)
+        for token in tokens
+        if token.domain == domain and token.kind is Kind.PUBLISHER
+    }
+    served = sorted(f"/{name}" for name in names if name is not None)
+    if f"/{action}" in served:
+        return f"{said}its server shows only a part of it, and is just starting or hangs."
+    if not served:
+        return f"{said}{nodes.text}, and no action has a server. Is it started?"
+    return f"{said}actions: {_listed(served)}.{did_you_mean(f'/{action}', served)}"
 
 
 def diagnose_types(tokens: Iterable[Token], distro: str) -> list[Finding]:
@@ -255,4 +284,5 @@ __all__ = [
     "diagnose_nodes",
     "diagnose_qos",
     "diagnose_types",
+    "explain_absence",
 ]

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from actionlib_core.wire.ros2.attachment import Numbering
 from actionlib_core.wire.ros2.names import (
     DEFAULT,
+    ROOT,
     Kind,
     Token,
     action_names,
@@ -205,6 +206,12 @@ class RosNode:
         keys = self.transport.list_alive(token_pattern(self.domain, kind, name=name), timeout)
         found = (parse_token(key) for key in sorted(keys))
         return [token for token in found if token is not None]
+
+    def list_others(self, timeout: float = LIST_TIMEOUT_S) -> list[Token]:
+        """Return the tokens of other sessions, in every domain; blocks as `list`."""
+        found = (parse_token(key) for key in self.transport.list_alive(f"{ROOT}/**", timeout))
+        own = self.token.session
+        return [token for token in found if token is not None and token.session != own]
 
 
 class RosServer(NamedTuple):

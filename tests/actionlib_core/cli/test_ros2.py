@@ -175,3 +175,32 @@ def test_the_bytes_of_a_topic(robot):
     assert robot("topic", "echo", "chatter", "--once") == 'data: "hello"\n---\n'
     end.close()
     publisher.close()
+
+
+def test_action_that_is_not_there_is_told_with_what_is(robot):
+    robot.action.show()
+    said = robot("info", "arm/fibb", code=2)
+    assert "domain 42: actions: /arm/fib. Did you mean '/arm/fib'?" in said
+
+
+def test_other_domain_is_told_with_the_one_that_has_nodes(robot):
+    other = RosNode(robot.session, robot.clock, domain=7, full_name="other")
+    other.show()
+    robot.action.close()
+    assert "Try --domain 7" in robot("info", "arm/fib", code=2)
+    other.close()
+
+
+def test_who_waits_for_a_server_without_limit_is_told_where_it_is_looked_for(robot):
+    robot.action.close()
+    late = []
+
+    def appear():
+        late.append(Ros2Server(robot.session, robot.clock, "arm/late", Fibonacci, domain=42))
+        late[0].on_goal = late[0].refuse
+
+    timer = robot.clock.call_later(10.0, appear)
+    said = robot("send_goal", "arm/late", "{order: 3}", code=1)
+    timer.cancel()
+    assert said.count("no server yet: looked at the program's own network in domain 42") == 1
+    late[0].close()

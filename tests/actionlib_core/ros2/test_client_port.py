@@ -602,3 +602,16 @@ def test_question_for_the_result_of_a_long_goal_is_asked_again(world):
     assert handle.get_goal_status() == Status.SUCCEEDED
     assert server.sent == [uuid]
     assert server.problems == []
+
+
+def test_who_waits_for_a_server_is_told_once_where_it_was_looked_for(world, caplog):
+    world.server(domain=7)
+    client = ActionClient("fib", Fibonacci, node=world.mission)
+    start = world.clock.now()
+    assert not client.wait_for_server(20.0)
+    assert world.clock.now() - start == pytest.approx(20.0)
+    (record,) = [r for r in caplog.records if "no server after" in r.message]
+    assert "Try --domain 7" in record.message
+    caplog.clear()
+    assert not client.wait_for_server(2.0)
+    assert caplog.records == []

@@ -13,6 +13,7 @@ from actionlib_core.wire.ros2.diagnosis import (
     diagnose_nodes,
     diagnose_qos,
     diagnose_types,
+    explain_absence,
 )
 from actionlib_core.wire.ros2.names import (
     DEFAULT,
@@ -114,3 +115,19 @@ def test_nodes_that_do_not_answer():
 
 def test_humble_is_told_by_its_hashes():
     assert {token.type_hash for token in action(distro="humble")} == {HASH_NOT_SUPPORTED}
+
+
+def test_absence_is_explained_by_what_is_there():
+    there = [
+        end(Kind.PUBLISHER, name, "a/msg/B", domain=3)
+        for name in ("odom", "spin/_action/status", "dock/_action/status")
+    ]
+    router = "tcp/robot.local:7447"
+    said = explain_absence("spinn", there, 3, router)
+    assert said.startswith(f"looked at router {router} in domain 3: ")
+    assert "/dock, /spin" in said
+    assert "'/spin'?" in said
+    assert "--domain 3" in explain_absence("spin", there, 0, router)
+    assert "only a part" in explain_absence("spin", there, 3, router)
+    assert "no action" in explain_absence("spin", there[:1], 3, "")
+    assert "RMW_IMPLEMENTATION" in explain_absence("spin", [], 0, router)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -137,6 +138,7 @@ def test_the_needed_servers_are_those_of_the_action_states():
 def test_the_recorder_names_goals_after_waypoints_else_after_states():
     from actionlib_core.interfaces.geometry_msgs.msg import PoseStamped
     from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseFeedback
+    from actionlib_core.interfaces.nav2_msgs.action import NavigateToPose
 
     recorder = TrackRecorder()
     assert not recorder.has_goals
@@ -151,6 +153,11 @@ def test_the_recorder_names_goals_after_waypoints_else_after_states():
         pose = PoseStamped()
         pose.pose.position.x = x
         recorder.on_event(ev.GoalFeedback(*head, "move_base", "g1", MoveBaseFeedback(pose)))
+    nav = NavigateToPose.Feedback()
+    nav.current_pose.pose.position.x = 1.5
+    recorder.on_event(ev.GoalFeedback(*head, "r/navigate_to_pose", "g5", nav))
+    recorder.on_event(ev.GoalFeedback(*head, "r/other", "g6", SimpleNamespace(current_pose=1)))
+    assert recorder.tracks.pop("r") == [(1.5, 0.0)]
     recorder.on_event(ev.GoalDone(*head, "move_base", "g1", "SUCCEEDED", ""))
     recorder.on_event(ev.GoalDone(*head, "move_base", "g2", "ABORTED", ""))
     assert recorder.has_goals
