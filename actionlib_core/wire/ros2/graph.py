@@ -192,6 +192,12 @@ class RosNode:
             raise
         return watches
 
+    def list_others(self, timeout: float = LIST_TIMEOUT_S) -> list[Token]:
+        """Return the tokens of other sessions, in every domain; blocks as `list`."""
+        found = (parse_token(key) for key in self.transport.list_alive(f"{ROOT}/**", timeout))
+        own = self.token.session
+        return [token for token in found if token is not None and token.session != own]
+
     def list(
         self,
         *,
@@ -206,12 +212,6 @@ class RosNode:
         keys = self.transport.list_alive(token_pattern(self.domain, kind, name=name), timeout)
         found = (parse_token(key) for key in sorted(keys))
         return [token for token in found if token is not None]
-
-    def list_others(self, timeout: float = LIST_TIMEOUT_S) -> list[Token]:
-        """Return the tokens of other sessions, in every domain; blocks as `list`."""
-        found = (parse_token(key) for key in self.transport.list_alive(f"{ROOT}/**", timeout))
-        own = self.token.session
-        return [token for token in found if token is not None and token.session != own]
 
 
 class RosServer(NamedTuple):
