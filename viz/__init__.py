@@ -11,7 +11,7 @@ Reads nothing but introspection records (`smachpy.introspection`) and events (`s
     viz.render(machine, "run.svg", run=history)  # with what the run visited and took
 
 `render` and `picture` draw one picture, `atlas` one page per container, `svg` the text a notebook
-shows. `TerminalView` shows a run while it happens.
+shows. `TerminalView` shows a run while it happens, `MachineWidget` does so in a notebook.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from viz.model.extract import UnknownPathError as UnknownPathError
     from viz.model.history import History as History
+    from viz.notebook import MachineWidget as MachineWidget
     from viz.pictures.drawing import PictureError as PictureError
     from viz.pictures.drawing import atlas as atlas
     from viz.pictures.drawing import picture as picture
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 __all__ = [
     "EngineError",
     "History",
+    "MachineWidget",
     "PictureError",
     "TerminalView",
     "UnknownPathError",
@@ -44,6 +46,7 @@ __all__ = [
 _HOMES = {
     "EngineError": "viz.pictures.graphviz_process",
     "History": "viz.model.history",
+    "MachineWidget": "viz.notebook",
     "PictureError": "viz.pictures.drawing",
     "TerminalView": "viz.terminal.panel",
     "UnknownPathError": "viz.model.extract",

@@ -23,6 +23,7 @@ EXTRAS: Final = {
     "mcap": "mcap",
     "cronsim": "cron",
     "psycopg": "postgres",
+    "anywidget": "notebook",
 }
 OWN_PACKAGES: Final = ("actionlib_core", "viz", "missions")
 """Top-level packages that are installed beside `smachpy`."""

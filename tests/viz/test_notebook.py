@@ -1,0 +1,123 @@
+"""The widget that shows a machine in a notebook: with real drawing, and its script in a browser."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import threading
+import time
+
+import pytest
+
+import viz
+from smachpy import CBState, State, StateMachine
+from viz.pictures.drawing import PictureError
+
+pytest.importorskip("anywidget")
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+
+
+class Held(State):
+    """Runs until it is let go."""
+
+    def __init__(self):
+        super().__init__(outcomes=["done", "preempted"])
+        self.go_on = threading.Event()
+
+    def execute(self, userdata):
+        self.go_on.wait(30.0)
+        return "done"
+
+
+@pytest.fixture
+def machine():
+    sm = StateMachine(outcomes=["done", "preempted"], name="JOB")
+    with sm:
+        StateMachine.add("FIRST", CBState(lambda _: "ok", outcomes=["ok"]), {"ok": "HELD"})
+        StateMachine.add("HELD", Held())
+    return sm
+
+
+@pytest.fixture
+def widget(machine):
+    widget = viz.MachineWidget(machine, interval=0.01)
+    yield widget
+    widget.close()
+
+
+def wait_for(condition, timeout=30.0):
+    deadline = time.monotonic() + timeout
+    while not condition():
+        assert time.monotonic() < deadline
+        threading.Event().wait(0.02)
+
+
+def test_it_follows_a_run_and_says_how_it_ended(machine, widget):
+    assert widget.status == "not started"
+    before = widget.picture
+    assert before.startswith(("<?xml", "<svg"))
+    runner = threading.Thread(target=machine.execute)
+    runner.start()
+    try:
+        wait_for(lambda: widget.status == "running: HELD" and widget.picture != before)
+        during = widget.picture
+    finally:
+        machine["HELD"].go_on.set()
+        runner.join(30.0)
+    wait_for(lambda: widget.status.startswith("ended: done after "))
+    wait_for(lambda: widget.picture != during)
+
+
+def test_after_its_close_it_follows_nothing(machine):
+    widget = viz.MachineWidget(machine)
+    widget.close()
+    widget.close()
+    machine["HELD"].go_on.set()
+    machine.execute()
+    assert widget.status == "not started"
+
+
+def test_a_picture_that_cannot_be_drawn_stops_no_machine(machine, widget, monkeypatch):
+    def fails(*_args, **_options):
+        raise PictureError("no dot any more")
+
+    monkeypatch.setattr("viz.notebook.picture", fails)
+    machine["HELD"].go_on.set()
+    assert machine.execute() == "done"
+    wait_for(lambda: widget.status == "no dot any more")
+
+
+@pytest.mark.parametrize("interval", [0.0, -1.0, math.nan, math.inf])
+def test_an_interval_that_is_no_time_is_refused(machine, interval):
+    with pytest.raises(PictureError, match="interval: got"):
+        viz.MachineWidget(machine, interval=interval)
+
+
+@pytest.mark.browser
+def test_its_script_shows_the_picture_and_follows(machine, widget):
+    if CHROMIUM is None:
+        pytest.skip("needs a browser; try: apt-get install chromium")
+    from playwright.sync_api import sync_playwright
+
+    facts = {"picture": widget.picture, "status": "<b>running</b>"}
+    script = widget._esm.replace("export default", "window.widget =")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        try:
+            page = browser.new_page()
+            page.set_content(f"<div id='el'></div><script>{script}</script>")
+            page.evaluate(
+                """(facts) => { const on = {}; window.changed = (name, value) => { facts[name] = value;
+                on[`change:${name}`]?.(); }; const model = { get: (name) => facts[name], off() {},
+                on: (name, f) => { on[name] = f; } };
+                window.widget.render({ model, el: document.getElementById("el") }); }""",
+                facts,
+            )
+            page.wait_for_function("document.querySelector('img').naturalWidth > 50")
+            assert page.text_content("p") == "<b>running</b>"
+            page.evaluate(f"changed('status', {json.dumps('ended: done')})")
+            assert page.text_content("p") == "ended: done"
+        finally:
+            browser.close()
