@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import contextlib
 import copy
-import io
 from typing import TYPE_CHECKING, Any, Protocol
 
 from actionlib_core.exceptions import ActionlibError
 from actionlib_core.suggest import did_you_mean
+from actionlib_core.yaml_text import load_yaml
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
@@ -173,7 +173,7 @@ def read_file(path: Path) -> dict[Any, Any]:
         ParameterFileError: it cannot be read, or is no dict.
     """
     try:
-        values = read_yaml(path.read_text(encoding="utf-8"))
+        values = load_yaml(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise ParameterFileError(path, f"{error}") from error
     if values is None:
@@ -181,21 +181,6 @@ def read_file(path: Path) -> dict[Any, Any]:
     if not isinstance(values, dict):
         raise ParameterFileError(path, f"got {values!r:.60}; expected a dict of parameters.")
     return values
-
-
-def read_yaml(text: str) -> Any:
-    """Return the value of a YAML text, as `_name:=value` has it on a command line.
-
-    Raises:
-        ValueError: it is no YAML.
-    """
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
-
-    try:
-        return YAML(typ="safe", pure=True).load(io.StringIO(text))
-    except YAMLError as error:
-        raise ValueError(f"got no YAML: {error}") from error
 
 
 def _clean(name: str) -> str:

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, Final
 from actionlib_core import shutdown
 from actionlib_core.clock import Deadlock, current_clock
 from actionlib_core.node import get_node
+from actionlib_core.yaml_text import load_yaml
 from smachpy.ros1.names.rospy.exceptions import ROSException, ROSInitException
-from smachpy.ros1.parameters import read_yaml
 from smachpy.ros1.session import session
 
 if TYPE_CHECKING:
@@ -119,7 +119,7 @@ def _set_private_parameters(argv: Sequence[str]) -> None:
         key, sign, value = word.partition(":=")
         if sign and re.fullmatch(r"_[A-Za-z]\w*", key):
             try:
-                parsed = read_yaml(value)
+                parsed = load_yaml(value)
             except ValueError:
                 parsed = value
             session().parameters.set(resolve_name(f"~{key[1:]}"), parsed)
