@@ -63,8 +63,7 @@ class Recorder:
         self._shift_ns = shift_ns
         self._run: Run | None = None
         self._root = f"/{machine.name or 'SM_ROOT'}"
-        visits = journal.position.visits
-        self._resume: dict[str, dict[str, Any]] = copy.deepcopy(visits) if goes_on else {}
+        self._resume: dict[str, dict[str, Any]] = {}  # visits that have not gone on yet
         self._now: dict[str, dict[str, Any]] = {}  # those of them that go on now
         preempts = journal.position.data["preempts"] if goes_on else []
         self._preempts = [one for one in preempts if one["source"] not in OF_PROCESS]
@@ -185,8 +184,9 @@ class Recorder:
         run.journal = self
         run.watched = run.careful = True
         if self._goes_on:
-            self._now[self._root] = self._resume.pop(self._root)
             self._write("Recovered", self._root, shift_ns=self._shift_ns)
+            self._resume = copy.deepcopy(self._journal.position.visits)
+            self._now[self._root] = self._resume.pop(self._root)
             return
         with self._journal.lock:
             facts: dict[str, Any] = {"in": "", "userdata": {}}

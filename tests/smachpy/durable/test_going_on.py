@@ -1,0 +1,415 @@
+"""What a mission that goes on does with states, goals, deadlines, changed machines and bad journals."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+import smachpy
+from actionlib_core.clock import VirtualClock, use_clock
+from smachpy import Concurrence, InvalidStateError, NotDurableError, State, StateMachine, events
+from smachpy.durable.journal import read_position
+from smachpy.durable.mission import MachineChangedError, OutageError
+from smachpy.durable.store import FencedError, StoreError
+from smachpy.exceptions import MissionError
+from smachpy.run.origin import asking
+from tests.smachpy.durable.killing_store import Kill, KillingStore
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+class Doing(State):
+    """Executes a function; kills its process when that says so."""
+
+    def __init__(self, do: Callable[[State, Any], str], **options: Any) -> None:
+        super().__init__(["ok", "skipped", "late"], io_keys=["value"], **options)
+        self.do = do
+
+    def execute(self, userdata: Any) -> str:
+        return self.do(self, userdata)
+
+
+def killed(*_: object) -> str:
+    raise Kill
+
+
+def fine(*_: object) -> str:
+    return "ok"
+
+
+def machine_of(*states: State, **options: Any) -> StateMachine:
+    machine = StateMachine(["ok", "skipped", "late", "preempted"], name="M", **options)
+    machine.userdata.value = 0
+    with machine:
+        for number, state in enumerate(states):
+            following = f"S{number + 1}" if number + 1 < len(states) else "ok"
+            machine.add(f"S{number}", state, {"ok": following})
+    return machine
+
+
+def kill(store: KillingStore, machine: StateMachine) -> None:
+    """Run `machine` until it is killed."""
+    with pytest.raises(Kill):
+        smachpy.run_durable(machine, store, mission="m")
+
+
+def go_on(store: KillingStore, machine: StateMachine, **options: Any) -> str:
+    return smachpy.run_durable(machine, store, mission="m", **options)
+
+
+@pytest.fixture
+def store() -> KillingStore:
+    return KillingStore()
+
+
+# -- what a state says -------------------------------------------------------------------------
+
+
+def test_a_state_that_is_to_be_skipped_ends_so(store: KillingStore) -> None:
+    kill(store, machine_of(Doing(killed, resume="skip:skipped")))
+    assert go_on(store, machine_of(Doing(killed, resume="skip:skipped"))) == "skipped"
+
+
+def test_a_method_decides_and_one_that_returns_none_lets_it_run(store: KillingStore) -> None:
+    class Deciding(Doing):
+        answer: str | None = "late"
+
+        def resume(self, userdata: Any) -> str | None:
+            assert userdata.value == 0
+            return self.answer
+
+    kill(store, machine_of(Deciding(killed)))
+    kill(store, machine_of(_with_answer(Deciding(killed), None)))
+    assert go_on(store, machine_of(Deciding(killed))) == "late"
+
+
+def _with_answer(state: Any, answer: str | None) -> Any:
+    state.answer = answer
+    return state
+
+
+def test_on_resume_is_called_with_the_own_userdata_of_a_container(store: KillingStore) -> None:
+    seen: list[Any] = []
+    options: dict[str, Any] = {"on_resume": lambda userdata: seen.append(userdata.value)}
+
+    def change(_: State, userdata: Any) -> str:
+        userdata.value = 7
+        return "ok"
+
+    def build(do: Any) -> StateMachine:
+        return machine_of(Doing(change, **options), Doing(do, **options), **options)
+
+    kill(store, build(killed))
+    assert go_on(store, build(fine)) == "ok"
+    assert seen == [7, 7]  # of the root, and of the state that was active
+
+
+def test_a_hook_that_raises_names_the_state(store: KillingStore) -> None:
+    kill(store, machine_of(Doing(killed)))
+    bad = machine_of(Doing(fine, on_resume=lambda _: 1 / 0))
+    with pytest.raises(smachpy.InvalidUserCodeError) as caught:
+        go_on(store, bad)
+    assert caught.value.path == "/M/S0"
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"resume": "skip:"},
+        {"resume": "again"},
+        {"resume": 3},
+        {"resume": lambda: None},
+        {"on_resume": "no"},
+        {"idempotent": 1},
+        {"transient": "socket"},
+    ],
+    ids=str,
+)
+def test_options_that_have_no_meaning_are_refused(options: dict[str, Any]) -> None:
+    with pytest.raises(InvalidStateError):
+        Doing(fine, **options)
+
+
+def test_an_operator_is_asked(store: KillingStore) -> None:
+    kill(store, machine_of(Doing(killed, resume="ask")))
+    machine = machine_of(Doing(killed, resume="ask"))
+
+    def force(event: events.Event) -> None:
+        if isinstance(event, events.Paused):
+            machine.control.force_outcome("/M/S0", "late")
+            machine.control.resume()
+
+    machine.subscribe(force)
+    assert go_on(store, machine) == "late"
+
+
+# -- userdata ----------------------------------------------------------------------------------
+
+
+def test_a_value_that_cannot_be_kept_is_an_error_when_it_is_set(store: KillingStore) -> None:
+    def bad(_: State, userdata: Any) -> str:
+        userdata.value = object()
+        raise AssertionError
+
+    with pytest.raises(smachpy.InvalidUserCodeError) as caught:
+        go_on(store, machine_of(Doing(bad)))
+    error = caught.value if isinstance(caught.value, NotDurableError) else caught.value.__cause__
+    assert isinstance(error, NotDurableError)
+    assert (error.key, error.path) == ("value", "/M/S0")
+
+
+def test_a_transient_key_is_not_kept(store: KillingStore) -> None:
+    def build(do: Any) -> StateMachine:
+        machine = machine_of(Doing(do), transient=["socket"])
+        machine.userdata.socket = object()
+        return machine
+
+    kill(store, build(killed))
+    assert "socket" not in read_position(store, "m").userdata["/M"]
+    assert go_on(store, build(fine)) == "ok"
+
+
+# -- time --------------------------------------------------------------------------------------
+
+
+def test_a_timeout_that_passed_meanwhile_is_handled_at_once(store: KillingStore) -> None:
+    options: dict[str, Any] = {"timeout": 10.0, "timeout_outcome": "late"}
+    with VirtualClock() as clock, use_clock(clock):
+        kill(store, machine_of(Doing(killed, **options)))
+        clock.sleep(11.0)
+        assert go_on(store, machine_of(Doing(killed, **options))) == "late"
+
+
+def test_what_is_left_of_a_timeout_is_left(store: KillingStore) -> None:
+    options: dict[str, Any] = {"timeout": 10.0, "timeout_outcome": "late"}
+
+    def wait(state: State, _: Any) -> str:
+        return "preempted" if state.sleep(100.0) else "ok"
+
+    with VirtualClock() as clock, use_clock(clock):
+        kill(store, machine_of(Doing(killed, **options)))
+        clock.sleep(4.0)
+        kill_at = clock.now()
+        assert go_on(store, machine_of(Doing(wait, **options))) == "late"
+        assert clock.now() - kill_at == pytest.approx(6.0)
+
+
+def test_an_outage_that_pauses_does_not_count(store: KillingStore) -> None:
+    options: dict[str, Any] = {"timeout": 10.0, "timeout_outcome": "late"}
+    with VirtualClock() as clock, use_clock(clock):
+        kill(store, machine_of(Doing(killed, **options)))
+        clock.sleep(1000.0)
+        assert go_on(store, machine_of(Doing(fine, **options)), outage="pauses") == "ok"
+    [[begin, end]] = read_position(store, "m").data["outages"]
+    assert end - begin == pytest.approx(1000e9)
+
+
+def test_a_pause_between_attempts_and_their_number_go_on(store: KillingStore) -> None:
+    tries: list[float] = []
+
+    def build(clock: VirtualClock, kills: int) -> StateMachine:
+        def attempt(_: State, __: Any) -> str:
+            if len(tries) == kills:
+                raise Kill
+            tries.append(clock.now())
+            return "late"
+
+        return machine_of(Doing(attempt, retry=(3, 8.0, ["late"])))
+
+    with VirtualClock() as clock, use_clock(clock):
+        store.arm(3, written=True)  # the pause before the second attempt
+        kill(store, build(clock, 9))
+        store.arm(0, written=False)
+        clock.sleep(3.0)
+        assert go_on(store, build(clock, 9)) == "late"
+    assert [at - tries[0] for at in tries] == pytest.approx([0.0, 8.0, 24.0])
+
+
+def test_a_journal_that_is_too_old_wants_a_person(store: KillingStore) -> None:
+    with VirtualClock() as clock, use_clock(clock):
+        kill(store, machine_of(Doing(killed)))
+        clock.sleep(61.0)
+        with pytest.raises(OutageError) as caught:
+            go_on(store, machine_of(Doing(fine)), max_outage=60.0)
+        assert caught.value.outage == pytest.approx(61.0)
+        assert go_on(store, machine_of(Doing(fine))) == "ok"
+
+
+# -- requests to stop --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("by", "expected"), [("operator", "preempted"), ("signal", "ok")])
+def test_an_operators_request_holds_on_and_one_of_a_signal_does_not(
+    store: KillingStore, by: str, expected: str
+) -> None:
+    def asked(state: State, _: Any) -> str:
+        return "preempted" if state.preempt_requested() else "ok"
+
+    def ask(_: State, __: Any) -> str:
+        with asking(by, "somebody"):
+            machine.request_preempt()
+        raise Kill
+
+    machine = machine_of(Doing(ask))
+    kill(store, machine)
+    assert go_on(store, machine_of(Doing(asked))) == expected
+
+
+def test_a_branch_that_was_stopped_before_stays_so(store: KillingStore) -> None:
+    def wait(state: State, _: Any) -> str:
+        state.wait_preempt()
+        state.service_preempt()
+        return "preempted"
+
+    def build(last: Any) -> StateMachine:
+        both = Concurrence(["ok"], "ok", child_termination_cb=lambda _: True)
+        with both:
+            both.add("QUICK", Doing(fine))
+            both.add("WAITS", Doing(wait), remapping={"value": "other"})
+        machine = StateMachine(["ok", "preempted", "skipped", "late"], name="M")
+        with machine:
+            machine.add("BOTH", both, {"ok": "LAST"})
+            machine.add("LAST", Doing(last))
+        return machine
+
+    calm = KillingStore()
+    expected = go_on(calm, build(fine))
+    for kill_at in range(1, calm.writes):
+        store = KillingStore()
+        store.arm(kill_at, written=True)
+        kill(store, build(fine))
+        store.arm(0, written=False)
+        assert go_on(store, build(fine)) == expected, kill_at
+
+
+# -- a machine that has changed ----------------------------------------------------------------
+
+
+def test_a_changed_machine_is_refused_with_the_differences(store: KillingStore) -> None:
+    kill(store, machine_of(Doing(killed)))
+    changed = machine_of(Doing(fine), Doing(fine))
+    with pytest.raises(MachineChangedError) as caught:
+        go_on(store, changed)
+    assert "/M/S1: is new" in caught.value.differences
+    assert go_on(store, changed, migrate={"/M/S0": "/M/S0"}) == "ok"
+
+
+def test_a_path_that_moved_is_followed(store: KillingStore) -> None:
+    def build(label: str, do: Any) -> StateMachine:
+        machine = StateMachine(["ok", "skipped", "late"], name="M")
+        machine.userdata.value = 0
+        with machine:
+            machine.add("FIRST", Doing(fine), {"ok": label})
+            machine.add(label, Doing(do))
+        return machine
+
+    kill(store, build("OLD", killed))
+    entered: list[str] = []
+    machine = build("NEW", fine)
+    machine.subscribe(
+        lambda event: entered.append(event.path) if isinstance(event, events.Entered) else None
+    )
+    with pytest.raises(MachineChangedError):
+        go_on(store, machine, migrate={"/M/FIRST": "/M/FIRST"})  # it does not say what OLD is now
+    with pytest.raises(MissionError):
+        go_on(store, machine, migrate={"/M/OLD": "/M/NOWHERE"})
+    assert go_on(store, machine, migrate={"/M/OLD": "/M/NEW"}) == "ok"
+    assert entered == ["/M/NEW"]
+
+
+def test_a_function_may_say_what_has_changed_or_refuse(store: KillingStore) -> None:
+    kill(store, machine_of(Doing(killed)))
+    changed = machine_of(Doing(fine), Doing(fine))
+    with pytest.raises(MachineChangedError):
+        go_on(store, changed, migrate=lambda _: None)
+    assert go_on(store, changed, migrate=lambda found: {"/M/S0": "/M/S0"} if found else None)
+
+
+# -- journals that cannot be used --------------------------------------------------------------
+
+
+@pytest.mark.parametrize("entry", [b"", b"{", b"[]", b'{"kind":"Nothing"}', b'{"kind":"Left"}'])
+def test_an_entry_that_cannot_be_read_is_told(store: KillingStore, entry: bytes) -> None:
+    kill(store, machine_of(Doing(killed)))
+    store.entries["m"].append(entry)
+    with pytest.raises(StoreError) as caught:
+        go_on(store, machine_of(Doing(fine)))
+    assert caught.value.reason == "corrupt"
+
+
+def test_a_journal_that_cannot_be_written_preempts_the_machine(store: KillingStore) -> None:
+    class Full(KillingStore):
+        def append(self, *arguments: Any, **named: Any) -> None:
+            if self.writes == 3:
+                raise StoreError("here", "no space is left.", reason="full")
+            super().append(*arguments, **named)
+
+    full, begun = Full(), []
+
+    def note(_: State, __: Any) -> str:
+        begun.append(1)
+        return "ok"
+
+    with pytest.raises(StoreError) as caught:
+        go_on(full, machine_of(*(Doing(note) for _ in range(9))))
+    assert caught.value.reason == "full"
+    assert len(begun) == 2
+    assert full.rows["m"].status == "interrupted"
+
+
+def test_one_that_was_taken_over_is_preempted(store: KillingStore) -> None:
+    class Taken(KillingStore):
+        def append(self, lease: Any, *arguments: Any, **named: Any) -> None:
+            if self.writes == 2:
+                raise FencedError("here", lease, "other:7")
+            super().append(lease, *arguments, **named)
+
+    taken = Taken()
+    with pytest.raises(FencedError):
+        go_on(taken, machine_of(*(Doing(fine) for _ in range(9))))
+
+
+# -- once --------------------------------------------------------------------------------------
+
+
+def test_once_is_per_visit_and_survives_attempts(store: KillingStore) -> None:
+    calls: list[int] = []
+
+    def do(_: State, userdata: Any) -> str:
+        smachpy.once("call", lambda: calls.append(userdata.value))
+        userdata.value += 1
+        return "late" if userdata.value == 1 else "ok"
+
+    machine = machine_of(Doing(do, retry=(2, 0.0, ["late"])), Doing(do))
+    assert go_on(store, machine) == "ok"
+    assert calls == [0, 2]
+
+
+def test_what_once_raises_is_not_kept_and_bad_arguments_are_refused(store: KillingStore) -> None:
+    calls: list[int] = []
+
+    def call() -> int:
+        calls.append(1)
+        if len(calls) == 1:
+            raise OSError
+        return 3
+
+    def do(_: State, userdata: Any) -> str:
+        try:
+            smachpy.once("call", call)
+        except OSError:
+            userdata.value = smachpy.once("call", call)
+        return "ok"
+
+    machine = machine_of(Doing(do))
+    assert go_on(store, machine) == "ok"
+    assert machine.userdata.value == 3
+
+    async def never() -> None: ...
+
+    for key, function in (("", call), (3, call), ("key", never), ("key", None)):
+        with pytest.raises(InvalidStateError):
+            smachpy.once(key, function)  # type: ignore[arg-type]
+    assert smachpy.once("outside", lambda: 4) == 4
