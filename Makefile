@@ -12,7 +12,7 @@ WORKERS := -n 3 --dist worksteal
 # The commands and the tests start many processes; each is quicker with cached bytecode.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help run test test-pythons contract-100 soak lint types format bench clean
+.PHONY: help run test test-pythons contract-100 soak soak-durable lint types format bench clean
 
 help:  ## Show the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /\1\t/p' Makefile | expand -t 14
@@ -35,6 +35,10 @@ contract-100:  ## Run the contract tests a hundred times in a row, with other fa
 soak:  ## Attack what is promised for some minutes and print the figures (GOALS=20000 SECONDS=150 SEED=1)
 	@.ci/venv dot,sim,test
 	$(BIN)/python tests/soak/soak.py $(if $(GOALS),--goals $(GOALS)) $(if $(SECONDS),--seconds $(SECONDS)) $(if $(SEED),--seed $(SEED))
+
+soak-durable:  ## Kill a durable mission's processes a thousand times (KILLS=1000)
+	@.ci/venv dot,sim,test
+	KILLS=$(or $(KILLS),1000) $(BIN)/python -m pytest -q -s -m slow tests/smachpy/durable/test_killed_processes.py
 
 lint:
 	@.ci/venv dot,sim,test

@@ -641,6 +641,10 @@ class RosClientPort:
         if error is not None:
             self._readable.report(f"{server.session} {server.node}", error)
         self._listener.on_server(server, error)
+        with self._lock:
+            heard_of = [goal for goal in self._goals.values() if goal.exchange.code]
+        for goal in heard_of:  # a status that came before the server's tokens was told to nobody
+            self._tell(goal)
 
     def _explain(self, change: ServerChange) -> TypeMismatchError | None:
         """Return what is wrong with the types of a server; None when nothing is."""
