@@ -11,6 +11,7 @@ viewers):
     preempt path          jump path          force path outcome
     break path [outcome]  unbreak path [outcome]
     initial path states
+    fire path transition   post path event        (of a Petri net plan)
 
 A path is absolute and begins with the machine's name as viewers show it ("/JOB/A"). `running` is
 "keep" or "cancel", as for `Control.pause`. An answer has `ok`, `text` (the reason of a refusal),
@@ -59,6 +60,8 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "break": ("path",),
     "unbreak": ("path",),
     "initial": ("path", "states"),
+    "fire": ("path", "transition"),
+    "post": ("path", "event"),
 }
 """Command -> its required arguments."""
 
@@ -143,6 +146,8 @@ class ControlServer:
             "break": lambda: self._break(path, outcome),
             "unbreak": lambda: control.remove_breakpoint(path, outcome),
             "initial": lambda: self._begin_at(path, command["states"]),
+            "fire": lambda: self._plan(path, "fire").fire(command["transition"]),
+            "post": lambda: self._plan(path, "post").post(command["event"]),
         }
         actions[command["command"]]()
 
@@ -168,6 +173,15 @@ class ControlServer:
                 f"as {self._path!r}."
             )
         container.set_initial_state([str(state) for state in states], UserData())
+
+    def _plan(self, path: str, command: str) -> Any:
+        found = self._find(path)
+        if getattr(found, "_smachpy_kind", "") != "plan":
+            raise CommandError(
+                f"command {command!r}: path: got {self._shown(path)!r}; expected that of a Petri "
+                "net plan."
+            )
+        return found
 
     def _find(self, path: str) -> Any:
         """Return the state at an absolute path, None when there is none."""

@@ -22,6 +22,8 @@ from smachpy.network.remote_control import (
     ControlServer,
     parse_command,
 )
+from smachpy.pnp import PetriNetPlan
+from tests.smachpy.pnp.nets import net_of
 
 
 class Wait(State):
@@ -111,6 +113,41 @@ def test_a_breakpoint_after_an_outcome(world):
     clock.sleep(3.0)
     assert machine.control.is_paused()
     assert client.send({**command, "command": "unbreak"})["breakpoints"] == []
+
+
+def test_a_plan_takes_events_and_fires(clock):
+    network = MemoryNetwork(clock)
+    robot = Node("robot", transport=network.session(), clock=clock)
+    desk = Node("desk", transport=network.session(), clock=clock)
+    plan = PetriNetPlan(net_of("init* -> there : [begun]\nthere -> goal : [never]", "inner"))
+    machine = StateMachine(outcomes=["goal", "fail", "preempted"], name="JOB")
+    with machine:
+        StateMachine.add("PLAN", plan)
+        StateMachine.add("A", Wait(), {"done": "goal"})
+    server = IntrospectionServer("robot", machine, "/JOB", node=robot, control=True)
+    server.start()
+    client = ControlClient("/robot", desk)
+    early = client.send({"command": "fire", "path": "/JOB/PLAN", "transition": "t1"})
+    assert "does not run" in early["text"]
+    outcomes = []
+    task = clock.spawn(lambda: outcomes.append(machine.execute()), name="mission")
+    clock.sleep(0.5)
+    wrong = client.send({"command": "post", "path": "/JOB/A", "event": "begun"})
+    assert not wrong["ok"]
+    assert "/JOB/A" in wrong["text"]
+    wrong = client.send({"command": "fire", "path": "/JOB/PLAN", "transition": "t7"})
+    assert not wrong["ok"]
+    assert "t7" in wrong["text"]
+    assert client.send({"command": "post", "path": "/JOB/PLAN", "event": "begun"})["ok"]
+    clock.sleep(0.5)
+    assert plan.marking() == {"p1": 1}
+    assert client.send({"command": "fire", "path": "/JOB/PLAN", "transition": "t1"})["ok"]
+    assert task.join(60.0)
+    assert outcomes == ["goal"]
+    client.close()
+    server.stop()
+    desk.close()
+    robot.close()
 
 
 def test_force_jump_preempt_and_the_next_start(world):

@@ -31,7 +31,7 @@ def plan(domain):
     net = net_of(NET, "fetch")
     plan = PetriNetPlan(net)
     with Node("robot") as node, use_node(node):
-        server = IntrospectionServer("fetch", plan, "/fetch")
+        server = IntrospectionServer("fetch", plan, "/fetch", control=True)
         server.start()
         worker = threading.Thread(target=plan.execute)
         worker.start()
@@ -86,3 +86,14 @@ def test_tokens_move_and_guards_say_what_they_wait_for(plan, start, look):
     plan.post("taken")
     wait_for(page, path_of(plan, "goal"), "\u25cf")
     assert text_of(page, third)[1] == ""
+
+
+def test_an_operator_fires_a_transition(plan, start, look):
+    page = look(start.view("--control").base + "?machine=fetch")
+    first, second, _ = (f"/fetch/{t.id}" for t in plan.plan.net.transitions)
+    wait_for(page, first, "begun is false")
+    page.click(f'g[data-path="{first}"]')
+    page.click("button >> text=Fire")
+    page.click("button >> text=Yes")
+    wait_for(page, second, "seen is false, close is false")
+    assert plan.marking() == {path_of(plan, "there").rpartition("/")[2]: 1}

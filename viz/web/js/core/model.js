@@ -27,6 +27,9 @@ export const KIND_NAMES = {
   missing: "missing state",
 };
 
+/** Whether a box is no state, but a place or a transition of a plan. @param {StateNode} node */
+export const isPartOfNet = ({ kind }) => kind === "transition" || kind.endsWith("place");
+
 const READABLE = 40; // so many boxes are readable at a glance
 
 export class Model {

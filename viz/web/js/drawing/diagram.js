@@ -1,6 +1,6 @@
 // The diagram: built once per layout, restyled by class when something happens.
 import { containerOf, ms, own } from "#core/fold.js";
-import { CHANGE_SIGNS, joinText, KIND_NAMES, signed } from "#core/model.js";
+import { CHANGE_SIGNS, isPartOfNet, joinText, KIND_NAMES, signed } from "#core/model.js";
 import { commonClass, outcomeClass } from "#core/outcomes.js";
 import { duration } from "#core/text.js";
 import { measure } from "#drawing/measure.js";
@@ -527,9 +527,6 @@ function outcomePill(node, pill, x, y) {
     el("text", centre, pill.outcome),
   );
 }
-
-/** Whether a box is no state, but a place or a transition of a plan. @param {StateNode} node */
-const isPartOfNet = ({ kind }) => kind === "transition" || kind.endsWith("place");
 
 /**
  * How many tokens the places of a plan hold; those where an action runs, 1 while it does.

@@ -1,6 +1,7 @@
 // The operator's commands; there only when the server was started with --control.
 import { useState } from "preact/hooks";
 import { command, control } from "#core/connection.js";
+import { isPartOfNet } from "#core/model.js";
 import * as store from "#core/store.js";
 import { fieldValue, html } from "#panels/html.js";
 
@@ -71,6 +72,11 @@ export function StateControls({ node, state }) {
   const breakpoints = control()?.breakpoints;
   if (!breakpoints) return null;
   const { path, parent } = node;
+  if (isPartOfNet(node))
+    return node.kind === "transition" && parent
+      ? html`<div class="actions"><${Confirm} text="Fire" question=${`Fire ${node.name}, whatever its guard says?`}
+          onConfirm=${() => command("fire", { path: parent.path, transition: node.label })} /></div>`
+      : null;
   const active = state?.since != null;
   const stops = breakpoints.some(([at, after]) => at === path && after === null);
   const chosen = node.outcomes.includes(outcome) ? outcome : node.outcomes[0];
