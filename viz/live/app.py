@@ -8,6 +8,8 @@
     GET  /api/picture         svg, png, pdf or dot; `theme` and the paths that are `active`
     GET  /api/export          the run as .html or .jsonl
     GET  /api/statistics      of recorded runs
+    GET  /api/runs            live and past runs, for the home page
+    GET  /api/open            the name of the machine that shows one of them
     GET  /api/why             why the newest run of a machine ended so
     GET  /api/compare         a machine and another one in one drawing
     GET  /api/value           a value of userdata as it is now, whole
@@ -40,6 +42,7 @@ from smachpy.exceptions import SmachError
 from viz.live import assets as page
 from viz.live.actions import GoalRefusedError
 from viz.live.machines import KEPT_EVENTS
+from viz.live.runs import Runs
 from viz.live.security import WRONG_TOKEN, Guard, refuse_command
 
 if TYPE_CHECKING:
@@ -102,6 +105,8 @@ class Viewer:
         statistics: Of recorded runs of a machine; blocks.
         hosts: Names that the server goes by, besides addresses.
         actions: On the network, for the page that sends goals; None shows none.
+        runs: Lists runs for the home page; None lists those of `machines`.
+        home: Pages begin with the list of runs, unless a machine is asked for.
         value: Asks a machine for a value of its userdata, by name, container and key; blocks.
         picture: Asks a machine for the picture of a question, by name and path: media type and
             bytes; blocks.
@@ -119,10 +124,14 @@ class Viewer:
         actions: Actions | None = None,
         value: Callable[[str, str, str], str] | None = None,
         picture: Callable[[str, str], tuple[str, bytes] | None] | None = None,
+        runs: Runs | None = None,
+        home: bool = False,
     ) -> None:
         self._picture_of = picture
         self._machines = machines
         self._value = value
+        self._listed = Runs(machines) if runs is None else runs
+        self._home = home
         self._actions = actions
         self._token = token
         self._send = send
@@ -145,6 +154,8 @@ class Viewer:
                 Route("/api/picture", self._picture),
                 Route("/api/export", self._export),
                 Route("/api/statistics", self._runs),
+                Route("/api/runs", self._run_list),
+                Route("/api/open", self._open),
                 Route("/api/why", self._why),
                 Route("/api/compare", self._compare),
                 Route("/api/value", self._whole_value),
@@ -228,6 +239,17 @@ class Viewer:
             return Json(await run_in_threadpool(self._statistics, machine.record))
         except SmachError as error:
             return PlainTextResponse(str(error), status_code=503)
+
+    async def _run_list(self, _request: Request) -> Response:
+        return Json(await run_in_threadpool(self._listed.rows))
+
+    async def _open(self, request: Request) -> Response:
+        asked = request.query_params.get("run", "")
+        try:
+            name = await run_in_threadpool(self._listed.open, asked)
+        except SmachError as error:
+            return Json({"ok": False, "text": str(error)}, status_code=404)
+        return Json({"ok": True, "name": name})
 
     async def _why(self, request: Request) -> Response:
         machine = self._asked(request)
@@ -372,6 +394,7 @@ class Viewer:
                 "control": self._token is not None,
                 "beat": BEAT_S,
                 "kept": KEPT_EVENTS,
+                "home": self._home,
             },
             self._actions,
         )

@@ -114,7 +114,9 @@ def _serve(
     network: Network,
     actions: Actions,
 ) -> int:
+    from smachpy.command.runs_folder import runs_folder
     from viz.live.app import Viewer
+    from viz.live.runs import Runs
     from viz.live.security import make_token
     from viz.live.server import PageServer
 
@@ -129,6 +131,8 @@ def _serve(
         actions=actions,
         value=network.value,
         picture=network.picture,
+        runs=Runs(machines, [runs_folder(), *(Path(place) for place in args.runs)]),
+        home=not args.child and not args.files,
     )
     server = PageServer(viewer, args.host, args.port)
     print(server.address + (f"#token={token}" if token else ""), flush=True)
@@ -184,7 +188,7 @@ def _load(machines: Machines, files: list[str]) -> None:
     for path in paths:
         recording = read_recording(path)
         machine = machines.obtain(path.name if names.count(path.name) == 1 else str(path))
-        machine.recorded = True
+        machine.recorded, machine.file = True, str(path)
         machine.reset(recording.history(), limit=len(recording.events) + 1)
 
 

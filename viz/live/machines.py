@@ -48,6 +48,7 @@ class Machine:
         stale: Since when nobody speaks for it [ns since the epoch]; None while somebody does.
         control: Pause and breakpoints; None when it obeys no commands.
         node: Name of the node that it runs in.
+        file: Where its recording was read from; "" for none.
         behind: How far its clock is behind this process's [ns]; None while nobody knows.
         before: Name of the machine that keeps what the program before this one did.
         after: The same the other way round, of one that is kept.
@@ -73,6 +74,7 @@ class Machine:
         self.control: dict[str, Any] | None = None
         self.stale: int | None = None
         self.recorded = False
+        self.file = ""
         self.node = ""
         self.behind: int | None = None
         self.epoch = uuid.uuid4().hex
@@ -372,6 +374,11 @@ class Machines:
             machine.name = next(name for name in names if name not in self._machines)
             self._machines[machine.name] = machine
         return machine.name
+
+    def forget(self, name: str) -> None:
+        """Know nothing of a machine any more."""
+        with self._lock:
+            self._machines.pop(name, None)
 
     def summaries(self) -> list[dict[str, Any]]:
         """Return what is known of every machine, by name."""

@@ -217,6 +217,7 @@ interface Settings {
   control: boolean;
   kept?: number;
   beat?: number;
+  home?: boolean;
 }
 interface StateStatistics {
   visits: number;
@@ -390,4 +391,21 @@ interface Series {
 interface Visit {
   path: string;
   from: number;
+}
+
+// A run in the list (viz/runs/listing.py); times are nanoseconds since the epoch.
+interface RunRow {
+  id: string;
+  name: string | null;
+  machine: string;
+  robots: string[];
+  live: boolean;
+  began: number | null;
+  ended: number | null;
+  last: number | null;
+  outcome: string | null;
+  reason: string;
+  problem: string;
+  file: string;
+  strip: [number, string, number, number | null, string][]; // row, state, from and to [s], class
 }

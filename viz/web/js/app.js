@@ -8,6 +8,7 @@ import { Page } from "#drawing/page.js";
 import { el } from "#drawing/svg.js";
 import { applyTheme } from "#drawing/theme.js";
 import { ActionsPage } from "#panels/actions.js";
+import { HomePage } from "#panels/home.js";
 import { html } from "#panels/html.js";
 import { Inspector } from "#panels/inspector.js";
 import { listenToKeys } from "#panels/keys.js";
@@ -81,6 +82,7 @@ function App() {
     ${store.hasMap.value && html`<${MapPanel} page=${page}><${Mounted} element=${floor} /><//>`}
     <${Inspector} page=${page} />
     <${PlayBar} page=${page} />
+    <${HomePage} />
     <${ActionsPage} />
     <div id="announced" class="hidden" aria-live="polite"></div>
     <${Notice} />

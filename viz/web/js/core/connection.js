@@ -69,6 +69,7 @@ export async function connect(handlers) {
   const asked = new URLSearchParams(location.search);
   store.wanted.value = asked.get("machine") ?? "";
   if (asked.has("actions")) showActions(true);
+  if (asked.has("runs")) showHome(true);
   open();
 }
 
@@ -136,6 +137,8 @@ function open() {
     });
   on("settings", (/** @type {Settings} */ settings) => {
     streamBegan = performance.now();
+    if (settings.home && !store.settings.value.home && !new URLSearchParams(location.search).has("machine"))
+      showHome(true);
     store.settings.value = settings;
     store.connection.value = "live";
     watch((settings.beat ?? 0) * 1000);
@@ -332,6 +335,52 @@ export async function command(name, more = {}) {
   if (result.ok) store.notify(`${name}${more.path ? ` ${more.path}` : ""}: done`);
   else store.notify(`${name}: ${result.text ?? "refused"}`, "error");
   return result.ok;
+}
+
+// -- the list of runs ---------------------------------------------------------------------------
+
+const REFRESH_MS = 2000; // between two lists of runs
+let refreshed = -REFRESH_MS; // [ms]
+/** @type {ReturnType<typeof setTimeout> | 0} */
+let refreshDue = 0;
+
+/** Ask for the runs again, at once or soon. */
+export function refreshRuns() {
+  if (refreshDue) return;
+  refreshDue = setTimeout(
+    async () => {
+      const answer = await ask("/api/runs");
+      refreshed = performance.now();
+      refreshDue = 0;
+      batch(() => {
+        store.runsProblem.value = Array.isArray(answer.runs) ? "" : (answer.text ?? "The runs cannot be listed.");
+        if (Array.isArray(answer.runs)) store.runs.value = /** @type {any} */ (answer);
+        store.runsKnown.value = true;
+      });
+    },
+    Math.max(0, refreshed + REFRESH_MS - performance.now()),
+  );
+}
+
+/** Show a run of the list. @param {string} id */
+export async function openRun(id) {
+  const answer = await ask(`/api/open?run=${encoded(id)}`);
+  if (!answer.ok) {
+    store.notify(`Run: ${answer.text}`, "error");
+    return;
+  }
+  showHome(false);
+  if (answer.name !== store.facts.value?.name) choose(answer.name);
+}
+
+/** @param {boolean} open */
+export function showHome(open) {
+  store.homeOpen.value = open;
+  const address = new URL(location.href);
+  if (open) address.searchParams.set("runs", "");
+  else address.searchParams.delete("runs");
+  history.replaceState(null, "", address);
+  if (open) refreshRuns();
 }
 
 /** @param {boolean} open */

@@ -86,6 +86,13 @@ export const laidOut = signal(null); // so many states, while it takes a while
 /** @type {Signal<string | null>} */
 export const dismissed = signal(null); // the run before whose notice was closed
 export const actionsOpen = signal(false);
+export const homeOpen = signal(false); // the list of runs
+/** @type {Signal<{ runs: RunRow[], folders: string[] }>} */
+export const runs = signal({ runs: [], folders: [] });
+export const runsKnown = signal(false);
+export const runsProblem = signal(""); // why they cannot be listed
+/** @type {Signal<Set<string>>} */
+export const pins = signal(new Set(saved("pins", []))); // ids of runs
 /** @type {Signal<string | null>} */
 export const chosenAction = signal(null);
 export const logFilter = signal("all");
@@ -151,6 +158,14 @@ export function addEvents(events) {
 
 /** Take in what the robot's topics told. @param {Observed[]} records */
 export const addObserved = (records) => scene.addObserved(records);
+
+/** @param {string} id of a run */
+export function togglePin(id) {
+  const next = new Set(pins.value);
+  if (!next.delete(id)) next.add(id);
+  pins.value = next;
+  save("pins", [...next]);
+}
 
 /** The visit that the pointer is on, in the timeline or the map. @param {Visit | null} visit */
 export function hover(visit) {

@@ -1,5 +1,5 @@
 // The keyboard: everything the pointer can do.
-import { command, control, isFile, showActions, showWhy } from "#core/connection.js";
+import { command, control, isFile, showActions, showHome, showWhy } from "#core/connection.js";
 import * as store from "#core/store.js";
 import { isDark } from "#drawing/theme.js";
 
@@ -7,7 +7,7 @@ import { isDark } from "#drawing/theme.js";
 
 const STEP = 80; // [px]
 const PRESSED = "a[href], button, summary, tr[tabindex]"; // Enter and Space press these
-const ON_ACTIONS = ["a", "d", "?", "Escape"]; // the keys that work while the actions are shown
+const ON_ACTIONS = ["a", "d", "h", "?", "Escape"]; // the keys that work while actions or runs are shown
 /** @type {Record<string, [number, number]>} */
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
@@ -47,6 +47,7 @@ export function listenToKeys(page) {
     ".": () => store.seekEvent(1),
     l: () => page.timeline.live(),
     i: () => page.setImplicit(!store.implicit.value),
+    h: () => isFile() || showHome(!store.homeOpen.value || !store.model.value),
     a: () => isFile() || showActions(!store.actionsOpen.value),
     d: () => page.setTheme(isDark() ? "light" : "dark"),
     "?": () => {
@@ -56,6 +57,7 @@ export function listenToKeys(page) {
     Escape: () => {
       if (store.help.value) store.help.value = false;
       else if (store.actionsOpen.value) showActions(false);
+      else if (store.homeOpen.value) showHome(!store.model.value);
       else if (store.treeOpen.value) store.treeOpen.value = false;
       else page.select(null);
     },
@@ -79,7 +81,7 @@ export function listenToKeys(page) {
       return;
     }
     if ((e.key === "Enter" || e.key === " ") && target.closest(PRESSED)) return;
-    if (store.actionsOpen.value && !ON_ACTIONS.includes(e.key)) return;
+    if ((store.actionsOpen.value || store.homeOpen.value) && !ON_ACTIONS.includes(e.key)) return;
     if (e.key in ARROWS) {
       const [dx, dy] = ARROWS[e.key];
       if (store.selected.value && !e.shiftKey) page.selectNeighbour(dx, dy);

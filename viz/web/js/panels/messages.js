@@ -37,6 +37,7 @@ const KEYS = [
   ["t", "states, on a small screen"],
   ["i", "implicit transitions"],
   ["a", "actions"],
+  ["h", "runs"],
   ["d", "dark or light"],
   ["Space", "play or hold; pause or resume the mission (with control)"],
   ["s", "step (with control)"],

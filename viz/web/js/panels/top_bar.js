@@ -1,6 +1,6 @@
 // Above the diagram: which machine, how it runs, the way to the state shown, search, the view, commands.
 import { useEffect, useRef, useState } from "preact/hooks";
-import { choose, encoded, isFile, link, showWhy } from "#core/connection.js";
+import { choose, encoded, isFile, link, showHome, showWhy } from "#core/connection.js";
 import { KIND_NAMES } from "#core/model.js";
 import { MODES, OF_RECORDED_RUNS } from "#core/statistics.js";
 import * as store from "#core/store.js";
@@ -25,6 +25,7 @@ export function TopBar({ page }) {
   return html`<header class="top">
     <button class="states-button" aria-expanded=${store.treeOpen.value} title="the states as a tree (t)"
       onClick=${toggleTree}>States</button>
+    <${RunsButton} />
     <${Chooser} />
     <span class=${`status ${status.kind}`} role="status" data-testid="status">${status.word}</span>
     ${
@@ -46,6 +47,13 @@ export function TopBar({ page }) {
     <${ActionsButton} />
     <${Controls} />
   </header>`;
+}
+
+function RunsButton() {
+  if (isFile()) return null;
+  const open = store.homeOpen.value;
+  return html`<button id="runs" class=${open ? "on" : ""} aria-pressed=${open} title="live and past runs (h)"
+    onClick=${() => showHome(!open || !store.model.value)}>Runs</button>`;
 }
 
 /** When the run is over: it has ended, or nobody tells of it any more. */

@@ -1,0 +1,187 @@
+"""Runs as rows of a list, and the list of what there is."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import asdict
+
+import pytest
+
+from smachpy import CBState, Concurrence, StateMachine, describe
+from smachpy.events.recording import RecordingError, recording_lines
+from viz.live import runs as runs_module
+from viz.live.machines import Machines
+from viz.live.runs import Runs
+from viz.runs.listing import MOST_PIECES, run_row
+
+S = 1_000_000_000
+BEGAN = 1_700_000_000 * S
+
+
+def chain(name="JOB"):
+    sm = StateMachine(outcomes=["done", "aborted"], name=name)
+    with sm:
+        StateMachine.add("A", CBState(lambda _: "ok", outcomes=["ok"]), {"ok": "B"})
+        StateMachine.add(
+            "B", CBState(lambda _: "done", outcomes=["done", "aborted"]), {"done": "done"}
+        )
+    return describe(sm)
+
+
+def told(*events, began=BEGAN):
+    return [
+        {"kind": kind, "path": path, "t": at, "stamp_ns": began + int(at * S), "seq": n, **facts}
+        for n, (at, kind, path, facts) in enumerate(events, 1)
+    ]
+
+
+def failed(began=BEGAN, root="/JOB"):
+    return told(
+        (0.0, "Started", root, {}),
+        (0.0, "Entered", f"{root}/A", {}),
+        (2.0, "Left", f"{root}/A", {"outcome": "ok"}),
+        (2.0, "Entered", f"{root}/B", {}),
+        (3.0, "GoalSent", f"{root}/B", {"action": "/robot_1/go", "goal_id": "1", "goal": None}),
+        (4.0, "GoalDone", f"{root}/B", {"action": "/robot_1/go", "goal_id": "1", "status": "ABORTED",
+                                        "text": "no way", "result": None}),
+        (5.0, "Left", f"{root}/B", {"outcome": "aborted"}),
+        (5.0, "Finished", root, {"outcome": "aborted"}),
+        began=began,
+    )  # fmt: skip
+
+
+def test_a_run_that_failed_has_its_first_cause():
+    row = run_row(chain(), failed())
+    assert (row["machine"], row["outcome"], row["robots"]) == ("JOB", "aborted", ["robot_1"])
+    assert (row["began"], row["ended"]) == (BEGAN, BEGAN + 5 * S)
+    assert "no way" in row["reason"]
+    assert row["strip"] == [(0, "A", 0.0, 2.0, "success"), (0, "B", 2.0, 5.0, "failure")]
+
+
+def test_a_run_that_goes_on_says_where_it_is():
+    row = run_row(chain(), failed()[:4])
+    assert (row["outcome"], row["ended"], row["reason"]) == (None, None, "B")
+    assert row["strip"][-1] == (0, "B", 2.0, None, "active")
+
+
+def test_only_the_newest_run_counts_and_none_is_no_run():
+    events = [*failed(), *failed(began=BEGAN + 100 * S)[:2]]
+    row = run_row(chain(), events)
+    assert (row["began"], len(row["strip"])) == (BEGAN + 100 * S, 1)
+    assert run_row(chain(), []) == {
+        "machine": "JOB", "robots": [], "began": None, "ended": None, "last": None,
+        "outcome": None, "reason": "", "strip": [],
+    }  # fmt: skip
+
+
+def test_a_concurrence_has_a_row_for_each_region():
+    sm = Concurrence(outcomes=["done"], default_outcome="done", name="BOTH")
+    with sm:
+        Concurrence.add("L", CBState(lambda _: "done", outcomes=["done"]))
+        Concurrence.add("R", CBState(lambda _: "done", outcomes=["done"]))
+    row = run_row(
+        describe(sm),
+        told(
+            (0.0, "Started", "/BOTH", {}),
+            (0.0, "Entered", "/BOTH/R", {}),
+            (0.0, "Entered", "/BOTH/L", {}),
+            (1.0, "Left", "/BOTH/R", {"outcome": "done"}),
+        ),
+    )
+    assert row["strip"] == [(1, "R", 0.0, 1.0, "success"), (0, "L", 0.0, None, "active")]
+
+
+def test_a_long_run_has_a_strip_of_its_longest_states():
+    events = [(0.0, "Started", "/JOB", {})]
+    for n in range(500):
+        events += [
+            (n, "Entered", "/JOB/A", {}),
+            (n + (n % 7) / 7, "Left", "/JOB/A", {"outcome": "ok"}),
+        ]
+    row = run_row(chain(), told(*events))
+    assert len(row["strip"]) == MOST_PIECES
+    assert all(to - since > 0.7 for _, _, since, to, _ in row["strip"])
+    assert [piece[2] for piece in row["strip"]] == sorted(piece[2] for piece in row["strip"])
+
+
+def test_what_is_cut_off_anywhere_is_a_row():
+    events = failed()
+    for first in range(len(events)):
+        row = run_row(chain(), events[first:])
+        assert row["machine"] == "JOB"
+
+
+def write(path, events, record=None):
+    path.write_text("".join(recording_lines(record or chain(), events, None)), encoding="utf-8")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write(tmp_path / "one.jsonl", failed())
+    write(tmp_path / "two.jsonl", failed(began=BEGAN + 9 * S))
+    (tmp_path / "bad.jsonl").write_text("no run\n", encoding="utf-8")
+    return tmp_path
+
+
+def test_files_and_machines_are_listed_newest_first(folder):
+    machines = Machines()
+    live = machines.obtain("live")
+    history = {"epoch": "x", "description": asdict(chain("LIVE"))}
+    live.reset({**history, "events": failed(BEGAN + 5 * S, "/LIVE")[:4]})
+    runs = Runs(machines, [folder, folder, folder / "none"])
+    rows = runs.rows()["runs"]
+    assert [(one["id"].rpartition("/")[2], one["live"]) for one in rows] == [
+        ("machine live", True),
+        ("two.jsonl", False),
+        ("one.jsonl", False),
+        ("bad.jsonl", False),
+    ]
+    assert "no header" in rows[-1]["problem"]
+    live.set_stale(BEGAN)
+    assert not next(one for one in runs.rows()["runs"] if one["name"] == "live")["live"]
+
+
+def test_a_file_that_is_being_written_is_no_second_run(folder):
+    machines = Machines()
+    history = {"epoch": "x", "description": asdict(chain())}
+    machines.obtain("job").reset({**history, "events": failed(BEGAN + 1000)[:4]})
+    ids = [one["id"] for one in Runs(machines, [folder]).rows()["runs"]]
+    assert not [one for one in ids if "one.jsonl" in one]
+    assert len(ids) == 3
+
+
+def test_a_file_is_read_again_only_when_it_has_changed(folder, monkeypatch):
+    read = []
+    real = runs_module.read_recording
+    monkeypatch.setattr(
+        runs_module, "read_recording", lambda path: (read.append(path.name), real(path))[1]
+    )
+    runs = Runs(Machines(), [folder])
+    runs.rows()
+    runs.rows()
+    assert sorted(read) == ["bad.jsonl", "one.jsonl", "two.jsonl"]
+    write(folder / "one.jsonl", failed()[:3])
+    os.utime(folder / "one.jsonl", ns=(1, 1))
+    (row,) = [one for one in runs.rows()["runs"] if one["file"].endswith("one.jsonl")]
+    assert row["outcome"] is None
+
+
+def test_what_is_listed_can_be_opened_and_nothing_else(folder, tmp_path_factory, monkeypatch):
+    monkeypatch.setattr(runs_module, "MOST_OPEN", 1)
+    machines = Machines()
+    runs = Runs(machines, [folder])
+    name = runs.open(f"file {folder / 'one.jsonl'}")
+    machine = machines.get(name)
+    assert machine.recorded
+    assert machine.summary()["outcome"] == "aborted"
+    assert runs.open(f"file {folder / 'one.jsonl'}") == name
+    assert runs.open(f"machine {name}") == name
+    assert len(runs.rows()["runs"]) == 3  # an opened file is one run
+    runs.open(f"file {folder / 'two.jsonl'}")
+    assert machines.get(name) is None
+    other = tmp_path_factory.mktemp("other") / "secret.jsonl"
+    write(other, failed())
+    for run in (f"file {other}", f"file {folder}/../x.jsonl", "file /etc/passwd", "machine none", "", "file",
+                f"file {folder / 'bad.jsonl'}"):  # fmt: skip
+        with pytest.raises(RecordingError):
+            runs.open(run)

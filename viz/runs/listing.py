@@ -1,0 +1,115 @@
+"""One run as a row of a list: machine, robots, outcome, strip of its states, why it failed.
+
+Pure: from the structure and the events alone.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+from smachpy.events.run_state import RAISED
+from smachpy.outcome_classes import outcome_class
+from viz.model.labels import shorten
+from viz.model.why import why
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from smachpy.introspection import StateRecord
+
+MOST_ROWS: Final = 8
+"""So many regions of a concurrence have a row of the strip."""
+
+MOST_PIECES: Final = 80
+MOST_ROBOTS: Final = 4
+LONGEST: Final = 160
+_ENDS: Final = frozenset({"Left", "Failed", "Finished"})
+
+
+def run_row(record: StateRecord, events: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return what a list shows of the newest run among some events.
+
+    Returns:
+        `machine`; `robots`, what stands in front of the names of its actions; `began` and `ended`
+        [ns since the epoch], null where they are unknown; `outcome`, null when it has no end;
+        `reason`, the first cause of an end that is no success, else where it is, or ""; `strip`:
+        row, name of the state, seconds from the beginning at its begin and end (null: it runs),
+        class of its outcome.
+    """
+    found = why(record, events)
+    kind = None if found.outcome is None else outcome_class(found.outcome)
+    steps = found.steps
+    reason = ""
+    if found.outcome == RAISED or kind in {"failure", "preempted"}:
+        reason = _cause(steps[0]) if steps else ""
+    elif found.outcome is None and steps:
+        reason = _name(steps[0].path, record)
+    run = [one for one in events if found.began is not None and one["stamp_ns"] >= found.began]
+    return {
+        "machine": record.label,
+        "robots": _robots(run),
+        "began": found.began,
+        "ended": found.ended if found.outcome is not None else None,
+        "last": found.ended,
+        "outcome": found.outcome,
+        "reason": shorten(reason, LONGEST),
+        "strip": [] if found.began is None else _strip(record, run, found.began),
+    }
+
+
+def _cause(step: Any) -> str:
+    name = step.path.rpartition("/")[2]
+    return f"{name}: {step.what}" + (f", {step.reason}" if step.reason else "")
+
+
+def _name(path: str, record: StateRecord) -> str:
+    """The way to a state below the root."""
+    return path.removeprefix(record.path).strip("/").replace("/", " \u203a ")
+
+
+def _robots(run: Sequence[dict[str, Any]]) -> list[str]:
+    actions = (str(one.get("action") or "") for one in run if one["kind"] == "GoalSent")
+    names = {action.lstrip("/").rpartition("/")[0] for action in actions}
+    return sorted(name for name in names if name)[:MOST_ROBOTS]
+
+
+def _strip(
+    record: StateRecord, run: Sequence[dict[str, Any]], began: int
+) -> list[tuple[int, str, float, float | None, str]]:
+    """The visits of the root's children; a concurrence has a row for each of them."""
+    children = {child.path: number for number, child in enumerate(record.children)}
+    watching = {
+        child.path for child in record.children if child.kind in {"monitor", "condition"}
+    }  # what they find is no failure
+    rows = record.kind == "concurrence"
+    since: dict[str, float] = {}
+    pieces: list[tuple[int, str, float, float | None, str]] = []
+
+    def add(path: str, to: float | None, kind: str) -> None:
+        row = min(children[path], MOST_ROWS - 1) if rows else 0
+        pieces.append((row, path.rpartition("/")[2], since.pop(path), to, kind))
+
+    for event in run:
+        path, at = event["path"], round((event["stamp_ns"] - began) / 1e9, 3)
+        if path not in children:
+            continue
+        if event["kind"] == "Entered":
+            since[path] = at
+        elif event["kind"] in _ENDS and path in since:
+            kind = str(outcome_class(event.get("outcome") or RAISED))
+            add(path, at, "other" if kind == "failure" and path in watching else kind)
+    for path in list(since):
+        add(path, None, "active")
+    pieces.sort(key=lambda piece: piece[2])
+    return _fewer(pieces)
+
+
+def _fewer(
+    pieces: list[tuple[int, str, float, float | None, str]],
+) -> list[tuple[int, str, float, float | None, str]]:
+    """Of too many pieces the longest, and those that run."""
+    if len(pieces) <= MOST_PIECES:
+        return pieces
+    by_length = sorted(pieces, key=lambda p: float("inf") if p[3] is None else p[3] - p[2])
+    kept = by_length[-MOST_PIECES:]
+    return sorted(kept, key=lambda piece: piece[2])
