@@ -143,7 +143,13 @@ def _is_same(file: dict[str, Any], row: dict[str, Any]) -> bool:
 
 def _read_row(path: Path, size: int) -> dict[str, Any]:
     row: dict[str, Any] = {"id": f"file {path}", "name": None, "live": False, "file": str(path)}
-    nothing = {"machine": path.stem, "robots": [], "began": None, "ended": None, "last": None}
+    nothing: dict[str, Any] = {
+        "machine": path.stem,
+        "robots": [],
+        "began": None,
+        "ended": None,
+        "last": None,
+    }
     problem = f"got {size} bytes; expected at most {LARGEST}" if size > LARGEST else ""
     if not problem:
         try:
