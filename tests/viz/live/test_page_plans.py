@@ -89,11 +89,12 @@ def test_tokens_move_and_guards_say_what_they_wait_for(plan, start, look):
 
 
 def test_an_operator_fires_a_transition(plan, start, look):
-    page = look(start.view("--control").base + "?machine=fetch")
+    view = start.view("--control")
+    page = look(f"{view.base}?machine=fetch#token={view.token}")
     first, second, _ = (f"/fetch/{t.id}" for t in plan.plan.net.transitions)
     wait_for(page, first, "begun is false")
     page.click(f'g[data-path="{first}"]')
-    page.click("button >> text=Fire")
-    page.click("button >> text=Yes")
+    page.get_by_role("button", name="Fire", exact=True).click()
+    page.get_by_role("button", name="Yes", exact=True).click()
     wait_for(page, second, "seen is false, close is false")
     assert plan.marking() == {path_of(plan, "there").rpartition("/")[2]: 1}
