@@ -7,14 +7,14 @@ import pytest
 from actionlib_core.cli import UsageError, _network
 from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.pubsub.topic import Publisher
-from actionlib_core.wire.presence import Kind
+from actionlib_core.wire.presence import SETTLE_MOST_S, Kind, settle_network
 
 NODES = ("cli", "robot")
 
 
 def test_an_empty_network_is_known_after_a_quiet_moment(nodes, clock):
     start = clock.now()
-    _network._settle(nodes[0], 0.4)
+    settle_network(nodes[0].transport, clock, 0.4)
     assert clock.now() - start == pytest.approx(0.4)
 
 
@@ -22,7 +22,7 @@ def test_who_shows_up_late_makes_it_wait_again(nodes, clock):
     start = clock.now()
     for number, delay in enumerate((0.3, 0.6)):
         clock.call_later(delay, lambda n=number: Publisher(f"a_{n}", String, node=nodes[1]))
-    _network._settle(nodes[0], 0.4)
+    settle_network(nodes[0].transport, clock, 0.4)
     assert clock.now() - start == pytest.approx(1.0)
 
 
@@ -30,8 +30,8 @@ def test_a_network_that_never_rests_is_taken_as_it_is(nodes, clock):
     start = clock.now()
     for number in range(100):
         clock.call_later(number * 0.1, lambda n=number: Publisher(f"a_{n}", String, node=nodes[1]))
-    _network._settle(nodes[0], 0.4)
-    assert clock.now() - start == pytest.approx(_network.SETTLE_MOST_S)
+    settle_network(nodes[0].transport, clock, 0.4)
+    assert clock.now() - start == pytest.approx(SETTLE_MOST_S)
 
 
 def test_a_name_is_waited_for_and_ends_of_other_kinds_are_not_it(nodes, clock):
