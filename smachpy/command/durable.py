@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from actionlib_core.output import tell
 from smachpy.exceptions import MissionError
 from smachpy.mission_info import mission_info
 from smachpy.sim.geometry import finite
@@ -18,9 +20,11 @@ if TYPE_CHECKING:
 
     from smachpy.command.targets import Target
     from smachpy.durable.mission import Outage
-    from smachpy.durable.store import MissionRow, Store
+    from smachpy.durable.store import FencedError, MissionRow, Store
     from smachpy.machines.container import Container
 
+LEASE_S: Final = 15.0
+EXIT_FENCED: Final = 2
 JOURNAL: Final = "./.smachpy/journal.db"
 
 
@@ -36,6 +40,7 @@ class DurableOptions:
         robot: The robot that it needs, or None.
         outage: Whether deadlines go on while no process runs it.
         max_outage: How old the journal may be [s]; None: what the mission says.
+        lease_s: How long a runner that says nothing holds the mission [s].
         migrate: Old path -> new path.
     """
 
@@ -46,6 +51,7 @@ class DurableOptions:
     robot: str | None
     outage: Outage
     max_outage: float | None
+    lease_s: float
     migrate: dict[str, str]
 
 
@@ -74,6 +80,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="do not go on with a journal that is older [s] (default: what the mission says)",
     )
     group.add_argument(
+        "--lease",
+        type=_seconds,
+        default=LEASE_S,
+        metavar="S",
+        help="in a database: after so long without a sign of this process another one may take the "
+        "mission over [s] (default: %(default)g)",
+    )
+    group.add_argument(
         "--migrate",
         action="append",
         default=[],
@@ -96,6 +110,7 @@ def durable_options(args: argparse.Namespace) -> DurableOptions | None:
                 ("--mission", args.mission is not None),
                 ("--outage", args.outage != "counts"),
                 ("--max-outage", args.max_outage is not None),
+                ("--lease", args.lease != LEASE_S),
                 ("--migrate", bool(args.migrate)),
             )
             if is_given
@@ -108,21 +123,38 @@ def durable_options(args: argparse.Namespace) -> DurableOptions | None:
             f"--durable: got it beside --time {args.time}; expected real time, in which there are "
             "outages."
         )
-    place, colon, attribute = args.target.partition(":")
-    is_file = place.endswith(".py") or "/" in place
-    target = f"{Path(place).resolve()}{colon}{attribute}" if is_file else args.target
-    inputs = [word for key, text in args.input for word in ("--input", f"{key}={text}")]
-    words = ["--", *args.words] if args.words else []
     return DurableOptions(
         journal=args.durable,
         mission=args.mission,
-        target=target,
-        argv=(*inputs, *words),
+        target=whole_target(args.target),
+        argv=words_of(args),
         robot=args.robot or None,
         outage=args.outage,
         max_outage=args.max_outage,
+        lease_s=args.lease,
         migrate=dict(args.migrate),
     )
+
+
+def whole_target(text: str) -> str:
+    """Return what names a mission; a file by its whole path."""
+    place, colon, attribute = text.partition(":")
+    is_file = place.endswith(".py") or "/" in place
+    return f"{Path(place).resolve()}{colon}{attribute}" if is_file else text
+
+
+def words_of(args: argparse.Namespace) -> tuple[str, ...]:
+    """Return the words of a command line that are the mission's arguments."""
+    inputs = [word for key, text in args.input for word in ("--input", f"{key}={text}")]
+    words = ["--", *args.words] if args.words else []
+    return (*inputs, *words)
+
+
+def _leave(error: FencedError) -> None:
+    """End the process at once: to preempt would cancel goals, which another process follows now."""
+    tell("smachpy", str(error))
+    sys.stdout.flush()
+    os._exit(EXIT_FENCED)
 
 
 @contextlib.contextmanager
@@ -140,13 +172,22 @@ def kept(target: Target, machine: Container, options: DurableOptions | None) -> 
 
     info = mission_info(target.thing)
     limit = info.max_outage if options.max_outage is None else options.max_outage
-    with contextlib.closing(open_store(options.journal)) as store:
+    # Who cannot reach the store has stopped before another one may take over: see `open_store`.
+    patience = min(8.0, options.lease_s / 2)
+    with contextlib.closing(open_store(options.journal, patience=patience)) as store:
         row = find_or_create(store, machine, options)
         begun = "goes on" if row.changed > row.created else "begins"
         print(f"mission {row.id} {begun}; journal: {store_name(options.journal)}", file=sys.stderr)
         migrate: Any = options.migrate or info.migrations
         with kept_mission(
-            machine, store, row.id, outage=options.outage, max_outage=limit, migrate=migrate
+            machine,
+            store,
+            row.id,
+            outage=options.outage,
+            max_outage=limit,
+            migrate=migrate,
+            lease_s=options.lease_s,
+            on_fenced=_leave,
         ):
             yield
 
@@ -158,9 +199,8 @@ def find_or_create(store: Store, machine: Container, options: DurableOptions) ->
         MissionError: the one that has begun has other arguments.
     """
     from smachpy.durable.mission import new_mission
-    from smachpy.durable.store import OVER
 
-    open_ones = [row for row in store.missions() if row.status not in OVER]
+    open_ones = [row for row in store.missions(open_only=True) if row.every is None]
     if options.mission is not None:
         for row in open_ones:
             if row.id == options.mission:

@@ -70,7 +70,7 @@ def register(subparsers: Any) -> None:
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        type=_input,
+        type=read_input,
         help="an argument of the mission's function by name, or a userdata key",
     )
     parser.add_argument(
@@ -95,7 +95,7 @@ def register(subparsers: Any) -> None:
     )
     parser.add_argument(
         "--server-timeout",
-        type=_seconds,
+        type=positive_seconds,
         default=10.0,
         metavar="S",
         help="how long to wait for the mission's action servers [s] (default: %(default)g)",
@@ -227,7 +227,7 @@ def _run_mission(
     if wants_help(args.words):
         print(usage(target))
         return 0
-    inputs = _inputs(args.input)
+    inputs = read_inputs(args.input)
     if _brings_robots(target, args.words, inputs):
         _use_own_network(args, stack)
     return run_mission(target, _options(args, inputs, mission_info(target.thing).world, events))
@@ -310,7 +310,8 @@ def _span(text: str) -> float:
     return float(match[1]) * {"": 1, "s": 1, "m": 60, "h": 3600}[match[2]]
 
 
-def _seconds(text: str) -> float:
+def positive_seconds(text: str) -> float:
+    """Return seconds above 0, for argparse."""
     seconds = finite(text)
     if seconds <= 0:
         raise argparse.ArgumentTypeError(f"got {text!r}; expected seconds above 0")
@@ -326,7 +327,8 @@ def _pace(text: str) -> Pace:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 
-def _inputs(pairs: Sequence[tuple[str, Text]]) -> dict[str, Text]:
+def read_inputs(pairs: Sequence[tuple[str, Text]]) -> dict[str, Text]:
+    """Return the values of `--input` by key; one given twice is refused."""
     inputs = dict(pairs)
     if len(inputs) < len(pairs):
         twice = next(key for key, _ in pairs if sum(key == other for other, _ in pairs) > 1)
@@ -334,7 +336,7 @@ def _inputs(pairs: Sequence[tuple[str, Text]]) -> dict[str, Text]:
     return inputs
 
 
-def _input(text: str) -> tuple[str, Text]:
+def read_input(text: str) -> tuple[str, Text]:
     """Read KEY=VALUE."""
     key, equals, value = text.partition("=")
     if not (key and equals):

@@ -20,10 +20,10 @@ from smachpy.run.grace import request_soon
 from smachpy.run.origin import asking
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
-    from smachpy.durable.store import Lease, Store
+    from smachpy.durable.store import FencedError, Lease, Store
     from smachpy.machines.container import Container
 
 Outage = Literal["counts", "pauses"]
@@ -159,14 +159,18 @@ def kept_mission(
     outage: Outage = "counts",
     max_outage: float | None = None,
     migrate: Any = None,
+    lease_s: float = LEASE_S,
+    on_fenced: Callable[[FencedError], object] | None = None,
 ) -> Iterator[Recorder]:
     """Let the one run of `machine` within the block be kept as `mission`, which the store has.
 
-    The arguments, and what is raised, are those of `run_durable`.
+    What is raised, and the other arguments, are those of `run_durable`. A runner that says nothing
+    for `lease_s` [s] loses the mission. When another one has taken it over, `on_fenced` is called,
+    in some thread, before the machine is preempted: its goals are the other one's now.
     """
     row = store.mission(mission)
     _refuse_plans(machine)
-    lease = store.claim(mission, this_runner(), seconds=LEASE_S)
+    lease = store.claim(mission, this_runner(), seconds=lease_s)
     status = QUEUED if row.status == QUEUED else INTERRUPTED
     try:
         position = read_position(store, mission)
@@ -184,13 +188,14 @@ def kept_mission(
             goes_on=goes_on,
             shift_ns=shift_ns,
         )
+        recorder.on_fenced = on_fenced
         if goes_on:
             recorder.restore()
         status = INTERRUPTED
         data = machine._smachpy
         data.journal = recorder
         try:
-            with _renewing(store, lease, machine, recorder, asked=row.cancel):
+            with _renewing(store, lease, lease_s, machine, recorder, asked=row.cancel):
                 yield recorder
         finally:
             data.journal = None
@@ -245,7 +250,13 @@ def _fitted(machine: Container, row: MissionRow, position: Position, migrate: An
 
 @contextlib.contextmanager
 def _renewing(
-    store: Store, lease: Lease, machine: Container, recorder: Recorder, *, asked: bool
+    store: Store,
+    lease: Lease,
+    lease_s: float,
+    machine: Container,
+    recorder: Recorder,
+    *,
+    asked: bool,
 ) -> Iterator[None]:
     """Renew the lease, and hear of a wish to cancel, while the block runs."""
     clock = current_clock()
@@ -257,9 +268,9 @@ def _renewing(
 
     def renew() -> None:
         told = False
-        while not over.wait(LEASE_S / 3):
+        while not over.wait(lease_s / 3):
             try:
-                wanted = store.renew(lease, seconds=LEASE_S)
+                wanted = store.renew(lease, seconds=lease_s)
             except MissionError as error:
                 recorder.stop(error)
                 return

@@ -49,6 +49,7 @@ class Recorder:
 
     Attributes:
         broken: Why nothing is written any more; None while all is well. The run was preempted.
+        on_fenced: Called before that when another runner has the mission, if given.
 
     Threads: as `smachpy.run.frame.RunJournal` is called: any thread of the run.
     """
@@ -57,6 +58,7 @@ class Recorder:
         self, machine: Container, journal: Journal, *, goes_on: bool, shift_ns: int = 0
     ) -> None:
         self.broken: Exception | None = None
+        self.on_fenced: Callable[[FencedError], object] | None = None
         self._machine = machine
         self._journal = journal
         self._goes_on = goes_on
@@ -136,6 +138,8 @@ class Recorder:
         if self.broken is not None:
             return
         self.broken = error
+        if self.on_fenced is not None and isinstance(error, FencedError):
+            self.on_fenced(error)
         log.logerr(f"{self._root}: the journal cannot be written, the run is preempted: {error}")
         with asking("program", "journal", str(error)):
             request_soon(self._machine)

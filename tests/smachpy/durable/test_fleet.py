@@ -1,0 +1,285 @@
+"""Missions in a queue: real runners, killed and suspended, and what they leave to one another."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from smachpy.command import main
+from smachpy.durable.store import open_store
+
+MISSION = """
+import os
+import time
+from pathlib import Path
+
+import smachpy
+from smachpy import StateMachine
+
+HERE = Path(__file__).parent
+
+
+def note(text):
+    with (HERE / "log").open("a") as log:
+        log.write(f"{text} {os.getpid()}\\n")
+
+
+@smachpy.state(outcomes=["done"], input_keys=["name"])
+def first(userdata):
+    note(f"first {userdata.name}")
+    return "done"
+
+
+@smachpy.state(outcomes=["done"], input_keys=["name"])
+def wait(userdata):
+    note(f"wait {userdata.name}")
+    while not (HERE / f"go_{userdata.name}").exists():
+        time.sleep(0.02)
+    note(f"end {userdata.name}")
+    return "done"
+
+
+def mission(name: str = "a"):
+    machine = StateMachine(["done"], name="ERRAND")
+    machine.userdata.name = name
+    with machine:
+        StateMachine.add("FIRST", first, {"done": "WAIT"})
+        StateMachine.add("WAIT", wait)
+    return machine
+"""
+WITHIN_S = 50
+
+
+@pytest.fixture
+def errand(tmp_path):
+    file = tmp_path / "errand.py"
+    file.write_text(MISSION)
+    return file
+
+
+def submit(errand, place, name, *options):
+    assert (
+        main(["submit", str(errand), "--db", place, "--mission", name, *options, "--", name]) == 0
+    )
+
+
+def runner(place, *options):
+    """Start a runner with its processes in one group, as on one computer."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "smachpy.command", "runner", "--db", place, *options],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )
+
+
+def log_of(errand):
+    file = errand.parent / "log"
+    return [tuple(line.split()) for line in file.read_text().splitlines()] if file.exists() else []
+
+
+def until(condition):
+    """Wait for what other processes do."""
+    deadline = time.monotonic() + WITHIN_S
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def pid_that(errand, what, name):
+    until(lambda: any(line[:2] == (what, name) for line in log_of(errand)))
+    return next(
+        int(pid) for kind, who, pid in reversed(log_of(errand)) if (kind, who) == (what, name)
+    )
+
+
+def end(process):
+    process.kill()
+    process.communicate()
+
+
+def statuses(place):
+    store = open_store(place)
+    try:
+        return {row.id: (row.status, row.outcome) for row in store.missions()}
+    finally:
+        store.close()
+
+
+def test_a_runner_takes_what_was_submitted(errand, tmp_path, capsys):
+    place = str(tmp_path / "queue.db")
+    for name in ("a", "b"):
+        submit(errand, place, name)
+        (tmp_path / f"go_{name}").touch()
+    submit(errand, place, "later", "--at", "2100-01-01T00:00Z")
+    assert main(["missions", "cancel", "later", "--durable", place]) == 0
+    process = runner(place, "--until-empty")
+    output, _ = process.communicate(timeout=WITHIN_S)
+    assert process.returncode == 0, output
+    assert statuses(place) == {
+        "a": ("ended", "done"),
+        "b": ("ended", "done"),
+        "later": ("cancelled", None),
+    }
+    assert [line[:2] for line in log_of(errand)] == [
+        (what, name) for name in ("a", "b") for what in ("first", "wait", "end")
+    ]
+
+
+def test_what_a_dead_computer_ran_goes_on_at_another(errand, tmp_path, store_place):
+    submit(errand, store_place, "a")
+    dead = runner(store_place)
+    child = pid_that(errand, "wait", "a")
+    os.kill(dead.pid, signal.SIGKILL)
+    os.kill(child, signal.SIGKILL)
+    end(dead)
+    other = runner(store_place, "--until-empty")
+    try:
+        until(lambda: pid_that(errand, "wait", "a") != child)
+        (tmp_path / "go_a").touch()
+        output, _ = other.communicate(timeout=WITHIN_S)
+    finally:
+        end(other)
+    assert "goes on" in output
+    assert statuses(store_place) == {"a": ("ended", "done")}
+    assert [line[0] for line in log_of(errand)] == ["first", "wait", "wait", "end"]
+
+
+@pytest.mark.postgres
+def test_a_computer_that_comes_back_is_refused(errand, tmp_path, postgres_url):
+    submit(errand, postgres_url, "a")
+    suspended = runner(postgres_url, "--lease", "2")
+    child = pid_that(errand, "wait", "a")
+    for pid in (suspended.pid, child):
+        os.kill(pid, signal.SIGSTOP)
+    other = runner(postgres_url)
+    try:
+        until(lambda: pid_that(errand, "wait", "a") != child)
+        for pid in (child, suspended.pid):
+            os.kill(pid, signal.SIGCONT)
+        lines = []
+        while "exit code 2" not in "".join(lines[-1:]):
+            lines.append(suspended.stdout.readline())
+            assert lines[-1], lines
+        assert any("taken it over" in line for line in lines), lines
+        assert statuses(postgres_url) == {"a": ("running", None)}
+        (tmp_path / "go_a").touch()
+        until(lambda: statuses(postgres_url) == {"a": ("ended", "done")})
+    finally:
+        for _, _, pid in log_of(errand):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(int(pid), signal.SIGKILL)
+        end(suspended)
+        end(other)
+    assert statuses(postgres_url) == {"a": ("ended", "done")}
+    ends = [pid for what, _, pid in log_of(errand) if what == "end"]
+    assert len(ends) == 1
+    assert int(ends[0]) != child
+
+
+def test_a_robot_has_one_mission_at_a_time(errand, tmp_path):
+    place = str(tmp_path / "queue.db")
+    for name, robot in (("a", "r1"), ("b", "r1"), ("c", "r2"), ("d", "r3")):
+        submit(errand, place, name, "--robot", robot)
+    process = runner(place, "--robot", "r1", "--robot", "r2", "--at-once", "3")
+    try:
+        pid_that(errand, "wait", "a")
+        pid_that(errand, "wait", "c")
+        store = open_store(place)
+        assert store.mission("b").status == "queued"
+        (tmp_path / "go_a").touch()
+        pid_that(errand, "wait", "b")
+        assert store.mission("d").status == "queued"
+        store.close()
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=WITHIN_S)
+    finally:
+        end(process)
+    assert statuses(place) == {
+        "a": ("ended", "done"),
+        "b": ("interrupted", None),
+        "c": ("interrupted", None),
+        "d": ("queued", None),
+    }
+
+
+def test_a_mission_that_cannot_run_here_is_left_for_a_while(errand, tmp_path):
+    place = str(tmp_path / "queue.db")
+    submit(errand, place, "a")
+    submit(errand, place, "b")
+    errand.rename(tmp_path / "gone.py")
+    process = runner(place, "--until-empty")
+    output, _ = process.communicate(timeout=WITHIN_S)
+    assert process.returncode == 0, output
+    assert statuses(place) == {"a": ("queued", None), "b": ("queued", None)}
+    assert output.count("exit code 2") == 2
+
+
+def test_a_schedule_is_kept_and_shown(errand, tmp_path, capsys):
+    place = str(tmp_path / "queue.db")
+    submit(errand, place, "night", "--every", "0 3 * * * Europe/Berlin", "--robot", "r1")
+    store = open_store(place)
+    row = store.mission("night")
+    assert (row.every, row.robot, row.argv) == ("0 3 * * * Europe/Berlin", "r1", ("--", "night"))
+    assert row.due > row.created
+    store.close()
+    capsys.readouterr()
+    assert main(["missions", "list", "--json", "--durable", place]) == 0
+    assert [each["id"] for each in json.loads(capsys.readouterr().out)] == ["night"]
+    # A run of the same file is another mission.
+    (tmp_path / "go_night").touch()
+    words = ["--plain", "--robot", "r1", "--durable", place, "--", "night"]
+    assert main(["run", str(errand), *words]) in {0, 1}
+    assert len(statuses(place)) == 2
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--every", "daily"],
+        ["--every", "* * * * * Nowhere"],
+        ["--at", "soon"],
+        ["--at", "08:00", "--every", "* * * * *"],
+        ["--robot", "no good"],
+        ["--input", "nothing=1"],
+        ["--db", "mysql://db"],
+        ["--", "a", "b", "c"],
+    ],
+    ids=" ".join,
+)
+def test_what_cannot_be_submitted_is_refused(errand, tmp_path, options, capsys):
+    place = tmp_path / "queue.db"
+    try:
+        code = main(["submit", str(errand), "--db", str(place), *options])
+    except SystemExit as error:
+        code = error.code
+    assert code == 2
+    assert capsys.readouterr().err
+    assert not place.exists()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--at-once", "0"],
+        ["--at-once", "x"],
+        ["--lease", "-1"],
+        ["--lease", "nan"],
+        ["--robot", "a b"],
+    ],
+)
+def test_a_runner_refuses_bad_options(tmp_path, options, capsys):
+    try:
+        code = main(["runner", "--db", str(tmp_path / "queue.db"), "--until-empty", *options])
+    except SystemExit as error:
+        code = error.code
+    assert code == 2
+    assert capsys.readouterr().err
