@@ -298,6 +298,7 @@ _CLOSES = {"Finished": "", "Left": "", "Failed": "", "GoalDone": "goal of "}
 _WITHIN = {
     **dict.fromkeys(("PreemptRequested", "PreemptServiced", "Abandoned"), ""),
     **dict.fromkeys(("Retried", "Paused", "Resumed"), ""),
+    **dict.fromkeys(("QuestionAsked", "QuestionAnswered"), ""),
     "Iterated": "item of ",
     "GoalFeedback": "goal of ",
     "UserdataWritten": "userdata of ",

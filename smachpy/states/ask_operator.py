@@ -12,8 +12,8 @@ The live page and the terminal view show the question as well, with a button for
 from __future__ import annotations
 
 import contextlib
+import itertools
 import math
-import uuid
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -91,10 +91,13 @@ class AskOperator(State):
         channel: str = "operator",
         **options: Any,
     ) -> None:
-        if not 0.0 < patience < math.inf:
-            raise MissionError(f"patience: got {patience:g}; expected more than 0 [s].")
+        if not isinstance(patience, (int, float)) or not 0.0 < patience < math.inf:
+            got = f"{patience:g}" if isinstance(patience, (int, float)) else repr(patience)
+            raise MissionError(f"patience: got {got}; expected more than 0 [s].")
         words = dict(answers) if isinstance(answers, Mapping) else {}
         answers = (answers,) if isinstance(answers, str) else tuple(answers)
+        if not all(isinstance(text, str) for text in (*answers, *words.values())):
+            raise MissionError(f"answers: got {words or list(answers)}; expected texts.")
         taken = {"", NO_ANSWER, "preempted"}.intersection(answer.strip() for answer in answers)
         if not answers or taken:
             raise MissionError(
@@ -123,7 +126,9 @@ class AskOperator(State):
         """
         node = get_node()
         scope = current_scope()
-        service = node.resolve(f"{self.__channel}/questions/q{uuid.uuid4().hex[:12]}")
+        # The same in each run with the same seed, and nobody else's.
+        number = next(node.shared("questions", lambda: itertools.count(1)))
+        service = node.resolve(f"{self.__channel}/questions/q{node.transport.session_id}_{number}")
         question = Question(
             path="" if scope is None else scope.path,
             text=str(self.__question(userdata) if callable(self.__question) else self.__question),

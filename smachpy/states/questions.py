@@ -190,7 +190,7 @@ def give_answer(service: str, answer: str, by: str, *, node: Node | None = None)
         node: Where it is; the current node when None.
 
     Raises:
-        AnswerRefusedError: it was not taken.
+        AnswerRefusedError: it was not taken, or the mission does not say.
 
     Blocks: until the mission has taken it, 3 s at most.
     """
@@ -198,9 +198,14 @@ def give_answer(service: str, answer: str, by: str, *, node: Node | None = None)
         raise AnswerRefusedError(service, answer, "expected one of its answers.")
     make: Any = AnswerQuestion._request_class
     request = make(answer=answer, by=by)
-    reply = _call(node or get_node(), service, request)
+    node = node or get_node()
+    asked = node.clock.now()
+    reply = _call(node, service, request)
     if reply is None:
-        raise AnswerRefusedError(service, answer, "nobody asks that any more.")
+        reason = "nobody asks that any more."
+        if node.clock.now() - asked >= CALL_S:
+            reason = f"the mission did not say in {CALL_S:g} s whether it took it."
+        raise AnswerRefusedError(service, answer, reason)
     if not reply.accepted:
         raise AnswerRefusedError(service, answer, reply.text)
 

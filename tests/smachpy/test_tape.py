@@ -286,6 +286,21 @@ def test_a_taped_run_alone_is_thinned_out_the_same(monkeypatch):
     assert len(thinned) < 450
 
 
+def test_a_question_that_waits_is_not_lost_in_a_flood():
+    """What a full tape keeps is what tells what goes on now."""
+    asked = {"kind": "QuestionAsked", "path": "/ROOT/ASK"}
+    entries = [(None, {"kind": "Entered", "path": "/ROOT/ASK"}, None, None, None)]
+    entries += [(None, asked, None, None, None)]
+    for _ in range(50):
+        for kind in ("Entered", "Left"):
+            entries.append((None, {"kind": kind, "path": "/ROOT/BUSY"}, None, None, None))
+    kept, _ = tapes.thin([part for entry in entries for part in entry])
+    assert asked in kept
+    entries.insert(2, (None, {"kind": "Left", "path": "/ROOT/ASK"}, None, None, None))
+    kept, _ = tapes.thin([part for entry in entries for part in entry])
+    assert asked not in kept
+
+
 def test_a_flood_of_visits_keeps_whole_visits(monkeypatch):
     """No visit gets the end of another one: a duration that is told has been measured."""
     monkeypatch.setattr(tapes, "SLACK", 4)

@@ -224,6 +224,20 @@ def test_pictures_are_told_by_their_bytes(tmp_path):
     assert read_picture(bytearray(b"GIF89a"))[0] == "image/gif"
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"answers": [1, 2], "patience": 5.0},
+        {"answers": {"yes": 7}, "patience": 5.0},
+        {"patience": "5"},
+        {"patience": None},
+    ],
+)
+def test_arguments_of_other_kinds_are_refused(arguments):
+    with pytest.raises(MissionError, match=r"got .*; expected"):
+        AskOperator("Go on?", **arguments)
+
+
 @pytest.mark.parametrize("default", ["maybe", "preempted", "", None])
 def test_a_default_that_is_no_answer_is_refused(default):
     with pytest.raises(MissionError, match="default: got"):

@@ -76,7 +76,7 @@ export async function connect(handlers) {
 /** The token stands in the fragment of the address, which no server is sent. */
 function readToken() {
   const words = new URLSearchParams(location.hash.slice(1));
-  const given = words.get("token");
+  const given = words.get("token") || null;
   words.delete("token");
   try {
     if (given) sessionStorage.setItem("smachpy.token", given);
