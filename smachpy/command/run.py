@@ -37,7 +37,12 @@ if TYPE_CHECKING:
 def register_list(subparsers: Any) -> None:
     """Add `smachpy list`."""
     parser = subparsers.add_parser(
-        "list", help="name the missions", description="Name the missions that are installed."
+        "list",
+        help="name the missions",
+        description="Name the missions that are installed, and the Petri net plans in a folder.",
+    )
+    parser.add_argument(
+        "folder", type=Path, nargs="?", default=Path(), metavar="FOLDER", help="of plans (here)"
     )
     parser.set_defaults(run=_list)
 
@@ -155,17 +160,17 @@ def _add_watching(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--record", type=Path, metavar="FILE", help="write the run to a file")
 
 
-def _list(_args: argparse.Namespace) -> int:
+def _list(args: argparse.Namespace) -> int:
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text as Cell
 
-    from smachpy.command.targets import list_missions
+    from smachpy.command.targets import list_missions, list_plans
 
     table = Table(box=None, pad_edge=False, show_header=False)
     table.add_column(style="bold")
     table.add_column()
-    for name, summary in list_missions().items():
+    for name, summary in {**list_missions(), **list_plans(args.folder)}.items():
         table.add_row(Cell(printable(name)), Cell(printable(summary)))
     Console(highlight=False).print(table)
     return 0

@@ -129,6 +129,34 @@ def list_missions() -> dict[str, str]:
     return lines
 
 
+def list_plans(folder: Path) -> dict[str, str]:
+    """Return the Petri net plans in a folder, name for `smachpy run` -> their actions, in a line.
+
+    The line of one that cannot be read says why.
+
+    Raises:
+        TargetError: the folder cannot be read.
+    """
+    from smachpy.pnp.plan import understand
+    from smachpy.pnp.problems import PlanError
+    from smachpy.pnp.reading import read_net
+
+    lines = {}
+    try:
+        files = sorted(path for path in folder.iterdir() if path.suffix in PLANS)
+    except OSError as error:
+        raise TargetError(str(folder), f"got {error.strerror}; expected a folder.") from error
+    for path in files:
+        try:
+            plan = understand(read_net(path)[0])
+        except PlanError as error:
+            lines[str(path)] = f"not available: {str(error).splitlines()[0]}"
+        else:
+            names = sorted({name.rpartition("#")[2].partition("_")[0] for name in plan.executables})
+            lines[str(path)] = f"Petri net plan of {', '.join(names) or 'no actions'}."
+    return lines
+
+
 def load_target(text: str) -> Target:
     """Load what a user named.
 

@@ -355,6 +355,20 @@ def test_list_names_the_missions():
     assert named == sorted(project["entry-points"]["smachpy.missions"])
 
 
+def test_list_names_the_plans_of_a_folder(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "200")
+    (tmp_path / "tour.plan").write_text("goto_x; wait_2")
+    (tmp_path / "bad.pnml").write_text("<pnml>")
+    assert main(["list", str(tmp_path)]) == 0
+    lines = {line.split()[0]: line for line in capsys.readouterr().out.splitlines() if line}
+    assert "Petri net plan of goto, wait." in lines[str(tmp_path / "tour.plan")]
+    assert "not available" in lines[str(tmp_path / "bad.pnml")]
+    monkeypatch.chdir(tmp_path)
+    assert main(["list"]) == 0
+    assert "\ntour.plan" in capsys.readouterr().out
+    assert main(["list", str(tmp_path / "none")]) == 2
+
+
 def test_what_a_mission_says_of_itself_cannot_write_to_the_terminal(monkeypatch, capsys):
     named = {"evil\x1b[2J": "turns it \x1b[31mred [bold]and loud"}
     monkeypatch.setattr("smachpy.command.targets.list_missions", lambda: named)
