@@ -13,6 +13,7 @@ import threading
 from collections import deque
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
+from uuid import uuid4
 
 from actionlib_core.exceptions import ActionlibError, TransportError, TypeMismatchError
 from actionlib_core.goal.ports import StatusEntry
@@ -191,12 +192,13 @@ class RosClientPort:
         self._sending: set[_Goal] = set()
         self._there: dict[RosServer, TypeMismatchError | None] = {}
         self._silent: set[RosServer] = set()
+        self._asks_for_life = False
         self._leaving: dict[RosServer, Timer] = {}
         self._probe = LinkProbe(
             node.clock,
             network.settings.probe,
-            self._subscribe_to_status,
-            lambda: bool(self._last_status and (self._goals or self._silent)),
+            self._ask_for_life,
+            lambda: bool((self._goals and self._there) or self._silent),
             self._on_silent,
         )
         self._readable = Readable(log)
@@ -716,6 +718,24 @@ class RosClientPort:
             self._there.update(dict.fromkeys(back))
         for server in back:
             self._listener.on_server(server, None)
+
+    def _ask_for_life(self) -> Closable:
+        """Ask for the last status or, of a server that had no goal yet, for the result of none.
+
+        The second is answered by its executor, which has no goals to be busy with. One such
+        question at a time, or those of a suspended server would push others out of its queue.
+        """
+        if self._last_status is not None:
+            return self._subscribe_to_status()
+
+        def on_done(_: bool) -> None:
+            self._asks_for_life = False
+
+        if not self._asks_for_life:
+            self._asks_for_life = True
+            asked = pack_id(uuid4().bytes)
+            self._ask(None, self._result, asked, status_in, lambda *_: None, on_done)
+        return contextlib.ExitStack()  # nothing to take back: a late answer counts, too
 
     def _on_silent(self, seconds: float) -> None:
         """Give up servers that do not answer, although their tokens are there."""

@@ -2,7 +2,8 @@
 
 A ROS 2 node takes a link for dead after 60 s of silence. The last status list, which servers keep
 for subscribers that come late, is answered by a node's network threads even while its executor is
-busy, and no callback runs there for it: asking for it again tells whether the link is there.
+busy, and no callback runs there for it: asking for it again tells whether the link is there. A
+server that has never had a goal keeps no list; it is asked for the result of an unknown goal.
 """
 
 from __future__ import annotations

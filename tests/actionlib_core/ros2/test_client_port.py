@@ -615,3 +615,48 @@ def test_who_waits_for_a_server_is_told_once_where_it_was_looked_for(world, capl
     caplog.clear()
     assert not client.wait_for_server(2.0)
     assert caplog.records == []
+
+
+def test_link_that_falls_silent_before_the_first_status_is_noticed(world):
+    server, client = world.server(), world.client()
+    server.on_goal = lambda query, uuid: None
+    handle = client.send_goal(Fibonacci.Goal(order=1))
+    server.wait(lambda: server.sent)
+    world.link.cut(50.0)
+    assert handle.wait(15.0)
+    assert handle.get_goal_status() == Status.LOST
+    assert "has not been heard" in handle.get_goal_status_text()
+    assert server.problems == []
+
+
+def test_server_that_thinks_about_its_first_goal_is_asked_for_life_and_left_in_peace(world):
+    server, client = world.server(), world.client()
+    kept = []
+    server.on_goal = lambda query, uuid: kept.append((query, uuid))
+    handle = client.send_goal(Fibonacci.Goal(order=1))
+    server.wait(lambda: kept)
+    world.clock.sleep(100.0)
+    assert not handle.wait(0.1)
+    assert 5 <= len(server._seen) - 1 <= 20
+    server.accept(*kept[0])
+    uuid = kept[0][1]
+    server.wait(lambda: uuid in server.asked)
+    server.end(uuid, 4)
+    assert handle.wait(5.0)
+    assert server.sent == [uuid]
+    assert server.problems == []
+
+
+def test_suspended_server_is_asked_for_life_once(world):
+    server, client = world.server(), world.client()
+    asked = []
+    server.on_goal = lambda query, uuid: None
+    server.on_result = lambda query, uuid: asked.append(query)
+    handle = client.send_goal(Fibonacci.Goal(order=1))
+    assert handle.wait(60.0)
+    assert handle.get_goal_status() == Status.LOST
+    world.clock.sleep(60.0)
+    assert len(asked) <= 2  # for life, and for the goal
+    for query in asked:
+        server.answer_result(query, 0)
+    assert client.wait_for_server(1.0)
