@@ -46,10 +46,12 @@ class Pace:
     Attributes:
         virtual: In this process alone, on a clock of its own.
         rate: Seconds per real second; None: as fast as the computer allows.
+        seed: Chooses who is next where several can go on in virtual time; None: who came first.
     """
 
     virtual: bool = False
     rate: float | None = None
+    seed: int | None = None
 
     @classmethod
     def read(cls, text: str) -> Pace:
@@ -443,7 +445,7 @@ def _open_virtual(
     from actionlib_core.clock import VirtualClock
     from actionlib_core.transport.memory import MemoryNetwork
 
-    with VirtualClock(rate=pace.rate) as clock, use_clock(clock):
+    with VirtualClock(pace.seed, rate=pace.rate) as clock, use_clock(clock):
         network = MemoryNetwork(clock)
         node = Node(
             "mission",

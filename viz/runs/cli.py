@@ -16,7 +16,10 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from smachpy.events.recording import Recording
+    from smachpy.introspection import StateRecord
     from viz.runs.compare import Side
+    from viz.runs.report import Runs
+    from viz.runs.statistics import Statistics
 
 EXAMPLES = """examples:
   smachpy run patrol --record runs/1.jsonl    record a run
@@ -28,6 +31,7 @@ EXAMPLES = """examples:
   smachpy runs compare old.json my_robot.missions:deliver -o diff.svg    the same as a picture
   smachpy runs export runs/1.jsonl -o 1.html  a page that opens without a server
   smachpy runs export runs/1.jsonl -o 1.mcap  for Foxglove
+  smachpy runs export runs/ -o report.html    one report of many runs
   smachpy view runs/1.jsonl                   see it again in the browser
 """
 MOST_PROBLEMS = 20
@@ -73,7 +77,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     two.add_argument("--depth", type=int, metavar="N", help="container levels to open")
     two.set_defaults(run=_compare)
     export = actions.add_parser("export", help="as a page (.html), for Foxglove (.mcap), a picture")
-    export.add_argument("file", metavar="FILE")
+    export.add_argument("file", metavar="FILE|DIR", help="a run, or many for one report (.html)")
     export.add_argument(
         "-o",
         "--output",
@@ -108,7 +112,7 @@ def _list(args: argparse.Namespace) -> int:
         table.add_column(title, no_wrap=True, justify="right" if title == "events" else "left")
     for recording in each_recording(args.places):
         table.add_row(*(Text(printable(word)) for word in _line(recording)))
-    _console().print(table)
+    console().print(table)
     return 0
 
 
@@ -157,9 +161,6 @@ def _each(places: Iterable[str]) -> Iterator[Recording]:
 
 
 def _show(args: argparse.Namespace) -> int:
-    from rich.table import Table
-    from rich.text import Text
-
     from viz.runs.statistics import count_by_machine, never_taken
 
     counted = count_by_machine(_each(args.places))
@@ -175,29 +176,39 @@ def _show(args: argparse.Namespace) -> int:
             }
             print(json.dumps(told))
         return 0
-    console = _console()
-    for label, (record, statistics, lost) in counted.items():
-        ended = ", ".join(f"{outcome} x{n}" for outcome, n in statistics.outcomes.items())
-        console.print(
-            printable(f"{label}: {statistics.runs} run(s); {ended or 'none has ended'}"),
-            markup=False,
-        )
-        if lost:
-            console.print(f"{lost} events are missing: visits and outcomes are at least these")
-        table = Table(box=None, pad_edge=False)
-        for title in ("state", "visits", "median", "95 %", "failed", "retried", "outcomes"):
-            table.add_column(title, justify="left" if title in {"state", "outcomes"} else "right")
-        for state in record.walk():
-            if state.path in statistics.states:
-                row = _row(state.path, statistics.states[state.path].to_json())
-                table.add_row(*(Text(printable(word)) for word in row))
-        console.print(table)
-        untaken = never_taken(record, statistics)
-        if untaken:
-            console.print(f"never taken: {len(untaken)} transition(s)")
-            for path, outcome in untaken[:MOST_PROBLEMS]:
-                console.print(printable(f"  {path}  {outcome}"), markup=False)
+    out = console()
+    for record, statistics, lost in counted.values():
+        print_statistics(out, record, statistics, lost)
     return 0
+
+
+def print_statistics(out: Console, record: StateRecord, statistics: Statistics, lost: int) -> None:
+    """Print what the runs of a machine add up to; `lost` events are missing in them."""
+    from rich.table import Table
+    from rich.text import Text
+
+    from viz.runs.statistics import never_taken
+
+    ended = ", ".join(f"{outcome} x{n}" for outcome, n in statistics.outcomes.items())
+    out.print(
+        printable(f"{record.label}: {statistics.runs} run(s); {ended or 'none has ended'}"),
+        markup=False,
+    )
+    if lost:
+        out.print(f"{lost} events are missing: visits and outcomes are at least these")
+    table = Table(box=None, pad_edge=False)
+    for title in ("state", "visits", "median", "95 %", "failed", "retried", "outcomes"):
+        table.add_column(title, justify="left" if title in {"state", "outcomes"} else "right")
+    for state in record.walk():
+        if state.path in statistics.states:
+            row = _row(state.path, statistics.states[state.path].to_json())
+            table.add_row(*(Text(printable(word)) for word in row))
+    out.print(table)
+    untaken = never_taken(record, statistics)
+    if untaken:
+        out.print(f"never taken: {len(untaken)} transition(s)")
+        for path, outcome in untaken[:MOST_PROBLEMS]:
+            out.print(printable(f"  {path}  {outcome}"), markup=False)
 
 
 def _row(path: str, numbers: dict[str, Any]) -> tuple[str, ...]:
@@ -231,19 +242,34 @@ def _why(args: argparse.Namespace) -> int:
 
 
 def _compare(args: argparse.Namespace) -> int:
-    from viz.runs.compare import unite
 
     old, new = _side(args.first), _side(args.second)
     if args.output:
         _draw_both(args, old, new)
         return 0
+    _print_union(old, new)
+    return 0
+
+
+def _print_union(old: Side, new: Side) -> None:
+    from viz.runs.compare import unite
+
     signs = {"added": "+", "removed": "-", "changed": "~", "numbers": " "}
     lines = [
         f"{signs[one['change']]} {one['path']}  {one['text']}".rstrip()
         for one in unite(old, new).listed()
     ]
-    _console().print(printable("\n".join(lines or ["no notable difference"])), markup=False)
-    return 0
+    console().print(printable("\n".join(lines or ["no notable difference"])), markup=False)
+
+
+def print_differences(before: Runs, now: Runs) -> None:
+    """Print how runs differ from earlier ones."""
+    from viz.runs.compare import Side
+
+    print("compared with earlier runs:")
+    _print_union(
+        Side("before", before.record, before.statistics), Side("now", now.record, now.statistics)
+    )
 
 
 def _draw_both(args: argparse.Namespace, old: Side, new: Side) -> None:
@@ -284,6 +310,8 @@ def _side(place: str) -> Side:
 def _export(args: argparse.Namespace) -> int:
     from smachpy.events.recording import read_recording
 
+    if Path(args.file).is_dir():
+        return _export_all(args.file, Path(args.output))
     recording = read_recording(args.file)
     output = Path(args.output)
     try:
@@ -294,6 +322,38 @@ def _export(args: argparse.Namespace) -> int:
         ) from error
     print(output)
     return 0
+
+
+def _export_all(folder: str, output: Path) -> int:
+    """One report of all runs in a folder."""
+    from viz.pictures.drawing import write
+    from viz.runs.report import report
+
+    if output.suffix != ".html":
+        raise UsageError(
+            f"smachpy runs export: {str(output)!r}: got {output.suffix or 'no ending'} for a "
+            f"folder of runs; expected .html, or one recording. Try -o {output.stem}.html"
+        )
+    print(write(report(collect_one(folder, "export")).encode("utf-8", "replace"), output))
+    return 0
+
+
+def collect_one(place: str, command: str) -> Runs:
+    """Return the runs in a folder or file, of one machine.
+
+    Raises:
+        UsageError: they are of several, or there are none.
+    """
+    from viz.runs.report import collect
+
+    found = collect(_each([place]))
+    if len(found) > 1:
+        raise UsageError(
+            f"smachpy runs {command}: {place!r}: got runs of {sorted(found)}; expected those of "
+            "one machine. Try a folder for each."
+        )
+    [runs] = found.values()
+    return runs
 
 
 def _write(recording: Recording, output: Path, runs: list[str], floor: Path | None) -> None:
@@ -317,7 +377,8 @@ def _write(recording: Recording, output: Path, runs: list[str], floor: Path | No
         render(recording.record, output, run=history)
 
 
-def _console() -> Console:
+def console() -> Console:
+    """Where to print: as wide as the terminal, 160 columns to a file."""
     import sys
 
     from rich.console import Console

@@ -1,0 +1,225 @@
+"""Many runs of one machine as one page that opens without a server."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from html import escape
+from typing import TYPE_CHECKING
+
+from smachpy.events.run_state import RAISED
+from smachpy.outcome_classes import outcome_class
+from viz.pictures.drawing import picture
+from viz.pictures.theme import LIGHT
+from viz.runs import charts
+from viz.runs.compare import Side, unite
+from viz.runs.statistics import Statistics, marks_of, quantile
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+    from smachpy.events.recording import Recording
+    from smachpy.introspection import StateRecord
+
+STYLE = f"""
+body {{ font: 13px/20px Inter, system-ui, sans-serif; color: {LIGHT.ink}; margin: 24px auto;
+  max-width: 960px; padding: 0 16px; }}
+h1 {{ font-size: 20px; }} h2 {{ font-size: 15px; margin-top: 32px; }}
+table {{ border-collapse: collapse; }} th, td {{ padding: 2px 16px 2px 0; text-align: left; }}
+td.n, th.n {{ text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }}
+.success {{ color: {LIGHT.success.text}; }} .failure {{ color: {LIGHT.failure.text}; }}
+.preempted {{ color: {LIGHT.preempted.text}; }} .muted {{ color: {LIGHT.muted}; }}
+.chart {{ width: 100%; font-size: 11px; }} .bars {{ fill: {LIGHT.active.stroke}; }}
+.ribbons path {{ fill: {LIGHT.edge}; opacity: .25; }} .ribbons path:hover {{ opacity: .6; }}
+.machine svg {{ max-width: 100%; height: auto; }} .wide {{ overflow-x: auto; }}
+"""
+
+
+@dataclass(slots=True)
+class Runs:
+    """What a report needs of the runs of one machine.
+
+    Attributes:
+        record: The machine as it was in the last run.
+        statistics: Of all states.
+        ways: For each run the states of the outermost container in their order, and the outcome.
+        files: Of each run the file, the outcome, and the seconds it took if it has ended.
+    """
+
+    record: StateRecord
+    statistics: Statistics = field(default_factory=Statistics)
+    ways: list[tuple[list[str], str]] = field(default_factory=list)
+    files: list[tuple[str, str, float | None]] = field(default_factory=list)
+
+
+def collect(recordings: Iterable[Recording]) -> dict[str, Runs]:
+    """Return what the runs of each machine add up to, by its label."""
+    found: dict[str, Runs] = {}
+    for recording in recordings:
+        runs = found.setdefault(recording.record.label, Runs(recording.record))
+        runs.record = recording.record
+        runs.statistics.add(recording.events, recording.record)
+        way = list(_way(recording))
+        outcome, seconds = "not finished", None
+        for event in recording.events:
+            if event["kind"] == "Finished":
+                outcome = event.get("outcome") or RAISED
+                seconds = (event["stamp_ns"] - recording.events[0]["stamp_ns"]) / 1e9
+        runs.ways.append((way, outcome))
+        runs.files.append((str(recording.path), outcome, seconds))
+    return found
+
+
+def _way(recording: Recording) -> Iterator[str]:
+    labels = {child.path: child.label for child in recording.record.children}
+    for event in recording.events:
+        if event["kind"] == "Entered" and event["path"] in labels:
+            yield labels[event["path"]]
+
+
+def report(
+    runs: Runs,
+    *,
+    before: Runs | None = None,
+    values: Mapping[str, Mapping[str, object]] | None = None,
+) -> str:
+    """Return the page.
+
+    Args:
+        runs: The runs.
+        before: Earlier ones to compare with.
+        values: By the file of a run, what was chosen for it.
+
+    Raises:
+        EngineError, PictureError: the machine cannot be drawn.
+
+    Blocks: while `dot` runs.
+    """
+    marks = marks_of(runs.statistics, runs.record)
+    ends = ", ".join(f"{outcome} \u00d7{n}" for outcome, n in runs.statistics.outcomes.items())
+    legend = (("", f"{runs.statistics.runs} runs: {ends or 'none has ended'}"),
+              ("heat", "the warmer, the longer in all"))  # fmt: skip
+    drawn = picture(runs.record, "svg", run=marks, legend=legend).decode()
+    seconds = {path: sum(s.durations) for path, s in runs.statistics.states.items()}
+    sections = [
+        ("Outcomes", _outcomes(runs)),
+        *([("What varied", _varied(runs, values))] if values else []),
+        ("Ways taken", charts.ways(runs.ways)),
+        ("The machine", f'<div class="machine wide">{drawn[drawn.index("<svg") :]}</div>'),
+        ("Time by state", charts.flame(runs.record, seconds)),
+        ("States", _states(runs)),
+        *([("Compared with earlier runs", _differences(before, runs))] if before else []),
+        ("Runs", _files(runs, values or {})),
+    ]
+    body = "".join(f"<h2>{title}</h2>{content}" for title, content in sections if content)
+    name = escape(runs.record.label)
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width">'
+        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; '
+        "style-src 'unsafe-inline'\">"
+        f"<title>{name}: {runs.statistics.runs} runs</title><style>{STYLE}</style></head>"
+        f"<body><h1>{name}: {runs.statistics.runs} runs</h1>{body}</body></html>\n"
+    )
+
+
+def _outcomes(runs: Runs) -> str:
+    ended = sum(runs.statistics.outcomes.values())
+    rows = []
+    for outcome, n in sorted(runs.statistics.outcomes.items(), key=lambda item: -item[1]):
+        times = [s for _, end, s in runs.files if end == outcome and s is not None]
+        cells = [_coloured(outcome), str(n), f"{n / ended:.0%}", *_times(times)]
+        rows.append(cells)
+    return _table(["outcome", "runs", "share", "median", "95 %"], rows)
+
+
+def _varied(runs: Runs, values: Mapping[str, Mapping[str, object]]) -> str:
+    """How runs ended by each quarter of what varied."""
+    rows = []
+    for key in dict.fromkeys(key for one in values.values() for key in one):
+        for words, ends in by_quarter(runs, values, key):
+            told = ", ".join(f"{_coloured(o)} \u00d7{n}" for o, n in ends.most_common())
+            rows.append([escape(key), escape(words), str(sum(ends.values())), told])
+    return _table(["value", "range", "runs", "outcomes"], rows)
+
+
+def by_quarter(
+    runs: Runs, values: Mapping[str, Mapping[str, object]], key: str
+) -> list[tuple[str, Counter[str]]]:
+    """Return how runs ended, by quarters of a number that varied or by each other value."""
+    pairs = [(values[file][key], end) for file, end, _ in runs.files if key in values.get(file, {})]
+    numbers = sorted((v, end) for v, end in pairs if isinstance(v, int | float))
+    if len(numbers) < len(pairs):
+        ends: dict[str, Counter[str]] = {}
+        for value, end in pairs:
+            ends.setdefault(str(value), Counter())[end] += 1
+        return list(ends.items())
+    size = -(-len(numbers) // 4)
+    quarters = [numbers[i : i + size] for i in range(0, len(numbers), size or 1)]
+    return [
+        (f"{part[0][0]:.3g} to {part[-1][0]:.3g}", Counter(end for _, end in part))
+        for part in quarters
+    ]
+
+
+def _states(runs: Runs) -> str:
+    rows = []
+    for state in runs.record.walk():
+        one = runs.statistics.states.get(state.path)
+        if one is None:
+            continue
+        bars = ""
+        if one.durations and max(one.durations) > 0:
+            low, high = min(one.durations), max(one.durations)
+            span = f"{low:.1f} to {high:.1f} s"
+            bars = f'{charts.histogram(one.durations, low, high)} <span class="muted">{span}</span>'
+        told = ", ".join(f"{_coloured(o)} \u00d7{n}" for o, n in one.outcomes.items())
+        cells = [escape(state.path), str(one.visits), *_times(one.durations)]
+        rows.append([*cells, f"{one.failures():.0%}", bars, told])
+    head = ["state", "visits", "median", "95 %", "failed", "durations", "outcomes"]
+    return f'<div class="wide">{_table(head, rows)}</div>'
+
+
+def _differences(before: Runs, runs: Runs) -> str:
+    old = Side("before", before.record, before.statistics)
+    new = Side("now", runs.record, runs.statistics)
+    rows = [
+        [escape(one["change"]), escape(one["path"]), escape(one["text"])]
+        for one in unite(old, new).listed()
+    ]
+    return _table(["change", "state", "what"], rows) if rows else "no notable difference"
+
+
+def _files(runs: Runs, values: Mapping[str, Mapping[str, object]]) -> str:
+    rows = []
+    for file, outcome, seconds in runs.files:
+        chosen = ", ".join(f"{key} {_short(v)}" for key, v in values.get(file, {}).items())
+        took = "" if seconds is None else f"{seconds:.1f} s"
+        rows.append([escape(file), _coloured(outcome), took, escape(chosen)])
+    return _table(["file", "outcome", "time", *(["values"] if values else [])], rows)
+
+
+def _short(value: object) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _times(durations: list[float]) -> list[str]:
+    found = [quantile(durations, share) for share in (0.5, 0.95)]
+    return ["" if value is None else f"{value:.2f} s" for value in found]
+
+
+def _coloured(outcome: str) -> str:
+    return f'<span class="{outcome_class(outcome)}">{escape(outcome)}</span>'
+
+
+NUMBERS = {"runs", "share", "median", "95 %", "visits", "failed", "time"}
+
+
+def _table(head: list[str], rows: list[list[str]]) -> str:
+    kinds = ['class="n"' if title in NUMBERS else "" for title in head]
+    top = "".join(f"<th {k}>{title}</th>" for k, title in zip(kinds, head, strict=True))
+    body = "".join(
+        f"<tr>{''.join(f'<td {k}>{c}</td>' for k, c in zip(kinds, row, strict=False))}</tr>"
+        for row in rows
+    )
+    return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"

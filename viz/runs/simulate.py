@@ -1,0 +1,338 @@
+"""Many simulated runs of one mission, with values that vary from run to run."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import math
+import os
+import random
+import signal
+import threading
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, field
+from multiprocessing import get_context
+from typing import TYPE_CHECKING, Any
+
+from smachpy.command.arguments import Text, parameters_of
+from smachpy.command.runner import NO_NAMES, build, needed_servers
+from smachpy.command.surroundings import Pace, RobotOptions, open_surroundings
+from smachpy.command.targets import load_target
+from smachpy.events.recording import Recorder
+from smachpy.exceptions import MissionError
+from smachpy.introspection import describe
+from smachpy.mission_info import mission_info
+from smachpy.sim.config import load_config
+from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from concurrent.futures import Executor
+    from pathlib import Path
+
+    from smachpy.command.targets import Target
+
+    Value = float | int | str
+
+SHORT = {"battery": "battery.charge"}
+"""Short names of the simulated robot's parameters."""
+SERVER_TIMEOUT_S = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Vary:
+    """One value that varies.
+
+    Attributes:
+        key: A parameter of the mission's function, one of its userdata keys, or a parameter of the
+            simulated robot: "battery.charge", in short "battery".
+        low, high: Its range, when it is a number.
+        choices: Or what to choose from, in turn.
+    """
+
+    key: str
+    low: float = 0.0
+    high: float = 0.0
+    choices: tuple[str, ...] = ()
+    whole: bool = False
+
+    @classmethod
+    def read(cls, text: str) -> Vary:
+        """Read "battery=0.2..1.0" or "place=lab,office".
+
+        Raises:
+            ValueError: it is neither.
+        """
+        key, equals, values = text.partition("=")
+        low, dots, high = values.partition("..")
+        if not (key.strip() and equals and values.strip()):
+            raise ValueError(f"got {text!r}; expected KEY=LOW..HIGH or KEY=ONE,OTHER")
+        if not dots:
+            return cls(key.strip(), choices=tuple(word.strip() for word in values.split(",")))
+        try:
+            first, last = float(low), float(high)
+        except ValueError:
+            first = last = math.nan
+        if not (math.isfinite(first) and math.isfinite(last) and first <= last):
+            raise ValueError(
+                f"got {text!r}; expected two numbers, the lower one first, such as {key}=0.2..1.0"
+            )
+        whole = "." not in low + high and first.is_integer() and last.is_integer()
+        return cls(key.strip(), first, last, whole=whole)
+
+    def value(self, run: int, runs: int, seed: int) -> Value:
+        """Return its value in a run: one from each of as many equal parts of the range as runs.
+
+        Each key takes its parts in an order of its own, which makes a Latin hypercube of several.
+
+        Args:
+            run: Number of the run, from 0.
+            runs: How many there are.
+            seed: Of the order, and of the place inside each part.
+        """
+        if self.choices:
+            return self.choices[run % len(self.choices)]
+        order = list(range(runs))
+        random.Random(f"{seed} {self.key}").shuffle(order)  # noqa: S311  no secret
+        inside = random.Random(f"{seed} {self.key} {run}").random()  # noqa: S311
+        share = (order[run] + inside) / runs
+        if self.whole:
+            return int(self.low) + int(share * (int(self.high) - int(self.low) + 1))
+        return self.low + share * (self.high - self.low)
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One run, as it is sent to who does it.
+
+    Attributes:
+        mission: What `smachpy run` takes: a name, a file, module:factory.
+        number: Of the run, from 1.
+        seed: Of the order in which things of the same instant happen.
+        values: By key.
+        file: Where it is recorded.
+    """
+
+    mission: str
+    number: int
+    seed: int
+    values: Mapping[str, Value]
+    file: Path
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """How a run ended.
+
+    Attributes:
+        task: The run.
+        outcome: None when it raised or could not be done.
+        error: Why not.
+    """
+
+    task: Task
+    outcome: str | None
+    error: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What to simulate.
+
+    Attributes:
+        mission: As `smachpy run` takes it.
+        runs: How many.
+        folder: Where recordings go; must exist.
+        vary: What varies.
+        seed: The same seed makes the same runs.
+    """
+
+    mission: str
+    runs: int
+    folder: Path
+    vary: Sequence[Vary] = field(default=())
+    seed: int = 1
+
+    def tasks(self) -> list[Task]:
+        """Return the runs.
+
+        Raises:
+            SmachError: there is no such mission, it needs real time, or it has no such key.
+        """
+        target = load_target(self.mission)
+        self._check(target)
+        return [
+            Task(
+                self.mission,
+                run + 1,
+                self.seed * 1_000_003 + run,
+                {vary.key: vary.value(run, self.runs, self.seed) for vary in self.vary},
+                self.folder / f"{run + 1:04}.jsonl",
+            )
+            for run in range(self.runs)
+        ]
+
+    def _check(self, target: Target) -> None:
+        info = mission_info(target.thing)
+        if info.real_time:
+            raise MissionError(
+                f"mission {target.name!r} needs real time: {info.real_time}; expected one that "
+                "runs in virtual time."
+            )
+        parameters = {*parameters_of(target.thing)}
+        robot = _robot_parameters()
+        known = {*parameters, *describe(target.build()).input_keys} if not parameters else None
+        for vary in self.vary:
+            key = SHORT.get(vary.key, vary.key)
+            if vary.key in parameters or (known and vary.key in known):
+                continue
+            if key not in robot:
+                names = ", ".join(sorted({*(known or parameters), *SHORT, *robot}))
+                raise MissionError(
+                    f"--vary {vary.key}: mission {target.name!r} has no such argument or key, and "
+                    f"the simulated robot no such parameter; expected one of {names}."
+                )
+            if info.world is not None:
+                raise MissionError(
+                    f"--vary {vary.key}: mission {target.name!r} plays in a world of its own "
+                    f"({info.world.name}); expected one of {sorted(parameters)}."
+                )
+
+
+def _robot_parameters() -> dict[str, float]:
+    config = load_config(OFFICE_ROBOT)
+    return {
+        f"{section}.{name}": getattr(getattr(config, section), name)
+        for section in ("robot", "planner", "control", "recovery", "scan", "battery")
+        for name in getattr(config, section).__slots__
+    }
+
+
+def simulate(
+    plan: Plan,
+    executor: Executor | None = None,
+    on_result: Callable[[Result], object] = lambda _: None,
+    *,
+    jobs: int | None = None,
+) -> list[Result]:
+    """Do the runs of a plan, in virtual time; each leaves a recording.
+
+    Args:
+        plan: What to do.
+        executor: Where; a pool of one process per core when None. Its workers need this package,
+            the mission and the folder.
+        on_result: Called for each as it ends, in the caller's thread.
+        jobs: Processes of that pool; None: one per core.
+
+    Returns:
+        The results in the order of the tasks.
+
+    Raises:
+        SmachError: as `Plan.tasks`.
+
+    Blocks: until all are done.
+    """
+    tasks = plan.tasks()
+    with contextlib.ExitStack() as stack:
+        if executor is None:
+            executor = stack.enter_context(_pool(jobs, len(tasks)))
+        futures = {executor.submit(run_one, task): task for task in tasks}
+        results = {}
+        for future in as_completed(futures):
+            task = futures[future]
+            error = future.exception()
+            result = future.result() if error is None else Result(task, None, _words(error))
+            results[task.number] = result
+            on_result(result)
+    return [results[task.number] for task in tasks]
+
+
+@contextlib.contextmanager
+def _pool(jobs: int | None, runs: int) -> Iterator[Executor]:
+    """Make processes for runs; those that have not begun when the context ends never do.
+
+    Args:
+        jobs: How many; None: one per core.
+        runs: No more are made than there are runs.
+    """
+    executor = ProcessPoolExecutor(
+        min(jobs or os.cpu_count() or 1, runs),
+        mp_context=get_context("spawn"),
+        initializer=_leave_signals,
+    )
+    try:
+        yield executor
+    finally:
+        executor.shutdown(cancel_futures=True)
+
+
+def _leave_signals() -> None:
+    """Ctrl-C is for the process that shares the work out."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _words(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error}".partition("\n")[0]
+
+
+def run_one(task: Task) -> Result:
+    """Do one run, in virtual time, with the simulated robot in this process.
+
+    Blocks: until it has ended.
+    """
+    quiet: Any = contextlib.nullcontext()
+    if threading.current_thread() is threading.main_thread():
+        quiet = contextlib.redirect_stdout(io.StringIO())
+    try:
+        with quiet:
+            return Result(task, _execute(task))
+    except Exception as error:  # noqa: BLE001  whatever the mission's code does is a result
+        return Result(task, None, _words(error))
+
+
+def _execute(task: Task) -> str:
+    target = load_target(task.mission)
+    robot_values = {
+        SHORT.get(key, key): value
+        for key, value in task.values.items()
+        if key not in parameters_of(target.thing) and SHORT.get(key, key) in _robot_parameters()
+    }
+    inputs = {
+        key: Text(value) if isinstance(value, str) else value
+        for key, value in task.values.items()
+        if SHORT.get(key, key) not in robot_values
+    }
+    info = mission_info(target.thing)
+    with contextlib.ExitStack() as stack:
+        config = OFFICE_ROBOT
+        if robot_values:
+            config = task.file.with_suffix(".yaml")
+            _write_config(config, robot_values)
+            stack.callback(config.unlink)
+        robot = RobotOptions(start=True, map=OFFICE_MAP, config=config, world=info.world)
+        surroundings = stack.enter_context(
+            open_surroundings(Pace(virtual=True, seed=task.seed), robot, NO_NAMES, "")
+        )
+        machine = build(target, inputs)
+        needed = needed_servers(describe(machine))
+        others = {name: needed[name] for name in needed.keys() - set(info.serves)}
+        surroundings.start(machine, others)
+        if not surroundings.wait(SERVER_TIMEOUT_S):
+            raise MissionError("the program is to end")
+        with Recorder(task.file, machine):
+            outcome = machine.execute()
+        surroundings.over()
+    return outcome
+
+
+def _write_config(file: Path, values: Mapping[str, Value]) -> None:
+    """Write the office robot's parameters with other values."""
+    from ruamel.yaml import YAML
+
+    yaml = YAML()
+    document = yaml.load(OFFICE_ROBOT)
+    for key, value in values.items():
+        section, _, name = key.partition(".")
+        document.setdefault(section, {})[name] = float(value) if isinstance(value, str) else value
+    with file.open("w", encoding="utf-8") as stream:
+        yaml.dump(document, stream)

@@ -1,0 +1,185 @@
+"""`smachpy simulate`: many runs of a mission in virtual time."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.output import printable
+from smachpy.command import UsageError
+
+if TYPE_CHECKING:
+    from viz.runs.report import Runs
+    from viz.runs.simulate import Result, Vary
+
+EXAMPLES = """examples:
+  smachpy simulate patrol --runs 100 --vary battery=0.2..1.0
+  smachpy simulate patrol --vary battery=0.2..1.0 --vary robot.max_speed=0.4..1.2 -o report.html
+  smachpy simulate there_and_back --vary x=2,4,8 --record runs/ --compare last_week/
+"""
+MOST_RUNS = 100_000
+MOST_FAILURES = 5
+
+
+def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the subcommand."""
+    parser = subparsers.add_parser(
+        "simulate",
+        help="do many runs of a mission in virtual time",
+        description="Do many runs of a mission with the simulated robot, in virtual time and in "
+        "parallel, with values that vary. Exit codes: 0 all runs ended, 1 some raised, 2 bad "
+        "input.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("mission", metavar="MISSION", help="as `smachpy run` takes it")
+    parser.add_argument(
+        "--runs", type=_count, default=20, metavar="N", help="how many (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--vary",
+        type=_vary,
+        action="append",
+        default=[],
+        metavar="KEY=LOW..HIGH",
+        help="an argument of the mission, a userdata key or a parameter of the robot; or "
+        "KEY=ONE,OTHER; may be repeated",
+    )
+    parser.add_argument(
+        "--seed", type=int, default=1, help="the same seed, the same runs (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--jobs", type=_count, metavar="N", help="runs at the same time (default: one a core)"
+    )
+    parser.add_argument(
+        "--record", type=Path, metavar="DIR", help="keep the recordings in this new folder"
+    )
+    parser.add_argument(
+        "--compare", metavar="DIR", help="recordings of earlier runs: what differs from them"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="a report (.html), or the machine with all runs as a picture (svg, png, pdf)",
+    )
+    parser.set_defaults(run=_run)
+
+
+def _count(text: str) -> int:
+    if not (text.isdecimal() and 1 <= int(text) <= MOST_RUNS):
+        raise argparse.ArgumentTypeError(f"got {text!r}; expected 1 to {MOST_RUNS}")
+    return int(text)
+
+
+def _vary(text: str) -> Vary:
+    from viz.runs.simulate import Vary
+
+    try:
+        return Vary.read(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def _run(args: argparse.Namespace) -> int:
+    keys = [vary.key for vary in args.vary]
+    if len(set(keys)) < len(keys):
+        raise UsageError(f"smachpy simulate: --vary: got {keys}; expected each key once.")
+    if args.record is None:
+        with tempfile.TemporaryDirectory(prefix="smachpy-simulate-") as folder:
+            return _simulate(args, Path(folder))
+    try:
+        args.record.mkdir(parents=True, exist_ok=True)
+        if any(args.record.iterdir()):
+            raise UsageError(
+                f"smachpy simulate: --record {str(args.record)!r}: got a folder that is not empty; "
+                "expected a new one, runs are never overwritten."
+            )
+    except OSError as error:
+        raise UsageError(
+            f"smachpy simulate: --record {str(args.record)!r}: {error.strerror or error}."
+        ) from error
+    return _simulate(args, args.record)
+
+
+def _simulate(args: argparse.Namespace, folder: Path) -> int:
+    from viz.runs.cli import collect_one, console, print_differences, print_statistics
+    from viz.runs.simulate import Plan, simulate
+
+    before = None if args.compare is None else collect_one(args.compare, "simulate --compare")
+    plan = Plan(args.mission, args.runs, folder, args.vary, args.seed)
+    progress = _Progress(args.runs)
+    try:
+        results = simulate(plan, on_result=progress.on_result, jobs=args.jobs)
+    finally:
+        progress.end()
+    failed = [result for result in results if result.outcome is None]
+    if len(failed) == len(results):
+        raise UsageError(f"smachpy simulate: no run has ended; run 1: {failed[0].error}")
+    runs = collect_one(str(folder), "simulate")
+    values = {str(result.task.file): result.task.values for result in results}
+    out = console()
+    print_statistics(out, runs.record, runs.statistics, 0)
+    _print_varied(runs, values)
+    for result in failed[:MOST_FAILURES]:
+        print(printable(f"run {result.task.number} raised: {_told(result)}"))
+    if len(failed) > MOST_FAILURES:
+        print(f"and {len(failed) - MOST_FAILURES} more")
+    if before is not None:
+        print_differences(before, runs)
+    if args.output is not None:
+        print(_write(args.output, runs, before, values))
+    return 1 if failed else 0
+
+
+def _told(result: Result) -> str:
+    chosen = ", ".join(f"{key}={value}" for key, value in result.task.values.items())
+    return f"{result.error} ({chosen})" if chosen else result.error
+
+
+def _print_varied(runs: Runs, values: Any) -> None:
+    """Print how runs ended by what varied."""
+    from viz.runs.report import by_quarter
+
+    for key in dict.fromkeys(key for one in values.values() for key in one):
+        print(printable(f"{key}:"))
+        for words, ends in by_quarter(runs, values, key):
+            told = ", ".join(f"{outcome} x{n}" for outcome, n in ends.most_common())
+            print(printable(f"  {words:20} {told}"))
+
+
+def _write(output: Path, runs: Runs, before: Runs | None, values: Any) -> Path:
+    from viz.pictures.drawing import render, write
+    from viz.runs.report import report
+    from viz.runs.statistics import marks_of
+
+    if output.suffix != ".html":
+        return render(runs.record, output, run=marks_of(runs.statistics, runs.record))
+    page = report(runs, before=before, values=values if any(values.values()) else None)
+    return write(page.encode("utf-8", "replace"), output)
+
+
+class _Progress:
+    """A line that counts the runs that have ended, in a terminal."""
+
+    def __init__(self, runs: int) -> None:
+        self._runs = runs
+        self._done = 0
+        self._shown = sys.stderr.isatty()
+
+    def on_result(self, _result: Result) -> None:
+        """Count one."""
+        self._done += 1
+        if self._shown:
+            sys.stderr.write(f"\r{self._done} of {self._runs} runs")
+            sys.stderr.flush()
+
+    def end(self) -> None:
+        """Wipe the line."""
+        if self._shown:
+            sys.stderr.write("\r\x1b[K")
+            sys.stderr.flush()
