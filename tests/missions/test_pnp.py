@@ -1,15 +1,21 @@
 """The plans of missions/pnp: loaded, checked, and driven on the simulated robot."""
 
+import contextlib
 from pathlib import Path
 
 import pytest
 
 import missions.pnp
 import smachpy
+from actionlib_core.node import Node, use_node
+from actionlib_core.transport.memory import MemoryNetwork
 from missions.pnp.robot import look, say
 from smachpy import State, events
 from smachpy.pnp import load, load_plan
 from smachpy.pnp.mapping import read_mapping
+from smachpy.sim.geometry import Pose2D
+from smachpy.sim.server import RobotServer
+from smachpy.sim.world import Robot, World
 
 FOLDER = Path(missions.pnp.__file__).parent
 PLANS = ["rounds", "look", "together", "avoid", "errand", "meet"]
@@ -72,6 +78,28 @@ def test_rounds():
     plan = load(FOLDER / "rounds.pnml", {"goto": Count}, conditions)
     outcome, left = driven(plan)
     assert (outcome, len(left)) == ("goal", 4)
+
+
+def test_meet_with_two_simulated_robots(clock, office, office_robot):
+    network = MemoryNetwork(clock)
+    world = World(office)
+    robots = []
+    with contextlib.ExitStack() as stack:
+        for name, pose in (("robot_0", Pose2D(2.0, 10.6, 0.0)), ("robot_1", office_robot.start)):
+            node = Node("robot", transport=network.session(), clock=clock, namespace=name)
+            stack.enter_context(node)
+            robots.append(Robot(world, office_robot, pose, clock.now()))
+            server = RobotServer(robots[-1], node=node)
+            server.start()
+            stack.callback(server.close)
+        node = stack.enter_context(Node("mission", transport=network.session(), clock=clock))
+        stack.enter_context(use_node(node))
+        outcome, left = driven(load_plan(FOLDER / "meet.pnml"))
+    assert outcome == "goal"
+    assert set(left[:2]) == {"/meet/robot_0#goto_kitchen", "/meet/robot_1#goto_hall"}
+    (kitchen, hall) = (robot.body.pose for robot in robots)
+    assert (kitchen.x, kitchen.y) == pytest.approx((4.6, 10.6), abs=0.3)
+    assert (hall.x, hall.y) == pytest.approx((9.8, 7.1), abs=0.3)
 
 
 def test_meet(clock):
