@@ -77,11 +77,11 @@ if TYPE_CHECKING:
     from smachpy.actions.simple_action_state import SimpleActionState as SimpleActionState
     from smachpy.checks import check as check
     from smachpy.durable.codec import NotDurableError as NotDurableError
-    from smachpy.durable.codec import register_type as register_type
     from smachpy.durable.mission import run_durable as run_durable
     from smachpy.durable.once import once as once
     from smachpy.network.client import IntrospectionClient as IntrospectionClient
     from smachpy.network.server import IntrospectionServer as IntrospectionServer
+    from smachpy.userdata.kept_types import register_type as register_type
 
 __all__ = [
     "ActionServerWrapper",
@@ -152,7 +152,7 @@ _LAZY: dict[str, str] = {
     "SimpleActionState": "smachpy.actions.simple_action_state",
     "check": "smachpy.checks",
     "once": "smachpy.durable.once",
-    "register_type": "smachpy.durable.codec",
+    "register_type": "smachpy.userdata.kept_types",
     "run_durable": "smachpy.durable.mission",
 }
 

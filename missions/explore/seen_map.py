@@ -11,6 +11,7 @@ import numpy as np
 from scipy import ndimage
 
 from missions.explore.scans import rays_of
+from smachpy import register_type
 from smachpy.sim.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyMap
 from smachpy.states import Pose2D
 
@@ -31,6 +32,7 @@ _SPARE: Final = 0.1  # [m] of room besides, where the robot is to stop and turn
 _EIGHT: Final = np.ones((3, 3), dtype=np.bool_)  # neighbours, corners included
 
 
+@register_type
 @dataclass(frozen=True, slots=True)
 class Frontier:
     """A place from which something unseen can be looked at.

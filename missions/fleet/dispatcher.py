@@ -10,7 +10,7 @@ from actionlib_core.clock import current_clock
 from actionlib_core.pubsub.service import Service
 from missions.fleet.order_book import DockBook, OrderBook, Stage
 from missions.interfaces.srv import Permit, PermitResponse
-from smachpy import loginfo, logwarn
+from smachpy import loginfo, logwarn, register_type
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 SERVICE: Final = "/fleet/permit"
 
 
+@register_type
 @dataclass(frozen=True, slots=True)
 class Delivery:
     """An order as it is handed out to one robot, this once.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from smachpy import register_type
 from smachpy.sim.checked_yaml import Limits
 from smachpy.states.waypoints import PlaceFile, Waypoint, network_name
 
@@ -34,6 +35,7 @@ class Task:
     service: str = ""
 
 
+@register_type
 @dataclass(frozen=True, slots=True)
 class Stop(Waypoint):
     """A waypoint with what to do there.

@@ -22,11 +22,9 @@ import base64
 import binascii
 import dataclasses
 import enum
-import inspect
 import json
 import math
 import sys
-import typing
 from datetime import date, datetime, time, timedelta, timezone
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -35,10 +33,16 @@ from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 from actionlib_core.exceptions import ActionlibError
 from actionlib_core.time import Duration, Time
 from smachpy.exceptions import (
-    InvalidStateError,
     InvalidUserCodeError,
     MissionError,
     did_you_mean,
+)
+from smachpy.userdata.kept_types import (
+    REGISTERED,
+    RegisteredType,
+    is_named_tuple,
+    name_of,
+    problem_of,
 )
 from smachpy.userdata.readonly import writable
 
@@ -48,7 +52,6 @@ if TYPE_CHECKING:
 C = TypeVar("C", bound=type)
 
 _DEEPEST: Final = 100
-_NO_CONSTRUCTOR: Final = "its constructor takes more than its fields"
 
 
 class NotDurableError(InvalidUserCodeError, TypeError):
@@ -89,102 +92,6 @@ class JournalValueError(MissionError, ValueError):
         self.place = place
         self.reason = reason
         super().__init__(f"journal: {place}: {reason}")
-
-
-@dataclasses.dataclass(frozen=True)
-class _Registered:
-    kind: type
-    to_data: Callable[[Any], Any] | None = None
-    from_data: Callable[[Any], Any] | None = None
-
-
-_registered: dict[str, _Registered] = {}
-
-
-def register_type(
-    kind: C,
-    *,
-    to_data: Callable[[Any], Any] | None = None,
-    from_data: Callable[[Any], Any] | None = None,
-) -> C:
-    """Let journals keep the instances of a class; also a decorator.
-
-    Dataclasses, named tuples and enums need no more than that, and bring along those of the same
-    kinds that their fields are annotated with. A subclass is another class.
-
-    Args:
-        kind: The class; it must be registered before the mission runs, at each start.
-        to_data: Of other classes: makes an instance a value that can be kept.
-        from_data: The reverse.
-
-    Returns:
-        `kind`.
-
-    Raises:
-        InvalidStateError: it is no class, or one that needs both functions.
-    """
-    if not isinstance(kind, type):
-        raise InvalidStateError(f"register_type: got {kind!r}; expected a class.")
-    if (to_data is None) != (from_data is None):
-        raise InvalidStateError(
-            f"register_type: {kind.__qualname__}: got one of to_data and from_data; expected both."
-        )
-    if to_data is None:
-        problem = _problem_of(kind)
-        if problem is not None:
-            raise InvalidStateError(
-                f"register_type: got {kind.__qualname__}: {problem}; expected a dataclass, a named "
-                "tuple or an enum. Try to_data=... and from_data=..."
-            )
-    _registered[_name_of(kind)] = _Registered(kind, to_data, from_data)
-    if to_data is None:
-        register_annotations(kind)
-    return kind
-
-
-def register_annotations(kind: type) -> None:
-    """Register what the fields of a class are annotated with, as far as it registers by itself.
-
-    Args:
-        kind: A dataclass, a TypedDict or another class; its annotations may be nested,
-            `dict[str, list[Waypoint]]`.
-    """
-    try:
-        hints = typing.get_type_hints(kind)
-    except Exception:  # noqa: BLE001  a name that only type checkers see: that field is left out
-        hints = {}
-    for hint in hints.values():
-        _register_hint(hint)
-
-
-def _register_hint(hint: Any) -> None:
-    for inner in typing.get_args(hint):
-        _register_hint(inner)
-    if not isinstance(hint, type) or _name_of(hint) in _registered:
-        return
-    if typing.is_typeddict(hint):
-        register_annotations(hint)
-    elif _problem_of(hint) is None:
-        register_type(hint)
-
-
-def _problem_of(kind: type) -> str | None:
-    """Say why a class needs functions of its own, None when it does not."""
-    if issubclass(kind, enum.Enum) or _is_named_tuple(kind):
-        return None
-    if not dataclasses.is_dataclass(kind):
-        return "it is another class"
-    fields = {field.name for field in dataclasses.fields(kind)}
-    constructor = inspect.signature(kind).parameters if kind.__dataclass_params__.init else ()  # type: ignore[attr-defined]
-    return None if fields.issuperset(constructor) else _NO_CONSTRUCTOR
-
-
-def _is_named_tuple(kind: type) -> bool:
-    return issubclass(kind, tuple) and hasattr(kind, "_fields")
-
-
-def _name_of(kind: type) -> str:
-    return f"{kind.__module__}:{kind.__qualname__}"
 
 
 def encode(value: Any, *, key: str = "", path: str = "") -> Any:
@@ -243,7 +150,7 @@ def _encode(value: Any, place: str, depth: int) -> Any:
     encoder = _ENCODERS.get(kind)
     if encoder is not None:
         return encoder(value, place, depth)
-    registered = _registered.get(_name_of(kind))
+    registered = REGISTERED.get(name_of(kind))
     if registered is not None and registered.kind is kind:
         return _encode_registered(value, registered, place, depth)
     shown = writable(value)
@@ -258,10 +165,10 @@ def _encode(value: Any, place: str, depth: int) -> Any:
 def _why_not(kind: type) -> tuple[str, str]:
     """Return the reason and the way out."""
     name = kind.__qualname__
-    same_name = _registered.get(_name_of(kind))
+    same_name = REGISTERED.get(name_of(kind))
     if "<locals>" in name:
         return "its class is made inside a function", "a class of a module"
-    if same_name is not None or _problem_of(kind) is None:
+    if same_name is not None or problem_of(kind) is None:
         return "its class is not registered", f"smachpy.register_type({name})"
     for base in kind.__mro__[1:]:
         if base in _ENCODERS or base is str:
@@ -347,9 +254,9 @@ _ENCODERS: Final[dict[type, Callable[[Any, str, int], Any]]] = {
 }
 
 
-def _encode_registered(value: Any, registered: _Registered, place: str, depth: int) -> Any:
+def _encode_registered(value: Any, registered: RegisteredType, place: str, depth: int) -> Any:
     kind = registered.kind
-    name = _name_of(kind)
+    name = name_of(kind)
     if registered.to_data is not None:
         try:
             data = registered.to_data(value)
@@ -463,13 +370,13 @@ def _decode_datetime(data: dict[str, Any], place: str) -> datetime:
         raise JournalValueError(place, reason) from error
 
 
-def _find(name: Any, place: str) -> _Registered:
-    found = _registered.get(name)
+def _find(name: Any, place: str) -> RegisteredType:
+    found = REGISTERED.get(name)
     if found is None:
         raise JournalValueError(
             place,
             f"got class {name!r}; expected one that is registered."
-            f"{did_you_mean(str(name), _registered)} Try smachpy.register_type before the run.",
+            f"{did_you_mean(str(name), REGISTERED)} Try smachpy.register_type before the run.",
         )
     return found
 
@@ -477,7 +384,7 @@ def _find(name: Any, place: str) -> _Registered:
 def _decode_fields(data: dict[str, Any], place: str) -> Any:
     kind = _find(data["$type"], place).kind
     values = _fields(data["fields"], place)
-    if _is_named_tuple(kind):
+    if is_named_tuple(kind):
         return kind(**values)
     if not dataclasses.is_dataclass(kind):
         raise JournalValueError(place, f"got fields of {data['$type']}; expected no dataclass.")

@@ -11,7 +11,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from smachpy import log
-from smachpy.durable.codec import decode, encode, register_annotations
+from smachpy.durable.codec import decode, encode
 from smachpy.durable.position import OF_PROCESS
 from smachpy.durable.store import FencedError, StoreError
 from smachpy.exceptions import InvalidUserCodeError, MissionError
@@ -22,6 +22,7 @@ from smachpy.run.grace import ask, request_soon
 from smachpy.run.interrupt import Interruption
 from smachpy.run.options import ASK
 from smachpy.run.origin import asking
+from smachpy.userdata.kept_types import register_annotations
 from smachpy.userdata.readonly import ATOMS
 from smachpy.userdata.typed import CheckedDict
 

@@ -6,9 +6,12 @@ import argparse
 import math
 from typing import Final, NamedTuple
 
+from smachpy.userdata.kept_types import register_type
+
 _TAU = 2.0 * math.pi
 
 
+@register_type
 class Pose2D(NamedTuple):
     """A place and a heading.
 

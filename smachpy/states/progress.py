@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from smachpy.userdata.kept_types import register_type
 
+
+@register_type
 @dataclass(frozen=True, slots=True)
 class Progress:
     """How far a mission is; written to a userdata key, it is shown while the mission runs.

@@ -12,6 +12,7 @@ from smachpy.sim.checked_yaml import REQUIRED, Document, Limits
 from smachpy.sim.config import SimConfig, load_config
 from smachpy.sim.exceptions import NavigationError
 from smachpy.sim.geometry import Pose2D, wrap_angle
+from smachpy.userdata.kept_types import register_type
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 _SHARE: Final = Limits(low=0.0, high=1.0)
 
 
+@register_type
 @dataclass(frozen=True, slots=True)
 class Waypoint:
     """A named place to drive to.

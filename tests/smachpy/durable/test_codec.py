@@ -19,16 +19,9 @@ from actionlib_core.interfaces.nav2_msgs.action import NavigateToPose
 from actionlib_core.interfaces.nav_msgs.msg import OccupancyGrid
 from actionlib_core.interfaces.ros2.geometry_msgs.msg import PoseStamped as Ros2PoseStamped
 from actionlib_core.time import Duration, Time
-from smachpy.durable import codec
-from smachpy.durable.codec import (
-    JournalValueError,
-    NotDurableError,
-    decode,
-    encode,
-    register_annotations,
-    register_type,
-)
+from smachpy.durable.codec import JournalValueError, NotDurableError, decode, encode
 from smachpy.exceptions import InvalidStateError
+from smachpy.userdata.kept_types import REGISTERED, register_annotations, register_type
 from smachpy.userdata.readonly import read_only
 from tests.smachpy.durable import kept_types
 from tests.smachpy.durable.kept_types import (
@@ -47,8 +40,12 @@ from tests.smachpy.durable.kept_types import (
 
 
 @pytest.fixture(autouse=True)
-def own_registry(monkeypatch):
-    monkeypatch.setattr(codec, "_registered", {})
+def own_registry():
+    before = dict(REGISTERED)
+    REGISTERED.clear()
+    yield
+    REGISTERED.clear()
+    REGISTERED.update(before)
 
 
 def through_json(value):
