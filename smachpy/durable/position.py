@@ -20,7 +20,7 @@ Any of them may hold `userdata` (path of a container -> key -> encoded value) an
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -88,7 +88,7 @@ class Position:
         Raises:
             KeyError: of an unknown kind, or about a visit that there is not.
         """
-        _FOLD[entry["kind"]](self, entry)
+        self._FOLD[entry["kind"]](self, entry)
         self.data["last_ns"] = max(self.data["last_ns"], entry["stamp_ns"])
         for container, values in entry.get("userdata", {}).items():
             self.userdata.setdefault(container, {}).update(values)
@@ -202,20 +202,19 @@ class Position:
         self.visits.clear()
         self.data.update(finished=True, outcome=entry["outcome"])
 
-
-_FOLD: dict[str, Callable[[Position, Mapping[str, Any]], None]] = {
-    "Started": Position._on_started,  # noqa: SLF001  its own module
-    "Entered": Position._on_entered,  # noqa: SLF001
-    "Left": Position._on_left,  # noqa: SLF001
-    "Retried": Position._on_retried,  # noqa: SLF001
-    "GoalSent": Position._on_goal_sent,  # noqa: SLF001
-    "GoalTaken": Position._on_goal_taken,  # noqa: SLF001
-    "GoalDone": Position._on_goal_done,  # noqa: SLF001
-    "Once": Position._on_once,  # noqa: SLF001
-    "PreemptRequested": Position._on_preempt,  # noqa: SLF001
-    "Recovered": Position._on_recovered,  # noqa: SLF001
-    "Finished": Position._on_finished,  # noqa: SLF001
-}
+    _FOLD: ClassVar[dict[str, Callable[[Position, Mapping[str, Any]], None]]] = {
+        "Started": _on_started,
+        "Entered": _on_entered,
+        "Left": _on_left,
+        "Retried": _on_retried,
+        "GoalSent": _on_goal_sent,
+        "GoalTaken": _on_goal_taken,
+        "GoalDone": _on_goal_done,
+        "Once": _on_once,
+        "PreemptRequested": _on_preempt,
+        "Recovered": _on_recovered,
+        "Finished": _on_finished,
+    }
 
 
 def folded(entries: Iterable[Mapping[str, Any]], start: Position | None = None) -> Position:

@@ -25,6 +25,7 @@ from smachpy.run.origin import asking
 from smachpy.userdata.kept_types import register_annotations
 from smachpy.userdata.readonly import ATOMS
 from smachpy.userdata.typed import CheckedDict
+from smachpy.userdata.user_data import data_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -83,7 +84,7 @@ class Recorder:
         }
         self._known: dict[str, dict[str, tuple[Any, str]]] = {}
         for container in self._containers.values():
-            data = container.userdata._data  # noqa: SLF001  one machinery
+            data = data_of(container.userdata)
             if isinstance(data, CheckedDict):
                 register_annotations(data.fields.kind)
 
@@ -95,7 +96,7 @@ class Recorder:
         """
         for path in self._homes.values():
             kept = self._journal.position.userdata.get(path, {})
-            data = self._containers[path].userdata._data  # noqa: SLF001  one machinery
+            data = data_of(self._containers[path].userdata)
             for key in [key for key in data if self._is_kept(path, key) and key not in kept]:
                 del data[key]
             known = self._known[path] = {}
@@ -156,7 +157,7 @@ class Recorder:
         if path is None:
             return {}
         written = None if step is None else set(getattr(step.userdata, "_output", {}).values())
-        data = dict(userdata._data)  # noqa: SLF001  one step: other branches may be writing
+        data = dict(data_of(userdata))  # one step: other branches may be writing
         known = self._known.setdefault(path, {})
         changed: dict[str, Any] = {}
         for key, value in data.items():
@@ -196,7 +197,7 @@ class Recorder:
         with self._journal.lock:
             facts: dict[str, Any] = {"in": "", "userdata": {}}
             for path in self._homes.values():
-                values = self._containers[path].userdata._data  # noqa: SLF001
+                values = data_of(self._containers[path].userdata)
                 known = self._known[path] = {}
                 kept = facts["userdata"][path] = {}
                 for key, value in values.items():

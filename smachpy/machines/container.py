@@ -33,7 +33,7 @@ from smachpy.run.step import Step
 from smachpy.run.visit import Origin
 from smachpy.slips import accepts
 from smachpy.userdata.typed import CheckedDict
-from smachpy.userdata.user_data import Remapper, UserData, reset, typed_userdata
+from smachpy.userdata.user_data import Remapper, UserData, data_of, reset, typed_userdata
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -516,7 +516,7 @@ def _all_problems(container: Container, where: str) -> Iterator[str]:
 
 def _key_problems(container: Container, where: str) -> Iterator[str]:
     """Yield the keys of children that typed userdata has no field for."""
-    data = container.userdata._data  # noqa: SLF001  one machinery
+    data = data_of(container.userdata)
     if not isinstance(data, CheckedDict):
         return
     fields = data.fields

@@ -30,6 +30,7 @@ from smachpy.network.server import (
     STATUS_TOPIC,
 )
 from smachpy.userdata.json_text import dumps, find_lost
+from smachpy.userdata.user_data import data_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -98,7 +99,7 @@ class IntrospectionClient:
         problems.word("path", path)
         labels = problems.names("initial_states", initial_states)
         seconds = ANSWER_S if timeout is None else problems.seconds("timeout", timeout)
-        values = {} if initial_userdata is None else dict(initial_userdata._data)  # noqa: SLF001
+        values = {} if initial_userdata is None else dict(data_of(initial_userdata))
         lost = find_lost(values)
         if lost:
             problems.add(

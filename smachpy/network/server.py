@@ -41,7 +41,7 @@ from smachpy.machines.problems import Problems
 from smachpy.network.feed import DESCRIPTION_TOPIC, EVENTS_TOPIC, STOP_S, Feed
 from smachpy.network.remote_control import ControlServer
 from smachpy.userdata.json_text import dumps, loads
-from smachpy.userdata.user_data import UserData
+from smachpy.userdata.user_data import UserData, data_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -309,7 +309,7 @@ def _checked(where: str, server_name: Any, argument: str, container: Any, path: 
 
 def _describe_userdata(userdata: UserData) -> str:
     """Return userdata as JSON, while states may be changing it in other threads."""
-    values = dict(userdata._data)  # noqa: SLF001  at once, so that no key vanishes meanwhile
+    values = dict(data_of(userdata))  # at once, so that no key vanishes meanwhile
     for _ in range(READ_TRIES):
         try:
             return dumps(values, longest=LONGEST_VALUE)

@@ -22,6 +22,7 @@ from smachpy.pnp.reading import find_plan, read_net
 from smachpy.run.child import ContainerData
 from smachpy.run.visit import End
 from smachpy.userdata.typed import CheckedDict
+from smachpy.userdata.user_data import data_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -210,7 +211,7 @@ class PetriNetPlan(Container):
         )
         data = self._smachpy
         data.net_plan = plan
-        before = self.userdata._data  # noqa: SLF001  one machinery
+        before = data_of(self.userdata)
         checked = before if isinstance(before, CheckedDict) else None
         values = _Noting(before) if checked is None else _NotingChecked(checked.fields)
         object.__setattr__(self.userdata, "_data", values)

@@ -149,6 +149,14 @@ def _rebuild(data: dict[str, Any], kind: type | None = None) -> UserData:
     return made
 
 
+def data_of(userdata: UserData) -> dict[str, Any]:
+    """Return the dict that holds the values of `userdata`, for the library alone.
+
+    A copy of it, `dict(data_of(ud))`, is one step: no key vanishes meanwhile.
+    """
+    return userdata._data  # noqa: SLF001  its own module
+
+
 class Remapper:
     """A state's window into the userdata of its container: declared keys only, under its names.
 
