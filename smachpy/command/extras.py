@@ -19,6 +19,7 @@ EXTRAS: Final = {
     "PIL": "sim",
     "starlette": "web",
     "uvicorn": "web",
+    "segno": "web",
     "textual": "tui",
     "mcap": "mcap",
     "cronsim": "cron",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ipaddress
 import os
 import sys
 from functools import partial
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.clock import SerialExecutor
 from actionlib_core.ros2_options import add_ros2_options, ros2_of_options
+from smachpy.command import UsageError
 
 if TYPE_CHECKING:
     import argparse
@@ -27,6 +29,7 @@ EXAMPLES = """examples:
   smachpy view --control               with pause, step, jump, preempt, and goals to actions
   smachpy view run.jsonl               a recorded run
   smachpy view --map office.yaml       with this floor, where no topic tells it
+  smachpy view --host 0.0.0.0 --qr     for others on this network; a phone reads the address
   smachpy view --runs runs/            with the statistics of recorded runs on the graph
 """
 PORT = 8080
@@ -51,6 +54,9 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     parser.add_argument(
         "--port", type=_port, default=PORT, help="0 takes any free port (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--qr", action="store_true", help="print the address as a QR code, too: for a phone"
     )
     parser.add_argument(
         "--auto-focus", action="store_true", help="pages follow the active states from the start"
@@ -81,7 +87,19 @@ def _port(text: str) -> int:
     return int(text)
 
 
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
 def _run(args: argparse.Namespace) -> int:
+    if args.qr and _is_loopback(args.host):
+        raise UsageError(
+            f"smachpy view: --qr: got it beside --host {args.host}, which nobody but this computer "
+            "can open; expected an address of its network. Try --host 0.0.0.0"
+        )
     from actionlib_core.node import get_node
     from viz.live.actions import Actions
     from viz.live.machines import Machines
@@ -135,11 +153,22 @@ def _serve(
         home=not args.child and not args.files,
     )
     server = PageServer(viewer, args.host, args.port)
-    print(server.address + (f"#token={token}" if token else ""), flush=True)
+    address = server.address + (f"#token={token}" if token else "")
+    print(address, flush=True)
+    if args.qr:
+        print_qr(address)
     if args.child:
         _end_with_parent(server)
     server.serve_here()
     return 0
+
+
+def print_qr(address: str) -> None:
+    """Print an address as a QR code, light on dark as most terminals are, with a light border."""
+    import segno
+
+    segno.make(address, error="l", micro=False).terminal(sys.stdout, compact=True)
+    sys.stdout.flush()
 
 
 @contextlib.contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import ipaddress
 import socket
 import urllib.error
@@ -9,8 +10,11 @@ import urllib.parse
 import urllib.request
 
 import pytest
+import segno
 
+from smachpy.command import main
 from viz.live.app import Viewer
+from viz.live.cli import print_qr
 from viz.live.machines import Machines
 from viz.live.server import EVERYWHERE, AddressError, PageServer, outward_address
 
@@ -54,3 +58,20 @@ def test_an_address_of_version_six_stands_in_brackets():
         pytest.skip("this computer has no such addresses")
     assert server.address == f"http://[::1]:{server.port}/"
     server._socket.close()
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "::1"])
+def test_a_qr_code_of_an_address_that_a_phone_cannot_open_is_refused(host, capsys):
+    assert main(["view", "--qr", "--host", host, "--port", "0"]) == 2
+    assert "Try --host 0.0.0.0" in capsys.readouterr().err
+
+
+def test_the_qr_code_has_the_address(capsys):
+    address = "http://192.0.2.7:8080/#token=abc"
+    print_qr(address)
+    printed = capsys.readouterr().out
+    again = io.StringIO()
+    segno.make(address, error="l", micro=False).terminal(again, compact=True)
+    assert printed == again.getvalue()
+    assert len(printed.splitlines()) > 10
+    assert "\u2580" in printed
