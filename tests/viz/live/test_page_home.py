@@ -122,3 +122,20 @@ def test_a_viewer_without_runs_says_how_to_make_one(served, look, tmp_path):
 def test_a_machine_that_is_asked_for_is_shown_at_once(home, look):
     page = look(f"{home.address}?machine=one")
     assert page.query_selector(".home") is None
+
+
+def test_a_live_run_that_asks_its_operator_says_so(home, look):
+    asked = {
+        "text": "Go on?",
+        "answers": ["yes", "no"],
+        "words": ["", ""],
+        "default": "no",
+        "patience": 60.0,
+        "service": "operator/questions/q1",
+        "has_picture": False,
+    }
+    page = look(home.address)
+    page.wait_for_selector(".runs .pill-text:has-text('running')")
+    home.machines.get("one").add(home.events([("QuestionAsked", "/JOB/A", asked)], after=2))
+    page.wait_for_selector(".runs .pill-text.waiting:has-text('asks you')")
+    page.wait_for_function("() => document.title.startsWith('(1) ')")

@@ -139,7 +139,9 @@ function Rows({ rows, pins }) {
 function Row({ row, pinned, today }) {
   const kind = standing(row);
   const known = row.problem ? "unreadable" : shorten(row.outcome ?? "no end", 20);
-  const word = kind === "live" ? "running" : known;
+  const asks = row.live && store.machines.value.some((one) => one.name === row.name && one.questions);
+  const colour = asks ? "waiting" : (KINDS[kind] ?? kind);
+  const word = asks ? "asks you" : kind === "live" ? "running" : known;
   const seconds = secondsOf(row, Date.now());
   const open = () => openRun(row.id);
   const onKeyDown = (/** @type {KeyboardEvent} */ e) => {
@@ -152,7 +154,7 @@ function Row({ row, pinned, today }) {
   return html`<tr tabindex="0" class=${row.problem ? "bad" : ""} onClick=${open} onKeyDown=${onKeyDown}>
     <td><button class=${pinned ? "pin on" : "pin"} aria-pressed=${pinned} title=${pinned ? "pinned" : "pin"}
       aria-label=${`pin ${row.machine}`} onClick=${pin}>${pinned ? "\u2605" : "\u2606"}</button></td>
-    <td><span class=${`pill-text ${KINDS[kind] ?? kind}`}>${SIGNS[kind]} ${word}</span></td>
+    <td><span class=${`pill-text ${colour}`}>${asks ? "?" : SIGNS[kind]} ${word}</span></td>
     <td class="what"><b>${shorten(row.machine, 40)}</b> <span class="hint">${row.robots.join(", ")}</span>
       <small title=${row.problem || row.reason}>${shorten(row.problem || row.reason, 110)}</small></td>
     <td class="right">${seconds === null ? "" : duration(seconds)}</td>

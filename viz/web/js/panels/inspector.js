@@ -21,7 +21,7 @@ const MOST_PROBLEMS = 30;
 export function Inspector({ page }) {
   store.slowTick.value; // components that read signals are drawn again only when those change
   const model = store.model.value;
-  if (!model) return html`<aside class="inspector"></aside>`;
+  if (!model) return html`<aside class="inspector"><${Questions} page=${page} /></aside>`;
   const shared = { page, data: store.shown(), now: store.nowMs() };
   return html`<aside class="inspector" aria-label="details">
     <${Questions} page=${page} />

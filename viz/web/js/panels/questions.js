@@ -30,7 +30,7 @@ export function Questions({ page }) {
   const facts = store.facts.value;
   const others = store.machines.value.filter((one) => one.name !== facts?.name && one.stale == null);
   const elsewhere = others.reduce((sum, one) => sum + (one.questions ?? 0), 0);
-  const title = facts ? titleOf(`${facts.label} \u2013 smachpy`, shown, elsewhere) : "smachpy";
+  const title = titleOf(facts ? `${facts.label} \u2013 smachpy` : "smachpy", shown, elsewhere);
   const newest = shown.findLast((one) => one.isOpen);
   useEffect(() => {
     if (!isFile()) document.title = title;
