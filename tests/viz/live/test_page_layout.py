@@ -72,6 +72,18 @@ def test_a_long_chain_is_folded(served, look):
     assert shown["k"] > 0.5
 
 
+def test_heat_has_a_scale_that_is_seen(served, look):
+    served.add("chain", sm=chain(["A", "B"], name="CHAIN"))
+    page = look(served.start())
+    all_levels(page)
+    assert page.locator(".legend .scale").count() == 0
+    page.evaluate("() => smachpy.page.setNumbers('time')")
+    scale = page.locator(".legend .scale")
+    scale.wait_for()
+    assert scale.inner_text().startswith("0 s")
+    assert scale.locator(".heat").bounding_box()["width"] >= 40
+
+
 def test_levels_lay_out_anew_for_the_view(served, look):
     served.add("chain", sm=chain([f"STEP_{n}" for n in range(24)], name="CHAIN"))
     page = look(served.start())

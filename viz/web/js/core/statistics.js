@@ -2,6 +2,7 @@
 // Counted as in viz/runs/statistics.py: tests/data/statistics.json holds for both.
 import { own } from "#core/fold.js";
 import { outcomeClass } from "#core/outcomes.js";
+import { duration } from "#core/text.js";
 
 /** @type {[string, string][]} */
 export const MODES = [
@@ -51,8 +52,7 @@ export function numbersFor(mode, run, statistics, model) {
     case "counts":
       return { countOf: counts(run), heatOf: null };
     case "time": {
-      const leaves = Object.entries(run).filter(([path]) => !model?.get(path)?.children.length);
-      const most = Math.max(0.001, ...leaves.map(([, state]) => state.seconds));
+      const most = mostSeconds(run, model);
       return { countOf: counts(run), heatOf: (path) => Math.min(1, (own(run, path)?.seconds ?? 0) / most) };
     }
     case "runs":
@@ -63,6 +63,36 @@ export function numbersFor(mode, run, statistics, model) {
       return { countOf: counts(run), heatOf: (path) => slower(own(run, path), own(recorded, path)) };
     default:
       return { countOf: null, heatOf: null };
+  }
+}
+
+/**
+ * The longest time that a state without states inside has taken [s].
+ * @param {Record<string, StateRun>} run
+ * @param {import("#core/model.js").Model | null} model
+ */
+function mostSeconds(run, model) {
+  const leaves = Object.entries(run).filter(([path]) => !model?.get(path)?.children.length);
+  return Math.max(0.001, ...leaves.map(([, state]) => state.seconds));
+}
+
+/**
+ * What the coldest and the hottest state mean in a mode, in words; null when it has no heat.
+ * @param {string} mode
+ * @param {Record<string, StateRun>} run
+ * @param {import("#core/model.js").Model | null} model
+ * @returns {[string, string] | null}
+ */
+export function heatScale(mode, run, model) {
+  switch (mode) {
+    case "time":
+      return ["0 s", duration(mostSeconds(run, model))];
+    case "failures":
+      return ["none failed", "all failed"];
+    case "compare":
+      return ["as usual", "twice as long"];
+    default:
+      return null;
   }
 }
 

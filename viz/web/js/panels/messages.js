@@ -2,6 +2,7 @@
 import { useState } from "preact/hooks";
 import { choose, isFile, takeToken } from "#core/connection.js";
 import { CHANGE_SIGNS } from "#core/model.js";
+import { heatScale } from "#core/statistics.js";
 import * as store from "#core/store.js";
 import { askerText, duration, holdText, shorten } from "#core/text.js";
 import { fieldValue, html, StateLink } from "#panels/html.js";
@@ -136,7 +137,11 @@ export function Legend() {
       (change) => html`<span><b class=${change}></b>${CHANGE_SIGNS[change]} ${change}</span>`,
     )}</div>`;
   }
-  return html`<div class="legend" aria-hidden="true">${LEGEND.map(
+  store.slowTick.value;
+  const scale = heatScale(store.numbers.value, store.shown().states, store.model.value);
+  return html`<div class="legend" aria-hidden="true">${
+    scale && html`<span class="scale">${scale[0]}<b class="heat"></b>${scale[1]}</span>`
+  }${LEGEND.map(
     ([kind, text]) => html`<span><b class=${kind}></b>${text}</span>`,
   )}${store.overview.value && html`<span class="hint">double-click a state to open its diagram</span>`}</div>`;
 }

@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Model } from "#core/model.js";
 import { Run } from "#core/run.js";
-import { coverage, failureShare, MODES, numbersFor } from "#core/statistics.js";
+import { coverage, failureShare, heatScale, MODES, numbersFor } from "#core/statistics.js";
 import { fixture } from "./fixtures.js";
 
 const { events, statistics, never_taken } = fixture("statistics.json");
@@ -55,4 +55,13 @@ test("a state that runs is compared by its finished visits alone", () => {
   assert.equal(numbersFor("compare", { "/A": state }, recorded, model).heatOf?.("/A"), 1);
   const first = { visits: 1, since: 1, outcome: null, outcomes: {}, seconds: 0 };
   assert.equal(numbersFor("compare", { "/A": first }, recorded, model).heatOf?.("/A"), 0);
+});
+
+test("heat has a scale in every mode that has heat", () => {
+  for (const [mode] of MODES) {
+    const { heatOf } = numbersFor(mode, run, statistics, model);
+    const scale = heatScale(mode, run, model);
+    assert.equal(scale !== null, heatOf !== null, mode);
+  }
+  assert.equal(heatScale("time", run, model)?.[0], "0 s");
 });
