@@ -73,11 +73,9 @@ def _list(args: argparse.Namespace) -> int:
     from rich.table import Table
     from rich.text import Text as Cell
 
-    from smachpy.durable.journal import read_position
-
     with _open(args) as store:
         rows = store.missions()
-        stands = {row.id: read_position(store, row.id).leaves() for row in rows}
+        stands = {row.id: _active(store, row.id) for row in rows}
     if args.json:
         print(json.dumps([{**_facts(row), "active": stands[row.id]} for row in rows]))
         return 0
@@ -99,6 +97,17 @@ def _list(args: argparse.Namespace) -> int:
         table.add_row(*(Cell(printable(cell)) for cell in cells))
     Console(highlight=False, soft_wrap=True).print(table)
     return 0
+
+
+def _active(store: Store, mission: str) -> list[str]:
+    """Return the active states; of a journal that cannot be read, why."""
+    from smachpy.durable.journal import read_position
+    from smachpy.durable.store import StoreError
+
+    try:
+        return read_position(store, mission).leaves()
+    except StoreError as error:
+        return [f"({error.reason})"]
 
 
 def _show(args: argparse.Namespace) -> int:
@@ -151,22 +160,16 @@ def _lines(row: MissionRow, position: Position) -> list[str]:
 
 def _resume(args: argparse.Namespace) -> int:
     from smachpy.command import main
+    from smachpy.durable.store import OVER, MissionOverError
 
     with _open(args) as store:
         row: MissionRow = store.mission(args.mission)
-        _check_open(args, store, row)
+        if row.status in OVER:
+            raise MissionOverError(store_name(args.durable), row.id, row.status)
     robot = ["--robot", row.robot] if row.robot else []
     own = ["--durable", args.durable, "--mission", row.id, "--max-outage", "1e12"]
     options = [word for word in args.options if word != "--"]
     return main(["run", row.target, *own, *robot, *options, *row.argv])
-
-
-def _check_open(args: argparse.Namespace, store: Store, row: MissionRow) -> None:
-    from smachpy.durable.store import OVER, MissionOverError
-
-    del store
-    if row.status in OVER:
-        raise MissionOverError(store_name(args.durable), row.id, row.status)
 
 
 def _cancel(args: argparse.Namespace) -> int:
