@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import json
 import os
@@ -13,10 +12,19 @@ from actionlib_core.output import printable
 from smachpy.command.durable import JOURNAL, store_name
 
 if TYPE_CHECKING:
+    import argparse
     from collections.abc import Callable
 
     from smachpy.durable.position import Position
     from smachpy.durable.store import MissionRow, Store
+
+
+_PASSED_ON = (
+    ("plain", "lines only, for logs"),
+    ("view", "show it in a browser while it runs, and after"),
+    ("control", "let viewers pause, step, jump and preempt"),
+)
+"""Options of `smachpy run` that `resume` has too, and their meaning."""
 
 
 def register(subparsers: Any) -> None:
@@ -47,12 +55,8 @@ def register(subparsers: Any) -> None:
         if name in {"list", "show"}:
             command.add_argument("--json", action="store_true", help="as JSON")
         if name == "resume":
-            command.add_argument(
-                "options",
-                nargs=argparse.REMAINDER,
-                metavar="...",
-                help="after the ID: options of `smachpy run`",
-            )
+            for option, meaning in _PASSED_ON:
+                command.add_argument(f"--{option}", action="store_true", help=meaning)
         command.set_defaults(act=run)
     parser.set_defaults(run=_run)
 
@@ -168,7 +172,7 @@ def _resume(args: argparse.Namespace) -> int:
             raise MissionOverError(store_name(args.durable), row.id, row.status)
     robot = ["--robot", row.robot] if row.robot else []
     own = ["--durable", args.durable, "--mission", row.id, "--max-outage", "1e12"]
-    options = [word for word in args.options if word != "--"]
+    options = [f"--{option}" for option, _ in _PASSED_ON if getattr(args, option)]
     return main(["run", row.target, *own, *robot, *options, *row.argv])
 
 

@@ -99,7 +99,7 @@ class Journal:
                 self._since_snapshot += len(entries)
                 snapshot = None
                 if self._since_snapshot >= SNAPSHOT_EVERY or finished:
-                    snapshot = json.dumps(self.position.data, separators=(",", ":")).encode()
+                    snapshot = self.position.to_bytes()
                     self._since_snapshot = 0
             self._store.append(
                 self._lease,

@@ -13,7 +13,7 @@ from smachpy.durable.journal import Journal, read_position
 from smachpy.durable.position import VERSION, Position
 from smachpy.durable.processes import this_runner
 from smachpy.durable.recorder import Recorder
-from smachpy.durable.store import INTERRUPTED, OVER, QUEUED, MissionRow, open_store
+from smachpy.durable.store import INTERRUPTED, OVER, QUEUED, MissionRow, StoreError, open_store
 from smachpy.exceptions import MissionError
 from smachpy.machines.container import below
 from smachpy.run.grace import request_soon
@@ -177,10 +177,13 @@ def kept_mission(
         goes_on = bool(position.visits)
         shift_ns = 0
         if goes_on:
-            position = _fitted(machine, row, position, migrate)
             gone_ns = current_clock().time_ns() - position.data["last_ns"]
             if max_outage is not None and gone_ns > max_outage * 1e9:
                 raise OutageError(mission, gone_ns / 1e9, max_outage)
+            fitted = _fitted(machine, row, position, migrate)
+            if fitted is not position:  # the entries so far have the old paths
+                store.append(lease, [], snapshot=fitted.to_bytes())
+                position = fitted
             shift_ns = max(0, gone_ns) if outage == "pauses" else 0
         recorder = Recorder(
             machine,
@@ -203,8 +206,8 @@ def kept_mission(
             raise recorder.broken
     finally:
         with contextlib.suppress(MissionError):  # fenced, or the store is gone: said above
-            if store.mission(mission).status not in OVER:
-                store.release(lease, status)
+            now = store.mission(mission).status
+            store.release(lease, now if now in OVER else status)
 
 
 def _refuse_plans(machine: Container) -> None:
@@ -218,8 +221,11 @@ def _refuse_plans(machine: Container) -> None:
 
 def _fitted(machine: Container, row: MissionRow, position: Position, migrate: Any) -> Position:
     """Return the position as it is in `machine`."""
-    old = structure.from_bytes(row.structure)
     new = structure.shape_of(machine)
+    try:
+        old = position.data.get("structure") or structure.from_bytes(row.structure)
+    except ValueError as error:
+        raise StoreError(f"mission {row.id!r}", f"{error}", reason="corrupt") from error
     found = structure.differences(old, new)
     if not found:
         return position
@@ -245,6 +251,7 @@ def _fitted(machine: Container, row: MissionRow, position: Position, migrate: An
             [f"{path}: was active and is no more" for path in missing],
             "Try '--migrate OLD_PATH=NEW_PATH' for each of them.",
         )
+    moved.data["structure"] = new
     return moved
 
 

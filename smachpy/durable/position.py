@@ -20,6 +20,7 @@ Any of them may hold `userdata` (path of a container -> key -> encoded value) an
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 if TYPE_CHECKING:
@@ -45,7 +46,8 @@ class Position:
             userdata: path of a container -> key -> encoded value;
             preempts: path, source, by and why of each request;
             started_ns, last_ns: stamps of the first entry and of the newest;
-            outages: pairs [from, to] of stamps; finished; outcome.
+            outages: pairs [from, to] of stamps; finished; outcome; structure: the machine that the
+            paths are of, when it is not the one that the mission began with.
     """
 
     def __init__(self, data: dict[str, Any] | None = None) -> None:
@@ -72,6 +74,10 @@ class Position:
         """See the class."""
         userdata: dict[str, dict[str, Any]] = self.data["userdata"]
         return userdata
+
+    def to_bytes(self) -> bytes:
+        """Return it as a snapshot."""
+        return json.dumps(self.data, separators=(",", ":")).encode()
 
     def leaves(self) -> list[str]:
         """Return the paths of what runs and has nothing that runs below it."""

@@ -97,7 +97,7 @@ def test_a_person_shows_resumes_and_forgets_it(
     Path("go").touch()
     assert main(["missions", "resume", "--durable", "../j.db", mission, "--plain"]) == 0
     monkeypatch.chdir(tmp_path)
-    assert missions("resume", mission) == 2  # it has ended
+    assert missions("resume", mission, "--plain") == 2  # it has ended
     assert missions("cancel", mission) == 2
     assert missions("forget", mission) == 0
     assert listed(capsys) == []
@@ -189,7 +189,7 @@ def test_a_journal_with_a_damaged_entry_is_refused_and_still_listed(
 ) -> None:
     assert run() == 130
     connection = sqlite3.connect("j.db")
-    connection.execute("UPDATE smachpy_entries SET entry = X'00'")
+    connection.execute("UPDATE smachpy_entries SET data = X'00'")
     connection.commit()
     connection.close()
     assert run() == 2

@@ -18,6 +18,7 @@ from tests.smachpy.durable.killing_store import Kill, KillingStore
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
 
 class Doing(State):
@@ -315,7 +316,10 @@ def test_a_path_that_moved_is_followed(store: KillingStore) -> None:
         go_on(store, machine, migrate={"/M/FIRST": "/M/FIRST"})  # it does not say what OLD is now
     with pytest.raises(MissionError):
         go_on(store, machine, migrate={"/M/OLD": "/M/NOWHERE"})
-    assert go_on(store, machine, migrate={"/M/OLD": "/M/NEW"}) == "ok"
+    kill_again = build("NEW", killed)
+    with pytest.raises(Kill):
+        go_on(store, kill_again, migrate={"/M/OLD": "/M/NEW"})
+    assert go_on(store, machine) == "ok"  # it has been said
     assert entered == ["/M/NEW"]
 
 
@@ -413,3 +417,8 @@ def test_what_once_raises_is_not_kept_and_bad_arguments_are_refused(store: Killi
         with pytest.raises(InvalidStateError):
             smachpy.once(key, function)  # type: ignore[arg-type]
     assert smachpy.once("outside", lambda: 4) == 4
+
+
+def test_a_program_runs_one_mission_after_the_other(tmp_path: Path) -> None:
+    for _ in range(2):
+        assert smachpy.run_durable(machine_of(Doing(fine)), tmp_path / "j.db") == "ok"
