@@ -79,6 +79,16 @@ def test_a_live_run_is_held_and_becomes_live_again(served, look):
     page.wait_for_selector(".live-button[aria-pressed=true]")
 
 
+def test_the_clock_goes_while_a_run_goes_on(served, look):
+    served.add("one", events=run()[:1])
+    page = look(served.start())
+    page.wait_for_selector(".clock input")
+    before = page.input_value(".clock input")
+    page.wait_for_function(
+        "(before) => document.querySelector('.clock input').value > before", arg=before
+    )
+
+
 def test_keys_and_buttons_jump(served, look):
     served.add("one", events=run())
     page = look(served.start())

@@ -58,6 +58,7 @@ export function PlayBar({ page }) {
 
 /** The instant shown, to read and to type. */
 function Clock() {
+  store.tick.value; // it has no properties, so it is drawn again only when this changes
   const last = store.run.last() ?? 0;
   const onChange = (/** @type {Event} */ e) => {
     const seconds = parseInstant(fieldValue(e));
