@@ -15,11 +15,10 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 from uuid import uuid4
 
-from actionlib_core.exceptions import ActionlibError, TransportError, TypeMismatchError
+from actionlib_core.exceptions import ActionlibError, TransportError
 from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.goal.states import Status
 from actionlib_core.interfaces import ros2_action
-from actionlib_core.interfaces.ros2 import distros_of
 from actionlib_core.wire.arrivals import Bursts, Readable
 from actionlib_core.wire.ros2.action_messages import (
     Asked,
@@ -33,7 +32,7 @@ from actionlib_core.wire.ros2.action_messages import (
     unpack_with_id,
 )
 from actionlib_core.wire.ros2.attachment import unpack_attachment
-from actionlib_core.wire.ros2.diagnosis import explain_absence
+from actionlib_core.wire.ros2.diagnosis import explain_absence, explain_mismatch
 from actionlib_core.wire.ros2.goal_exchange import GoalExchange, Step
 from actionlib_core.wire.ros2.goal_states import CancelCode
 from actionlib_core.wire.ros2.graph import ActionServers
@@ -53,12 +52,13 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from actionlib_core.clock import Timer
+    from actionlib_core.exceptions import TypeMismatchError
     from actionlib_core.goal.ports import ClientListener
     from actionlib_core.node import Node
     from actionlib_core.transport import Closable, Reply, Sample
     from actionlib_core.wire.action_messages import ActionTypes
     from actionlib_core.wire.ros2.action_messages import Canceling
-    from actionlib_core.wire.ros2.graph import End, RosServer, ServerChange
+    from actionlib_core.wire.ros2.graph import End, RosServer
     from actionlib_core.wire.ros2.names import Token
 
 T = TypeVar("T")
@@ -626,7 +626,10 @@ class RosClientPort:
             change = self._servers.on_token(token, alive=alive)
             if change is None:
                 return
-        server, error = change.server, self._explain(change)
+        server, error = (
+            change.server,
+            explain_mismatch(self._name, change, self._network.settings.distro),
+        )
         with self._lock:
             self._silent.discard(server)
             if change.alive:
@@ -647,26 +650,6 @@ class RosClientPort:
             heard_of = [goal for goal in self._goals.values() if goal.exchange.code]
         for goal in heard_of:  # a status that came before the server's tokens was told to nobody
             self._tell(goal)
-
-    def _explain(self, change: ServerChange) -> TypeMismatchError | None:
-        """Return what is wrong with the types of a server; None when nothing is."""
-        if not change.mismatches:
-            return None
-        first = change.mismatches[0]
-        own, found = (first.own.name, first.own.hash), (first.found.name, first.found.hash)
-        by = f"action server of node {change.server.node!r}"
-        if own[0] != found[0]:
-            return TypeMismatchError(self._name, own, found, by=by)
-        distro, others = self._network.settings.distro, distros_of(*found)
-        fitting = " or ".join(f"'{other}'" for other in others)
-        way_out = (
-            f"That is how {fitting} defines it, and this program takes '{distro}'. Try 'distro' in "
-            "the configuration, or --distro."
-            if others
-            else "No distribution known here defines it so. Try the robot's own definition, in a "
-            "folder that SMACHPY_INTERFACE_PATH names."
-        )
-        return TypeMismatchError(self._name, own, found, by=by, way_out=way_out)
 
     def _lose_soon(self, server: RosServer) -> None:
         """Take the loss of a server after its last answers, which its tokens may overtake."""

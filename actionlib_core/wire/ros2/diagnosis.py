@@ -9,7 +9,7 @@ from collections import Counter
 from enum import StrEnum
 from typing import TYPE_CHECKING, NamedTuple
 
-from actionlib_core.exceptions import InterfaceError
+from actionlib_core.exceptions import InterfaceError, TypeMismatchError
 from actionlib_core.interfaces import ros2
 from actionlib_core.suggest import did_you_mean
 from actionlib_core.wire.ros2.names import (
@@ -22,6 +22,7 @@ from actionlib_core.wire.ros2.names import (
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from actionlib_core.wire.ros2.graph import ServerChange
     from actionlib_core.wire.ros2.names import Token
 
 CLOCK_OFF_S = 0.1  # Nav2's usual tolerance for transforms
@@ -110,6 +111,32 @@ def explain_absence(action: str, tokens: Iterable[Token], domain: int, router: s
     if not served:
         return f"{said}{nodes.text}, and no action has a server. Is it started?"
     return f"{said}actions: {_listed(served)}.{did_you_mean(f'/{action}', served)}"
+
+
+def explain_mismatch(action: str, change: ServerChange, distro: str) -> TypeMismatchError | None:
+    """Return what is wrong with the types of a server that has appeared; None when nothing is.
+
+    Args:
+        action: Its full name here.
+        change: What its tokens say.
+        distro: Whose definitions are used here.
+    """
+    if not change.mismatches:
+        return None
+    first = change.mismatches[0]
+    own, found = (first.own.name, first.own.hash), (first.found.name, first.found.hash)
+    by = f"action server of node {change.server.node!r}"
+    if own[0] != found[0]:
+        return TypeMismatchError(action, own, found, by=by)
+    fitting = " or ".join(f"'{other}'" for other in ros2.distros_of(*found))
+    way_out = (
+        f"That is how {fitting} defines it, and this program takes '{distro}'. Try 'distro' in "
+        "the configuration, or --distro."
+        if fitting
+        else "No distribution known here defines it so. Try the robot's own definition, in a "
+        "folder that SMACHPY_INTERFACE_PATH names."
+    )
+    return TypeMismatchError(action, own, found, by=by, way_out=way_out)
 
 
 def diagnose_types(tokens: Iterable[Token], distro: str) -> list[Finding]:
@@ -285,4 +312,5 @@ __all__ = [
     "diagnose_qos",
     "diagnose_types",
     "explain_absence",
+    "explain_mismatch",
 ]
