@@ -22,6 +22,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.clock import RealClock, SerialExecutor, current_clock
+from actionlib_core.exceptions import ActionlibError
+from actionlib_core.interfaces import get_message
+from actionlib_core.interfaces._sources import BUNDLED
 from smachpy import log
 from smachpy.events import record_text
 from smachpy.exceptions import SmachError
@@ -36,6 +39,8 @@ if TYPE_CHECKING:
 FORMAT = "smachpy-run"
 VERSION = 1
 OBSERVED = "Observed"
+TYPES = "Types"
+"""Kind of the records that hold definitions of the mission's own goal types."""
 WAITING_OBSERVED = 1_000
 """So many records of the robot's topics wait to be written; of more, the oldest are left out."""
 
@@ -88,6 +93,7 @@ class Recording:
         cut: Whether the file ends in the middle of a line.
         observed: What the robot's topics told meanwhile, numbered from 1 in `n`.
         made_ns: When it really began; `stamp_ns` is another date if the mission's time was virtual.
+        definitions: Texts of the mission's own message types, as `interface_texts` returns them.
     """
 
     path: Path
@@ -98,6 +104,7 @@ class Recording:
     cut: bool = False
     observed: list[dict[str, Any]] = field(default_factory=list)
     made_ns: int = 0
+    definitions: dict[str, str] = field(default_factory=dict)
 
     @property
     def dropped(self) -> int:
@@ -152,6 +159,7 @@ class Recorder:
         except OSError as error:
             raise RecordingError(path, f"cannot write: {error.strerror or error}.") from error
         self._observed: deque[dict[str, Any]] = deque(maxlen=WAITING_OBSERVED)
+        self._types: set[str] = set()  # of goals, whose definitions were looked for
         self._tape = machine.tape(self._on_news, limit=WAITING_EVENTS)
 
     def __enter__(self) -> Self:
@@ -210,11 +218,23 @@ class Recorder:
                 self._unwritten += len(records)
                 continue
             try:
-                self._file.write("".join(map(event_line, records)))
+                types = self._new_types(records)
+                self._file.write("".join(map(event_line, [*types, *records])))
                 self._file.flush()
             except OSError as error:
                 self._unwritten += len(records)
                 self._fail(error)
+
+    def _new_types(self, records: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+        """Yield the definitions of goals' types that come for the first time."""
+        for record in records:
+            goal = record.get("goal") if record["kind"] == "GoalSent" else None
+            name = goal.get("$msg") if isinstance(goal, dict) else None
+            if isinstance(name, str) and name not in self._types:
+                self._types.add(name)
+                if texts := interface_texts(name):
+                    stamp_ns = record["stamp_ns"]
+                    yield {"kind": TYPES, "path": "", "stamp_ns": stamp_ns, "definitions": texts}
 
     def _take_observed(self) -> list[dict[str, Any]]:
         return [self._observed.popleft() for _ in range(len(self._observed))]
@@ -223,6 +243,26 @@ class Recorder:
         if not self._failed:
             self._failed = True
             log.logerr(f"recording {str(self.path)!r}: ends here: {error.strerror or error}.")
+
+
+def interface_texts(goal: str) -> dict[str, str]:
+    """Return the texts of an action's goal, result and feedback, each with all types in it.
+
+    Args:
+        goal: The goal's type, "my_msgs/TurnGoal".
+
+    Returns:
+        The texts by type, as rosbag writes them; nothing for types of ROS that are
+        known everywhere, and for what is no goal.
+    """
+    package = goal.partition("/")[0]
+    if not goal.endswith("Goal") or (BUNDLED / package).is_dir():
+        return {}
+    names = [goal.removesuffix("Goal") + part for part in ("Goal", "Result", "Feedback")]
+    try:
+        return {name: get_message(name)._full_text for name in names}
+    except ActionlibError:  # a type of ROS 2, or one that is gone
+        return {}
 
 
 def header_line(
@@ -285,7 +325,12 @@ def read_recording(path: str | Path) -> Recording:
     whole = lines[1:-1]  # what follows the last line's end was cut off, or is empty
     recording.cut = bool(lines[-1]) and len(lines) > 1
     records = [_read_event(path, number, line) for number, line in enumerate(whole, 2)]
-    recording.events = list(_numbered(one for one in records if one["kind"] != OBSERVED))
+    recording.events = list(
+        _numbered(one for one in records if one["kind"] not in {OBSERVED, TYPES})
+    )
+    for one in records:
+        if one["kind"] == TYPES and isinstance(one.get("definitions"), dict):
+            recording.definitions |= {str(k): str(v) for k, v in one["definitions"].items()}
     observed = (one for one in records if one["kind"] == OBSERVED)
     recording.observed = [{**one, "n": number} for number, one in enumerate(observed, 1)]
     return recording

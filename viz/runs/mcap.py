@@ -21,7 +21,7 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.exceptions import ActionlibError
-from actionlib_core.interfaces import get_message
+from actionlib_core.interfaces import define_action, define_message, get_message
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from actionlib_core.interfaces.smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 from actionlib_core.interfaces.std_msgs.msg import Header, String
@@ -34,6 +34,7 @@ from smachpy.userdata.json_text import dumps
 from viz.runs.scene import Scene
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     from smachpy.events.recording import Recording
@@ -80,6 +81,7 @@ class _Export:
         self.left_out: Counter[tuple[str, str]] = Counter()  # by topic and reason
 
     def run(self) -> None:
+        define_types(self._recording.definitions)
         for container in self._containers.values():
             message = _structure(container, self._recording.stamp_ns)
             topic = f"{self._server}/smach/container_structure"
@@ -176,6 +178,38 @@ class _Export:
             local_data=dumps(userdata),
             info=event["kind"],
         )
+
+
+def define_types(definitions: Mapping[str, str]) -> None:
+    """Make actions known whose texts a recording has, unless this program knows them already."""
+    for name, goal in definitions.items():
+        action = name.removesuffix("Goal")
+        parts = [goal, definitions.get(f"{action}Result"), definitions.get(f"{action}Feedback")]
+        if action == name or None in parts or _is_known(name):
+            continue
+        try:
+            own = [_define_inner(text) for text in parts if text is not None]
+            define_action(action, "\n---\n".join(own))
+        except ActionlibError as error:
+            log.logwarn(f"definition of {action!r} in the recording: {error}")
+
+
+def _define_inner(full: str) -> str:
+    """Make known what a type's full text has after its own, innermost first; return its own."""
+    own, *inner = full.split(f"{'=' * 80}\nMSG: ")
+    for section in reversed(inner):
+        name, _, text = section.partition("\n")
+        if not _is_known(name.strip()):
+            define_message(name.strip(), text)
+    return own.rstrip("\n")
+
+
+def _is_known(name: str) -> bool:
+    try:
+        get_message(name)
+    except ActionlibError:
+        return False
+    return True
 
 
 def _structure(container: StateRecord, stamp_ns: int) -> Any:

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-from actionlib_core.interfaces import get_message
-from smachpy.events.recording import read_recording
+from actionlib_core.interfaces import define_action, get_message
+from smachpy.events.recording import interface_texts, read_recording
 from smachpy.introspection import StateRecord, TransitionRecord
 from viz.runs.mcap import write_mcap
 
@@ -53,6 +53,13 @@ EVENTS = [
     {"kind": "Left", "path": "/JOB/A", "t": 0.0, "outcome": "done"},
     {"kind": "Entered", "path": "/JOB/B", "t": 0.0},
 ]
+
+
+def goal_sent(kind, fields):
+    goal = {"$msg": kind, "fields": fields}
+    return {
+        "kind": "GoalSent", "path": "/JOB/A", "t": 0.0, "action": "work", "goal_id": "g", "goal": goal,
+    }  # fmt: skip
 
 
 def exported(tmp_path: Path, observed):
@@ -132,3 +139,38 @@ def test_what_has_another_shape_is_left_out_and_named(tmp_path, caplog, broken):
     assert [topic for _, topic, _ in found if topic in {"/pose", "/map", "/scan"}] == ["/pose"]
     if broken["what"] != ["?"]:
         assert "left out" in caplog.text
+
+
+def test_own_types_come_from_the_recording(tmp_path):
+    line = "=" * 80
+    texts = {
+        "elsewhere_msgs/WeldGoal": f"Seam[] seams\n\n{line}\nMSG: elsewhere_msgs/Seam\nfloat64 long\n",
+        "elsewhere_msgs/WeldResult": "bool ok\n",
+        "elsewhere_msgs/WeldFeedback": "",
+        "elsewhere_msgs/BadGoal": "no such line\x00 at all",
+        "elsewhere_msgs/BadResult": "",
+        "elsewhere_msgs/BadFeedback": "",
+        "elsewhere_msgs/Alone": "",
+    }
+    seam = {"$msg": "elsewhere_msgs/Seam", "fields": {"long": 1.5}}
+    found = exported(
+        tmp_path,
+        [
+            {"kind": "Types", "definitions": texts},
+            {"kind": "Types", "definitions": ["?"]},
+            goal_sent("elsewhere_msgs/WeldGoal", {"seams": [seam]}),
+            goal_sent("elsewhere_msgs/BadGoal", {}),
+        ],
+    )
+    goals = [(schema.name, m) for schema, topic, m in found if topic == "/work/goal"]
+    assert [name for name, _ in goals] == ["elsewhere_msgs/WeldActionGoal"]
+    assert goals[0][1].goal.seams[0].long == 1.5
+
+
+def test_definitions_of_own_types_are_recorded_and_those_of_ros_are_not():
+    define_action("at_home_msgs/Wash", "geometry_msgs/Point at\n---\n---\nfloat32 part\n")
+    texts = interface_texts("at_home_msgs/WashGoal")
+    assert texts.keys() == {f"at_home_msgs/Wash{part}" for part in ("Goal", "Result", "Feedback")}
+    assert "MSG: geometry_msgs/Point" in texts["at_home_msgs/WashGoal"]
+    for name in ("move_base_msgs/MoveBaseGoal", "nowhere_msgs/XGoal", "at_home_msgs/Wash", ""):
+        assert interface_texts(name) == {}
