@@ -198,12 +198,17 @@ class SqlStore(ABC):
             row = self._known(
                 cursor,
                 id,
-                "status, robot, owner, mark, lease_end, fence" + self.dialect.for_update,
+                "status, robot, owner, mark, lease_end, fence, every" + self.dialect.for_update,
             )
-            status, robot, owner, mark, lease_end, fence = row
+            status, robot, owner, mark, lease_end, fence, every = row
             now = self._now(cursor)
             if status in OVER:
                 raise MissionOverError(self.where, id, status)
+            if every is not None:
+                raise MissionError(
+                    f"{self.where}: mission {id!r}: got a schedule, {every!r}; expected one of the "
+                    "missions that it begins. Try: smachpy missions list"
+                )
             if not (again and owner == runner and mark == self._mark):
                 self._refuse_held(id, owner, mark, lease_end, now)
             if robot is not None:

@@ -137,6 +137,7 @@ class Store(Protocol):
         Raises:
             MissionInUseError: another one that lives holds it, or another mission of its robot.
             MissionOverError: it has ended or was cancelled.
+            MissionError: it is a schedule.
         """
         ...
 

@@ -15,6 +15,8 @@ import pytest
 from smachpy.command import main
 from smachpy.durable.store import open_store
 
+pytestmark = pytest.mark.timeout(240)  # several processes after one another, on a busy computer
+
 MISSION = """
 import os
 import time

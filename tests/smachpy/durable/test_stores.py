@@ -161,6 +161,13 @@ def test_a_mission_that_is_given_back_can_be_taken_again(store):
     assert store.read("m1") == (None, [b"a", b"b"])
 
 
+def test_a_schedule_is_not_run_itself(store):
+    store.create(replace(ROW, every="* * * * *", due=1.0))
+    with pytest.raises(MissionError, match="schedule"):
+        store.claim("m1", this_runner(), seconds=1)
+    assert store.mission("m1").status == "queued"
+
+
 @pytest.mark.parametrize(
     "write",
     [
