@@ -240,7 +240,7 @@ LOOP.append(LOOP)
         (np.ma.masked_array([1]), "", np.ma.MaskedArray),
         (1j, "", complex),
     ],
-    ids=str,
+    ids=lambda value: value if isinstance(value, str) else type(value).__name__,
 )
 def test_what_cannot_be_kept_is_named(value, place, kind):
     with pytest.raises(NotDurableError) as caught:

@@ -126,7 +126,7 @@ def test_a_hook_that_raises_names_the_state(store: KillingStore) -> None:
         {"idempotent": 1},
         {"transient": "socket"},
     ],
-    ids=str,
+    ids=lambda options: " ".join(f"{key} {type(value).__name__}" for key, value in options.items()),
 )
 def test_options_that_have_no_meaning_are_refused(options: dict[str, Any]) -> None:
     with pytest.raises(InvalidStateError):
