@@ -10,6 +10,7 @@ from actionlib_core.clock import RealClock
 from actionlib_core.config import DOMAIN_VARIABLE, ENVIRONMENT_VARIABLE, LAST_DOMAIN, Config
 from actionlib_core.private_network import (
     FIRST_PRIVATE_DOMAIN,
+    list_private_networks,
     network_is_chosen,
     private_network,
     watch_private_networks,
@@ -65,6 +66,7 @@ def test_tools_of_the_default_domain_see_them_come_and_go():
             mine.append(domain)
             watch = watch_private_networks(shared, on_change)  # also those that were there before
             assert news[True].wait(WAIT_S)
+            assert domain in list_private_networks(shared)
             assert not news[False].is_set()
         assert news[False].wait(WAIT_S)
         watch.close()
