@@ -60,6 +60,7 @@ class Session:
         stopped: How a dry program ended, once it has.
         shows_transitions: Somebody shows them already, so SMACH's log need not.
         loaded: Its machine was built, and may be run by somebody else.
+        rosout: Publishes what the program logs; None before it has a node.
         on_action: Called with the name of each action that a client of the program is made for.
     """
 
@@ -82,6 +83,7 @@ class Session:
         self.named_node = False
         self.shows_transitions = False
         self.loaded = False
+        self.rosout: Any = None
         self.on_action: Callable[[str], object] = lambda _name: None
         self._make_node = make_node or _make_default
         self._handling = contextlib.ExitStack()

@@ -78,6 +78,24 @@ def test_a_state_may_catch_it_and_keeps_its_outcome(clock):
     assert machine_of(wait).execute() == "done"
 
 
+def test_what_it_logs_is_on_rosout(clock):
+    import rospy
+    from rosgraph_msgs.msg import Log
+
+    rospy.init_node("script")
+    heard = []
+    subscriber = rospy.Subscriber("/rosout", Log, heard.append)
+    rospy.sleep(0.1)
+    rospy.logwarn("low: %d", 20)
+    rospy.logdebug("nobody asks for that")
+    rospy.sleep(0.1)
+    subscriber.unregister()
+    (message,) = heard
+    assert (message.level, message.name, message.msg) == (Log.WARN, "/script", "low: 20")
+    assert message.file == __file__
+    assert message.line > 0
+
+
 def test_raised_by_the_program_itself_it_is_an_error(clock):
     def wait(rospy):
         raise rospy.ROSInterruptException("nobody has asked")

@@ -6,6 +6,7 @@ Source:
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import logging
 import os
@@ -15,13 +16,19 @@ from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core import shutdown
 from actionlib_core.clock import Deadlock, current_clock
+from actionlib_core.exceptions import ActionlibError
+from actionlib_core.interfaces.rosgraph_msgs.msg import Log
 from actionlib_core.node import get_node
+from actionlib_core.pubsub.topic import Publisher
+from actionlib_core.time import Time
 from actionlib_core.yaml_text import load_yaml
 from smachpy.ros1.names.rospy.exceptions import ROSException, ROSInitException
 from smachpy.ros1.session import session
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+
+_MOST_LOGS: Final = 100  # that wait to be published; beyond, the oldest are dropped
 
 DEBUG: Final = 1
 INFO: Final = 2
@@ -66,7 +73,7 @@ def init_node(
         anonymous: Add a number that no other program has.
         log_level: The lowest level that is logged, `rospy.DEBUG` for example.
         disable_rostime: As rospy takes it.
-        disable_rosout: As rospy takes it.
+        disable_rosout: Publish nothing that is logged on /rosout.
         disable_signals: Leave Ctrl-C and SIGTERM to the program.
         xmlrpc_port: As rospy takes it.
         tcpros_port: As rospy takes it.
@@ -75,9 +82,7 @@ def init_node(
         ROSInitException: the name is none, or the network cannot be joined.
         ROSException: called again with another name.
     """
-    del disable_rostime, disable_rosout, xmlrpc_port, tcpros_port
-    from actionlib_core.exceptions import ActionlibError
-
+    del disable_rostime, xmlrpc_port, tcpros_port
     if not name or not isinstance(name, str):
         raise ValueError(f"init_node: name: got {name!r}; expected a word.")
     if log_level is not None:
@@ -96,6 +101,8 @@ def init_node(
         raise ROSInitException(str(error)) from error
     _set_private_parameters(now.argv if argv is None else argv)
     shutdown.on_shutdown(lambda: now.run_hooks("shutdown"))
+    if not (disable_rosout or now.dry):
+        now.rosout = Publisher("/rosout", Log, queue_size=_MOST_LOGS)
     if not disable_signals:
         now.handle_signals()
 
@@ -270,7 +277,22 @@ def _place() -> tuple[str, int]:
 def _log(level: int, msg: Any, args: tuple[Any, ...], logger_name: str | None) -> None:
     where = logger if not logger_name else logging.getLogger(f"rosout.{logger_name}")
     if not session().dry and where.isEnabledFor(level):
-        where.log(level, "%s", _text(msg, args))
+        text = _text(msg, args)
+        where.log(level, "%s", text)
+        _publish(level, text)
+
+
+def _publish(level: int, text: str) -> None:
+    """Publish what was logged on /rosout, once there is a node."""
+    publisher = session().rosout
+    if publisher is None:
+        return
+    file, line = _place()
+    own = next((ours for ours, theirs in _LEVELS.items() if theirs == level), INFO)
+    message = Log(level=own, name=f"/{session().name}", msg=text, file=file, line=line)
+    message.header.stamp = Time.now()
+    with contextlib.suppress(ActionlibError):  # its node has left, or somebody has another type
+        publisher.publish(message)
 
 
 def _functions(level: int) -> tuple[Callable[..., None], ...]:
