@@ -299,7 +299,11 @@ class StatusPublisher:
                 if soonest is not None:
                     self._arm(soonest)
                 return
-        self.publish()
+        try:
+            self.publish()
+        except TransportError as error:  # the session was closed under the server
+            self.close()
+            log.warning("%s Its status is sent no more.", error)
 
 
 class GoalKeeper:

@@ -345,6 +345,21 @@ def test_server_whose_session_is_closed_stops(nodes, clock):
     assert ends == [GoalStatus.ABORTED, GoalStatus.REJECTED, GoalStatus.REJECTED]
 
 
+def test_server_whose_session_is_closed_sends_its_status_no_more(nodes, clock, caplog):
+    """The clock's timers got an error five times a second, until the end of the program."""
+    server_node, client_node = nodes
+    server = ActionServer("demo", msg.TestAction, node=server_node)
+    client = ActionClient("demo", msg.TestAction, node=client_node)
+    assert client.wait_for_server(LONG_S)
+    client.send_goal(msg.TestGoal(1))
+    clock.sleep(1.0)
+    server_node.transport.close()
+    caplog.clear()
+    clock.sleep(5.0)
+    assert [record.levelname for record in caplog.records] == ["WARNING"]
+    server.stop()
+
+
 def test_simple_server_whose_session_is_closed_stops(nodes, clock):
     """Nor was the execute callback told to stop."""
     server_node, client_node = nodes
