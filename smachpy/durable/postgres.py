@@ -22,13 +22,11 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 _DEFAULTS: Final = {
-    "connect_timeout": "10",
     "application_name": "smachpy",
     "target_session_attrs": "read-write",  # of several hosts, the one that writes
-    "keepalives_idle": "5",
-    "keepalives_interval": "2",
-    "keepalives_count": "3",
-    "tcp_user_timeout": "10000",
+    "keepalives_idle": "2",
+    "keepalives_interval": "1",
+    "keepalives_count": "2",
 }
 # Not to_regclass: that answers from a cache, also what was so before a lock was waited for.
 _HAS_TABLES: Final = (
@@ -82,7 +80,10 @@ class PostgresStore(SqlStore):
             problem = "got a URL that cannot be read"
             raise self._store_error("unreachable", problem) from None
         self.where = _without_password(given)
-        self._arguments: dict[str, Any] = {**_DEFAULTS, **given}
+        # A network that swallows everything is noticed within the patience, too.
+        half = max(2, round(patience / 2))
+        limits = {"connect_timeout": str(half), "tcp_user_timeout": str(1000 * half)}
+        self._arguments: dict[str, Any] = {**_DEFAULTS, **limits, **given}
         try:
             self._connection = self._connect()
         except psycopg.Error as error:
