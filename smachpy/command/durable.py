@@ -177,7 +177,6 @@ def kept(target: Target, machine: Container, options: DurableOptions | None) -> 
     with contextlib.closing(open_store(options.journal, patience=patience)) as store:
         row = find_or_create(store, machine, options)
         begun = "goes on" if row.changed > row.created else "begins"
-        print(f"mission {row.id} {begun}; journal: {store_name(options.journal)}", file=sys.stderr)
         migrate: Any = options.migrate or info.migrations
         with kept_mission(
             machine,
@@ -189,6 +188,8 @@ def kept(target: Target, machine: Container, options: DurableOptions | None) -> 
             lease_s=options.lease_s,
             on_fenced=_leave,
         ):
+            where = store_name(options.journal)
+            print(f"mission {row.id} {begun}; journal: {where}", file=sys.stderr)
             yield
 
 
