@@ -380,6 +380,7 @@ interface Robot {
   scans: Scan[];
   plans: { t: number; points: [number, number][] }[];
   goals: DrivenGoal[];
+  tasks: Pick<DrivenGoal, "id" | "path" | "visit" | "t" | "to">[]; // goals that are no places
   pieces: Piece[];
   done: number; // so many poses are in pieces
 }

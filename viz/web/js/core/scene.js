@@ -60,8 +60,19 @@ export function countUntil(list, t) {
   return low;
 }
 
+/**
+ * The newest of some goals, if it had been sent and had not ended by `t`.
+ * @template {{ t: number, to: number | null }} G
+ * @param {G[]} goals
+ * @param {number} t
+ */
+function newestAt(goals, t) {
+  const goal = goals[countUntil(goals, t) - 1];
+  return goal && (goal.to === null || t <= goal.to) ? goal : null;
+}
+
 /** @returns {Robot} */
-const newRobot = () => ({ poses: [], observed: null, scans: [], plans: [], goals: [], pieces: [], done: 0 });
+const newRobot = () => ({ poses: [], observed: null, scans: [], plans: [], goals: [], tasks: [], pieces: [], done: 0 });
 
 export class Scene {
   /** @type {Map<string, Robot>} */
@@ -109,15 +120,21 @@ export class Scene {
       const robot = this.robots.get(robotOf(e.action));
       const goal = robot?.goals.findLast((one) => one.id === e.goal_id);
       if (goal) Object.assign(goal, { to: t, status: e.status, text: e.text });
+      const task = robot?.tasks.findLast((one) => one.id === e.goal_id);
+      if (task) task.to = t;
     }
   }
 
   /** @param {RunEvent} e @param {number} t */
   #goalSent(e, t) {
     const place = placeIn(e.goal, GOALS);
-    if (!place) return;
     const robot = this.#robot(robotOf(e.action));
     const from = this.entered.get(e.path) ?? t;
+    if (!place) {
+      robot.tasks.push({ id: e.goal_id, path: e.path, visit: from, t, to: null });
+      if (robot.poses.length && robot.poses[robot.poses.length - 1].t > t) this.#again(robot);
+      return;
+    }
     /** @type {DrivenGoal} */
     const goal = { id: e.goal_id, path: e.path, visit: from, t, to: null, status: "ACTIVE", text: "", ...place };
     robot.goals.push(goal);
@@ -178,11 +195,13 @@ export class Scene {
   piecesOf(robot) {
     for (; robot.done < robot.poses.length; robot.done++) {
       const pose = robot.poses[robot.done];
-      const goal = robot.goals[countUntil(robot.goals, pose.t) - 1];
-      const drives = goal && (goal.to === null || pose.t <= goal.to);
-      const path = drives ? goal.path : null;
-      const visit = drives ? goal.visit : null;
+      // A goal that is a place drives; else what else the robot was sent may make it drive.
+      const goal = newestAt(robot.goals, pose.t) ?? newestAt(robot.tasks, pose.t);
+      const path = goal?.path ?? null;
+      const visit = goal?.visit ?? null;
       const last = robot.pieces.at(-1);
+      const moved = robot.done > 0 && robot.poses[robot.done - 1].x !== pose.x;
+      if (path !== null && moved && !this.drivers.includes(path)) this.drivers.push(path);
       if (last && last.path === path && last.visit === visit) last.poses.push(pose);
       else {
         const before = last?.poses.at(-1);

@@ -109,6 +109,22 @@ test("robots are kept apart, and goals that are no places are passed over", () =
   assert.deepEqual(scene.drivers, ["/M/GO", "/M/BACK"]);
 });
 
+test("a goal that is no place drives as well, where the robot moves", () => {
+  const scene = new Scene();
+  scene.addEvents([
+    at(1, "GoalSent", "/M/DELIVER", { action: "deliver", goal_id: "7", goal: message("G", { item: "cup" }) }),
+    at(4, "GoalDone", "/M/DELIVER", { action: "deliver", goal_id: "7", status: "SUCCEEDED", text: "" }),
+    at(4, "GoalSent", "/M/CHARGE", { action: "charge", goal_id: "8", goal: message("G", { until: 1 }) }),
+  ]);
+  assert.equal(scene.isEmpty, true);
+  scene.addObserved(OBSERVED);
+  assert.deepEqual(
+    pieces(scene).map(([path]) => path),
+    [null, "/M/DELIVER"],
+  );
+  assert.deepEqual(scene.drivers, ["/M/DELIVER"]);
+});
+
 test("places have the names that states wrote", () => {
   const scene = new Scene();
   scene.addEvents([
