@@ -8,10 +8,11 @@ where threads take part. Each figure is the median of several rounds in which th
 turns; peers log nothing. transitions and python-statemachine are driven by events and py_trees
 ticks, so theirs is the nearest equivalent, not the same work.
 
-With the event stream attached there are three rows: `taped` (`machine.tape()`, read after the run),
-`recorded` (a file is being written, as by `smachpy run --record`) and `listener` (a list's append,
-called at each event). Beside them stands `python call`, what one call of an empty Python function
-costs: a listener is two of them, two events and two looks at both clocks per transition.
+With the event stream attached there are three rows: `buffered` (`machine.event_buffer()`, read
+after the run), `recorded` (a file is being written, as by `smachpy run --record`) and `listener`
+(a list's append, called at each event). Beside them stands `python call`, what one call of an empty
+Python function costs: a listener is two of them, two events and two looks at both clocks per
+transition.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ BUDGETS = {
     "flat / smach": 0.25,
     "userdata / smach": 0.3,
     "nested / smach": 0.4,
-    "flat taped / flat": 2.0,
+    "flat buffered / flat": 2.0,
     "flat recorded / flat": 2.0,
     "concurrence runs/s": 2000.0,
     "preempt p50 ms": 0.5,
@@ -233,13 +234,13 @@ def peers(makers, missing):
 
 def flat_figures(rounds, missing):
     count = 10 * STEPS
-    listened, taped, recorded = ring(smachpy), ring(smachpy), ring(smachpy)
+    listened, buffered, recorded = ring(smachpy), ring(smachpy), ring(smachpy)
     heard = []
     listened.subscribe(heard.append)
-    tape = taped.tape()
+    buffer = buffered.event_buffer()
     candidates = {
         "smachpy": (ring(smachpy).execute, count),
-        "smachpy taped": (taped.execute, count, tape.read),
+        "smachpy buffered": (buffered.execute, count, buffer.read),
         "smachpy recorded": (recorded.execute, count),
         "smachpy listener": (listened.execute, count, heard.clear),
         "python call": (times(lambda: None, count), count),
@@ -345,7 +346,7 @@ def figures(rounds):
         found["nested / smach"] = nested["smachpy"] / nested["smach"]
         found["iterator / smach"] = looped["smachpy"] / looped["smach"]
         found["bytes per state: smach"] = bytes_per_state(load_smach())
-    for how in ("taped", "recorded", "listener"):
+    for how in ("buffered", "recorded", "listener"):
         found[f"flat {how} / flat"] = flat[f"smachpy {how}"] / flat["smachpy"]
     found["concurrence runs/s"] = 1e6 / concurrence_figures(rounds)["smachpy"]
     latencies = preempt_latencies(60 * rounds)

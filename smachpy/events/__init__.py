@@ -384,7 +384,7 @@ else; `by` is the thread, or what `request_preempt(by=...)` said.
 """
 
 NUMBERS = frozenset({"seq", "dropped"})
-"""What a tape adds to a record: the event's number, and the number of events missing before it."""
+"""What a buffer adds to a record: the event's number, and how many events are missing before it."""
 
 _BY_NAME = {kind.__name__: kind for kind in EVENT_TYPES}
 
@@ -432,7 +432,7 @@ def was_cut(text: str, size: int) -> bool:
 
 
 def from_record(record: dict[str, Any]) -> Event:
-    """Rebuild the event of a `to_record` dict; the numbers of a tape in it are passed over.
+    """Rebuild the event of a `to_record` dict; the numbers of a buffer in it are passed over.
 
     Raises:
         ValueError: `kind` names no event, or a field is missing or unknown.

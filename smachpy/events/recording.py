@@ -4,8 +4,8 @@ The first line is the header: `format` "smachpy-run", `version`, `machine` (a
 `smachpy.introspection.StateRecord`), `stamp_ns` and `base`, the `RunState` before
 the first event, or null. Every further line is an event (`smachpy.events.to_record`) with a number
 `seq`. Where events are missing it jumps, and the next event has their number, `dropped`; what goes
-on in the end is told all the same (`events.tape`). A last line that was cut off by a crash is left
-out when reading.
+on in the end is told all the same (`events.buffer`). A last line that was cut off by a crash is
+left out when reading.
 
 Lines of kind "Observed" are no events of the machine: they hold what the robot's topics told
 (`smachpy.network.observations`).
@@ -45,8 +45,8 @@ WAITING_OBSERVED = 1_000
 """So many records of the robot's topics wait to be written; of more, the oldest are left out."""
 
 WAITING_EVENTS = 100_000
-"""So many entries of a tape wait to be written: when the disk hangs, or the machine is faster than
-its events become text. Further ones are thinned out and counted."""
+"""So many entries wait to be written: when the disk hangs, or the machine is faster than its events
+become text. Further ones are thinned out and counted."""
 
 CLOSE_S = 2.0
 
@@ -160,7 +160,7 @@ class Recorder:
             raise RecordingError(path, f"cannot write: {error.strerror or error}.") from error
         self._observed: deque[dict[str, Any]] = deque(maxlen=WAITING_OBSERVED)
         self._types: set[str] = set()  # of goals, whose definitions were looked for
-        self._tape = machine.tape(self._on_news, limit=WAITING_EVENTS)
+        self._buffer = machine.event_buffer(self._on_news, limit=WAITING_EVENTS)
 
     def __enter__(self) -> Self:
         return self
@@ -174,7 +174,7 @@ class Recorder:
         Blocks: 2 s at most.
         """
         self._closed = True
-        self._tape.close()
+        self._buffer.close()
         self._on_news()
         in_time = self._executor.join(CLOSE_S)
         if in_time and self._file.closed:
@@ -189,9 +189,9 @@ class Recorder:
                 self._file.close()
             except OSError as error:
                 self._fail(error)
-        if self._tape.dropped:
+        if self._buffer.dropped:
             log.logwarn(
-                f"recording {str(self.path)!r}: {self._tape.dropped} events are missing; more "
+                f"recording {str(self.path)!r}: {self._buffer.dropped} events are missing; more "
                 "came than could be written. Every state's last visit is there."
             )
         if self._unwritten:
@@ -200,7 +200,7 @@ class Recorder:
     @property
     def dropped(self) -> int:
         """So many events were not written: there were too many at once, or the disk failed."""
-        return self._tape.dropped + self._unwritten
+        return self._buffer.dropped + self._unwritten
 
     def observe(self, record: dict[str, Any]) -> None:
         """Write what a robot's topic told, a record of `RobotTopics`; nothing after `close`."""
@@ -213,7 +213,7 @@ class Recorder:
 
     def _write(self) -> None:
         """Write what was taken down, until there is no more."""
-        while records := [*self._tape.read(), *self._take_observed()]:
+        while records := [*self._buffer.read(), *self._take_observed()]:
             if self._failed:
                 self._unwritten += len(records)
                 continue

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from smachpy import log
-from smachpy.events.tape import LONGEST, Tape
+from smachpy.events.buffer import LONGEST, EventBuffer
 from smachpy.machines.problems import Problems
 from smachpy.run.callback import call_bounded
 from smachpy.run.frame import SUBSCRIPTIONS
@@ -107,32 +107,34 @@ class Callbacks:
 
         return unsubscribe
 
-    def tape(
+    def event_buffer(
         self, on_news: Callable[[], object] | None = None, *, limit: int = LONGEST, name: str = ""
-    ) -> Tape:
+    ) -> EventBuffer:
         """Take every event of this container and of all below it down, to be read later.
 
         It costs the machine a fraction of what a listener does. Arguments as for
-        `smachpy.events.tape.Tape`, whose `read` gives the records and whose `close` ends it.
+        `smachpy.events.buffer.EventBuffer`: its `read` gives the records, its `close` ends it.
 
         Threads: any.
         """
-        problems = Problems("tape")
+        problems = Problems("event_buffer")
         problems.function("on_news", on_news, "on_news()", 0)
         problems.whole("limit", limit, 0, "a whole number >= 0")
         problems.raise_all()
-        made = Tape(self, on_news, limit=limit, name=name)
-        self._smachpy_add_tape(made)
+        made = EventBuffer(self, on_news, limit=limit, name=name)
+        self._smachpy_add_buffer(made)
         return made
 
-    def _smachpy_add_tape(self, tape: Tape) -> None:
+    tape = event_buffer  # its name in the first release
+
+    def _smachpy_add_buffer(self, buffer: EventBuffer) -> None:
         data = self._smachpy
-        data.tapes = (*data.tapes, tape)
+        data.buffers = (*data.buffers, buffer)
         self.__subscriptions_changed()
 
-    def _smachpy_remove_tape(self, tape: Tape) -> None:
+    def _smachpy_remove_buffer(self, buffer: EventBuffer) -> None:
         data = self._smachpy
-        data.tapes = tuple(item for item in data.tapes if item is not tape)
+        data.buffers = tuple(item for item in data.buffers if item is not buffer)
         self.__subscriptions_changed()
 
     def __subscriptions_changed(self) -> None:

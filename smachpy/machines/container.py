@@ -279,7 +279,7 @@ class Container(Openable, Callbacks, State):
         raised = True
         try:
             data.frame = frame.first.innermost = frame
-            if data.listeners or data.tapes:
+            if data.listeners or data.buffers:
                 frame.run.watched = True
             journal = frame.run.journal
             resumed = journal is not None and journal.resumes(frame)

@@ -27,7 +27,7 @@ from smachpy.run.grace import end_visit, forget_visit, request_soon, unknown_out
 from smachpy.run.interrupt import Interruption
 from smachpy.run.origin import asking
 from smachpy.run.runner import (
-    only_tape,
+    only_buffer,
     publish_left,
     publish_raised,
     run_watched,
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from typing import Unpack
 
-    from smachpy.events.tape import Tape
+    from smachpy.events.buffer import EventBuffer
     from smachpy.introspection import Kind
     from smachpy.machines.state import State, StateOptions
     from smachpy.run.frame import Frame
@@ -379,9 +379,9 @@ class StateMachine(Container):
             ):
                 following = self.__careful(frame, step)
             elif run.watched:
-                tape = only_tape(frame)
-                if tape is not None:
-                    following = self.__taped(frame, step, tape)
+                buffer = only_buffer(frame)
+                if buffer is not None:
+                    following = self.__buffered(frame, step, buffer)
                 else:
                     following = self.__follow(frame, step, run_watched(frame, step))
             else:
@@ -401,8 +401,8 @@ class StateMachine(Container):
                 return following
             step = following
 
-    def __taped(self, frame: Frame, step: Step, tape: Tape) -> Following:
-        """Run step after step as `_loop` does while one tape is all that wants to know.
+    def __buffered(self, frame: Frame, step: Step, buffer: EventBuffer) -> Following:
+        """Run step after step as `_loop` does while one buffer is all that wants to know.
 
         Returns how the machine goes on when something else comes up. A loop of its own, because
         one entry says that a step ended and that the next began, with one look at the clock: there
@@ -414,9 +414,9 @@ class StateMachine(Container):
             return step
         base, now = frame.path, run.clock.now
         run.flush()
-        tape.put((now(), base, None, None, step))
+        buffer.put((now(), base, None, None, step))
         while True:
-            rounds, note = tape.room()
+            rounds, note = buffer.room()
             for _ in rounds:
                 try:
                     window = step.watched_userdata(frame) if step.writes else step.userdata
@@ -437,7 +437,7 @@ class StateMachine(Container):
                     publish_left(frame, step, outcome)
                     self.__raise_bad_outcome(frame, step, outcome)
                 if following.final:
-                    tape.put((now(), base, step, outcome, None))
+                    buffer.put((now(), base, step, outcome, None))
                     return following
                 frame.step = following  # first the mark, then the look
                 if (
@@ -450,8 +450,8 @@ class StateMachine(Container):
                     frame.step = following
                     return following
                 note((now(), base, step, outcome, following))
-                if tape.quiet:
-                    tape.ring()
+                if buffer.quiet:
+                    buffer.ring()
                 step = following
 
     def __careful(self, frame: Frame, step: Step) -> Following:

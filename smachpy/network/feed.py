@@ -48,7 +48,7 @@ OBSERVED_TOPIC = "/smach/observed"
 HISTORY_SERVICE = "/smach/history"
 
 QUEUED_EVENTS = 20_000
-"""Limit of the tape: beyond it events are thinned out, which shows as gaps in `seq`."""
+"""Limit of the buffer: beyond it events are thinned out, which shows as gaps in `seq`."""
 
 KEPT_EVENTS = 5_000
 """Events kept for viewers that join late, and events that may wait to be sent."""
@@ -62,7 +62,7 @@ STOP_S = 1.0
 class Feed:
     """Sends the description and the events of a machine, and keeps the newest events.
 
-    The machine only appends its events to a tape; another thread encodes and sends them, so that
+    The machine only appends its events to a buffer; another thread encodes and sends them, so that
     the machine never waits for the network.
 
     Args:
@@ -109,7 +109,7 @@ class Feed:
         self._clock = current_clock()  # the machine's, by which its events are stamped
         self._values = serve_values(server_name, machine, path, node)
         self._is_open = False  # the history may be asked for before the events are offered
-        self._tape = machine.tape(self._on_news, limit=QUEUED_EVENTS, name=path)
+        self._buffer = machine.event_buffer(self._on_news, limit=QUEUED_EVENTS, name=path)
         self._robot = RobotTopics(node) if robot is None else robot
         self._deaf: Callable[[], None] | None = None  # ends the listening to the robot
         self._watchers: set[str] = set()
@@ -133,7 +133,7 @@ class Feed:
         self._presence.close()
         self._watchers.clear()
         self._executor.submit(self._listen)
-        self._tape.close()
+        self._buffer.close()
         self._on_news()
         if not self._executor.join(STOP_S):
             with self._lock:
@@ -178,7 +178,7 @@ class Feed:
         kinds: dict[str, str] = {}
         with self._lock:
             wanted = self._is_open and self._events.get_num_connections() > 0
-            for record in self._tape.read():
+            for record in self._buffer.read():
                 kinds[record["path"]] = record["kind"]
                 if record["kind"] == Started.__name__:
                     self._executor.submit(self._describe)

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from actionlib_core.node import Node
     from actionlib_core.time import Duration
     from actionlib_core.transport import PublisherPort
-    from smachpy.events.tape import Tape
+    from smachpy.events.buffer import EventBuffer
     from smachpy.machines.state import State
     from smachpy.network.robot_topics import RobotTopics
 
@@ -164,7 +164,7 @@ class ContainerProxy:
         self._lock = threading.Lock()
         self._marked = False  # an update is scheduled
         self._updated = 0.0  # when it last began, on the clock [s]
-        self._tape: Tape | None = None
+        self._buffer: EventBuffer | None = None
         self._forget: Callable[[], None] | None = None
         self._info = "Initial state"
         self._sent: dict[str, Any] = {}
@@ -192,10 +192,10 @@ class ContainerProxy:
         self._updated = topics.clock.now() - STATUS_INTERVAL_S
         self._update(topics)
         if listen:
-            self._tape = self._container.tape(self.mark, limit=1)
+            self._buffer = self._container.event_buffer(self.mark, limit=1)
 
     def mark(self, kind: str = "") -> None:
-        """Send changes soon; `kind` is the event that made them, "" if the tape has it."""
+        """Send changes soon; `kind` is the event that made them, "" if the buffer has it."""
         with self._lock:
             self._info = kind or self._info
             topics = self._topics
@@ -225,9 +225,9 @@ class ContainerProxy:
             self._commands.unregister()
         topics.executor.join(STOP_S)
         self._update(topics)
-        if self._tape is not None:
-            self._tape.close()
-        self._forget = self._tape = self._commands = None
+        if self._buffer is not None:
+            self._buffer.close()
+        self._forget = self._buffer = self._commands = None
         self._sent.clear()
         if self._own_topics is not None:
             self._own_topics.close()
@@ -258,7 +258,7 @@ class ContainerProxy:
 
     def _update(self, topics: _Topics) -> None:
         """Send what has changed."""
-        while self._tape is not None and (records := self._tape.read()):
+        while self._buffer is not None and (records := self._buffer.read()):
             self._info = records[-1]["kind"]
         structure = self._describe_structure()
         if structure != self._sent.get("structure"):

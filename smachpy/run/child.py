@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from actionlib_core.clock import Event as ClockEvent
     from smachpy.events import Event
-    from smachpy.events.tape import Tape
+    from smachpy.events.buffer import EventBuffer
     from smachpy.run.frame import Frame, Gate, RunJournal
     from smachpy.run.options import Options
     from smachpy.run.visit import Origin
@@ -103,7 +103,7 @@ class ContainerData(StateData):
         root: The root's frame while it runs as the root of a machine.
         plan: Its children, compiled; None when they have changed.
         listeners: Called at each event of it and of all below it.
-        tapes: Take these events down.
+        buffers: Take these events down.
         control: The operator's control, once somebody asked for it.
         journal: Keeps its next run as a root; None: nobody does.
         callback: Runs its callback or hook, while there is one.
@@ -115,6 +115,7 @@ class ContainerData(StateData):
 
     __slots__ = (
         "answered",
+        "buffers",
         "callback",
         "children",
         "context_kwargs",
@@ -130,7 +131,6 @@ class ContainerData(StateData):
         "remappings",
         "root",
         "start_cbs",
-        "tapes",
         "termination_cbs",
         "transition_cbs",
     )
@@ -149,7 +149,7 @@ class ContainerData(StateData):
         self.root: Frame | None = None
         self.plan: Any = None
         self.listeners: tuple[Callable[[Event], object], ...] = ()
-        self.tapes: tuple[Tape, ...] = ()
+        self.buffers: tuple[EventBuffer, ...] = ()
         self.control: Gate | None = None
         self.journal: RunJournal | None = None
         self.callback: Any = None  # a smachpy.run.callback.CallbackFrame

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from actionlib_core.clock import Clock
     from smachpy.events import Event
-    from smachpy.events.tape import Tape
+    from smachpy.events.buffer import EventBuffer
     from smachpy.run.child import Child, Parent
     from smachpy.run.grace import Visit
 
@@ -235,22 +235,22 @@ class Subscribers:
     Attributes:
         version: `SUBSCRIPTIONS.version` then.
         listeners: Those of the container, then those of the containers above.
-        tapes: Likewise.
-        tape: The only one that hears anything, if it is a tape.
+        buffers: Likewise.
+        buffer: The only one that hears anything, if it is a buffer.
     """
 
-    __slots__ = ("listeners", "tape", "tapes", "version")
+    __slots__ = ("buffer", "buffers", "listeners", "version")
 
     def __init__(
         self,
         version: object,
         listeners: tuple[Callable[[Event], object], ...],
-        tapes: tuple[Tape, ...],
+        buffers: tuple[EventBuffer, ...],
     ) -> None:
         self.version = version
         self.listeners = listeners
-        self.tapes = tapes
-        self.tape = tapes[0] if len(tapes) == 1 and not listeners else None
+        self.buffers = buffers
+        self.buffer = buffers[0] if len(buffers) == 1 and not listeners else None
 
 
 class Frame:
@@ -355,9 +355,9 @@ class Frame:
 
     def give(self, subscribers: Subscribers, event: Event) -> None:
         """Give `event` to `subscribers`."""
-        if subscribers.tapes:
-            for tape in subscribers.tapes:
-                tape.take(event)
+        if subscribers.buffers:
+            for buffer in subscribers.buffers:
+                buffer.take(event)
         for listener in subscribers.listeners:
             try:
                 listener(event)
@@ -378,13 +378,13 @@ class Frame:
                 above = parent.find_subscribers()
         data = container._smachpy
         if above is None or parent is None or parent.container is not container:
-            for tape in data.tapes:
-                tape.begin(self.here() if parent is None else self.path, self.run.clock)
+            for buffer in data.buffers:
+                buffer.begin(self.here() if parent is None else self.path, self.run.clock)
             if above is None:
-                above = Subscribers(version, data.listeners, data.tapes)
-            elif data.listeners or data.tapes:
+                above = Subscribers(version, data.listeners, data.buffers)
+            elif data.listeners or data.buffers:
                 listeners = data.listeners + above.listeners
-                above = Subscribers(version, listeners, data.tapes + above.tapes)
+                above = Subscribers(version, listeners, data.buffers + above.buffers)
         self.subscribers = above
         return above
 

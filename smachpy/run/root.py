@@ -171,7 +171,7 @@ class Root(Branch):
             data.journal.attach(self)
         if data.control is not None:
             data.control.attach(run)
-        if data.listeners or data.tapes:
+        if data.listeners or data.buffers:
             run.watched = True
 
     def _execute(self, step: Step) -> str:

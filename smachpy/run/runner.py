@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
 
     from actionlib_core.clock import Timer
-    from smachpy.events.tape import Tape
+    from smachpy.events.buffer import EventBuffer
     from smachpy.run.child import Child
     from smachpy.run.frame import Frame
     from smachpy.run.options import Options
@@ -410,12 +410,12 @@ def publish_left(frame: Frame, step: Step, outcome: Any) -> None:
         run.control.note_outcome(frame, step, outcome)
 
 
-def only_tape(frame: Frame) -> Tape | None:
-    """Return the tape that is the only one to hear the events of `frame`; None if there is none."""
+def only_buffer(frame: Frame) -> EventBuffer | None:
+    """Return the buffer that alone hears the events of `frame`; None if there is none."""
     subscribers = frame.subscribers
     if subscribers is None or subscribers.version is not SUBSCRIPTIONS.version:
         subscribers = frame.find_subscribers()
-    return subscribers.tape
+    return subscribers.buffer
 
 
 # -- what goes wrong ---------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from actionlib_core.clock import VirtualClock
 from actionlib_core.clock._virtual_parts import Stopped
 from smachpy.events import Entered, Event
-from smachpy.events.tape import SLOTS, EventTape
+from smachpy.events.buffer import SLOTS, RawEventBuffer
 from smachpy.testing.runs import find_path
 
 if TYPE_CHECKING:
@@ -148,15 +148,15 @@ class Recorder:
                 if not waiting:  # a listener slows the machine down
                     self._unsubscribe()
 
-        tape = _StepTape(self._machine, self._clock, self._steps)
+        buffer = _StepBuffer(self._machine, self._clock, self._steps)
         if waiting:
             self._unsubscribe = self._machine.subscribe(on_event)
         try:
             yield
         finally:
             self._unsubscribe()
-            tape.close()
-            self.events = tape.events()
+            buffer.close()
+            self.events = buffer.events()
             for timer in self._timers:
                 timer.cancel()
 
@@ -179,8 +179,8 @@ class Recorder:
         return tuple(found)
 
 
-class _StepTape(EventTape):
-    """A tape that raises in the machine's thread when too much happens at one moment."""
+class _StepBuffer(RawEventBuffer):
+    """A buffer that raises in the machine's thread when too much happens at one moment."""
 
     def __init__(self, machine: Container, clock: Clock, most: int) -> None:
         self._time = clock

@@ -105,7 +105,7 @@ NAMES = [
     "_label",
     "_items",
     "_listeners",
-    "_tapes",
+    "_buffers",
     "_step",
     "_run",
     "_event",

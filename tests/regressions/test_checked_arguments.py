@@ -335,7 +335,7 @@ def test_add_names_the_argument_that_is_wrong(arguments, named):
         lambda sm: sm.subscribe(lambda: None),
         lambda sm: sm.wait_ended("soon"),
         lambda sm: sm.wait_ended(NAN),
-        lambda sm: sm.tape(on_news=7),
+        lambda sm: sm.event_buffer(on_news=7),
         lambda sm: smachpy.set_preempt_handler(sm, timeout="60"),
         lambda sm: smachpy.set_preempt_handler(7),
         lambda sm: smachpy.set_shutdown_check(7),
@@ -417,14 +417,14 @@ def containers_of(made):
     return sm, both, loop
 
 
-@pytest.mark.parametrize("watched", [False, True, "tape"])
+@pytest.mark.parametrize("watched", [False, True, "buffer"])
 @pytest.mark.parametrize("outcome", [["ok"], {"ok": 1}, None, 7, ("ok",), object(), {1}])
 def test_what_is_no_outcome_is_told_as_it_is(outcome, watched):
     for container in containers_of(lambda: smachpy.CBState(lambda ud: outcome, outcomes=["ok"])):
         if watched is True:
             container.subscribe(lambda event: None)
         elif watched:
-            container.tape()
+            container.event_buffer()
         with pytest.raises(smachpy.SmachError) as raised:
             container.execute()
         assert f"/C/A: unknown outcome: got {outcome!r}" in str(raised.value)

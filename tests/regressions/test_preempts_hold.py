@@ -356,8 +356,8 @@ class ListenerWithLock:
 
 LOCKS = {
     "listener": lambda m: m.listener.lock,
-    "tape that is thinned": lambda m: m.tape._cut,
-    "tape that is read": lambda m: m.tape._lock,
+    "buffer that is thinned": lambda m: m.buffer._cut,
+    "buffer that is read": lambda m: m.buffer._lock,
     "control": lambda m: m.machine.control._lock,
     "container": lambda m: m.machine._smachpy.frame.run.lock,
     "child": lambda m: m.machine["S0"]._smachpy.frame.run.lock,
@@ -387,7 +387,7 @@ class Heard:
         self.node = Node("robot", transport=self.network.session(), clock=self.clock)
         self.server = IntrospectionServer("viewer", self.machine, "/SM_ROOT", node=self.node)
         self.server.start()
-        self.tape = self.machine.tape(limit=1)
+        self.buffer = self.machine.event_buffer(limit=1)
         self.machine.subscribe(self.listener)
         running = threading.Event()
         self.machine["S0"].register_start_cb(lambda *_: running.set())

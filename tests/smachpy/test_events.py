@@ -122,9 +122,9 @@ def test_failures_are_events():
     assert isinstance(heard[-1], Finished)
 
 
-@pytest.mark.parametrize("taped", [True, False])
+@pytest.mark.parametrize("buffered", [True, False])
 @pytest.mark.parametrize("kind", [KeyboardInterrupt, SystemExit])
-def test_what_is_never_wrapped_ends_the_states_in_the_events_too(clock, kind, taped):
+def test_what_is_never_wrapped_ends_the_states_in_the_events_too(clock, kind, buffered):
     def leave(ud):
         raise kind
 
@@ -133,12 +133,12 @@ def test_what_is_never_wrapped_ends_the_states_in_the_events_too(clock, kind, ta
     sm = smachpy.StateMachine(["ok"], name="P")
     sm.add("IN", inner)
     heard = []
-    tape = sm.tape()
-    if not taped:
+    buffer = sm.event_buffer()
+    if not buffered:
         sm.subscribe(heard.append)
     with pytest.raises(kind):
         sm.execute()
-    told = [(record["kind"], record["path"]) for record in tape.read()]
+    told = [(record["kind"], record["path"]) for record in buffer.read()]
     assert told[-3:] == [("Failed", "/P/IN/X"), ("Failed", "/P/IN"), ("Finished", "/P")]
 
 
@@ -354,6 +354,6 @@ def test_a_record_becomes_text_whatever_is_in_it():
     assert json.loads(text)["path"] == "/A"
 
 
-def test_the_numbers_of_a_tape_are_no_fields_of_an_event():
+def test_the_numbers_of_a_buffer_are_no_fields_of_an_event():
     record = to_record(Iterated("/P", 0.0, 0, 3))
     assert from_record({**record, "seq": 7, "dropped": 2}) == Iterated("/P", 0.0, 0, 3)

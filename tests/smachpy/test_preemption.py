@@ -824,7 +824,7 @@ class Stone(smachpy.State):
         return "ok"
 
 
-@pytest.mark.parametrize("how", ["listener", "tape"])
+@pytest.mark.parametrize("how", ["listener", "buffer"])
 @pytest.mark.parametrize("where", ["concurrence", "task"])
 def test_what_is_left_behind_has_left_in_the_events_and_says_nothing_more(clock, where, how):
     inner = chain(Stone())
@@ -834,7 +834,7 @@ def test_what_is_left_behind_has_left_in_the_events_and_says_nothing_more(clock,
         inner = both
     sm = chain(inner, name="P")
     heard = []
-    tape = sm.tape()
+    buffer = sm.event_buffer()
     if how == "listener":
         sm.subscribe(lambda event: heard.append(type(event).__name__))
     clock.call_later(1.0, sm.request_preempt)
@@ -843,7 +843,7 @@ def test_what_is_left_behind_has_left_in_the_events_and_says_nothing_more(clock,
         task.join()
     else:
         sm.execute()
-    told = tape.read()
+    told = buffer.read()
     assert clock.now() < 10.0
     entered = [record["path"] for record in told if record["kind"] == "Entered"]
     left = [record["path"] for record in told if record["kind"] == "Left"]
@@ -853,5 +853,5 @@ def test_what_is_left_behind_has_left_in_the_events_and_says_nothing_more(clock,
     assert deepest not in [r["path"] for r in told if r["kind"] == "PreemptServiced"]
     count = len(heard)
     clock.sleep(1000.0)
-    assert tape.read() == []
+    assert buffer.read() == []
     assert len(heard) == count

@@ -153,7 +153,7 @@ class Machine:
     def add(self, records: Iterable[dict[str, Any]]) -> bool:
         """Take events in, each with its `seq`; False when some are missing before them.
 
-        Those that the machine itself has dropped (`smachpy.events.tape`) are not missed.
+        Those that the machine itself has dropped (`smachpy.events.buffer`) are not missed.
         """
         with self._lock:
             for record in records:

@@ -37,13 +37,14 @@ def question(path):
 
 
 @pytest.mark.zenoh
+@pytest.mark.timeout(300)  # six processes, one after another
 def test_a_mission_in_another_process_is_answered_by_name(tmp_path):
     (tmp_path / "ask.py").write_text(textwrap.dedent(MISSION))
     env = {**os.environ, "SMACHPY_DOMAIN": str(1 + (os.getpid() * 11 + 5) % 9999)}
 
     def answer(*words):
         done = subprocess.run(
-            [*COMMAND, "answer", *words], env=env, capture_output=True, text=True, timeout=60
+            [*COMMAND, "answer", *words], env=env, capture_output=True, text=True, timeout=200
         )
         return done.returncode, done.stdout, done.stderr
 

@@ -43,10 +43,10 @@ def test_an_exploration_finds_the_outcomes_of_a_plan():
 
 def test_a_recording_tells_where_the_tokens_were(clock):
     machine = plan()
-    tape = machine.tape()
+    buffer = machine.event_buffer()
     assert machine.execute() == "goal"
-    fired = [record for record in tape.read() if record["kind"] == "Fired"]
-    tape.close()
+    fired = [record for record in buffer.read() if record["kind"] == "Fired"]
+    buffer.close()
     assert fired[-1]["transition"] == "t6"
 
 

@@ -10,7 +10,7 @@ import pytest
 from actionlib_core.node import Node
 from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import IntrospectionServer, State, StateMachine
-from smachpy.events import tape
+from smachpy.events import buffer
 from smachpy.introspection import describe
 from smachpy.network import feed
 from viz.live.machines import Machine, Machines
@@ -73,7 +73,7 @@ def watch(clock):
 
 def test_a_flood_ends_as_the_mission_does(clock, watch, monkeypatch):
     monkeypatch.setattr(feed, "QUEUED_EVENTS", 50)
-    monkeypatch.setattr(tape, "SLACK", 50)
+    monkeypatch.setattr(buffer, "SLACK", 50)
     job = spinning(2000)
     seen = watch(job)
     mission = clock.spawn(job.execute, name="mission")

@@ -15,7 +15,7 @@ import pytest
 
 from actionlib_core.interfaces import define_action
 from smachpy import CBState, State, StateMachine, describe
-from smachpy.events import GoalDone, GoalFeedback, GoalSent, tape, to_record
+from smachpy.events import GoalDone, GoalFeedback, GoalSent, buffer, to_record
 from smachpy.events import recording as recording_module
 from smachpy.events.recording import (
     Recorder,
@@ -171,7 +171,7 @@ def test_more_events_than_can_be_written_end_as_the_run_did(
     tmp_path, clock, monkeypatch, caplog, capsys
 ):
     monkeypatch.setattr(recording_module, "WAITING_EVENTS", 20)
-    monkeypatch.setattr(tape, "SLACK", 20)
+    monkeypatch.setattr(buffer, "SLACK", 20)
 
     class Again(State):
         left = 3000
@@ -206,7 +206,7 @@ def test_a_recorder_that_is_late_tells_what_is_missing_too(tmp_path, clock, capl
     machine = make_machine()
     recorder = Recorder(tmp_path / "run.jsonl", machine)
     monkeypatch.setattr(recorder._executor, "join", lambda _seconds: False)
-    recorder._tape.dropped = 17
+    recorder._buffer.dropped = 17
     recorder.close()
     assert "still being written" in caplog.text
     assert "17 events are missing" in caplog.text

@@ -1,4 +1,4 @@
-"""Tapes: what they take down is what a listener hears, whatever happens, and costs no more."""
+"""Event buffers: what they take down is what a listener hears, whatever happens, and costs no more."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import smachpy
 from actionlib_core.clock import RealClock, VirtualClock, use_clock
 from smachpy import Concurrence, Iterator, State, StateMachine
 from smachpy.events import Entered, Left, Started, UserdataWritten, to_record
-from smachpy.events import tape as tapes
+from smachpy.events import buffer as buffers
+from smachpy.events.buffer import RawEventBuffer
 from smachpy.events.run_state import RunState
-from smachpy.events.tape import EventTape
 
 
 class Work(State):
@@ -74,18 +74,18 @@ def story(way, act, *, seed=None, make=mission):
         if way == "listener":
             sm.subscribe(lambda event: heard.append(json.loads(json.dumps(to_record(event)))))
         else:
-            tape = sm.tape() if way == "tape" else EventTape(sm)
+            buffer = sm.event_buffer() if way == "buffer" else RawEventBuffer(sm)
         act(clock, sm)
         sm.execute()
-        if way == "tape":
-            heard = without_seq(tape.read())
+        if way == "buffer":
+            heard = without_seq(buffer.read())
         elif way == "events":
-            heard = [to_record(event) for event in tape.events()]
+            heard = [to_record(event) for event in buffer.events()]
         return json.loads(json.dumps(heard))
 
 
 def both_ways(act, **how):
-    taken, heard = story("tape", act, **how), story("listener", act, **how)
+    taken, heard = story("buffer", act, **how), story("listener", act, **how)
     assert taken == heard
     assert story("events", act, **how) == heard
     return taken
@@ -165,11 +165,11 @@ ACTS = st.lists(
 
 @settings(max_examples=60)
 @given(ACTS, st.integers(0, 1000))
-def test_whatever_happens_a_second_tape_and_a_listener_agree(acts, seed):
+def test_whatever_happens_a_second_buffer_and_a_listener_agree(acts, seed):
     """Listeners that come and go change the way that events are taken down, not the events."""
     with VirtualClock(seed) as clock, use_clock(clock):
         sm = mission()
-        tape = sm.tape()
+        buffer = sm.event_buffer()
         forget = []
 
         def do(what):
@@ -193,7 +193,7 @@ def test_whatever_happens_a_second_tape_and_a_listener_agree(acts, seed):
             clock.call_later(at, lambda what=what: do(what))
         clock.call_later(30.0, sm.control.resume)
         outcome = sm.execute()
-        records = tape.read()
+        records = buffer.read()
     assert [record["seq"] for record in records] == list(range(1, len(records) + 1))
     assert records[-1]["outcome"] == outcome
     active = []
@@ -254,56 +254,56 @@ def assert_thinned(records, whole):
 
 
 def test_who_does_not_read_sees_how_it_ended_and_what_is_missing(clock, monkeypatch):
-    monkeypatch.setattr(tapes, "SLACK", 50)
+    monkeypatch.setattr(buffers, "SLACK", 50)
     sm = ring(1000)
-    whole, tape = sm.tape(), sm.tape(limit=100)
+    whole, buffer = sm.event_buffer(), sm.event_buffer(limit=100)
     sm.execute()
-    found = tape.read()
+    found = buffer.read()
     assert len(found) < 350
     assert [r["seq"] for r in found[:99]] == list(range(1, 100))  # and a note
     assert found[-1]["kind"] == "Finished"
-    assert tape.dropped == sum(record.get("dropped", 0) for record in found)
-    assert tape.dropped + len(found) == 2 + 4 * 1000
+    assert buffer.dropped == sum(record.get("dropped", 0) for record in found)
+    assert buffer.dropped + len(found) == 2 + 4 * 1000
     assert_thinned(found, whole.read())
     sm["B"].left = 1
     sm.execute()
-    assert [r["seq"] for r in tape.read()] == [4003 + i for i in range(6)]
+    assert [r["seq"] for r in buffer.read()] == [4003 + i for i in range(6)]
 
 
-def test_a_taped_run_alone_is_thinned_out_the_same(monkeypatch):
-    """A machine with one tape and no listener takes two events down at once."""
-    monkeypatch.setattr(tapes, "SLACK", 50)
+def test_a_buffered_run_alone_is_thinned_out_the_same(monkeypatch):
+    """A machine with one buffer and no listener takes two events down at once."""
+    monkeypatch.setattr(buffers, "SLACK", 50)
     with VirtualClock() as clock, use_clock(clock):
         sm = ring(1000)
-        tape = sm.tape(limit=100)
+        buffer = sm.event_buffer(limit=100)
         sm.execute()
-        thinned = tape.read()
+        thinned = buffer.read()
     with VirtualClock() as clock, use_clock(clock):
         sm = ring(1000)
-        tape = sm.tape()
+        buffer = sm.event_buffer()
         sm.execute()
-        assert_thinned(thinned, tape.read())
+        assert_thinned(thinned, buffer.read())
     assert len(thinned) < 450
 
 
 def test_a_question_that_waits_is_not_lost_in_a_flood():
-    """What a full tape keeps is what tells what goes on now."""
+    """What a full buffer keeps is what tells what goes on now."""
     asked = {"kind": "QuestionAsked", "path": "/ROOT/ASK"}
     entries = [(None, {"kind": "Entered", "path": "/ROOT/ASK"}, None, None, None)]
     entries += [(None, asked, None, None, None)]
     for _ in range(50):
         for kind in ("Entered", "Left"):
             entries.append((None, {"kind": kind, "path": "/ROOT/BUSY"}, None, None, None))
-    kept, _ = tapes.thin([part for entry in entries for part in entry])
+    kept, _ = buffers.thin([part for entry in entries for part in entry])
     assert asked in kept
     entries.insert(2, (None, {"kind": "Left", "path": "/ROOT/ASK"}, None, None, None))
-    kept, _ = tapes.thin([part for entry in entries for part in entry])
+    kept, _ = buffers.thin([part for entry in entries for part in entry])
     assert asked not in kept
 
 
 def test_a_flood_of_visits_keeps_whole_visits(monkeypatch):
     """No visit gets the end of another one: a duration that is told has been measured."""
-    monkeypatch.setattr(tapes, "SLACK", 4)
+    monkeypatch.setattr(buffers, "SLACK", 4)
 
     class Slow(State):
         def __init__(self):
@@ -319,9 +319,9 @@ def test_a_flood_of_visits_keeps_whole_visits(monkeypatch):
         sm = StateMachine(["ok"], name="M")
         with sm:
             StateMachine.add("S", Slow(), {"again": "S"})
-        tape = sm.tape(limit=3)
+        buffer = sm.event_buffer(limit=3)
         sm.execute()
-        records = tape.read()
+        records = buffer.read()
     times = {}
     for record in records:
         if record["kind"] in ("Entered", "Started"):
@@ -335,9 +335,9 @@ def test_a_flood_of_visits_keeps_whole_visits(monkeypatch):
 @given(ACTS, st.integers(0, 1000), st.integers(0, 8), st.integers(1, 8))
 def test_whatever_happens_what_is_kept_tells_what_goes_on(acts, seed, limit, slack):
     with VirtualClock(seed) as clock, use_clock(clock), pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tapes, "SLACK", slack)
+        patch.setattr(buffers, "SLACK", slack)
         sm = mission()
-        whole, tape = sm.tape(), sm.tape(limit=limit)
+        whole, buffer = sm.event_buffer(), sm.event_buffer(limit=limit)
         told, all_of_it = [], []
 
         def do(what):
@@ -349,7 +349,7 @@ def test_whatever_happens_what_is_kept_tells_what_goes_on(acts, seed, limit, sla
                 elif what == "force":
                     sm.control.force_outcome("/M/FIRST", "ok")
                 elif what in ("listen", "forget"):
-                    told.extend(tape.read())
+                    told.extend(buffer.read())
                     all_of_it.extend(whole.read())
                     assert_thinned(told, all_of_it)
                 else:
@@ -361,17 +361,17 @@ def test_whatever_happens_what_is_kept_tells_what_goes_on(acts, seed, limit, sla
             clock.call_later(at, lambda what=what: do(what))
         clock.call_later(30.0, sm.control.resume)
         sm.execute()
-        assert_thinned(told + tape.read(), all_of_it + whole.read())
+        assert_thinned(told + buffer.read(), all_of_it + whole.read())
 
 
 def test_news_are_told_once_until_everything_is_read(clock):
     told = []
     sm = ring(3)
-    tape = sm.tape(lambda: told.append(len(told)))
+    buffer = sm.event_buffer(lambda: told.append(len(told)))
     sm.execute()
     assert told == [0]
-    assert tape.read()
-    assert tape.read() == []
+    assert buffer.read()
+    assert buffer.read() == []
     sm["B"].left = 1
     sm.execute()
     assert told == [0, 1]
@@ -379,25 +379,25 @@ def test_news_are_told_once_until_everything_is_read(clock):
 
 def test_a_reader_that_cannot_be_told_hurts_nobody(clock, caplog):
     sm = ring(1)
-    tape = sm.tape(lambda: 1 / 0)
+    buffer = sm.event_buffer(lambda: 1 / 0)
     assert sm.execute() == "ok"
-    assert len(tape.read()) == 6
+    assert len(buffer.read()) == 6
     assert "on_news" in caplog.text
 
 
-def test_a_closed_tape_takes_nothing_down(clock):
+def test_a_closed_buffer_takes_nothing_down(clock):
     sm = ring(1)
-    tape = sm.tape()
-    tape.close()
-    tape.close()
+    buffer = sm.event_buffer()
+    buffer.close()
+    buffer.close()
     sm.execute()
-    assert tape.read() == []
+    assert buffer.read() == []
 
 
-def test_a_tape_of_a_part_and_under_another_name(clock):
+def test_a_buffer_of_a_part_and_under_another_name(clock):
     sm = mission()
-    part = sm["BOTH"]["INNER"].tape(name="/SHOWN")
-    whole = sm.tape(name="/ROBOT/M")
+    part = sm["BOTH"]["INNER"].event_buffer(name="/SHOWN")
+    whole = sm.event_buffer(name="/ROBOT/M")
     sm.execute()
     paths = {record["path"] for record in part.read()}
     assert paths == {"/SHOWN/A", "/SHOWN/B", "/SHOWN/C"}
@@ -417,19 +417,19 @@ def test_a_value_is_taken_down_as_it_was_then(clock):
 
     sm = StateMachine(["ok"])
     sm.add("A", Writes())
-    tape = sm.tape()
+    buffer = sm.event_buffer()
     sm.execute()
-    (written,) = [r for r in tape.read() if r["kind"] == "UserdataWritten"]
+    (written,) = [r for r in buffer.read() if r["kind"] == "UserdataWritten"]
     assert written["value"] == [1]
 
 
 def test_times_are_those_of_the_computer():
     with use_clock(RealClock()) as clock:
         sm = mission_of_quick_states()
-        tape = sm.tape()
+        buffer = sm.event_buffer()
         before = clock.now(), clock.time_ns()
         sm.execute()
-        records = tape.read()
+        records = buffer.read()
         after = clock.now(), clock.time_ns()
     assert [r["t"] for r in records] == sorted(r["t"] for r in records)
     stamps = [r["stamp_ns"] for r in records]
@@ -447,28 +447,28 @@ def mission_of_quick_states():
     return sm
 
 
-def test_two_tapes_hear_the_same(clock):
+def test_two_buffer_hear_the_same(clock):
     sm = mission()
-    one, two = sm.tape(), sm.tape()
+    one, two = sm.event_buffer(), sm.event_buffer()
     sm.execute()
     assert one.read() == two.read()
 
 
-def test_a_tape_of_events_gives_what_a_listener_gets():
+def test_a_buffer_of_events_gives_what_a_listener_gets():
     with VirtualClock() as clock, use_clock(clock):
         sm, heard = mission(), []
-        tape = EventTape(sm)
-        clock.call_later(0.5, lambda: sm.subscribe(heard.append))  # the tape was alone till then
+        buffer = RawEventBuffer(sm)
+        clock.call_later(0.5, lambda: sm.subscribe(heard.append))  # the buffer was alone till then
         sm.execute()
-        events = tape.events()
+        events = buffer.events()
     assert [type(event) for event in events[:3]] == [Started, Entered, UserdataWritten]
     assert events[-len(heard) :] == heard
     assert {type(event) for event in heard} >= {Entered, Left, UserdataWritten}
-    assert tape.events() == []
-    tape.close()
+    assert buffer.events() == []
+    buffer.close()
 
 
-def test_a_tape_of_events_keeps_all_of_them_with_the_values_themselves():
+def test_a_buffer_of_events_keeps_all_of_them_with_the_values_themselves():
     value = object()
 
     class Writes(State):
@@ -480,15 +480,15 @@ def test_a_tape_of_events_keeps_all_of_them_with_the_values_themselves():
             return "ok"
 
     with use_clock(RealClock()):
-        sm = ring(60_000)  # more transitions than a tape of records keeps
-        tape = EventTape(sm)
+        sm = ring(60_000)  # more transitions than a buffer of records keeps
+        buffer = RawEventBuffer(sm)
         sm.execute()
-        assert len(tape.events()) == 240_000 + 2
-        assert tape.dropped == 0
+        assert len(buffer.events()) == 240_000 + 2
+        assert buffer.dropped == 0
         sm = StateMachine(["ok"])
         with sm:
             StateMachine.add("W", Writes())
-        tape = EventTape(sm)
+        buffer = RawEventBuffer(sm)
         sm.execute()
-    (written,) = [event for event in tape.events() if isinstance(event, UserdataWritten)]
+    (written,) = [event for event in buffer.events() if isinstance(event, UserdataWritten)]
     assert written.value is value

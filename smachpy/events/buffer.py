@@ -1,11 +1,11 @@
 """A machine's events taken down now and read later: the way to hear of it that costs it least.
 
-    tape = machine.tape()
+    buffer = machine.event_buffer()
     machine.execute()
-    for record in tape.read():
+    for record in buffer.read():
         ...
 
-A listener (`Container.subscribe`) is called at each event and holds the machine up; a tape takes
+A listener (`Container.subscribe`) is called at each event and holds the machine up; a buffer takes
 half a microsecond for a transition and builds its records when somebody reads them, in another
 thread if you like. Recordings and the feed of viewers are made of it.
 """
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from actionlib_core.clock import Clock
     from smachpy.events import Event
 
-__all__ = ["Tape"]
+__all__ = ["EventBuffer"]
 
 LONGEST = 100_000
 """So many entries wait for a reader; an entry is an event, or a transition of two."""
@@ -62,7 +62,7 @@ _SAME_NS = 1_000_000  # a wall clock that goes back by less than this was only r
 
 
 class _Begin(NamedTuple):
-    """Note: the tape's machine has this path from here on."""
+    """Note: the buffer's machine has this path from here on."""
 
     path: str
 
@@ -73,15 +73,15 @@ class _Dropped(NamedTuple):
     events: int
 
 
-class Taped(Protocol):
-    """What a tape needs of its container."""
+class Buffered(Protocol):
+    """What a buffer needs of its container."""
 
-    def _smachpy_add_tape(self, tape: Tape) -> None: ...
-    def _smachpy_remove_tape(self, tape: Tape) -> None: ...
+    def _smachpy_add_buffer(self, buffer: EventBuffer) -> None: ...
+    def _smachpy_remove_buffer(self, buffer: EventBuffer) -> None: ...
 
 
-class Tape:
-    """The events of a container and of all below it, from now on; made by `Container.tape`.
+class EventBuffer:
+    """The events of a container and of all below it, from now on; made by `Container.event_buffer`.
 
     Args:
         machine: The container.
@@ -100,7 +100,7 @@ class Tape:
 
     def __init__(
         self,
-        machine: Taped,
+        machine: Buffered,
         on_news: Callable[[], object] | None = None,
         *,
         limit: int = LONGEST,
@@ -126,12 +126,12 @@ class Tape:
 
     def close(self) -> None:
         """Take nothing more down; what is there can still be read. A second call does nothing."""
-        self._machine._smachpy_remove_tape(self)
+        self._machine._smachpy_remove_buffer(self)
 
     def read(self) -> list[dict[str, Any]]:
         """Return the records (`smachpy.events.to_record`) since the last call, in order.
 
-        Each has `seq`, the number of the event on this tape, from 1; dropped events count too. The
+        Each has `seq`, the number of the event on this buffer, from 1; dropped events count. The
         first after a gap has `dropped`, so many are missing before it.
         """
         with self._lock:
@@ -187,7 +187,7 @@ class Tape:
             try:
                 self._on_news()
             except Exception as error:  # noqa: BLE001  a border: reported, the machine goes on
-                log.log_exception(f"tape of {self.path}: on_news raised {error!r}", error)
+                log.log_exception(f"buffer of {self.path}: on_news raised {error!r}", error)
 
     def begin(self, path: str, clock: Clock) -> None:
         """Note where the machine runs and by which clock."""
@@ -251,8 +251,8 @@ class Tape:
         return record
 
 
-class EventTape(Tape):
-    """A tape that gives the events themselves, for a reader in the same process.
+class RawEventBuffer(EventBuffer):
+    """A buffer that gives the events themselves, for a reader in the same process.
 
     It never drops any; the values in them are the machine's own, as a listener gets them.
 
@@ -260,9 +260,9 @@ class EventTape(Tape):
         machine: The container.
     """
 
-    def __init__(self, machine: Taped) -> None:
+    def __init__(self, machine: Buffered) -> None:
         super().__init__(machine, limit=sys.maxsize)
-        machine._smachpy_add_tape(self)
+        machine._smachpy_add_buffer(self)
 
     def take(self, event: Event) -> None:
         """Take an event down."""
