@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from actionlib_core import node
 from smachpy.command import main
 from smachpy.sim.maps import OFFICE_MAP
 
@@ -277,6 +278,7 @@ def test_two_runs_that_bring_their_robots_do_not_meet(monkeypatch):
 def test_only_a_run_that_brings_its_robot_has_a_network_of_its_own(
     monkeypatch, tmp_path, capsys, arguments, own
 ):
+    monkeypatch.setattr(node, "_default", node._Default())  # another test may have joined one
     monkeypatch.delenv("SMACHPY_DOMAIN")
     file = tmp_path / "mission.py"
     file.write_text(
@@ -302,6 +304,7 @@ def test_only_a_run_that_brings_its_robot_has_a_network_of_its_own(
 def test_a_mission_that_starts_its_robots_has_a_network_of_its_own(
     monkeypatch, tmp_path, capsys, robots, arguments, own
 ):
+    monkeypatch.setattr(node, "_default", node._Default())
     monkeypatch.delenv("SMACHPY_DOMAIN")
     file = tmp_path / "mission.py"
     file.write_text(

@@ -12,6 +12,7 @@ import time
 
 import pytest
 
+from actionlib_core import node
 from smachpy.command import main
 from smachpy.durable.store import open_store
 
@@ -225,7 +226,8 @@ def test_a_mission_that_cannot_run_here_is_left_for_a_while(errand, tmp_path):
     assert output.count("exit code 2") == 2
 
 
-def test_a_schedule_is_kept_and_shown(errand, tmp_path, capsys):
+def test_a_schedule_is_kept_and_shown(errand, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(node, "_default", node._Default())  # another test may have joined one
     place = str(tmp_path / "queue.db")
     submit(errand, place, "night", "--every", "0 3 * * * Europe/Berlin", "--robot", "r1")
     store = open_store(place)

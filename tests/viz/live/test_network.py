@@ -102,8 +102,8 @@ class Behind:
         return self._clock.time_ns() - self._ns
 
 
-def test_a_viewer_knows_how_far_a_robots_clock_is_off(clock, watch):
-    watch.robot.clock = Behind(clock, 300.0)
+def test_a_viewer_knows_how_far_a_robots_clock_is_off(clock, watch, monkeypatch):
+    monkeypatch.setattr(feed, "current_clock", lambda: Behind(clock, 300.0))
     seen = watch(spinning(1))
     assert seen.facts()["behind"] == pytest.approx(300e9, abs=1e9)
 
