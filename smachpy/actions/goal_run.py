@@ -355,8 +355,10 @@ class GoalExchange:
     def _keep_end(self, handle: ClientGoalHandle) -> None:
         """Write how the goal ended; only then may the server forget it."""
         handle.keeps_result = False
+        run = self.run
+        if run.status == "LOST" and self.unanswered:
+            return  # what follows is decided after this, and again by a process that goes on
         if self._journal is not None and self._frame is not None:
-            run = self.run
             self._journal.goal_done(self._frame, self.goal_id, run.status, run.text, self.result)
             if handle.goal.over and run.status != "LOST":
                 handle.acknowledge()

@@ -207,6 +207,28 @@ def test_one_that_was_written_and_never_sent_is_sent(world: World) -> None:
     assert len(world.ids) == 1
 
 
+@pytest.mark.parametrize("written", [False, True])
+@pytest.mark.parametrize("kill_at", [1, 2, 3])
+def test_one_that_was_never_sent_is_sent_also_after_a_second_kill(
+    world: World, kill_at: int, *, written: bool
+) -> None:
+    """Its loss was written before the new one was: the next process took it for lost."""
+    world.serve()
+    world.store.arm(3, written=True)  # the write before it is sent
+    with pytest.raises(Kill):
+        world.run(world.machine())
+    world.store.arm(kill_at, written=written)
+    with pytest.raises(Kill):
+        world.run(world.machine())
+    world.store.arm(0, written=False)
+    for after in (9.0, 19.0):
+        world.clock.call_later(
+            after, lambda: [each.set_succeeded(Result(7)) for each in world.handles[-1:]]
+        )
+    assert world.run(world.machine()) == "succeeded"
+    assert len(world.ids) == len(set(world.ids)) == 1
+
+
 def test_a_kill_at_each_write_executes_each_goal_once(world: World) -> None:
     def run(kill_at: int, *, written: bool) -> str:
         world.store.arm(kill_at, written=written)
