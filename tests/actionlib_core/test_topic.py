@@ -284,10 +284,11 @@ def test_closing_the_node_closes_its_topics(nodes):
 def test_topics_over_zenoh():
     clock = RealClock()
     heard = []
-    done = clock.event()
+    latched, done = clock.event(), clock.event()
 
     def callback(message):
         heard.append(message.data)
+        latched.set()
         if message.data == 20:
             done.set()
 
@@ -298,6 +299,7 @@ def test_topics_over_zenoh():
             assert publisher.wait_for_connections(timeout=10)
             assert subscriber.wait_for_connections(timeout=10)
             assert wait_for_message("count", Int32, 10, node=listener) == Int32(0)
+            assert latched.wait(10)  # else a later message may come before it, in its place
             for number in range(1, 21):
                 publisher.publish(number)
             assert done.wait(10)
