@@ -27,6 +27,26 @@ Exception
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+MD5_DIGITS = 32
+
+
+def text_of(error: BaseException, form: Callable[[object], str] = str) -> str:
+    """Return what an exception says; the user's own class may raise when it is asked.
+
+    Args:
+        error: The exception.
+        form: `repr` for one whose class is to be told too.
+    """
+    try:
+        return form(error)
+    except Exception as broken:  # noqa: BLE001  a border to user code
+        return f"<{type(error).__name__}: its text raised {type(broken).__name__}>"
+
 
 class ActionlibError(Exception):
     """Root of all errors that actionlib_core raises on purpose."""
@@ -187,7 +207,7 @@ class TypeMismatchError(ActionlibError, TypeError):
     Attributes:
         name: The name.
         expected_type: Our type, "pkg/Type".
-        expected_md5: Its checksum.
+        expected_md5: Its checksum: md5, or the type hash of ROS 2.
         found_type: The other end's type.
         found_md5: Its checksum.
     """
@@ -205,9 +225,10 @@ class TypeMismatchError(ActionlibError, TypeError):
         self.expected_type, self.expected_md5 = expected
         self.found_type, self.found_md5 = found
         whose = f" from {by}" if by else ""
+        what = "md5" if len(expected[1]) == MD5_DIGITS else "type hash"
         super().__init__(
-            f"{name}: types differ: got {found[0]!r} (md5 {found[1]}){whose}; "
-            f"expected {expected[0]!r} (md5 {expected[1]}). {way_out}"
+            f"{name}: types differ: got {found[0]!r} ({what} {found[1]}){whose}; "
+            f"expected {expected[0]!r} ({what} {expected[1]}). {way_out}"
         )
 
 

@@ -147,10 +147,12 @@ class NameArguments:
     Attributes:
         rules: In the order of the command line.
         rest: The arguments that are not about names, the program's own (`rospy.myargv`).
+        parameters: The words `_name:=value` of ROS 1, as they stand.
     """
 
     rules: tuple[Rule, ...] = ()
     rest: tuple[str, ...] = ()
+    parameters: tuple[str, ...] = ()
 
     def node_name(self, name: str) -> str:
         """Return what the node called `name` in the program is called here."""
@@ -187,9 +189,10 @@ class _Collected:
     rules: list[Rule] = field(default_factory=list)
     rest: list[str] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
+    parameters: list[str] = field(default_factory=list)
 
     def take_rule(self, text: str, *, node: str = "") -> None:
-        """Read one `from:=to`; parameters and unknown `__settings` are left aside."""
+        """Read one `from:=to`; parameters are only kept, unknown `__settings` left aside."""
         old, _, new = text.partition(":=")
         try:
             if old == "__ns":
@@ -197,6 +200,8 @@ class _Collected:
             elif old in {"__node", "__name"}:
                 check_base_name(new)
             elif old.startswith("_"):
+                if not old.startswith("__"):
+                    self.parameters.append(text)
                 return
             else:
                 check_name(old, "remapped name")
@@ -240,8 +245,9 @@ def _split_node(text: str) -> tuple[str, str]:
 def parse_arguments(argv: Sequence[str]) -> NameArguments:
     """Read remapping from a command line, in the style of ROS 1 and of ROS 2.
 
-    ROS 1: `a:=b __ns:=/robot_1 __name:=patrol`; `_param:=value` and unknown `__log:=...` are
-    left aside. ROS 2: `--ros-args -r a:=b -r __ns:=/robot_1 -r __node:=patrol [--]`.
+    ROS 1: `a:=b __ns:=/robot_1 __name:=patrol`; `_param:=value` is kept as it stands, unknown
+    `__log:=...` is left aside. ROS 2: `--ros-args -r a:=b -r __ns:=/robot_1 -r __node:=patrol
+    [--]`.
 
     Args:
         argv: The arguments; the program's name in front may be there or not.
@@ -264,7 +270,7 @@ def parse_arguments(argv: Sequence[str]) -> NameArguments:
             collected.rest.append(argument)
     if collected.problems:
         raise NameSetupError(*collected.problems)
-    return NameArguments(tuple(collected.rules), tuple(collected.rest))
+    return NameArguments(tuple(collected.rules), tuple(collected.rest), tuple(collected.parameters))
 
 
 def _is_rule(argument: str) -> bool:

@@ -95,7 +95,7 @@ class Node:
             config = load_config() if transport is None else Config()
         self.config = config
         self.transport: Transport = transport if transport is not None else open_zenoh(config)
-        self._lock = threading.Lock()
+        self._lock = threading.Lock()  # guards who is to be closed, and whether it is over
         self._entities = itertools.count(1)
         self._shared_lock = (
             threading.RLock()
@@ -217,6 +217,7 @@ class Node:
 
         if not self._closed:
             name = f"let go by node {self.full_name}"
+            # Not here: the garbage collector runs this amid any code, which may hold any lock.
             self.clock.call_later(0.0, lambda: self.clock.spawn(close, name=name))
 
     def time_to_leave(self, longest: float) -> float:
@@ -245,6 +246,7 @@ class Node:
             )
             self._closers.clear()
             self._asks.clear()
+        # All are asked first, so that their grace runs at the same time; the newest closes first.
         for call in (*asks, *closers):
             try:
                 call()

@@ -42,6 +42,8 @@ def bridge(
     services: Iterable[str] = (),
     used: bool = False,
     all: bool = False,  # noqa: A002  as the option is called
+    on_demand: bool = False,
+    leave_out: Iterable[str] = (),
     namespace: str = "",
     host: str = "",
     status_timeout: float = 5.0,
@@ -59,6 +61,10 @@ def bridge(
         used: Bridge also all actions of the robot, all its services but those for logs, and the
             topics that programs on our network use.
         all: Bridge everything that there is on both sides, but `/rosout`.
+        on_demand: Bridge also the actions and topics that programs on our network have an end of,
+            and the services that this program calls or waits for, as soon as they do.
+        leave_out: Names in ROS 1 that are not bridged, whatever else is asked; `*` stands for any
+            characters.
         namespace: What the robot's names live under here, "robot_1"; "" is nothing.
         host: Name or address under which the robot finds this computer; "" takes `ROS_HOSTNAME`,
             then `ROS_IP`, then the address from which its master is reached.
@@ -98,6 +104,8 @@ def bridge(
         frozenset(map(_full, services)),
         used=used,
         all=all,
+        on_demand=on_demand,
+        leave_out=tuple(leave_out),
     )
     address = check_master(master or os.environ.get(MASTER_VARIABLE) or DEFAULT_MASTER)
     times = [

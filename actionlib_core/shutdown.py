@@ -18,7 +18,7 @@ import signal
 import threading
 import weakref
 from contextvars import ContextVar
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from actionlib_core.clock import RealClock, SerialExecutor, current_clock
 from actionlib_core.clock._serial import report_thread_exception
@@ -32,8 +32,25 @@ if TYPE_CHECKING:
 EXIT_THREADS = 4  # timers, callbacks, and two for what a machine does when it is preempted
 
 
+class Stoppable(Protocol):
+    """What runs, and ends when it is asked to."""
+
+    @property
+    def clock(self) -> Clock:
+        """The clock of its threads."""
+        ...
+
+    def stop(self) -> None:
+        """Ask it to end; may block."""
+
+
 class Shutdown:
     """One shutdown, requested at most once until `clear`.
+
+    Attributes:
+        runs: What runs just now, such as state machines; its `stop` is called when shutdown is
+            requested, in a thread of its clock. Whoever adds itself looks at `requested` then. A
+            set, as it costs a machine no lock.
 
     Threads: every method may be called from any thread; `note` from a signal handler too.
     """
@@ -45,6 +62,7 @@ class Shutdown:
         self._events: weakref.WeakKeyDictionary[Clock, Event] = weakref.WeakKeyDictionary()
         self._callbacks: dict[int, tuple[Clock, Callable[[], object]]] = {}
         self._count = 0
+        self.runs: set[Stoppable] = set()
         self._at_exit: dict[int, Callable[[], object]] = {}
 
     @property
@@ -144,6 +162,7 @@ class Shutdown:
             self._delivered = True
             events = list(self._events.values()) if first else []
             callbacks = list(self._callbacks.values()) if first else []
+            callbacks += [(run.clock, run.stop) for run in self.runs.copy()] if first else []
             self._callbacks.clear()
         for event in events:
             event.set()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from actionlib_core.exceptions import FieldError
 from actionlib_core.interfaces import get_action
-from actionlib_core.wire.action_messages import ActionTypes
+from actionlib_core.wire.action_types import ActionTypes
 from actionlib_core.yaml_text import YamlTextError, load_yaml
 
 if TYPE_CHECKING:

@@ -30,17 +30,20 @@ class CallbackQueue:
     They run with the owner's clock and node as the current ones. No thread exists while idle.
     What is urgent overtakes callbacks that take longer than `PATIENCE_S`, in another thread.
 
+    Attributes:
+        context: The context they run in; to be copied.
+
     Threads: any; `call` never waits, so it may be used under a lock.
     """
 
     def __init__(self, node: Node, name: str) -> None:
         with use_clock(node.clock), use_node(node):
-            self._context = contextvars.copy_context()
+            self.context = contextvars.copy_context()
         self._clock = node.clock
         self._name = name
-        self._executor = SerialExecutor(_Marking(self), name)
-        self._thread: int | None = None
-        self._lock = threading.Lock()
+        self._executor = SerialExecutor(node.clock, name, self._spawn_marked)
+        self._thread: int | None = None  # that runs callbacks now
+        self._lock = threading.Lock()  # guards the two below
         self._urgent: deque[_Once] = deque()
         self._helpers = 0
 
@@ -52,7 +55,7 @@ class CallbackQueue:
         """As `call`; but if other callbacks hold it up, run it beside them in another thread."""
         once = _Once(partial(function, *args))
         once.timer = self._clock.call_later(PATIENCE_S, partial(self._overtake, once))
-        self._executor.submit(once)
+        self._executor.submit(once)  # whichever of the two comes first runs it
 
     def _overtake(self, once: _Once) -> None:
         with self._lock:
@@ -66,7 +69,7 @@ class CallbackQueue:
         while True:
             with self._lock:
                 if not self._urgent:
-                    self._helpers -= 1
+                    self._helpers -= 1  # with the lock: what comes next gets a new thread
                     return
                 once = self._urgent.popleft()
             try:
@@ -80,13 +83,16 @@ class CallbackQueue:
 
     def spawn(self, target: Callable[[], object], name: str) -> Task:
         """Run `target` in a thread of its own, with the owner's clock and node."""
-        return self._context.copy().run(partial(self._clock.spawn, target, name=name))
+        return self.context.copy().run(partial(self._clock.spawn, target, name=name))
 
     def is_inside(self) -> bool:
         """Tell whether the calling thread is running one of the callbacks."""
         return self._thread == get_ident()
 
-    def mark(self, target: Callable[[], object]) -> None:
+    def _spawn_marked(self, target: Callable[[], object], name: str) -> Task:
+        return self.spawn(partial(self._mark, target), name)
+
+    def _mark(self, target: Callable[[], object]) -> None:
         """Run `target`, and know that this thread runs callbacks meanwhile."""
         me = self._thread = get_ident()
         try:
@@ -107,19 +113,9 @@ class _Once:
 
     def __call__(self) -> None:
         try:
-            function = self._functions.pop()
+            function = self._functions.pop()  # atomic
         except IndexError:  # another thread has taken it
             return
         if self.timer is not None:
             self.timer.cancel()
         function()
-
-
-class _Marking:
-    """Starts the thread that runs the callbacks of a queue."""
-
-    def __init__(self, queue: CallbackQueue) -> None:
-        self._queue = queue
-
-    def spawn(self, target: Callable[[], object], *, name: str) -> Task:
-        return self._queue.spawn(partial(self._queue.mark, target), name)

@@ -20,7 +20,7 @@ from actionlib_core.goal.states import Status
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from actionlib_core.wire.action_messages import ActionTypes
+    from actionlib_core.wire.action_types import ActionTypes
 
 log = logging.getLogger(__name__)
 

@@ -8,10 +8,13 @@ network, time and callbacks together, under one lock.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import logging
+import math
 import os
 import threading
 import weakref
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -23,23 +26,31 @@ from actionlib_core._arguments import (
     check_wait,
 )
 from actionlib_core.action._callbacks import CallbackQueue
-from actionlib_core.action.goal_id_generator import GoalIDGenerator
 from actionlib_core.action.sent_goal import SentGoal
+from actionlib_core.clock import current_clock
 from actionlib_core.exceptions import ActionException, ActionlibError, TransportError
 from actionlib_core.goal.bounded import Backlog, Recent
-from actionlib_core.goal.client import STATUS_LIST_TIMEOUT_S, ClientGoal, Duty, KnownServers, Path
+from actionlib_core.goal.client import (
+    STATUS_LIST_TIMEOUT_S,
+    STATUSES,
+    ClientGoal,
+    Duty,
+    KnownServers,
+    Path,
+)
 from actionlib_core.goal.states import TERMINAL, CommState, Status, TerminalState
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalID
 from actionlib_core.node import get_node
 from actionlib_core.shutdown import current_shutdown
 from actionlib_core.time import Time
-from actionlib_core.wire.action_messages import ActionTypes
+from actionlib_core.wire.action_types import ActionTypes
 from actionlib_core.wire.ports import make_client_port
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
 
     from actionlib_core.action._action_spec import ActionSpec as Spec
-    from actionlib_core.clock import Event, Timer
+    from actionlib_core.clock import Clock, Event, Timer
     from actionlib_core.exceptions import TypeMismatchError
     from actionlib_core.goal.ports import ClientPort, Server, StatusEntry
     from actionlib_core.node import Node
@@ -52,6 +63,7 @@ __all__ = [
     "ClientGoalHandle",
     "CommState",
     "CommStateMachine",
+    "GoalIDGenerator",
     "GoalManager",
     "TerminalState",
     "get_name_of_constant",
@@ -68,13 +80,54 @@ CALLBACKS_S = 1.0  # waiting for a goal's end waits no longer for callbacks that
 
 UNSURE = " and had not acknowledged the goal, which may or may not have begun"
 
-_STATUSES = {int(status): status for status in Status}
 _OVER = frozenset({CommState.DONE, CommState.LOST})
 
 A_co = TypeVar("A_co", covariant=True)
 G = TypeVar("G")
 R = TypeVar("R")
 F = TypeVar("F")
+
+
+_count = itertools.count(1)  # one per process: `next` is atomic
+
+
+class GoalIDGenerator:
+    """Makes ids that differ from all others on the network.
+
+    Args:
+        name: What an id begins with; the name of the default node when None.
+        clock: Gives the stamp; the current clock when None.
+
+    Threads: any; ids never repeat within a process, those of a virtual clock never on that clock.
+    """
+
+    def __init__(self, name: str | None = None, *, clock: Clock | None = None) -> None:
+        if name is None:
+            name = get_node().name
+        self._clock = clock
+        self.name = ""
+        self.set_name(name)
+
+    def set_name(self, name: str) -> None:
+        """Set what ids begin with.
+
+        Args:
+            name: Usually the node's name.
+        """
+        self.name = name
+
+    def generate(self) -> tuple[str, int]:
+        """Return a new id and its stamp [ns since the epoch]."""
+        clock = self._clock if self._clock is not None else current_clock()
+        stamp_ns = clock.time_ns()
+        secs, nsecs = divmod(stamp_ns, 1_000_000_000)
+        count = getattr(clock, "numbers", _count)  # a virtual clock's own: each run has the same
+        return f"{self.name}-{next(count)}-{secs}.{nsecs}", stamp_ns
+
+    def generate_ID(self) -> GoalID:  # noqa: N802  actionlib's name
+        """Return a new id, stamped with the present time."""
+        goal_id, stamp_ns = self.generate()
+        return GoalID(stamp=Time(0, stamp_ns), id=goal_id)
 
 
 def get_name_of_constant(C: Any, n: int) -> str:  # noqa: N803  actionlib's name
@@ -93,28 +146,24 @@ def get_name_of_constant(C: Any, n: int) -> str:  # noqa: N803  actionlib's name
     return "???"
 
 
+@dataclass(slots=True, weakref_slot=True, eq=False, repr=False)
 class ClientGoalHandle:
     """One goal as its client holds it. Two handles are equal when they are of one goal.
 
     Dropping the handle changes nothing: the goal is followed until it is over. ROS's attribute
     `comm_state_machine` is the handle itself.
 
-    Args:
+    Attributes:
         manager: The client's goals.
         goal: The goal's life cycle.
         body: The packed goal message.
-
-    Attributes:
-        goal: See above.
-        manager: See above.
-        body: See above.
         on_state: Called under the manager's lock with each state passed; must only note it.
         on_feedback: The same, when feedback has come; None when nobody wants any.
-        feedback: The feedback that nobody has taken; guarded by the manager's lock.
+        feedback: The feedback that nobody has taken, None while none has come; guarded by the
+            manager's lock.
         keeps_result: The server is to keep the result until `acknowledge` is called.
-        calls_back: The goal has callbacks, for which `settled` waits.
-        settled: Set when the goal is over and its last callback has returned, or nobody follows it.
-        ended: Set when the goal is over or nobody follows it; made when somebody waits for that.
+        calls_back: The goal has callbacks, which `wait` waits for.
+        settled: The goal is over and its last callback has returned, or nobody follows it.
         ended_at: When the goal was over [s, clock]; None while it is not.
         last_call: The callback that reports the goal's end has begun.
         asking: A question about the goal is under way.
@@ -122,41 +171,23 @@ class ClientGoalHandle:
     Threads: every method may be called from any thread and any callback.
     """
 
-    __slots__ = (
-        "__weakref__",
-        "_shown",
-        "_shown_to",
-        "asking",
-        "body",
-        "calls_back",
-        "ended",
-        "ended_at",
-        "feedback",
-        "goal",
-        "keeps_result",
-        "last_call",
-        "manager",
-        "on_feedback",
-        "on_state",
-        "settled",
-    )
-
-    def __init__(self, manager: GoalManager, goal: ClientGoal, body: bytes = b"") -> None:
-        self.manager = manager
-        self.goal = goal
-        self.body = body
-        self.on_state: Callable[[CommState], object] | None = None
-        self.on_feedback: Callable[[], object] | None = None
-        self.feedback: Backlog[Any] = Backlog()
-        self.calls_back = False
-        self.settled: Event = manager.clock.event()
-        self.ended: Event | None = None
-        self.ended_at: float | None = None
-        self.last_call = False
-        self.keeps_result = False
-        self.asking = False
-        self._shown: CommState | None = None
-        self._shown_to = 0
+    manager: GoalManager
+    goal: ClientGoal
+    body: bytes = b""
+    on_state: Callable[[CommState], object] | None = None
+    on_feedback: Callable[[], object] | None = None
+    feedback: Backlog[Any] | None = None
+    keeps_result: bool = False
+    calls_back: bool = False
+    settled: bool = False
+    ended_at: float | None = None
+    last_call: bool = False
+    asking: bool = False
+    # Most goals are waited for once at most: these exist when somebody waits.
+    _ended: Event | None = None
+    _settled: Event | None = None
+    _shown: CommState | None = None
+    _shown_to: int = 0
 
     # -- for programs --------------------------------------------------------------------------
 
@@ -202,7 +233,7 @@ class ClientGoalHandle:
     @property
     def dropped_feedback(self) -> int:
         """How many feedback messages were dropped, as the callback was slower than they came."""
-        return self.feedback.dropped
+        return 0 if self.feedback is None else self.feedback.dropped
 
     def wait(self, timeout: float | None = None) -> bool:
         """Wait until the goal is over and its last callback has returned.
@@ -251,13 +282,43 @@ class ClientGoalHandle:
     @property
     def forgotten(self) -> bool:
         """Whether the goal runs on and nobody follows it."""
-        return self.settled.is_set() and not self.goal.over
+        return self.settled and not self.goal.over
+
+    def note_ended(self) -> None:
+        """Wake those who wait for the goal's end. Needs the manager's lock."""
+        if self._ended is not None:
+            self._ended.set()
+
+    def settle(self) -> None:
+        """Note that the goal is over, or nobody follows it, and its last callback has returned."""
+        with self.manager.lock:
+            self.settled = True
+            for event in (self._ended, self._settled):  # a goal that is forgotten ends both waits
+                if event is not None:
+                    event.set()
+
+    def wait_ended(self, timeout: float | None) -> None:
+        """Wait until the goal is over or nobody follows it, `timeout` [s] at most."""
+        with self.manager.lock:
+            if self.goal.over or self.settled:
+                return
+            ended = self._ended = self._ended or self.manager.clock.event()
+        ended.wait(timeout)
+
+    def wait_settled(self, timeout: float | None) -> bool:
+        """Wait until the goal is settled, `timeout` [s] at most; return whether it is."""
+        with self.manager.lock:
+            if self.settled:
+                return True
+            settled = self._settled = self._settled or self.manager.clock.event()
+        return settled.wait(timeout)
 
     def call(self, state: CommState, callback: Callable[..., object], *args: object) -> None:
         """Run a user callback, for which the goal stands in `state`, after those before it."""
         self.manager.callbacks.call(self._show, state, callback, *args)
 
     def _show(self, state: CommState, callback: Callable[..., object], *args: object) -> None:
+        # The thread first: another one that reads in between must not take the state for its own.
         self._shown_to, self._shown = threading.get_ident(), state
         self.last_call = state in _OVER
         try:
@@ -278,10 +339,28 @@ class ClientGoalHandle:
             finally:
                 self.drop_feedback_after(started)
 
+    def keep_feedback(self, feedback: Any, size: int) -> None:
+        """Keep feedback of `size` bytes for whoever wants it. Needs the manager's lock."""
+        if self.on_feedback is None:  # the goal was forgotten since the feedback was read
+            return
+        if self.feedback is None:
+            self.feedback = Backlog()
+        dropped_before = self.feedback.dropped
+        if self.feedback.add(feedback, size):
+            self.on_feedback()
+        elif not dropped_before:
+            log.warning(
+                "action '%s': the feedback of goal %s comes faster than it is taken, and the "
+                "oldest of %d messages is dropped. Try a callback that takes no time.",
+                self.manager.name,
+                self.goal.id,
+                len(self.feedback),
+            )
+
     def take_feedback(self) -> Any:
         """Return the next feedback; None when none waits."""
         with self.manager.lock:
-            return self.feedback.take()
+            return None if self.feedback is None else self.feedback.take()
 
     def drop_feedback_after(self, started: float, limit: float = FEEDBACK_S) -> None:
         """Drop what waits if the goal is over and a callback did not keep up.
@@ -293,7 +372,7 @@ class ClientGoalHandle:
         if ended_at is None or self.manager.clock.now() < max(started, ended_at) + limit:
             return
         with self.manager.lock:
-            dropped = self.feedback.drop_all()
+            dropped = 0 if self.feedback is None else self.feedback.drop_all()
         if dropped:
             log.warning(
                 "action '%s': goal %s is over: the last %d messages of its feedback were dropped, "
@@ -301,7 +380,7 @@ class ClientGoalHandle:
                 self.manager.name,
                 self.goal.id,
                 dropped,
-                self.feedback.dropped,
+                self.dropped_feedback,
             )
 
 
@@ -361,16 +440,17 @@ class GoalManager:
         self._server_lost_timeout = server_lost_timeout
         self._status_list_timeout = status_list_timeout
         self._servers = KnownServers(status_list_timeout)
-        self._goals: dict[str, ClientGoalHandle] = {}
-        self._ended = Recent(REMEMBERED)
-        self._strangers = Recent(REMEMBERED)
-        self._acks: list[str] = []
-        self._waiters: list[Event] = []
+        self._goals: dict[str, ClientGoalHandle] = {}  # by id, those that are not over
+        self._ended: dict[str, None] = {}  # ids of the others: a `Recent`, written out for speed
+        self._strangers = Recent(REMEMBERED)  # sessions that were reported
+        self._acks: list[str] = []  # ids of goals whose result is here, for the next message
+        self._ack_timer: Timer | None = None
+        self._waiters: list[Event] = []  # for a server; woken once, they come again
         self._timer: Timer | None = None
-        self._due = 0.0
+        self._due = math.inf  # when the timer runs [s, clock]; without one, never
         self._closed = False
-        self._dropped = False
-        port.open(self)
+        self._dropped = False  # the last goal that ends closes this
+        port.open(self)  # last: the network tells at once of the servers that are there
         self._forget_on_close = node.on_close(self.close)
 
     def close(self) -> None:
@@ -382,12 +462,11 @@ class GoalManager:
                 self._pass(handle, handle.goal.lose("the action client was stopped"))
             self._closed = True
             self._forget_on_close()
-            acks, self._acks = self._acks, []
             if self._timer is not None:
                 self._timer.cancel()
             self._wake()
-        if acks:
-            self.port.acknowledge(acks)
+        # Without the lock: closing waits for callbacks of the network, which may wait for it.
+        self._send_acks()
         self.port.close()
 
     def let_go(self) -> None:
@@ -439,7 +518,7 @@ class GoalManager:
                     error = self._servers.find_wrong_type()
                     if error is not None:
                         raise error
-                    changed.clear()
+                    changed.clear()  # with the lock: a server that appears now sets it again
                     if changed not in self._waiters:
                         self._waiters.append(changed)
                 left = None if deadline is None else deadline - self.clock.now()
@@ -468,10 +547,13 @@ class GoalManager:
             TypeMismatchError: the action's server has another type.
             TransportError: the client is stopped.
         """
+        heard = self.port.is_heard()  # asks the network, which may itself wait for our lock
         with self.lock:
             if self._closed:
                 raise self._stopped()
-            goal = handle.goal
+            goal, now = handle.goal, self.clock.now()
+            if goal.over:  # cancelled meanwhile, by another thread or a signal handler
+                return
             known = self._goals.get(goal.id)
             if known is not None:
                 self._take_over(known, handle)
@@ -479,10 +561,18 @@ class GoalManager:
             error = self._servers.find_wrong_type()
             if error is not None:
                 raise error
-            duty = goal.begin(self.clock.now())
-            self._goals[goal.id] = handle
-            self._arm(goal.due)
-        self._fulfil(handle, duty)
+            duty, receiver = goal.begin(now), None
+            if heard and duty is Duty.GOAL:
+                receiver = self._servers.find_receiver(goal, now)
+            if receiver is not None:
+                goal.on_offered(*receiver)
+            if goal.due < self._due:
+                self._arm(goal.due)  # before the next line: it raises when there is no thread
+            self._goals[goal.id] = handle  # before it is sent: the answer may be here at once
+        if receiver is not None:
+            self.port.send_goal(goal.id, goal.stamp_ns, handle.body, receiver.server)
+        elif duty is Duty.ASK:
+            self._fulfil(handle, duty)
 
     def _take_over(self, known: ClientGoalHandle, handle: ClientGoalHandle) -> None:
         """Let `handle` follow a goal that was forgotten and still runs. Needs the lock."""
@@ -545,15 +635,10 @@ class GoalManager:
         """
         goal = handle.goal
         if not handle.calls_back:
-            handle.settled.wait(timeout)
+            handle.wait_settled(timeout)
             return goal.over
         deadline = None if timeout is None else self.clock.now() + timeout
-        with self.lock:
-            if not goal.over and not handle.forgotten and handle.ended is None:
-                handle.ended = self.clock.event()
-            ended = handle.ended
-        if ended is not None:
-            ended.wait(timeout)
+        handle.wait_ended(timeout)
         if not goal.over or self.callbacks.is_inside():
             return goal.over
         now = self.clock.now()
@@ -561,10 +646,10 @@ class GoalManager:
         ended_at = now if handle.ended_at is None else handle.ended_at
         patience = max(0.0, ended_at + CALLBACKS_S - now)
         first = patience if left is None else min(patience, left)
-        if handle.settled.wait(first):
+        if handle.wait_settled(first):
             return True
         if handle.last_call:
-            handle.settled.wait(None if left is None else left - first)
+            handle.wait_settled(None if left is None else left - first)
         elif first == patience:
             log.warning(
                 "action '%s': goal %s is over, but a callback of this client has not returned for "
@@ -581,9 +666,7 @@ class GoalManager:
             if handle.goal.over:
                 return
             handle.on_state = handle.on_feedback = None
-            handle.settled.set()
-            if handle.ended is not None:
-                handle.ended.set()
+            handle.settle()  # it stays in `_goals`, so that its result is acknowledged
 
     # -- servers -------------------------------------------------------------------------------
 
@@ -635,7 +718,7 @@ class GoalManager:
                 goal = handle.goal
                 entry = taken.get(goal.id)
                 if entry is not None:
-                    self._hear(handle, entry, server.session, now)
+                    self._pass(handle, goal.hear(entry, server.session, now), entry)
                 elif goal.server in {"", server.session}:
                     self._pass(handle, goal.on_untaken(now))
             acks, self._acks = self._acks, []
@@ -690,23 +773,21 @@ class GoalManager:
         now = self.clock.now()
         servers, goals = self._servers, self._goals
         if servers.current is None or session in servers.foreign:
-            with self.lock:
-                if servers.hear_foreign(session, now):
-                    self._hurry(now)
-                    self._wake()
-                if goals and session in servers.foreign:
-                    self._arm(servers.foreign[session])
-        if not goals:
+            self._hear_foreign(session, now)
+        if not goals:  # so it is with most lists that a client hears: no lock for them
             return
         with self.lock:
-            listed = set()
+            speaks, listed = servers.may_speak(session), set()
             for entry in entries:
                 listed.add(entry.id)
                 handle = goals.get(entry.id)
-                if handle is not None and (
-                    servers.may_speak(session) or self._believes(session, handle)
-                ):
-                    self._hear(handle, entry, session, now)
+                if handle is not None and (speaks or self._believes(session, handle)):
+                    goal = handle.goal
+                    path = goal.hear(entry, session, now)
+                    if path and handle.on_state is None and not goal.over and goal.due >= self._due:
+                        continue  # nobody is to be told, and the timer looks in time
+                    if path != ():
+                        self._pass(handle, path, entry)
             if whole and (len(listed) < len(goals) or not listed.issuperset(goals)):
                 answers = servers.current is not None
                 for handle in list(goals.values()):
@@ -714,29 +795,20 @@ class GoalManager:
                         self._pass(handle, handle.goal.on_unlisted(now, answers=answers))
                         self._arm(handle.goal.due)
 
-    def _hear(self, handle: ClientGoalHandle, entry: StatusEntry, session: str, now: float) -> None:
-        """Take a status. Needs the lock."""
-        status = _STATUSES.get(entry.status)
-        if status is None:
-            log.error("action '%s': unknown status %d of a goal", self.name, entry.status)
-            return
-        goal = handle.goal
-        if not goal.stamp_ns:  # one that was attached to
-            goal.stamp_ns = entry.stamp_ns
-        before = goal.comm
-        path = goal.on_status(status, entry.text, now)
-        due = goal.due
-        if session and goal.acknowledged:  # not one that knows of the cancel only
-            goal.server = session
-        if goal.comm is not before:
-            self._arm(due)
-        if path:
-            self._pass(handle, path)
+    def _hear_foreign(self, session: str, now: float) -> None:
+        """Take a status list of a session that may stand for a server without a token."""
+        with self.lock:
+            if self._servers.hear_foreign(session, now):
+                self._hurry(now)
+                self._wake()
+            if self._goals and session in self._servers.foreign:
+                self._arm(self._servers.foreign[session])
 
     def _believes(self, session: str, handle: ClientGoalHandle) -> bool:
-        """Tell whether a session that is no server may speak of a goal; report one that may not."""
+        """Tell whether a session may speak of a goal; report one that may not."""
         goal = handle.goal
-        if goal.acknowledged and session == goal.server:
+        its_own = goal.acknowledged and session == goal.server
+        if its_own or self._servers.may_speak(session):
             return True
         self.on_stranger(session)
         return False
@@ -746,7 +818,7 @@ class GoalManager:
         handle = self._goals.get(entry.id)
         if handle is None:
             return
-        if not (self._servers.may_speak(session) or self._believes(session, handle)):
+        if not self._believes(session, handle):
             return
         feedback = None
         if handle.on_feedback is not None:
@@ -762,40 +834,36 @@ class GoalManager:
             if entry.status == goal.status and session == goal.server and goal.acknowledged:
                 goal.on_sign_of_life(now)
             else:
-                self._hear(handle, entry, session, now)
-            if handle.on_feedback is None or feedback is None:  # the latter: just taken over
-                return
-            dropped_before = handle.feedback.dropped
-            if handle.feedback.add(feedback, len(body)):
-                handle.on_feedback()
-            elif not dropped_before:
-                log.warning(
-                    "action '%s': the feedback of goal %s comes faster than it is taken, and the "
-                    "oldest of %d messages is dropped. Try a callback that takes no time.",
-                    self.name,
-                    goal.id,
-                    len(handle.feedback),
-                )
+                self._pass(handle, goal.hear(entry, session, now), entry)
+            if feedback is not None:
+                handle.keep_feedback(feedback, len(body))
 
     def on_result(
-        self, entry: StatusEntry, body: bytes, session: str, *, answered: bool = False
+        self, entry: StatusEntry, body: bytes | None, session: str, *, answered: bool = False
     ) -> None:
-        """Handle a result; `answered`: it was asked for."""
+        """Handle a result; `answered`: it was asked for, and without a `body` is not kept."""
         handle = self._goals.get(entry.id)
         if handle is None:
-            if entry.id in self._ended:
+            if entry.id in self._ended:  # the first acknowledgement was lost
                 self.acknowledge(entry.id)
             return
-        may_speak = answered or self._servers.may_speak(session)
-        if not may_speak and not self._believes(session, handle):
+        if not (answered or self._believes(session, handle)):
             return
-        status = _STATUSES.get(entry.status, Status.LOST)
-        text, result = entry.text, None
-        try:
-            result = self.port.read_result(body)
-        except (ValueError, ActionlibError) as error:
-            status, text = Status.LOST, f"the result cannot be read: {error}"
-        self._end(handle, status, text, result, session)
+        status, text, result = STATUSES.get(entry.status, Status.LOST), entry.text, None
+        if body is not None:
+            try:
+                result = self.port.read_result(body)
+            except (ValueError, ActionlibError) as error:
+                status, text = Status.LOST, f"the result cannot be read: {error}"
+        if not handle.keeps_result:
+            self.acknowledge(entry.id)
+        with self.lock:
+            goal, now = handle.goal, self.clock.now()
+            if session:
+                goal.server = session
+            path = goal.on_result(status, text, result, now)
+            if path:
+                self._finish(handle, path)
 
     def follows(self, goal_id: str) -> bool:
         """Return whether a goal is followed, and not over."""
@@ -806,26 +874,15 @@ class GoalManager:
         handle = self._goals.get(entry.id)
         if handle is None:
             return
-        status = _STATUSES.get(entry.status)
-        if status in TERMINAL:
-            self._end(handle, status, entry.text, None, session)
+        if STATUSES.get(entry.status) in TERMINAL:
+            self.on_result(entry, None, session, answered=True)
             return
         with self.lock:
-            if status is not Status.LOST:
-                self._hear(handle, entry, session, self.clock.now())
+            if entry.status != Status.LOST:
+                now = self.clock.now()
+                self._pass(handle, handle.goal.hear(entry, session, now), entry)
             elif not self._servers.conflict:  # else another server may have it
                 self._pass(handle, handle.goal.on_unknown(entry.text))
-
-    def _end(
-        self, handle: ClientGoalHandle, status: Status, text: str, result: Any, session: str
-    ) -> None:
-        with self.lock:
-            goal = handle.goal
-            if session:
-                goal.server = session
-            self._pass(handle, goal.on_result(status, text, result, self.clock.now()))
-        if not handle.keeps_result:
-            self.acknowledge(goal.id)
 
     def acknowledge(self, goal_id: str) -> None:
         """Tell the server, soon, that a result has arrived."""
@@ -833,40 +890,65 @@ class GoalManager:
             if self._closed:
                 return
             self._acks.append(goal_id)
-            if len(self._acks) < ACK_AT:
-                self._arm(self.clock.now() + TICK_S)
-                return
-            acks, self._acks = self._acks, []
-        self.port.acknowledge(acks)
+            count = len(self._acks)
+            if count == 1:
+                self._ack_timer = self.clock.call_later(TICK_S, self._send_acks)
+        if count >= ACK_AT:
+            self._send_acks()
 
-    def _pass(self, handle: ClientGoalHandle, path: Path) -> None:
-        """Report the states that a goal has passed. Needs the lock."""
+    def _send_acks(self) -> None:
+        with self.lock:
+            acks, self._acks = self._acks, []
+            if self._ack_timer is not None:
+                self._ack_timer.cancel()
+        if acks:
+            self.port.acknowledge(acks)
+
+    def _pass(
+        self, handle: ClientGoalHandle, path: Path | None, entry: StatusEntry | None = None
+    ) -> None:
+        """Act on the states that a goal has passed, by `entry`. Needs the lock."""
+        if path is None:
+            log.error("action '%s': unknown status %s of a goal", self.name, entry)
         if not path:
             return
         goal = handle.goal
         if goal.over:
-            self._goals.pop(goal.id, None)
-            handle.ended_at = self.clock.now()
-            if handle.ended is not None:
-                handle.ended.set()
-            self._ended.add(goal.id)
-            if self._dropped and not self._goals:
-                self.let_go()
+            self._finish(handle, path)
+            return
         if handle.on_state is not None:
             for state in path:
                 handle.on_state(state)
-        elif goal.over and handle.on_feedback is not None:
-            self.callbacks.call(handle.settled.set)  # behind the last feedback
-        elif goal.over:
-            handle.settled.set()
-        if goal.over:  # they hold the handle and maybe its client, which would stay until a gc
-            handle.on_state = handle.on_feedback = None
+        if goal.due < self._due:
+            self._arm(goal.due)
+
+    def _finish(self, handle: ClientGoalHandle, path: Path) -> None:
+        """Follow a goal that is over no more, and say so. Needs the lock."""
+        now = self.clock.now()
+        self._goals.pop(handle.goal.id, None)
+        self._ended[handle.goal.id] = None
+        if len(self._ended) > REMEMBERED:
+            del self._ended[next(iter(self._ended))]
+        handle.ended_at = now
+        if self._dropped and not self._goals:
+            self.let_go()
+        if handle.on_state is None and handle.on_feedback is None:
+            handle.settle()
+            return
+        handle.note_ended()
+        if handle.on_state is None:
+            self.callbacks.call(handle.settle)  # behind the last feedback
+        else:
+            for state in path:
+                handle.on_state(state)  # settles the handle behind the callbacks it queues
+        # They hold the handle and maybe its client, which would stay until a garbage collection.
+        handle.on_state = handle.on_feedback = None
 
     # -- time, and what is sent ----------------------------------------------------------------
 
     def _arm(self, due: float) -> None:
         """Let the timer run at `due` or a little later. Needs the lock."""
-        if self._closed or (self._timer is not None and self._due <= due):
+        if self._closed or self._due <= due:  # too early does no harm: it looks, and is set anew
             return
         if self._timer is not None:
             self._timer.cancel()
@@ -875,12 +957,11 @@ class GoalManager:
 
     def _on_timer(self) -> None:
         now = self.clock.now()
-        duties = []
+        duties = []  # fulfilled without the lock, which the network's threads wait for
         with self.lock:
-            self._timer = None
+            self._timer, self._due = None, math.inf
             if self._closed:
                 return
-            acks, self._acks = self._acks, []
             for server in self._servers.take_overdue(now):
                 self._lose_goals_of(server, "is gone")
             for session in self._servers.take_silent(now):
@@ -899,8 +980,6 @@ class GoalManager:
             dues.extend(self._servers.foreign.values())
             if dues:
                 self._arm(max(min(dues), now + TICK_S))
-        if acks:
-            self.port.acknowledge(acks)
         for handle, duty in duties:
             self._fulfil(handle, duty, wait=False)  # a full link must not hold up other timers
 
@@ -917,9 +996,8 @@ class GoalManager:
         if Duty.GOAL in duty and self.port.is_heard():
             with self.lock:
                 # It may have been cancelled or lost while it had not been sent.
-                receiver = (
-                    None if goal.over else self._servers.find_receiver(goal, self.clock.now())
-                )
+                now = self.clock.now()
+                receiver = None if goal.over else self._servers.find_receiver(goal, now)
                 if receiver is not None:
                     goal.on_offered(*receiver)
             if receiver is not None:
@@ -1091,7 +1169,7 @@ class ActionClient(Generic[A_co]):
             def on_state(state: CommState) -> None:
                 handle.call(state, transition_cb, handle)
                 if state in _OVER:
-                    handle.manager.callbacks.call(handle.settled.set)
+                    handle.manager.callbacks.call(handle.settle)
 
             handle.on_state = on_state
         if feedback_cb is not None:

@@ -121,16 +121,14 @@ class GoalContext(Generic[F]):
 class _Runner(SimpleActionServer):
     """A simple action server that accepts goals when their function says so."""
 
+    _accepts = False
+
     def __init__(self, function: Any, **kwargs: Any) -> None:
         self._function = function
         super().__init__(execute_cb=function, **kwargs)
 
-    def _run_next(self) -> None:
-        handle = self._take_next()
-        if handle is not None:
-            self._run(handle, self._execute, handle, GoalContext(self, handle))
-
-    def _execute(self, handle: ServerGoalHandle, context: GoalContext[Any]) -> None:
+    def _execute(self, handle: ServerGoalHandle) -> None:
+        context: GoalContext[Any] = GoalContext(self, handle)
         try:
             result = self._function(handle.get_goal(), context)
         except Reject as end:

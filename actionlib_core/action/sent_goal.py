@@ -11,7 +11,6 @@ Leaving the block before the goal is over cancels it.
 from __future__ import annotations
 
 import contextlib
-import threading
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from actionlib_core._arguments import check_delay
@@ -49,22 +48,21 @@ class SentGoal(Generic[R, F]):
         self._clock = handle.manager.clock
         self._timeout = timeout
         self._deadline = None if timeout is None else self._clock.now() + timeout
-        self._lock = threading.Lock()
         self._changed = self._clock.event(f"news of a goal of {self._name}")
+        # Without a lock, which a signal handler that cancels might find held: list operations are
+        # atomic.
         self._wakers: list[Callable[[], object]] = []
         handle.on_state = self._note_state
         handle.on_feedback = self._tell
 
     def _note_state(self, state: CommState) -> None:
         if state in {CommState.DONE, CommState.LOST}:
-            self._handle.settled.set()
+            self._handle.settle()
         self._tell()
 
     def _tell(self) -> None:
         self._changed.set()
-        with self._lock:
-            wakers = tuple(self._wakers)
-        for wake in wakers:
+        for wake in tuple(self._wakers):
             wake()
 
     # -- state ---------------------------------------------------------------------------------
@@ -109,7 +107,7 @@ class SentGoal(Generic[R, F]):
 
         Blocks: until then, `timeout` [s] at most; None: no limit.
         """
-        return self._handle.settled.wait(check_delay(f"goal {self.id}", "timeout", timeout))
+        return self._handle.wait_settled(check_delay(f"goal {self.id}", "timeout", timeout))
 
     def cancel(self) -> None:
         """Ask for the goal's end; it ends when the server says so."""
@@ -141,7 +139,7 @@ class SentGoal(Generic[R, F]):
         timeout = check_delay(f"goal {self.id}", "timeout", timeout)
         if not self._wait(timeout):
             self.cancel()
-            self._handle.settled.wait(CANCEL_GRACE_S)
+            self._handle.wait_settled(CANCEL_GRACE_S)
             raise self._late(timeout)
         return self._outcome()
 
@@ -155,7 +153,7 @@ class SentGoal(Generic[R, F]):
         """
         while True:
             self._changed.clear()
-            over = self.over
+            over = self.over  # looked at first: what came before the end is then here
             if over:
                 self._changed.set()  # for those who wait in another thread
             while (feedback := self._take()) is not None:
@@ -187,7 +185,7 @@ class SentGoal(Generic[R, F]):
         return feedback
 
     def _wait(self, timeout: float | None) -> bool:
-        return self._handle.settled.wait(self._left(timeout)) or self.over
+        return self._handle.wait_settled(self._left(timeout)) or self.over
 
     def _left(self, timeout: float | None) -> float | None:
         if self._deadline is None:
@@ -260,18 +258,16 @@ class SentGoal(Generic[R, F]):
             with contextlib.suppress(RuntimeError):  # the loop has just been closed
                 loop.call_soon_threadsafe(changed.set)
 
-        with self._lock:
-            self._wakers.append(wake)
+        self._wakers.append(wake)
         try:
             async with asyncio.timeout(limit):
-                while not condition():
+                while not condition():  # looked at after `wake` is there: nothing is missed
                     await changed.wait()
                     changed.clear()
         except TimeoutError:
             return bool(condition())
         finally:
-            with self._lock:
-                self._wakers.remove(wake)
+            self._wakers.remove(wake)
         return True
 
 

@@ -11,16 +11,17 @@ from __future__ import annotations
 import contextlib
 import logging
 import threading
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from actionlib_core._arguments import check_delay, check_function, check_seconds
 from actionlib_core.action._callbacks import CallbackQueue
-from actionlib_core.action.goal_id_generator import GoalIDGenerator
 from actionlib_core.exceptions import (
     ActionException,
     IllegalTransitionError,
     ServerConflictError,
     TransportError,
+    text_of,
 )
 from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.goal.server import (
@@ -34,7 +35,7 @@ from actionlib_core.goal.states import TERMINAL, Status
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus
 from actionlib_core.node import get_node
 from actionlib_core.time import Time
-from actionlib_core.wire.action_messages import ActionTypes
+from actionlib_core.wire.action_types import ActionTypes
 from actionlib_core.wire.ports import make_server_port
 
 if TYPE_CHECKING:
@@ -66,19 +67,17 @@ OnClientLost = Literal["continue", "cancel"]
 OnRestart = Literal["abort", "resume"]
 
 
+@dataclass(slots=True, weakref_slot=True, eq=False, repr=False)
 class ServerGoalHandle:
     """One goal of an `ActionServer`. Two handles are equal when they are of one goal.
 
     ROS's attribute `status_tracker` is the handle itself, with a tracker's `goal`, `goal_id` and
     `status`.
 
-    Args:
+    Attributes:
         keeper: The server's goals.
         record: The goal's place in the life cycle.
         content: The goal message (XGoal).
-
-    Attributes:
-        record: See above.
         begun: The goal callback has begun with it.
         cancel_waits: It was asked to stop before that.
         resumed: An earlier server, which was killed, had accepted it already.
@@ -86,20 +85,17 @@ class ServerGoalHandle:
     Threads: every method may be called from any thread and any callback.
     """
 
-    __slots__ = ("__weakref__", "_content", "_keeper", "begun", "cancel_waits", "record", "resumed")
-
-    def __init__(self, keeper: GoalKeeper, record: ServerGoal, content: Any) -> None:
-        self._keeper = keeper
-        self._content = content
-        self.record = record
-        self.begun = False
-        self.cancel_waits = False
-        self.resumed = False
+    keeper: GoalKeeper
+    record: ServerGoal
+    content: Any
+    begun: bool = False
+    cancel_waits: bool = False
+    resumed: bool = False
 
     @property
     def goal(self) -> Any:
         """The XActionGoal message that brought the goal."""
-        return self._keeper.types.action_goal(goal_id=self.goal_id, goal=self._content)
+        return self.keeper.types.action_goal(goal_id=self.goal_id, goal=self.content)
 
     @property
     def goal_id(self) -> GoalID:
@@ -119,7 +115,7 @@ class ServerGoalHandle:
 
     def get_default_result(self) -> Any:
         """Return a new result message with default values."""
-        return self._keeper.types.result()
+        return self.keeper.types.result()
 
     def set_accepted(self, text: str = "") -> None:
         """Accept the goal: PENDING becomes ACTIVE, RECALLING becomes PREEMPTING.
@@ -128,7 +124,7 @@ class ServerGoalHandle:
             IllegalTransitionError: the goal is in another state.
             ActionException: `text` is not a string.
         """
-        self._keeper.accept(self, text)
+        self.keeper.step(self, "accept", "set_accepted()", text=text)
 
     def set_canceled(self, result: Any = None, text: str = "") -> None:
         """End the goal as asked: RECALLED when it was never accepted, else PREEMPTED.
@@ -142,23 +138,23 @@ class ServerGoalHandle:
             ActionException: `result` is not of the action's type, or `text` is not a string; the
                 goal goes on.
         """
-        self._keeper.finish(self, "cancel", "set_canceled()", result, text)
+        self.keeper.step(self, "cancel", "set_canceled()", result, text)
 
     def set_rejected(self, result: Any = None, text: str = "") -> None:
         """Refuse the goal; arguments and errors as `set_canceled`, allowed before acceptance."""
-        self._keeper.finish(self, "reject", "set_rejected()", result, text)
+        self.keeper.step(self, "reject", "set_rejected()", result, text)
 
     def set_aborted(self, result: Any = None, text: str = "") -> None:
         """End the goal in failure; arguments and errors as `set_canceled`."""
-        self._keeper.finish(self, "abort", "set_aborted()", result, text)
+        self.keeper.step(self, "abort", "set_aborted()", result, text)
 
     def set_succeeded(self, result: Any = None, text: str = "") -> None:
         """End the goal in success; arguments and errors as `set_canceled`."""
-        self._keeper.finish(self, "succeed", "set_succeeded()", result, text)
+        self.keeper.step(self, "succeed", "set_succeeded()", result, text)
 
     def set_cancel_requested(self) -> bool:
         """Note that the goal is asked to stop; False when it has ended or was asked before."""
-        return self._keeper.request_cancel(self)
+        return self.keeper.request_cancel(self)
 
     def publish_feedback(self, feedback: Any) -> None:
         """Send feedback to the goal's client.
@@ -167,11 +163,11 @@ class ServerGoalHandle:
             FieldError: `feedback` does not fit the action.
             TransportError: the server's node is closed.
         """
-        self._keeper.send_feedback(self.record.entry(), feedback)
+        self.keeper.send_feedback(self.record.entry(), feedback)
 
     def get_goal(self) -> Any:
         """Return the goal message (XGoal)."""
-        return self._content
+        return self.content
 
     def get_goal_id(self) -> GoalID:
         """Return the goal's id and stamp."""
@@ -232,10 +228,10 @@ class StatusPublisher:
         self._lock = lock
         self._goals = goals
         self._port = port
-        self._published = clock.now() - PERIOD_S
+        self._published = clock.now() - PERIOD_S  # the last list
         self._timer: Timer | None = None
-        self._due = 0.0
-        self._change_waits = False
+        self._due = 0.0  # when the timer runs
+        self._change_waits = False  # for the timer
         self._closed = False
 
     def close(self) -> None:
@@ -248,32 +244,49 @@ class StatusPublisher:
     def publish(self) -> None:
         """Send the list now."""
         with self._lock:
-            if self._closed:
+            if not self.claim(self._clock.now(), at_once=True):
                 return
-            self._change_waits = False
-            now = self._clock.now()
-            self._published = now
             listed = self._goals.list_statuses()
-            self._arm(now + PERIOD_S)
-        try:
-            self._port.send_status(listed)
-        except TransportError:
-            if not self._goals.closed:  # else the server stopped in between
-                raise
+        self._send(listed)
 
     def on_change(self) -> None:
         """Note that a goal has changed: send the list now or soon."""
         if self._change_waits:  # the list is made after this is reset, so this change is in it
             return
         with self._lock:
-            due = self._published + GAP_S + GAP_PER_GOAL_S * len(self._goals.tracked)
-            if due > self._clock.now():
-                if not self._closed:
-                    self._change_waits = True
-                    if self._timer is None or due < self._due:
-                        self._arm(due)
+            if not self.claim(self._clock.now()):
                 return
-        self.publish()
+            listed = self._goals.list_statuses()
+        self._send(listed)
+
+    def claim(self, now: float, *, at_once: bool = False) -> bool:
+        """Note that a goal is about to change. Needs the lock, until the list is made.
+
+        Returns:
+            Whether the caller is to send the list, `at_once` or as some time has passed since the
+            last one; else the timer sends it soon, or nobody does as the server has stopped.
+        """
+        if self._closed:
+            return False
+        due = self._published + GAP_S + GAP_PER_GOAL_S * len(self._goals.tracked)
+        if at_once or due <= now:
+            self._change_waits = False
+            self._published = now
+            if self._timer is None or now + PERIOD_S < self._due:
+                self._arm(now + PERIOD_S)
+            return True
+        if not self._change_waits:
+            self._change_waits = True
+            if self._timer is None or due < self._due:
+                self._arm(due)
+        return False
+
+    def _send(self, listed: list[StatusEntry]) -> None:
+        try:
+            self._port.send_status(listed)
+        except TransportError:
+            if not self._goals.closed:  # else the server stopped in between
+                raise
 
     def hurry(self) -> None:
         """Send a change that waits for others now, unless the list is long."""
@@ -294,11 +307,15 @@ class StatusPublisher:
                 return
             now = self._clock.now()
             soonest = self._goals.expire(now)
-            quiet = not self._change_waits and now - self._published > PERIOD_S / 2
-            if quiet and not self._goals.listed():  # an empty list is not repeated
-                if soonest is not None:
-                    self._arm(soonest)
-                return
+            if not self._change_waits:
+                repeated = self._published + PERIOD_S
+                if now < repeated:  # the list was sent since the timer was set
+                    self._arm(repeated)
+                    return
+                if not self._goals.listed():  # an empty list is not repeated
+                    if soonest is not None:
+                        self._arm(soonest)
+                    return
         try:
             self.publish()
         except TransportError as error:  # the session was closed under the server
@@ -360,8 +377,7 @@ class GoalKeeper:
         self._deliver_goal = deliver_goal
         self._deliver_cancel = deliver_cancel
         self._on_stopped = on_stopped
-        self._ids = GoalIDGenerator(f"/{node.full_name}", clock=node.clock)
-        self._drained: Event | None = None
+        self._drained: Event | None = None  # while it says farewell
         self._durable = durable
         self._file: GoalFile | None = None
         self._resumes = resumes
@@ -402,7 +418,7 @@ class GoalKeeper:
         for handle in handles:
             record = handle.record
             if record.status is Status.RECALLING:
-                self.finish(handle, "cancel", "the restart of its server", None, TEXT_RESTARTED)
+                self.step(handle, "cancel", "the restart of its server", None, TEXT_RESTARTED)
             elif record.status is Status.PREEMPTING or (handle.resumed and not self._resumes):
                 self.give_up(handle, TEXT_RESTARTED)
             else:
@@ -426,16 +442,6 @@ class GoalKeeper:
 
     # -- what the server's code does -----------------------------------------------------------
 
-    def accept(self, handle: ServerGoalHandle, text: str = "") -> None:
-        """Accept a goal; see `ServerGoalHandle.set_accepted`."""
-        text = self._as_text(text, "set_accepted()")
-        with self.lock:
-            now = self._clock.now()
-            self.goals.step(handle.record, "accept", "set_accepted()", now, text)
-        self._keep(handle.record)
-        self.port.send_accepted(handle.record.entry())
-        self.status.on_change()
-
     def request_cancel(self, handle: ServerGoalHandle) -> bool:
         """Mark a goal as asked to stop; see `ServerGoalHandle.set_cancel_requested`."""
         with self.lock:
@@ -445,23 +451,23 @@ class GoalKeeper:
             self.status.on_change()
         return changed
 
-    def finish(
+    def step(
         self,
         handle: ServerGoalHandle,
         event: str,
         call: str,
-        result: Any,
-        text: str,
+        result: Any = None,
+        text: str = "",
         *,
         wait: bool = True,
     ) -> None:
-        """End a goal by an event of the server's table: move it, keep its result, send it.
+        """Accept a goal or end it, and tell its client.
 
         Args:
             handle: The goal.
-            event: See `server_life_cycle`.
+            event: "accept", or one that ends it: see `server_life_cycle`.
             call: What the user called, for the error.
-            result: None sends one with default values.
+            result: What a goal ends with; None sends one with default values.
             text: Why, for people.
             wait: For room on a link that is full; not on the network's thread, which others need.
 
@@ -471,17 +477,38 @@ class GoalKeeper:
             FieldError: a field of `result` has a wrong type.
         """
         # Whatever can fail comes first: a goal that has ended must have a result.
-        text = self._as_text(text, call)
-        body = self._pack_result(result, call)
+        if not (isinstance(text, str) and text.isascii()):
+            text = self._as_text(text, call)
+        body = None
+        if event != "accept":
+            kind = self.types.result
+            body = self.port.pack_result(
+                kind() if result is None else self._checked(result, kind, call)
+            )
         record = handle.record
         with self.lock:
-            self.goals.step(record, event, call, self._clock.now(), text)
-            record.result = body
+            now = self._clock.now()
+            listed_now = self.status.claim(now)
+            try:
+                entry = self.goals.step(record, event, call, now, text)
+            except IllegalTransitionError:
+                self.status.on_change()  # the change whose list was claimed here still waits
+                raise
+            if body is not None:
+                record.result = body
+            listed = self.goals.list_statuses() if listed_now else None
             stopped = self.stopped
-        self._keep(record)
-        if not stopped:
-            self.port.send_result(record.entry(), body, wait=wait)
-            self.status.on_change()
+        if self._file is not None:
+            self._keep(record)
+        if stopped:
+            return
+        # The result goes before the list, from which a client without it learns that it misses one.
+        if body is not None:
+            self.port.send_result(entry, body, wait=wait)
+        elif self.port.send_accepted is not None:
+            self.port.send_accepted(entry)
+        if listed is not None:
+            self.port.send_status(listed)
 
     def give_up(self, handle: ServerGoalHandle, text: str) -> None:
         """End a goal that its code has left without an end; one that has ended stays."""
@@ -489,7 +516,7 @@ class GoalKeeper:
         if status not in TERMINAL:
             event = "abort" if status in {Status.ACTIVE, Status.PREEMPTING} else "reject"
             try:
-                self.finish(handle, event, "the end of its callback", None, text)
+                self.step(handle, event, "the end of its callback", None, text)
             except IllegalTransitionError:
                 return  # another thread has just ended it
             except TransportError:
@@ -504,15 +531,13 @@ class GoalKeeper:
 
     def send_result(self, entry: StatusEntry, result: Any) -> None:
         """Send a result under any status; errors as `finish`."""
-        self.port.send_result(entry, self._pack_result(result, "publish_result()"))
+        message = self._checked(result, self.types.result, "publish_result()")
+        self.port.send_result(entry, self.port.pack_result(message))
 
     def send_feedback(self, entry: StatusEntry, feedback: Any) -> None:
         """Send feedback for a goal; errors as `finish`."""
         message = self._checked(feedback, self.types.feedback, "publish_feedback()")
         self.port.send_feedback(entry, self.port.pack_feedback(message))
-
-    def _pack_result(self, result: Any, call: str) -> bytes:
-        return self.port.pack_result(self._checked(result, self.types.result, call))
 
     def _checked(self, message: Any, expected: Any, call: str) -> Any:
         """Return a message of the type expected, one with default values for None."""
@@ -549,7 +574,7 @@ class GoalKeeper:
         with self.lock:
             self.goals.close()
             running = [goal for goal in self.goals.listed() if goal.status not in TERMINAL]
-        try:
+        try:  # without the lock: results wait for room on a full link
             for goal in running:
                 if isinstance(goal.tag, ServerGoalHandle):
                     self.give_up(goal.tag, TEXT_STOPPED)
@@ -592,7 +617,7 @@ class GoalKeeper:
             self.port.close()
         finally:
             self.close_file()
-            self.left.set()
+            self.left.set()  # last: who waits may start the next server, with the same file
 
     # -- what arrives (on the network's thread) ------------------------------------------------
 
@@ -604,7 +629,10 @@ class GoalKeeper:
         Nothing here waits for a link that is full: a client that misses the answer asks again.
         """
         if not goal_id:
-            goal_id, stamp_ns = self._ids.generate()
+            from actionlib_core.action.client import GoalIDGenerator
+
+            ids = GoalIDGenerator(f"/{self.node.full_name}", clock=self._clock)
+            goal_id, stamp_ns = ids.generate()
         record = ServerGoal(goal_id, stamp_ns or self._clock.time_ns(), client=client)
         with self.lock:
             if self.stopped:
@@ -612,9 +640,10 @@ class GoalKeeper:
             arrival, known = self.goals.on_goal(record, self._clock.now())
             if arrival is Arrival.LATE:
                 return False
+            # With the lock: a cancel that comes right behind it finds the handle.
             handle = record.tag = ServerGoalHandle(self, record, content)
             if arrival is Arrival.RECALLED:
-                record.result = self._pack_result(None, "the cancel that came first")
+                record.result = self.port.pack_result(self.types.result())
             past = None if known is not None else self.goals.past_status(goal_id)
         unkept = None
         file = self._file
@@ -623,7 +652,7 @@ class GoalKeeper:
         if arrival is Arrival.NEW:
             if unkept is not None:  # it could be run twice: better not at all
                 log.error("goal %s on '%s' cannot be kept: %s", goal_id, self.name, unkept)
-                self.finish(handle, "reject", "its file", None, unkept, wait=False)
+                self.step(handle, "reject", "its file", None, unkept, wait=False)
                 return True
             self._deliver_goal(handle)
             return True
@@ -679,7 +708,7 @@ class GoalKeeper:
     def on_conflict(self, error: ServerConflictError) -> None:
         """Leave the name to the older server."""
         with self.lock:
-            if self.error is not None or self.stopped:
+            if self.error is not None or self.stopped:  # each other token may tell of it
                 return
             self.error = error
             self.goals.close()
@@ -820,7 +849,7 @@ class ActionServer:
             if self._started:
                 return
             self._started = True
-        self._forget = self.node.on_close(self.stop)
+        self._forget = self.node.on_close(self.stop)  # raises when the node is closed
         try:
             self.initialize()
         except BaseException:
@@ -836,7 +865,7 @@ class ActionServer:
         except BaseException:
             self.keeper.close_file()
             raise
-        self.keeper.settle(kept)
+        self.keeper.settle(kept)  # behind `open`: what it says is heard
 
     def stop(self) -> None:
         """End all goals (ABORTED, or REJECTED when not yet accepted) and leave the name.
@@ -965,7 +994,7 @@ class ActionServer:
 
     def _run_goal_callback(self, handle: ServerGoalHandle) -> None:
         """Give a goal to the user's code; one that it raises on is ended, not forgotten."""
-        with self.lock:
+        with self.lock:  # a cancel either came before and waits, or is delivered by itself
             handle.begun = True
             cancelled = handle.cancel_waits
         if cancelled:
@@ -973,7 +1002,7 @@ class ActionServer:
         try:
             self.goal_callback(handle)
         except BaseException as error:  # also `sys.exit`, which ends this thread
-            text = str(error) if isinstance(error, Exception) else repr(error)
+            text = text_of(error, str if isinstance(error, Exception) else repr)
             self.keeper.give_up(handle, f"Exception in goal callback: {text}")
             raise
 

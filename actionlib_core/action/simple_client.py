@@ -100,6 +100,12 @@ class SimpleActionClient(Generic[A]):
         """A condition that is notified when a goal is over. `wait_for_result` is the better way."""
         if self._condition is None:
             self._condition = threading.Condition()
+            handle = self._handle
+            if handle is not None and handle.on_state is None:
+                with handle.manager.lock:  # the goal was sent without: it may be ending just now
+                    if not (handle.goal.over or handle.settled):
+                        handle.calls_back = True
+                        handle.on_state = self._make_on_state(handle)
         return self._condition
 
     # -- the server ----------------------------------------------------------------------------
@@ -192,27 +198,16 @@ class SimpleActionClient(Generic[A]):
     ) -> None:
         """Send a goal, or ask for it, and follow it instead of the former one."""
         where = f"action '{self.action_client.ns}'"
-        check_functions(where, done_cb=done_cb, active_cb=active_cb, feedback_cb=feedback_cb)
-        handle = make(goal, check_limit(where, "ack_timeout", ack_timeout))
-        callbacks = handle.manager.callbacks
-        handle.calls_back = (done_cb or active_cb or feedback_cb or self._condition) is not None
-
-        def on_state(state: CommState) -> None:  # under the manager's lock
-            nonlocal active_cb
-            if state in _RUNNING and active_cb is not None:
-                handle.call(state, active_cb)
-                active_cb = None  # once
-            elif state in _OVER:
-                if done_cb is not None:
-                    handle.call(state, done_cb, int(handle.goal.status), handle.goal.result)
-                if handle.calls_back or self._condition is not None:
-                    callbacks.call(self._settle, handle)
-                else:
-                    handle.settled.set()
-
-        handle.on_state = on_state
+        if done_cb is not None or active_cb is not None or feedback_cb is not None:
+            check_functions(where, done_cb=done_cb, active_cb=active_cb, feedback_cb=feedback_cb)
+        limit = None if ack_timeout is None else check_limit(where, "ack_timeout", ack_timeout)
+        handle = make(goal, limit)
+        # A goal without callbacks needs no thread: whoever waits for it is woken by the network's.
+        if done_cb is not None or active_cb is not None or self._condition is not None:
+            handle.on_state = self._make_on_state(handle, done_cb, active_cb)
         if feedback_cb is not None:
             handle.on_feedback = partial(handle.call_with_feedback, feedback_cb)
+        handle.calls_back = handle.on_state is not None or feedback_cb is not None
         # It is the client's goal before anything can come back: a callback sees its own goal.
         former, self._handle = self._handle, handle
         begun = False
@@ -222,12 +217,30 @@ class SimpleActionClient(Generic[A]):
         finally:
             if not begun and self._handle is handle:
                 self._handle = former
-        if former is not None:
+        if former is not None and not former.goal.over:  # only now: an error leaves it followed
             former.manager.forget(former)
+
+    def _make_on_state(
+        self,
+        handle: ClientGoalHandle,
+        done_cb: Callable[[int, Any], object] | None = None,
+        active_cb: Callable[[], object] | None = None,
+    ) -> Callable[[CommState], object]:
+        def on_state(state: CommState) -> None:  # under the manager's lock
+            nonlocal active_cb
+            if state in _RUNNING and active_cb is not None:
+                handle.call(state, active_cb)
+                active_cb = None  # once
+            elif state in _OVER:
+                if done_cb is not None:
+                    handle.call(state, done_cb, int(handle.goal.status), handle.goal.result)
+                handle.manager.callbacks.call(self._settle, handle)
+
+        return on_state
 
     def _settle(self, handle: ClientGoalHandle) -> None:
         """Note that the last callback of a goal has returned."""
-        handle.settled.set()
+        handle.settle()
         if self._condition is not None:
             with self._condition:
                 self._condition.notify_all()
@@ -279,7 +292,8 @@ class SimpleActionClient(Generic[A]):
 
         Blocks: until then.
         """
-        limit = self._check_wait("timeout", timeout)
+        no_limit = isinstance(timeout, float) and timeout == 0.0
+        limit = None if no_limit else self._check_wait("timeout", timeout)
         handle = self._handle
         if handle is None:
             return False

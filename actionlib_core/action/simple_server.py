@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import logging
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core._arguments import check_delay, check_function
 from actionlib_core.action.server import TEXT_STOPPED, ActionServer, OnClientLost, OnRestart
-from actionlib_core.exceptions import ActionException
+from actionlib_core.exceptions import ActionException, text_of
 from actionlib_core.goal.server import FUTURE_NS, RESULT_TIMEOUT_S
 from actionlib_core.goal.single import ANNOUNCE, Policy, SingleGoal
 from actionlib_core.goal.states import TERMINAL, Status
@@ -74,6 +75,8 @@ class SimpleActionServer:
         without any lock.
     """
 
+    _accepts = True  # goals are accepted before they run
+
     def __init__(
         self,
         name: str,
@@ -92,9 +95,10 @@ class SimpleActionServer:
         self.execute_callback = execute_cb
         self.goal_callback: Callable[[], object] | None = None
         self.preempt_callback: Callable[[], object] | None = None
+        # The lock guards all these, but one look at `_policy` is atomic and does without.
         self._policy: SingleGoal[ServerGoalHandle] = SingleGoal(policy)
-        self._task: Task | None = None
-        self._idle: Event | None = None
+        self._task: Task | None = None  # the thread that runs goals; it ends when none come
+        self._idle = False  # the thread that runs goals waits for one
         self._stopping = False
         self._grace_ends: float | None = None
         # Its callbacks only note what came; direct calls save each goal a change of threads.
@@ -117,6 +121,12 @@ class SimpleActionServer:
         self.lock = self.action_server.lock
         self._name = self.action_server.ns
         self._queue = self.action_server.callback_queue
+        # Starts the thread that runs goals, in the context of callbacks.
+        self._start: Callable[[], Task] = partial(
+            self._queue.context.copy().run,
+            partial(self._clock.spawn, self.executeLoop, name=f"{self._name} execute"),
+        )
+        self._come: Event = self._clock.event(f"a goal for {self._name}")
         self._preempted: Event = self._clock.event()
         self._forget: Callable[[], None] | None = None
         if auto_start:
@@ -153,7 +163,7 @@ class SimpleActionServer:
         if forget is None:
             return
         forget()
-        task = self._task
+        task = self._task  # before it is asked to stop, upon which it may end
         grace_ends = self._begin_to_stop()
         if task is not None:
             task.join(max(0.0, grace_ends - self._clock.now()))
@@ -187,8 +197,8 @@ class SimpleActionServer:
         with self.lock:
             self._stopping = True
             waiting = self._policy.on_stop()
-            if self._idle is not None:
-                self._idle.set()
+            if self._idle:
+                self._come.set()
         self._preempted.set()
         for handle in waiting:
             self._keeper.give_up(handle, TEXT_STOPPED)
@@ -229,12 +239,15 @@ class SimpleActionServer:
     def _take_next(self) -> ServerGoalHandle | None:
         """Make the waiting goal the current one, not yet accepted; None when none waits."""
         with self.lock:
+            asked = self._policy.preempt_requested  # of the goal before; then `_preempted` is set
             new, pushed = self._policy.accept()
             if new is None:
                 return None
-            self._preempted.clear()
             if self._policy.preempt_requested:
                 self._preempted.set()
+            elif asked:
+                self._preempted.clear()
+        # Without the lock: sending its result waits for room on a full link.
         if pushed is not None and pushed.record.status not in TERMINAL:
             pushed.set_canceled(None, TEXT_NEWER)
         return new
@@ -323,9 +336,7 @@ class SimpleActionServer:
             raise ActionException(
                 f"action '{self._name}': {call}: got no goal; expected one that was accepted."
             )
-        self._keeper.finish(goal, event, call, result, text)
-        with self.lock:
-            self._policy.on_ended(goal)
+        self._keeper.step(goal, event, call, result, text)
 
     def publish_feedback(self, feedback: Any) -> None:
         """Send feedback (XFeedback) to the current goal's client.
@@ -392,8 +403,10 @@ class SimpleActionServer:
             decision = self._policy.on_goal(goal, stamp_ns)
             if decision.preempt:  # under the lock: the next goal clears it there
                 self._preempted.set()
-            if decision.announce:
-                self._start_execution()
+            if decision.announce and self._idle:
+                self._come.set()
+            elif decision.announce and self.execute_callback is not None and self._task is None:
+                self._task = self._start()
         if decision is not ANNOUNCE or self.goal_callback is not None:
             self._carry_out(decision, TEXT_NEWER)
 
@@ -420,7 +433,7 @@ class SimpleActionServer:
 
     def _turn_away(self, goal: ServerGoalHandle, event: str, text: str) -> None:
         """End a goal that never began; on the network's thread, which must not wait for a link."""
-        self._keeper.finish(
+        self._keeper.step(
             goal, event, f"the policy {self._policy.policy!r}", None, text, wait=False
         )
 
@@ -439,70 +452,61 @@ class SimpleActionServer:
 
     # -- execution -----------------------------------------------------------------------------
 
-    def _start_execution(self) -> None:
-        """Wake or start the thread that runs goals, unless it is busy. Needs the lock."""
-        if self._idle is not None:
-            self._idle.set()
-        elif self.execute_callback is not None and self._task is None:
-            self._task = self._queue.spawn(self.executeLoop, f"{self._name} execute")
-
     def executeLoop(self) -> None:  # noqa: N802  actionlib's name
         """Run the goals that wait, until none has come for `LINGER_S`."""
         try:
-            self._run_waiting()
+            while self._wait_for_goal():
+                self._run_next()
         except BaseException:  # `sys.exit` in a callback: another thread goes on with the rest
             with self.lock:
-                self._task = self._idle = None
+                self._task, self._idle = None, False
                 if self._policy.waiting:
-                    self._start_execution()
+                    self._task = self._start()
             raise
 
-    def _run_waiting(self) -> None:
-        come = self._clock.event(f"a goal for {self._name}")
-        while True:
-            with self.lock:
-                come.clear()
-                waiting = bool(self._policy.waiting)
-                self._idle = None if waiting else come
-            if waiting:
-                self._run_next()
-            elif self._stopping or not come.wait(LINGER_S):
-                with self.lock:
-                    self._idle = None
-                    if self._stopping or not self._policy.waiting:
-                        self._task = None
-                        return
+    def _wait_for_goal(self) -> bool:
+        """Wait for the next goal; False when the thread is to end.
+
+        Blocks: until then, `LINGER_S` at most.
+        """
+        with self.lock:
+            self._idle = not self._policy.waiting
+            if not self._idle:
+                return True
+            self._come.clear()  # a goal that comes from here on finds `_idle` and sets it
+        come = not self._stopping and self._come.wait(LINGER_S)
+        with self.lock:
+            self._idle = False
+            if come or (self._policy.waiting and not self._stopping):
+                return True
+            self._task = None  # with the lock: the next goal starts another thread
+        return False
 
     def _run_next(self) -> None:
-        """Accept the goal that waits and run it."""
-        goal = self._take_next()
-        if goal is not None and self.execute_callback is not None:
-            message = goal.get_goal()
-            goal.set_accepted(TEXT_ACCEPTED)
-            self._run(goal, self.execute_callback, message)
-
-    def _run(
-        self, handle: ServerGoalHandle, execute: Callable[..., object], *arguments: Any
-    ) -> None:
-        """Run one goal and make sure that it ends."""
+        """Run the goal that waits, if there is one, and make sure that it ends."""
+        handle = self._take_next()
+        if handle is None:
+            return
+        if self._accepts:
+            self._keeper.step(handle, "accept", "set_accepted()", text=TEXT_ACCEPTED)
         text = TEXT_NO_STATUS
         try:
-            execute(*arguments)
+            self._execute(handle)
         except Exception as error:  # noqa: BLE001  a border: told to the client and logged
             if handle.record.text == TEXT_STOPPED:
                 return  # `stop` has ended the goal, which the callback found out the hard way
             text = self._report(error)
         except BaseException as error:
-            self._abort(handle, f"Exception in execute callback: {error!r}")
+            text = text_of(error, repr)
+            self._keeper.give_up(handle, f"Exception in execute callback: {text}")
             raise
-        self._abort(handle, text)
+        if handle.record.status not in TERMINAL:
+            self._keeper.give_up(handle, text)
+
+    def _execute(self, handle: ServerGoalHandle) -> None:
+        if self.execute_callback is not None:
+            self.execute_callback(handle.content)
 
     def _report(self, error: Exception) -> str:
         log.error("action '%s': exception in execute callback", self._name, exc_info=error)
-        return f"Exception in execute callback: {error}"
-
-    def _abort(self, handle: ServerGoalHandle, text: str) -> None:
-        """End a goal that its callback has left without an end."""
-        self._keeper.give_up(handle, text)
-        with self.lock:
-            self._policy.on_ended(handle)
+        return f"Exception in execute callback: {text_of(error)}"

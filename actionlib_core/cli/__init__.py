@@ -49,7 +49,13 @@ class _Parser(argparse.ArgumentParser):
     """argparse with the house's exit code and a way out in every error."""
 
     def error(self, message: str) -> NoReturn:
-        self.exit(EXIT_ERROR, f"{self.prog}: {printable(message)}\nTry '{self.prog} --help'.\n")
+        way_out = f"Try '{self.prog} --help'."
+        if message.startswith("unrecognized arguments: "):
+            options = [word.partition("=")[0] for word in message.split()]
+            early = [word for word in options if word in self._option_string_actions]
+            if early:  # of the command as a whole
+                way_out = f"Try {early[0]} before the verb: {self.prog} {early[0]} ... VERB."
+        self.exit(EXIT_ERROR, f"{self.prog}: {printable(message)}\n{way_out}\n")
 
 
 def main(

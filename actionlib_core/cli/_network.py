@@ -288,7 +288,7 @@ def ask(node: Node, name: str, goal_id: str, about: Literal["result", "goal"] = 
     Blocks: `ASK_S` at most.
     """
     from actionlib_core.interfaces.actionlib_msgs.msg import GoalID
-    from actionlib_core.wire.action_messages import action_keys, pack_goal_id
+    from actionlib_core.wire.actions import action_keys, pack_goal_id
     from actionlib_core.wire.encoding import encoding_of
 
     replies: list[Reply] = []

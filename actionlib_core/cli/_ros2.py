@@ -38,7 +38,9 @@ def _ends() -> ModuleType:
 
 
 def list_ros2_ends(node: Node) -> list[Endpoint]:
-    """Return the ends there are on networks of ROS 2, by their names here; hidden ones are not.
+    """Return the ends there are on networks of ROS 2, by their names here.
+
+    Those that ROS 2's tools hide are left out, and those of the command's own node.
 
     Blocks: until the networks have answered, a second each at most.
     """
@@ -48,6 +50,7 @@ def list_ros2_ends(node: Node) -> list[Endpoint]:
         _ends().end_of(network, token)
         for network in _ends().networks(node)
         for token in network.ros.list()
+        if (token.session, token.node_id) != (network.ros.token.session, network.ros.token.node_id)
     )
     return [end for end in found if end is not None]
 

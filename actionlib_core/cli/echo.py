@@ -34,7 +34,7 @@ def register(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print messages until Ctrl-C, `--timeout` or, with `--once` or `-n`, enough of them."""
     from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatusArray
-    from actionlib_core.wire.action_messages import action_keys
+    from actionlib_core.wire.actions import action_keys
 
     with open_node(args, settle=0.0) as node:
         server = find_server(node, args.name, args.timeout)

@@ -62,7 +62,7 @@ def register(subparsers: Any) -> None:
 def _goals(node: Node, name: str) -> list[StatusEntry]:
     """Return the goals that a server tracks, without cancels whose goals never came."""
     from actionlib_core.goal.states import Status
-    from actionlib_core.wire.action_messages import unpack_statuses
+    from actionlib_core.wire.actions import unpack_statuses
 
     entries = unpack_statuses(ask(node, name, "").payload)
     return [entry for entry in entries if entry.stamp_ns or entry.status != Status.RECALLING]
@@ -147,7 +147,7 @@ def _not_there(entry: StatusEntry, what: str, args: argparse.Namespace) -> int:
 def _status(node: Node, args: argparse.Namespace, spec: Any) -> tuple[StatusEntry, Any]:
     """Return the status of a goal and its result, None when it is not there."""
     from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
-    from actionlib_core.wire.action_messages import unpack_report, unpack_status
+    from actionlib_core.wire.actions import unpack_report, unpack_status
     from actionlib_core.wire.encoding import encoding_of
 
     answer = ask(node, args.name, args.id)
@@ -159,7 +159,7 @@ def _status(node: Node, args: argparse.Namespace, spec: Any) -> tuple[StatusEntr
 
 def _goal(node: Node, args: argparse.Namespace, spec: Any) -> Any:
     """Return what a goal was, None when the server has let go of it."""
-    from actionlib_core.wire.action_messages import unpack_goal
+    from actionlib_core.wire.actions import unpack_goal
 
     try:
         answer = ask(node, args.name, args.id, "goal")
@@ -178,8 +178,7 @@ def _cancel(args: argparse.Namespace) -> int:
     stamp_ns = _stamp(args.before)
     from actionlib_core.goal.states import TERMINAL
     from actionlib_core.interfaces.actionlib_msgs.msg import GoalID
-    from actionlib_core.wire.action_messages import pack_goal_id
-    from actionlib_core.wire.client_port import GOAL
+    from actionlib_core.wire.actions import GOAL, pack_goal_id
     from actionlib_core.wire.encoding import encoding_of
 
     with open_node(args) as node:

@@ -77,12 +77,13 @@ def install(clock: VirtualClock) -> None:
 
 
 def remove(clock: VirtualClock) -> None:
-    """Undo `install`; with the last clock Python is as it was."""
-    _forget_twins(clock)
+    """Undo `install`, also half of it; with the last clock Python is as it was."""
     with _guard:
-        _clocks.remove(clock)
+        if clock in _clocks:
+            _clocks.remove(clock)
         if not _clocks:
             _restore()
+    _forget_twins(clock)
 
 
 def _here() -> VirtualClock | None:
@@ -399,8 +400,8 @@ def _replace() -> None:
         if type(names) is dict and not _is_in(name, REAL_TIME):
             for key, real in _search(name, names):
                 if names.get(key) is real:
-                    names[key] = _FAKES[id(real)]
                     _places.append((names, key, real, _FAKES[id(real)]))
+                    names[key] = _FAKES[id(real)]
     threading.Thread.start = _start  # type: ignore[method-assign, assignment]
     threading.Thread.join = _join  # type: ignore[method-assign, assignment]
     threading.Thread.is_alive = _is_alive  # type: ignore[method-assign, assignment]

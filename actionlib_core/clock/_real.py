@@ -10,9 +10,12 @@ import contextlib
 import heapq
 import itertools
 import math
+import os
 import threading
 import time
+import weakref
 from contextvars import Context, ContextVar, copy_context
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeVar
 
 from actionlib_core.clock._protocol import check_seconds
@@ -29,6 +32,7 @@ IDLE_S = 5.0  # a cached thread without work ends after this
 IDLE_NAME = "idle"  # what a cached thread is called between two jobs
 
 
+@dataclass(slots=True, eq=False, repr=False)
 class RealEvent:
     """An event whose `set` takes no lock, so that a signal handler may call it at any moment.
 
@@ -36,11 +40,8 @@ class RealEvent:
     Here every waiter brings a lock of its own; list operations are atomic.
     """
 
-    __slots__ = ("_flag", "_waiters")
-
-    def __init__(self) -> None:
-        self._flag = False
-        self._waiters: list[_thread.LockType] = []
+    _flag: bool = field(default=False, init=False)
+    _waiters: list[_thread.LockType] = field(default_factory=list, init=False)
 
     def is_set(self) -> bool:
         return self._flag
@@ -99,25 +100,19 @@ def _acquire_in_main(waiter: _thread.LockType, timeout: float | None) -> bool:
             return False
 
 
+@dataclass(slots=True, eq=False, repr=False)
 class RealTask:
     """A target running in a cached thread."""
 
-    __slots__ = ("_context", "_done", "_ident", "_target", "error", "name")
-
-    def __init__(self, target: Callable[[], object], name: str) -> None:
-        self._target = target
-        self._context = copy_context()
-        self._done = RealEvent()
-        self._ident: int | None = None
-        self.name = name
-        self.error: BaseException | None = None
-
-    @property
-    def ident(self) -> int | None:
-        return self._ident
+    _target: Callable[[], object]
+    name: str
+    _context: Context = field(default_factory=copy_context, init=False)
+    _done: RealEvent = field(default_factory=RealEvent, init=False)
+    ident: int | None = field(default=None, init=False)
+    error: BaseException | None = field(default=None, init=False)
 
     def run(self) -> None:
-        self._ident = threading.get_ident()
+        self.ident = threading.get_ident()
         try:
             self._context.run(self._target)
         except BaseException as error:  # noqa: BLE001  the thread's border: kept and reported
@@ -125,7 +120,7 @@ class RealTask:
             if not isinstance(error, SystemExit):
                 report_thread_exception()
         finally:
-            self._ident = None
+            self.ident = None
             del self._target, self._context
             threading.current_thread().name = IDLE_NAME  # before anybody hears that it has ended
             self._done.set()
@@ -142,7 +137,7 @@ class _Worker:
 
     def __init__(self, cache: _ThreadCache) -> None:
         self._cache = cache
-        self._wake = _thread.allocate_lock()
+        self._wake = _thread.allocate_lock()  # released by who gives a task
         self._wake.acquire()
         self._task: RealTask | None = None
         self._thread = threading.Thread(target=self._run, name=IDLE_NAME, daemon=True)
@@ -210,6 +205,7 @@ class _ThreadCache:
             self._start_late()
 
     def retire(self, worker: _Worker) -> bool:
+        # Whoever takes a worker out of the list owns it: `start`, for a task, or this, to end it.
         if len(self._idle) <= self._kept:
             return False
         try:
@@ -232,13 +228,11 @@ class _ThreadCache:
                 worker.give(task)
 
 
+@dataclass(slots=True, eq=False, repr=False)
 class RealTimer:
     """One call of the timer thread."""
 
-    __slots__ = ("callback",)
-
-    def __init__(self, callback: Callable[[], object]) -> None:
-        self.callback: Callable[[], object] | None = callback
+    callback: Callable[[], object] | None
 
     def cancel(self) -> None:
         self.callback = None
@@ -247,10 +241,16 @@ class RealTimer:
 class RealClock:
     """Monotonic and wall time of the computer, real threads.
 
-    All timers are in one thread, which exists while there are any.
+    All timers are in one thread, which exists while there are any. A forked child begins without
+    threads and timers: those of its parent stay there.
     """
 
     def __init__(self) -> None:
+        self.begin()
+        _clocks.add(self)
+
+    def begin(self) -> None:
+        """Forget all threads and timers."""
         self._cache = _ThreadCache()
         # Re-entrant: a signal handler that sets a timer may interrupt the code that holds it.
         self._timer_lock = threading.RLock()
@@ -312,7 +312,7 @@ class RealClock:
     def _run_timers(self) -> None:
         try:
             while (timer := self._next_timer()) is not None:
-                callback, timer.callback = timer.callback, None
+                callback, timer.callback = timer.callback, None  # a `cancel` from now on is late
                 if callback is not None:
                     try:
                         callback()
@@ -346,7 +346,15 @@ class RealClock:
             return runner.run(main)
 
 
+def _begin_again() -> None:
+    for clock in list(_clocks):
+        clock.begin()
+
+
+_clocks: weakref.WeakSet[RealClock] = weakref.WeakSet()
 _REAL = RealClock()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_begin_again)
 _clock: ContextVar[Clock] = ContextVar("clock", default=_REAL)
 
 

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
+import _thread
 import threading
 from collections import deque
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from actionlib_core.clock._protocol import Task
-
-
-class Spawner(Protocol):
-    """What starts a task: a clock, or something in front of one."""
-
-    def spawn(self, target: Callable[[], object], *, name: str) -> Task:
-        """Run `target` in a thread of its own."""
-        ...
+    from actionlib_core.clock._protocol import Clock, Task
 
 
 class SerialExecutor:
@@ -27,64 +20,64 @@ class SerialExecutor:
     transport, and callbacks of one owner never overlap. An exception is reported, and so is what
     ends a thread (`sys.exit`, for one); what was submitted after it runs all the same.
 
-    Threads: `submit` may be called from any thread and never waits for a callable.
+    Args:
+        clock: Gives events, and the task.
+        name: The task's.
+        spawn: Starts the task in another way than `clock.spawn` does.
+
+    Threads: `submit` may be called from any thread or signal handler and never waits.
     """
 
-    def __init__(self, clock: Spawner, name: str) -> None:
+    def __init__(self, clock: Clock, name: str, spawn: Callable[..., Task] | None = None) -> None:
         self._clock = clock
         self._name = name
-        self._lock = threading.Lock()
+        self._spawn = spawn or clock.spawn
         self._queue: deque[Callable[[], object]] = deque()
-        self._task: Task | None = None
+        # Held while a task runs what is queued. Nobody waits for it: a signal handler that submits
+        # may have interrupted a `submit` of the same thread at any line.
+        self._busy = _thread.allocate_lock()
 
     def submit(self, function: Callable[[], object]) -> None:
         """Run `function` after everything submitted before it."""
-        with self._lock:
-            self._queue.append(function)
-            if self._task is None:
-                self._task = self._clock.spawn(self._drain, name=self._name)
+        self._queue.append(function)
+        self._start()
 
     def join(self, timeout: float | None = None) -> bool:
-        """Wait until nothing is queued or running.
+        """Wait until everything submitted before has run.
 
         Returns:
-            Whether the executor became idle.
+            Whether it has.
 
-        Blocks: until idle or `timeout` [s] has passed. Not to be called from a submitted callable.
+        Blocks: until then or `timeout` [s] has passed. Not to be called from a submitted callable.
         """
-        while True:
-            with self._lock:
-                task = self._task
-            if task is None:
-                return True
-            if not task.join(timeout):
-                return False
-            if task.error is None:  # else another task goes on with the rest
-                return True
+        # In this order: what is taken from the queue runs while `_busy` is held.
+        if not self._queue and not self._busy.locked():
+            return True
+        reached = self._clock.event()
+        self.submit(reached.set)
+        return reached.wait(timeout)
+
+    def _start(self) -> None:
+        if self._queue and self._busy.acquire(blocking=False):
+            try:
+                self._spawn(self._drain, name=self._name)
+            except BaseException:  # the system gives no thread
+                self._busy.release()
+                raise
 
     def _drain(self) -> None:
         try:
-            self._run_all()
-        except BaseException as error:
-            if isinstance(error, SystemExit):  # the one that a thread ends with in silence
-                report_exit(self._name, error)
-            with self._lock:
-                self._task = None
-                if self._queue:
-                    self._task = self._clock.spawn(self._drain, name=self._name)
+            while self._queue:
+                try:
+                    self._queue.popleft()()
+                except Exception:  # noqa: BLE001  a border: reported, the next callable still runs
+                    report_thread_exception()
+        except SystemExit as error:  # the one that a thread ends with in silence
+            report_exit(self._name, error)
             raise
-
-    def _run_all(self) -> None:
-        while True:
-            with self._lock:
-                if not self._queue:
-                    self._task = None
-                    return
-                function = self._queue.popleft()
-            try:
-                function()
-            except Exception:  # noqa: BLE001  a border: reported, and the next callable still runs
-                report_thread_exception()
+        finally:
+            self._busy.release()
+            self._start()  # what was submitted until here has found it busy
 
 
 def report_exit(name: str, error: SystemExit) -> None:

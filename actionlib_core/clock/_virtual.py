@@ -35,7 +35,7 @@ from actionlib_core.clock._virtual_parts import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine, Iterator
+    from collections.abc import Callable, Coroutine, Iterable, Iterator
     from typing import Self
 
 T = TypeVar("T")
@@ -175,8 +175,8 @@ class VirtualClock:
         """
         from actionlib_core.clock._patched import install, remove
 
-        install(self)
-        try:
+        try:  # around `install` too: a Ctrl-C in the midst of it leaves nothing replaced
+            install(self)
             yield self
         finally:
             remove(self)
@@ -208,6 +208,16 @@ class VirtualClock:
         # of the owner's gate goes now. Only the owner itself is sure not to wait at it.
         if self._participants.get(threading.get_ident()) is self._owner:
             self._owner.gate = LockGate()
+
+    def stop(self, tasks: Iterable[VirtualTask]) -> None:
+        """End participants, as the end of their process would: their waits raise from now on.
+
+        Blocks: not; each unwinds when it has its next turn, and no time passes for that.
+        """
+        with self._lock:
+            for task in tasks:
+                task.participant.stopped = True
+                self._wake(task.participant)
 
     def __enter__(self) -> Self:
         return self
@@ -256,7 +266,7 @@ class VirtualClock:
         if me is None or self._in_callback:
             raise _refusal(in_callback=me is not None)
         with self._lock:
-            if self._closed:
+            if self._closed or me.stopped:
                 raise Stopped
             if event is not None and event.flag:  # set since the caller looked
                 return True
@@ -285,14 +295,14 @@ class VirtualClock:
         return due is None or due > deadline
 
     def _check_open(self, me: Participant) -> None:
-        if self._closed and me is not self._owner:
+        if me.stopped or (self._closed and me is not self._owner):
             raise Stopped
 
     def enter(self, me: Participant) -> bool:
         """Begin the first turn in a new thread; False when the clock was closed before it came."""
         with self._lock:
             self._participants[threading.get_ident()] = me
-        return not self._closed
+        return not (self._closed or me.stopped)
 
     def _hand_over(self, me: Participant) -> None:
         """Let the next one run and wait for my turn; so does, a moment, what a signal raised."""
@@ -449,6 +459,8 @@ class VirtualClock:
         self._in_callback = True
         try:
             contextvars.Context().run(callback)
+        except Stopped:
+            pass  # it was for participants that were stopped
         except BaseException as error:  # a border: reported, the run goes on
             main = threading.current_thread() is threading.main_thread()
             if main and isinstance(error, KeyboardInterrupt):  # Ctrl-C came, whoever was running

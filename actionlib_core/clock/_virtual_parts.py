@@ -58,7 +58,7 @@ class TimeLimit(Exception):  # noqa: N818  as Deadlock
 
 
 class Stopped(BaseException):
-    """The clock was closed while this participant waited."""
+    """The clock was closed, or this participant stopped, while it waited."""
 
 
 class Participant:
@@ -75,6 +75,7 @@ class Participant:
         turn: Number of its wait.
         woken: Whether the event ended its wait.
         error: What its wait is to raise.
+        stopped: Whether its waits raise `Stopped`.
     """
 
     __slots__ = (
@@ -86,6 +87,7 @@ class Participant:
         "job",
         "name",
         "noted",
+        "stopped",
         "turn",
         "woken",
     )
@@ -101,6 +103,7 @@ class Participant:
         self.turn = 0
         self.woken = True
         self.error: BaseException | None = None
+        self.stopped = False
 
     def begin(self) -> None:
         """See that it has a thread, which waits for the turn."""

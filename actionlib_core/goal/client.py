@@ -8,6 +8,7 @@ runs a goal id once. Time is an argument everywhere.
 from __future__ import annotations
 
 import enum
+from dataclasses import KW_ONLY, dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from actionlib_core.goal.bounded import Recent
@@ -16,7 +17,7 @@ from actionlib_core.goal.states import TERMINAL, CommState, Status
 
 if TYPE_CHECKING:
     from actionlib_core.exceptions import TypeMismatchError
-    from actionlib_core.goal.ports import Server
+    from actionlib_core.goal.ports import Server, StatusEntry
 
 RESEND_FIRST_S = 0.5  # first repetition of a goal or cancel; then twice as long each time
 ASK_FIRST_S = 0.2  # a final status is here and the result is not: ask for it
@@ -34,7 +35,9 @@ TEXT_NEVER_TAKEN = "This goal was canceled before any action server had taken it
 
 _STEPS = client_life_cycle().steps
 _NAMES: Final = [status.name for status in Status]
+STATUSES: Final = {int(status): status for status in Status}
 _OVER: Final = frozenset({CommState.DONE, CommState.LOST})
+_AWAITED: Final = frozenset({CommState.WAITING_FOR_RESULT, CommState.WAITING_FOR_CANCEL_ACK})
 _BEGUN: Final = frozenset({CommState.ACTIVE, CommState.PREEMPTING})
 
 Path = tuple[CommState, ...]
@@ -49,18 +52,15 @@ class Duty(enum.Flag):
     ASK = enum.auto()
 
 
+@dataclass(slots=True, eq=False)
 class ClientGoal:
     """One goal as its client sees it.
 
-    Args:
-        goal_id: The goal's id.
+    Attributes:
+        id: The goal's id.
         stamp_ns: When it was sent [ns since the epoch]; 0 when unknown.
         attached: The goal was sent in an earlier life: it is never sent, only asked for.
         ack_timeout: Without a word from a server for so long [s] the goal is LOST; None: no limit.
-
-    Attributes:
-        id: The goal's id.
-        stamp_ns: See above.
         comm: Where it stands.
         status: The last thing the server said; LOST once the goal is lost.
         text: What the server said about that, or why the goal is lost.
@@ -76,63 +76,38 @@ class ClientGoal:
     Threads: none of its own, no lock; the owner calls it under its lock.
     """
 
-    __slots__ = (
-        "_ack_by",
-        "_cancelled",
-        "_due",
-        "_pause",
-        "_unlisted_since",
-        "ack_timeout",
-        "acknowledged",
-        "address",
-        "attached",
-        "begun",
-        "comm",
-        "id",
-        "offered",
-        "over",
-        "result",
-        "server",
-        "stamp_ns",
-        "status",
-        "text",
-    )
-
-    def __init__(
-        self,
-        goal_id: str,
-        stamp_ns: int = 0,
-        *,
-        attached: bool = False,
-        ack_timeout: float | None = None,
-    ) -> None:
-        self.id = goal_id
-        self.stamp_ns = stamp_ns
-        self.attached = attached
-        self.ack_timeout = ack_timeout
-        self.comm = CommState.WAITING_FOR_GOAL_ACK
-        self.status = Status.PENDING
-        self.text = ""
-        self.result: object = None
-        self.server = ""
-        self.address: Server | None = None
-        self.offered = attached
-        self.acknowledged = False
-        self.begun = False
-        self.over = False
-        self._cancelled = False
-        self._pause = RESEND_FIRST_S
-        self._due = 0.0
-        self._ack_by: float | None = None
-        self._unlisted_since: float | None = None
+    id: str
+    stamp_ns: int = 0
+    _: KW_ONLY
+    attached: bool = False
+    ack_timeout: float | None = None
+    comm: CommState = CommState.WAITING_FOR_GOAL_ACK
+    status: Status = Status.PENDING
+    text: str = ""
+    result: object = None
+    server: str = ""
+    address: Server | None = None
+    offered: bool = False
+    acknowledged: bool = False
+    begun: bool = False
+    over: bool = False
+    _cancelled: bool = False
+    _pause: float = RESEND_FIRST_S
+    _due: float = 0.0
+    _ack_by: float | None = None
+    _unlisted_since: float | None = None
 
     # -- what the user does --------------------------------------------------------------------
 
     def begin(self, now: float) -> Duty:
         """Start; return what to send."""
         self._due = now + RESEND_FIRST_S
-        self.limit_ack(self.ack_timeout, now)
-        return Duty.ASK if self.attached else Duty.GOAL
+        if self.ack_timeout is not None:
+            self.limit_ack(self.ack_timeout, now)
+        if not self.attached:
+            return Duty.GOAL
+        self.offered = True
+        return Duty.ASK
 
     def limit_ack(self, ack_timeout: float | None, now: float) -> None:
         """Be LOST without a word from a server for so long from now [s]; None: no limit."""
@@ -155,7 +130,7 @@ class ClientGoal:
         path = self._go("cancel")
         if self.over or self.comm is CommState.WAITING_FOR_RESULT:
             return path, Duty.NOTHING
-        if not self.offered:
+        if not (self.offered or self.attached):
             return path + self.on_result(Status.RECALLED, TEXT_NEVER_SENT, None, now), Duty.NOTHING
         self._cancelled = True
         self._pause = RESEND_FIRST_S
@@ -163,6 +138,24 @@ class ClientGoal:
         return path, Duty.CANCEL
 
     # -- what arrives --------------------------------------------------------------------------
+
+    def hear(self, entry: StatusEntry, session: str, now: float) -> Path | None:
+        """Take what a server says of the goal; return the states passed, None if it is no status.
+
+        Args:
+            entry: What it says.
+            session: The server's; "" when unknown.
+            now: The time [s, clock].
+        """
+        status = STATUSES.get(entry.status)
+        if status is None:
+            return None
+        if not self.stamp_ns:  # it was attached to
+            self.stamp_ns = entry.stamp_ns
+        path = self.on_status(status, entry.text, now)
+        if session and self.acknowledged:  # not a server that knows of the cancel only
+            self.server = session
+        return path
 
     def on_status(self, status: Status, text: str, now: float) -> Path:
         """Take a status; return the states passed. One that was overtaken on the way is dropped."""
@@ -173,7 +166,9 @@ class ClientGoal:
         # RECALLING may stand for a cancel that overtook its goal: the goal must still be sent.
         if status is not Status.RECALLING or self.attached:
             self.acknowledged = True
-        self._heard(now)
+        self._unlisted_since = self._ack_by = None
+        if self.acknowledged and self.comm not in _AWAITED:
+            self._due = now + SILENCE_S
         if (self.comm, _NAMES[status]) not in _STEPS:
             return ()
         path = self._go(_NAMES[status])
@@ -281,14 +276,6 @@ class ClientGoal:
         if self._cancelled and self.comm is CommState.WAITING_FOR_CANCEL_ACK:
             return Duty.CANCEL | Duty.ASK
         return Duty.ASK
-
-    def _heard(self, now: float) -> None:
-        self._unlisted_since = None
-        self._ack_by = None
-        if self.comm is CommState.WAITING_FOR_RESULT:
-            return
-        if self.acknowledged and self.comm is not CommState.WAITING_FOR_CANCEL_ACK:
-            self._due = now + SILENCE_S
 
     def _go(self, event: str) -> Path:
         path = _STEPS[self.comm, event]

@@ -122,9 +122,9 @@ class ClientListener(Protocol):
         """Handle feedback."""
 
     def on_result(
-        self, entry: StatusEntry, body: bytes, session: str, *, answered: bool = False
+        self, entry: StatusEntry, body: bytes | None, session: str, *, answered: bool = False
     ) -> None:
-        """Handle a result; `answered`: it was asked for."""
+        """Handle a result; `answered`: it was asked for, and without a `body` is not kept."""
 
     def on_answer(self, entry: StatusEntry, session: str = "") -> None:
         """Handle the answer to `ask` when there is no result to send."""
@@ -180,8 +180,9 @@ class ServerPort(Protocol):
     def pack_feedback(self, feedback: Any) -> bytes:
         """Return the bytes of a feedback message; errors as `pack_result`."""
 
-    def send_accepted(self, entry: StatusEntry) -> None:
-        """Say that a goal is accepted, where its client waits for that; a status follows."""
+    @property
+    def send_accepted(self) -> Callable[[StatusEntry], None] | None:
+        """Says that a goal is accepted; None where the status list, which follows, says it."""
 
     def send_status(self, entries: Iterable[StatusEntry]) -> None:
         """Send the status list; dropped when the network is slow, as it is sent again."""

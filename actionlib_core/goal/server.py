@@ -180,7 +180,9 @@ class ServerGoals:
         goal.status = path[-1]
         return True
 
-    def step(self, goal: ServerGoal, event: str, call: str, now: float, text: str = "") -> None:
+    def step(
+        self, goal: ServerGoal, event: str, call: str, now: float, text: str = ""
+    ) -> StatusEntry:
         """Move a goal along its life cycle; one that has ended is forgotten after a time.
 
         Args:
@@ -189,6 +191,9 @@ class ServerGoals:
             call: What the user called, for the error.
             now: The time [s, clock].
             text: What the status says from now on.
+
+        Returns:
+            Its status now.
 
         Raises:
             IllegalTransitionError: its status does not allow the event.
@@ -202,6 +207,7 @@ class ServerGoals:
         if goal.status in TERMINAL:
             goal.listed_until = now + LISTED_S
             goal.kept_until = now + self.result_timeout
+        return StatusEntry(goal.id, goal.stamp_ns, goal.status, text)
 
     def on_acknowledged(self, goal_ids: Iterable[str], now: float) -> None:
         """Forget the results that their clients have."""
@@ -258,7 +264,11 @@ class ServerGoals:
 
     def list_statuses(self) -> list[StatusEntry]:
         """Return the status list."""
-        return [goal.entry() for goal in self.listed()]
+        return [
+            StatusEntry(goal.id, goal.stamp_ns, goal.status, goal.text)
+            for goal in self.tracked.values()
+            if goal.listed_until is not None or goal.status not in TERMINAL
+        ]
 
     def expire(self, now: float) -> float | None:
         """Forget what is past its time; return when the next thing is [s, clock]."""

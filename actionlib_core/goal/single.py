@@ -9,9 +9,24 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Any, Generic, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypeVar
 
-G = TypeVar("G")
+from actionlib_core.goal.states import TERMINAL
+
+if TYPE_CHECKING:
+    from actionlib_core.goal.server import ServerGoal
+
+
+class Goal(Protocol):
+    """What this needs to know of a goal."""
+
+    @property
+    def record(self) -> ServerGoal:
+        """Its place in the life cycle."""
+        ...
+
+
+G = TypeVar("G", bound=Goal)
 
 Policy = Literal["preempt", "queue", "reject"]
 POLICIES: tuple[Policy, ...] = ("preempt", "queue", "reject")
@@ -67,7 +82,6 @@ class SingleGoal(Generic[G]):
         self.policy = policy
         self.current: G | None = None
         self.preempt_requested = False
-        self._running = False
         self.waiting: deque[_Waiting[G]] = deque()
         self._current_stamp_ns = 0
 
@@ -78,8 +92,8 @@ class SingleGoal(Generic[G]):
 
     @property
     def running(self) -> bool:
-        """Whether the current goal was accepted and has not ended."""
-        return self._running
+        """Whether the current goal has not ended."""
+        return self.current is not None and self.current.record.status not in TERMINAL
 
     def find(self, goal: G) -> G:
         """Return the object known here that equals `goal`, else `goal`."""
@@ -92,7 +106,7 @@ class SingleGoal(Generic[G]):
 
     def on_stop(self) -> list[G]:
         """Note that everything ends; return the goals that wait, which wait no more."""
-        self.preempt_requested = self._running
+        self.preempt_requested = self.running
         waiting = [entry.goal for entry in self.waiting]
         self.waiting.clear()
         return waiting
@@ -103,21 +117,21 @@ class SingleGoal(Generic[G]):
             self.waiting.append(_Waiting(goal, stamp_ns))
             return ANNOUNCE
         if self.policy == "reject":
-            if self._running or self.waiting:
+            if self.running or self.waiting:
                 return Decision(reject=goal)
             self.waiting.append(_Waiting(goal, stamp_ns))
             return ANNOUNCE
         newest = self.waiting[-1].stamp_ns if self.waiting else 0
         if stamp_ns < newest or stamp_ns < self._current_stamp_ns:
             return Decision(recall=(goal,))
-        if not self.waiting and not self._running:
+        if not self.waiting and not self.running:
             self.waiting.append(_Waiting(goal, stamp_ns))
             return ANNOUNCE
         older = tuple(waiting.goal for waiting in self.waiting)
         self.waiting.clear()
         self.waiting.append(_Waiting(goal, stamp_ns))
-        self.preempt_requested = self.preempt_requested or self._running
-        return Decision(recall=older, preempt=self._running, announce=True)
+        self.preempt_requested = self.preempt_requested or self.running
+        return Decision(recall=older, preempt=self.running, announce=True)
 
     def on_cancel(self, goal: G, *, recall_waiting: bool) -> Decision[G]:
         """Take a cancel for a goal.
@@ -127,7 +141,7 @@ class SingleGoal(Generic[G]):
             recall_waiting: A goal that only waits is recalled at once; else it is accepted first,
                 as in ROS, and finds itself preempted.
         """
-        if goal is self.current and self._running:
+        if goal is self.current and self.running:
             self.preempt_requested = True
             return Decision(preempt=True)
         for entry in self.waiting:
@@ -146,14 +160,8 @@ class SingleGoal(Generic[G]):
         """
         if not self.waiting:
             return None, None
-        pushed = self.current if self._running else None
+        pushed = self.current if self.running else None
         new = self.waiting.popleft()
         self.current, self._current_stamp_ns = new.goal, new.stamp_ns
-        self._running = True
         self.preempt_requested = new.cancelled
         return self.current, pushed
-
-    def on_ended(self, goal: G) -> None:
-        """Note that a goal reached a terminal status."""
-        if goal is self.current:
-            self._running = False

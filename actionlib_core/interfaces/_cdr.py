@@ -116,7 +116,7 @@ def _write_source(definition: Definition, resolve: Resolve, scope: dict[str, Any
     _write_fields(output, definition.fields, "m", resolve)
     output.flush()
     source.add("return HEADER + b")
-    return source.function("write(m)")
+    return source.writer()
 
 
 def _write_fields(output: _Output, fields: tuple[Field, ...], owner: str, resolve: Resolve) -> None:

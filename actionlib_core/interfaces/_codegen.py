@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.exceptions import DeserializationError
 from actionlib_core.interfaces import _arrays
+from actionlib_core.interfaces._values import coerced
 from actionlib_core.time import Duration, Time
 
 if TYPE_CHECKING:
@@ -84,14 +85,31 @@ class Source:
     def function(self, signature: str) -> str:
         return "\n".join([f"def {signature}:", *self.lines, ""])
 
+    def writer(self) -> str:
+        """Return the function `write`, whose lines are the fast path.
+
+        Values of other types than the fields' own are converted, or refused with what is wrong.
+        """
+        body = ["    " + line for line in self.lines]
+        return "\n".join(
+            [
+                "def write(m, again=True):",
+                "    try:",
+                *body,
+                "    except WRITE_ERRORS:",
+                "        if not again: raise",
+                "        return write(coerced(m), False)",
+                "",
+            ]
+        )
+
 
 def make_codecs(
     cls: type[Message], definition: Definition, resolve: Resolve
 ) -> tuple[Callable[[Any], bytes], Callable[[bytes], Any]]:
     """Return the functions `write(message) -> bytes` and `read(bytes) -> message` of a class.
 
-    `write` raises one of `WRITE_ERRORS` on values that need converting or are wrong; `read` raises
-    DeserializationError.
+    `write` raises FieldError on values that do not fit; `read` raises DeserializationError.
     """
     scope = new_scope()
     text = _write_source(definition, resolve, scope) + _read_source(cls, definition, resolve, scope)
@@ -104,6 +122,8 @@ def new_scope() -> dict[str, Any]:
     """Return the names that generated functions use."""
     return {
         "Mismatch": _arrays.MismatchError,
+        "WRITE_ERRORS": WRITE_ERRORS,
+        "coerced": coerced,
         "Bad": DeserializationError,
         "READ_ERRORS": (struct.error, _arrays.MismatchError, OverflowError, TypeError),
         "new": object.__new__,
@@ -156,7 +176,7 @@ def _write_source(definition: Definition, resolve: Resolve, scope: dict[str, Any
         source.add(f"return {parts[0] if parts else repr(b'')}")
     else:
         source.add(f"return b''.join(({', '.join(parts)}))")
-    return source.function("write(m)")
+    return source.writer()
 
 
 def _write_fields(

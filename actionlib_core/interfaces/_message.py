@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, cast
 
 from actionlib_core.exceptions import FieldError, InterfaceError
 from actionlib_core.interfaces import _arrays
-from actionlib_core.interfaces._codegen import WRITE_ERRORS, make_codecs
+from actionlib_core.interfaces._codegen import make_codecs
 from actionlib_core.interfaces._definition import attribute_of
 from actionlib_core.interfaces._values import (
     ROS2_TIMES,
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from actionlib_core.interfaces._definition import Definition
+
+    Codecs = tuple[Callable[[Any], bytes], Callable[[bytes], Any]]
 
 
 class Buffer(Protocol):
@@ -66,8 +69,9 @@ class Message:
     """Whether the first field is a `std_msgs/Header header`."""
     _definition: ClassVar[Definition]
     _nested: ClassVar[dict[str, type[Message]]]
-    _write: ClassVar[Callable[[Any], bytes]]
-    _read: ClassVar[Callable[[bytes], Any]]
+    _write: ClassVar[Any]  # static functions, which a type checker takes for methods
+    _read: ClassVar[Any]
+    _codecs: ClassVar[Callable[[], Codecs]]
 
     def to_bytes(self) -> bytes:
         """Return the ROS 1 serialisation.
@@ -75,12 +79,8 @@ class Message:
         Raises:
             FieldError: Values do not fit their fields; all of them are named.
         """
-        write = type(self)._write  # noqa: SLF001 # a field of that name hides nothing here
-        try:
-            return write(self)
-        except WRITE_ERRORS:
-            # Values of other types than the fields' own: convert them, or say what is wrong.
-            return write(coerced(self))
+        data: bytes = self._write(self)
+        return data
 
     @classmethod
     def from_bytes(cls, data: bytes) -> Self:
@@ -97,7 +97,7 @@ class Message:
 
     def deserialize(self, data: bytes) -> Self:
         """Fill this message from its ROS 1 serialisation and return it; raises as `from_bytes`."""
-        other = type(self)._read(data)  # noqa: SLF001 # as above
+        other = self._read(data)
         for name in self.__slots__:
             setattr(self, name, getattr(other, name))
         return self
@@ -210,7 +210,7 @@ def make_class(
     *,
     module: str,
     base: type[Message] = Message,
-    make: Callable[..., tuple[Callable[[Any], bytes], Callable[[bytes], Any]]] = make_codecs,
+    make: Callable[..., Codecs] = make_codecs,
     **attributes: Any,
 ) -> type[Message]:
     """Make the class of a message.
@@ -244,21 +244,22 @@ def make_class(
     namespace["__init__"] = _make_init(definition, resolve)
     cls: Any = type(definition.short_name, (base,), namespace)
 
-    def compile_codecs() -> None:
+    @cache
+    def codecs() -> Codecs:
         # On first use: most classes are only ever parts of others, which have them unrolled. Two
         # threads here at once do the same work twice, nothing worse.
         write, read = make(cls, definition, resolve)
         cls._write = staticmethod(write)
         cls._read = staticmethod(read)
+        return write, read
 
     def first_write(message: Any) -> bytes:
-        compile_codecs()
-        return cast("bytes", cls._write(message))
+        return codecs()[0](message)
 
     def first_read(data: bytes) -> Any:
-        compile_codecs()
-        return cls._read(data)
+        return codecs()[1](data)
 
+    cls._codecs = staticmethod(codecs)
     cls._write = staticmethod(first_write)
     cls._read = staticmethod(first_read)
     for field in definition.fields:
@@ -266,6 +267,11 @@ def make_class(
             # `getattr(message, "in")` works too, under the field's own name.
             setattr(cls, field.name, cls.__dict__[field.attribute])
     return cast("type[Message]", cls)
+
+
+def codecs_of(cls: type[Message]) -> Codecs:
+    """Return the compiled `to_bytes` and `from_bytes` of a class, for those who call them often."""
+    return cls._codecs()
 
 
 def _documentation(definition: Definition) -> str:
@@ -278,6 +284,7 @@ def _make_init(definition: Definition, resolve: Callable[[str], type[Message]]) 
     """Make `__init__`: one argument per field, None (or nothing) for the default."""
     # Names with an underscore in front, which no field has.
     scope: dict[str, Any] = {
+        "_new": object.__new__,
         "_Time": Time,
         "_Duration": Duration,
         "_to_time": to_time,
@@ -297,7 +304,16 @@ def _make_init(definition: Definition, resolve: Callable[[str], type[Message]]) 
         elif not field.type.is_array and field.type.base in ROS2_TIMES:
             cls = "_M_" + field.type.base.replace("/", "_")
             given = f"({name} if {name}.__class__ is {cls} else _to_ros2_time({cls}, {name}))"
-        lines.append(f"    self.{name} = {default} if {name} is None else {given}")
+        if default in {"_Time()", "_Duration()"}:
+            # Most messages have a header: its stamp is made without a call, as codecs do.
+            lines += [
+                f"    if {name} is None:",
+                f"        self.{name} = _t = _new({default[:-2]})",
+                "        _t.secs = _t.nsecs = 0",
+                f"    else: self.{name} = {given}",
+            ]
+        else:
+            lines.append(f"    self.{name} = {default} if {name} is None else {given}")
     lines.append("    if _extra: _take_extra(self, _extra)")
     # The text holds only names checked by the parser.
     exec(compile("\n".join(lines), f"<__init__ of {definition.name}>", "exec"), scope)  # noqa: S102
@@ -320,4 +336,4 @@ def _take_extra(message: Message, extra: dict[str, Any]) -> None:
         setattr(message, ours[name], value)
 
 
-__all__ = ["Buffer", "Message", "Ros2Message", "attribute_of", "make_class"]
+__all__ = ["Buffer", "Message", "Ros2Message", "attribute_of", "codecs_of", "make_class"]

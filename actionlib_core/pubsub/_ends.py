@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from actionlib_core.node import get_node
 from actionlib_core.shutdown import current_shutdown
+from actionlib_core.wire import looked_for
 from actionlib_core.wire.end_port import make_end_port
 from actionlib_core.wire.presence import Endpoint, Kind, find_mismatch
 
@@ -105,13 +106,15 @@ class NameWatch:
         self._end = end
         self._any_type = any_type
         self._on_new = on_new
-        self._lock = threading.Lock()
+        self._lock = threading.Lock()  # guards the three below; never held while others are called
         self._ends: dict[str, Endpoint] = {}
         self._mismatches: dict[Endpoint, TypeMismatchError] = {}
         self._waiters: list[Event] = []
         self._closed = False
         self._watch: Closable | None = None
-        self._forget = node.on_close(self.close)
+        self._forget = node.on_close(self.close)  # first: it raises when the node is closed
+        if Kind.SERVICE in kinds:
+            looked_for.services.add(end.own.name)
         try:
             self._watch = end.watch(frozenset(kinds), self._on_end)
         except BaseException:
@@ -173,7 +176,7 @@ class NameWatch:
                 if over or self._closed:
                     return False
                 changed.wait(left)
-                changed.clear()
+                changed.clear()  # before the next look: what happens after it sets it again
             return True
         finally:
             forget()

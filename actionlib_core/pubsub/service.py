@@ -24,6 +24,7 @@ from actionlib_core.exceptions import (
     ServiceConflictError,
     ServiceException,
     TypeMismatchError,
+    text_of,
 )
 from actionlib_core.pubsub._ends import NameWatch
 from actionlib_core.pubsub.service_proxy import ServiceEnd, handler_raised, is_from
@@ -275,7 +276,7 @@ _BUSY = (
 
 
 def _fail(query: Query, error: BaseException) -> None:
-    _send_error(query, type(error).__name__, str(error))
+    _send_error(query, type(error).__name__, text_of(error))
 
 
 def _send_error(query: Query, kind: str, text: str) -> None:

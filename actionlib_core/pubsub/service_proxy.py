@@ -6,6 +6,7 @@ Source:
 
 from __future__ import annotations
 
+import itertools
 import json
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -41,8 +42,22 @@ if TYPE_CHECKING:
 CALL_TIMEOUT_S = 60.0  # default limit of a call
 APPEAR_S = 2.0  # how much of it a call gives a server to appear
 FOREVER_S = 1e8  # for the network, which wants a number: three years
+LEAST_S = 3600.0  # see `patience_of`
 STALE_S = 0.2  # a server that vanishes so soon after a call may have been gone before it
 MARGIN_S = 1.0  # the network gives up after the call itself has
+
+
+_unlimited = itertools.count(1)  # calls without a limit; taking one is a single step
+
+
+def patience_of(calls: int) -> float:
+    """Return how long the network may wait for the answer to the `calls`-th call without a limit.
+
+    Zenoh keeps some 0.7 kB of each query until its time is over, answered or not. A program that
+    makes a few such calls may wait years; one that makes millions is held to some 20 MB, and what
+    its calls of the last hour take.
+    """
+    return max(FOREVER_S / calls, LEAST_S)
 
 
 class ServiceEnd(End):
@@ -87,7 +102,8 @@ class ServiceProxy(ServiceEnd):
         persistent: As rospy takes it; there is no connection to keep here.
         headers: As rospy takes it; not sent.
         timeout: Longest time of a call [s], waiting for the server to appear included; None waits
-            until the server has answered or died.
+            until the server has answered or died. After 27,777 calls without a limit in one
+            program each waits an hour at most; see `patience_of`.
         node: Where it lives; the node in force when None.
 
     Raises:
@@ -221,7 +237,8 @@ class ServiceProxy(ServiceEnd):
             done.append(True)
             news.set()
 
-        longest = FOREVER_S if timeout is None else timeout + MARGIN_S
+        longest = patience_of(next(_unlimited)) if timeout is None else timeout + MARGIN_S
+        start = self.node.clock.now()
         query = self._end.ask(request, longest, on_reply, on_done)
 
         def settled() -> bool:
@@ -233,6 +250,12 @@ class ServiceProxy(ServiceEnd):
             query.close()
         if replies:
             return replies[0]
+        if done and self.node.clock.now() >= start + longest:
+            raise ServiceTimeoutError(
+                self.resolved_name,
+                f"no answer: got none in {longest:g} s; expected one sooner in a program that has "
+                "made so many calls without a limit. Try a timeout.",
+            )
         raise self._explain_silence(timeout, in_time=in_time)
 
     def _wait_for_answer(

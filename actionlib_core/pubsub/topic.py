@@ -225,7 +225,7 @@ class Subscriber(_TopicEnd, Generic[M]):
         self.callback = callback
         self.callback_args = callback_args
         self.queue_size = queue_size
-        self._lock = threading.Lock()
+        self._lock = threading.Lock()  # guards the messages that wait
         self._waiting: Backlog[Sample] = Backlog(queue_size or MESSAGES)
         self._call = self._caller()
         self._join(lambda: self._end.receive(self._on_sample))
@@ -242,7 +242,7 @@ class Subscriber(_TopicEnd, Generic[M]):
         with self._lock:
             dropped_before = self._waiting.dropped
             fitted = self._waiting.add(sample, len(sample.payload))
-        if fitted:
+        if fitted:  # one call each; a message that pushed another out is delivered in its place
             self._call(self._deliver)
         elif not dropped_before and not self.queue_size:  # else it was asked for
             logger.warning(

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import ctypes
 import sys
-import threading
 from functools import partial
 from threading import get_ident
 from typing import TYPE_CHECKING, TypeVar
@@ -45,9 +44,9 @@ class Inside:
 
     def __exit__(self, *_: object) -> None:
         me = get_ident()
-        self.depths[me] -= 1
-        if not self.depths[me]:
-            del self.depths[me]
+        depth = self.depths.pop(me) - 1
+        if depth:
+            self.depths[me] = depth
 
     def wait_idle(self, timeout: float) -> None:
         """Wait until no other thread is in a call.
@@ -110,13 +109,12 @@ class Inlet:
         executor: Runs what arrives inside a call of ours.
     """
 
-    __slots__ = ("_gate", "_lock", "_queued", "_submit", "closed")
+    __slots__ = ("_gate", "_queued", "_submit", "closed")
 
     def __init__(self, gate: Gate, executor: SerialExecutor) -> None:
         self._gate = gate
         self._submit = executor.submit
-        self._lock = threading.Lock()
-        self._queued = 0
+        self._queued: list[None] = []  # one for each that waits; list operations are atomic
         self.closed = False
 
     def take(
@@ -128,8 +126,7 @@ class Inlet:
         """Run `function(item)`, or `refuse(item)` when this is closed."""
         me = get_ident()
         if self._queued or me in inside.depths:
-            with self._lock:
-                self._queued += 1
+            self._queued.append(None)
             self._submit(partial(self._run_queued, function, item, refuse))
         else:
             if me not in pinned:
@@ -142,8 +139,7 @@ class Inlet:
         try:
             self._run(get_ident(), function, item, refuse)
         finally:
-            with self._lock:
-                self._queued -= 1
+            self._queued.pop()
 
     def _run(
         self,

@@ -39,6 +39,9 @@ _MESSAGES = [
 # https://github.com/eclipse-zenoh/zenoh/issues/2806
 _ONE_DIALS = {"peer": {"to_router": "always", "to_peer": "greater-zid"}}
 _LOOKING = ["liveliness_query", "declare_liveliness_subscriber"]
+QUEUED = 16  # the most that zenoh takes; room is made when it is needed
+DROP_S = 0.005
+_QUEUE = "transport/link/tx/queue"
 
 
 def zenoh_settings(config: Config) -> dict[str, object]:
@@ -62,6 +65,10 @@ def zenoh_settings(config: Config) -> dict[str, object]:
         "open/return_conditions/declares": config.settle > 0,
         "timestamping/enabled": _stamps(config),
         "transport/link/tx/lease": round(config.lease * 1e3),
+        # Messages that may be dropped rather than waited for (those to ROS 2) are dropped after a
+        # few of a burst otherwise: zenoh's own queue has room for two.
+        f"{_QUEUE}/size/data": QUEUED,
+        f"{_QUEUE}/congestion_control/drop/wait_before_drop": round(DROP_S * 1e6),
         # Shared memory saves nothing at our sizes, and a killed process leaves its segments behind.
         "transport/shared_memory/enabled": False,
     }

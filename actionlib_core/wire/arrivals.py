@@ -36,7 +36,7 @@ class Readable:
 
     def __init__(self, log: logging.Logger) -> None:
         self._log = log
-        self._lock = threading.Lock()
+        self._lock = threading.Lock()  # guards `_told`
         self._told = Recent(TOLD)
         self._encodings: dict[type[Typed], str] = {}
 
@@ -45,7 +45,7 @@ class Readable:
         encoding = self._encodings.get(message_class)
         if encoding is None:
             encoding = self._encodings.setdefault(message_class, encoding_of(message_class))
-        if sample.encoding == encoding:
+        if sample.encoding == encoding:  # the usual case; anything else is parsed
             return True
         try:
             check_encoding(
@@ -79,10 +79,15 @@ class Bursts(Generic[T]):
         spawn: Runs a function in another thread, which has a name.
         handle: Takes an item; never by two threads at once.
 
+    Attributes:
+        waiting: What was taken and not yet handed on.
+        lock: Held while an item is handed on. When nothing waits, and then nobody holds it,
+            everything was handed on.
+
     Threads: `take` and `flush` are called by the network's threads.
     """
 
-    __slots__ = ("_called", "_clock", "_handle", "_last", "_lock", "_rapid", "_spawn", "_waiting")
+    __slots__ = ("_called", "_clock", "_handle", "_last", "_rapid", "_spawn", "lock", "waiting")
 
     def __init__(
         self,
@@ -93,9 +98,10 @@ class Bursts(Generic[T]):
         self._clock = clock
         self._spawn = spawn
         self._handle = handle
-        self._lock = threading.Lock()
-        self._waiting: deque[T] = deque()
-        self._called = False
+        self.lock = threading.Lock()
+        self.waiting: deque[T] = deque()
+        self._called = False  # the thread that gathers is under way
+        # Without a lock: threads that miscount only begin a burst sooner or later.
         self._rapid = 0
         self._last = float("-inf")
 
@@ -105,29 +111,29 @@ class Bursts(Generic[T]):
         self._rapid = self._rapid + 1 if now - self._last < RAPID_S else 0
         self._last = now
         if self._rapid < RAPID and not self._called:
-            with self._lock:
+            with self.lock:
                 self._handle(item)
             return
-        self._waiting.append(item)
+        self.waiting.append(item)
         if not self._called:
             self._called = True
             self._spawn(self._gather, "feedback")
 
     def flush(self) -> None:
         """Hand everything on that was taken before."""
-        with self._lock:
-            if self._waiting:
+        with self.lock:
+            if self.waiting:
                 self._hand_on()
 
     def _gather(self) -> None:
         self._clock.sleep(PAUSE_S)
-        with self._lock:
+        with self.lock:
             self._hand_on()
             self._called = False
             self._hand_on()  # what came in between, when nobody was called
 
     def _hand_on(self) -> None:
-        waiting = self._waiting
+        waiting = self.waiting
         while waiting:
             try:
                 self._handle(waiting.popleft())

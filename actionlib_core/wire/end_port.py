@@ -6,7 +6,7 @@ encodings nor tokens.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from actionlib_core.transport import Quality
 from actionlib_core.wire.encoding import check_encoding, encoding_of, parse_encoding
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from actionlib_core.transport import (
         Closable,
         Presence,
-        PublisherPort,
         Query,
         Reply,
         Sample,
@@ -36,21 +35,17 @@ if TYPE_CHECKING:
     OnEnd = Callable[[str, Endpoint, bool], None]
 
 
-class Sender(Protocol):
-    """The sending end of a topic."""
+class Sender(NamedTuple):
+    """The sending end of a topic.
 
-    def put(self, message: Any) -> None:
-        """Send a message.
+    Attributes:
+        put: Sends a message; raises FieldError when a value does not fit its field, TransportError
+            when the transport is closed. Blocks while the network has no room.
+        close: Leaves the topic.
+    """
 
-        Raises:
-            FieldError: a value does not fit its field.
-            TransportError: the transport is closed.
-
-        Blocks: while the network has no room.
-        """
-
-    def close(self) -> None:
-        """Leave the topic."""
+    put: Callable[[Any], None]
+    close: Callable[[], None]
 
 
 class EndPort(Protocol):
@@ -153,17 +148,6 @@ def make_end_port(
     return OwnEndPort(node, kind, name, interface)
 
 
-class _OwnSender:
-    __slots__ = ("_port", "close")
-
-    def __init__(self, port: PublisherPort) -> None:
-        self._port = port
-        self.close = port.close
-
-    def put(self, message: Any) -> None:
-        self._port.put(message.to_bytes())
-
-
 class OwnEndPort:
     """An end on our own wire: ROS 1's bytes under the name itself; see `make_end_port`."""
 
@@ -193,7 +177,8 @@ class OwnEndPort:
     def send(self, *, latch: bool) -> Sender:
         quality = Quality(express=True, latch=latch)
         encoding = encoding_of(self._interface)
-        return _OwnSender(self._transport.publisher(self.own.name, encoding, quality))
+        port = self._transport.publisher(self.own.name, encoding, quality)
+        return Sender(lambda message: port.put(message.to_bytes()), port.close)
 
     def receive(self, callback: Callable[[Sample], None]) -> Closable:
         return self._transport.subscribe(self.own.name, callback)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.exceptions import InterfaceError
-from actionlib_core.wire.action_messages import ActionTypes
+from actionlib_core.wire import looked_for
+from actionlib_core.wire.action_types import ActionTypes
 from actionlib_core.wire.presence import Kind, token_pattern
 
 if TYPE_CHECKING:
@@ -36,12 +37,15 @@ def make_client_port(
         TransportError: that network cannot be joined.
 
     Blocks: the first time on a network of ROS 2, until it is joined.
+
+    Threads: any. The listener is called on the network's threads; feedback that comes in a burst is
+        handed on in a thread of its own.
     """
     if _is_on_ros2(node, name, types):
         from actionlib_core.wire.ros2.client_port import RosClientPort
 
         return RosClientPort(node, name, types, spawn)
-    from actionlib_core.wire.client_port import ActionClientPort
+    from actionlib_core.wire.actions import ActionClientPort
 
     return ActionClientPort(node, name, types, spawn)
 
@@ -55,7 +59,7 @@ def make_server_port(node: Node, name: str, types: ActionTypes) -> ServerPort:
         from actionlib_core.wire.ros2.server_port import RosServerPort
 
         return RosServerPort(node, name, types)
-    from actionlib_core.wire.server_port import ActionServerPort
+    from actionlib_core.wire.actions import ActionServerPort
 
     return ActionServerPort(node, name, types)
 
@@ -84,6 +88,7 @@ def watch_for_server(
             if presence.alive:
                 on_there()
 
+        looked_for.actions.add(name)
         pattern = token_pattern(Kind.ACTION_SERVER, name)
         return node.transport.watch_alive(pattern, on_presence)
     from actionlib_core.wire.ros2.mapping import action_on_ros2

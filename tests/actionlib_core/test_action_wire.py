@@ -11,7 +11,7 @@ from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from actionlib_core.interfaces.std_msgs.msg import Header
 from actionlib_core.time import Time
-from actionlib_core.wire import action_messages as wire
+from actionlib_core.wire import actions as wire
 
 stamps = st.integers(0, (2**32 - 1) * 10**9)
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=12)

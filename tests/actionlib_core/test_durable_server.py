@@ -375,7 +375,7 @@ def test_kill_9_and_a_new_process(tmp_path, on_restart, status, result):
 def test_goals_of_ros2_types_are_kept(tmp_path, spec):
     from actionlib_core.action._durable import GoalFile
     from actionlib_core.goal.server import ServerGoal
-    from actionlib_core.wire.action_messages import ActionTypes
+    from actionlib_core.wire.action_types import ActionTypes
 
     types = ActionTypes.of(spec)
     file = GoalFile(tmp_path / "goals.db", "/fibonacci", types)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 
 import pytest
@@ -21,8 +22,9 @@ from actionlib_core.exceptions import (
 from actionlib_core.interfaces import define_service
 from actionlib_core.interfaces.std_srvs.srv import Empty, SetBool, SetBoolResponse, Trigger
 from actionlib_core.node import Node
+from actionlib_core.pubsub import service_proxy
 from actionlib_core.pubsub.service import Service
-from actionlib_core.pubsub.service_proxy import ServiceProxy, wait_for_service
+from actionlib_core.pubsub.service_proxy import ServiceProxy, patience_of, wait_for_service
 from actionlib_core.transport.faulty import FaultyTransport
 from actionlib_core.transport.memory import MemoryNetwork
 
@@ -148,6 +150,23 @@ def test_without_limit_a_call_ends_with_the_server(nodes, clock):
     with pytest.raises(ServiceLostError):
         proxy(True)
     assert clock.now() == pytest.approx(1e5)
+
+
+@pytest.mark.parametrize(
+    ("calls", "seconds"), [(1, 1e8), (1000, 1e5), (27_777, 3600.1), (10**9, 3600.0)]
+)
+def test_calls_without_a_limit_leave_a_bounded_trace_in_the_network(calls, seconds):
+    assert patience_of(calls) == pytest.approx(seconds, rel=1e-4)
+
+
+def test_the_millionth_call_without_a_limit_ends_after_an_hour(nodes, clock, monkeypatch):
+    monkeypatch.setattr(service_proxy, "_unlimited", itertools.count(10**6))
+    Service("stuck", SetBool, lambda _: clock.sleep(4000.0), node=nodes[0])
+    proxy = ServiceProxy("stuck", SetBool, timeout=None, node=nodes[1])
+    start = clock.now()
+    with pytest.raises(ServiceTimeoutError, match="without a limit"):
+        proxy(True)
+    assert clock.now() - start == pytest.approx(3600.0, abs=10.0)
 
 
 def test_slow_calls_do_not_hold_up_others(nodes, clock):

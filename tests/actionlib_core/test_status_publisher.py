@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import threading
+from types import SimpleNamespace
 
 import pytest
 
-from actionlib_core.action.server import GAP_S, PERIOD_S, StatusPublisher
+from actionlib_core.action.server import GAP_S, PERIOD_S, GoalKeeper, StatusPublisher
+from actionlib_core.clock import RealClock
+from actionlib_core.exceptions import IllegalTransitionError
 from actionlib_core.goal.server import ServerGoal, ServerGoals
 
 
@@ -16,6 +19,8 @@ class LateClock:
     def __init__(self):
         self.time = 100.0
         self.timers = []
+
+    event = RealClock().event
 
     def now(self):
         return self.time
@@ -94,3 +99,32 @@ def test_an_empty_list_is_not_said_again_and_needs_no_timer():
     server.clock.run(server.clock.time + PERIOD_S)
     assert server.said == [["a"], ["a"], []]
     assert server.clock.timers == []
+
+
+def test_call_that_is_refused_holds_up_no_change():
+    """The change before it was said with the next list, up to a second later."""
+    clock, said, handles = LateClock(), [], []
+    port = SimpleNamespace(
+        send_accepted=None,
+        send_status=lambda entries: said.append([entry.status.name for entry in entries]),
+    )
+    keeper = GoalKeeper(
+        SimpleNamespace(clock=clock),
+        "demo",
+        None,
+        port,
+        on_client_lost="continue",
+        result_timeout=60.0,
+        deliver_goal=handles.append,
+        deliver_cancel=handles.remove,
+        on_stopped=said.clear,
+    )
+    keeper.on_goal("a", 1, None, "client")
+    handles[0].set_accepted()
+    handles[0].set_cancel_requested()
+    assert said == [["ACTIVE"]]
+    clock.time += 2 * GAP_S  # the timer is late
+    with pytest.raises(IllegalTransitionError):
+        handles[0].set_accepted()
+    clock.run(clock.time + 2 * GAP_S)
+    assert said == [["ACTIVE"], ["PREEMPTING"]]

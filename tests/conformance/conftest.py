@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from actionlib_core.clock import Clock
-    from actionlib_core.transport import Presence, Transport
+    from actionlib_core.transport import Presence, Sample, Transport
 
 T = TypeVar("T")
 DEADLINE_S = 10.0
@@ -63,17 +63,29 @@ class Network:
         return Inbox(self.clock)
 
     def meet(self, *sessions: Transport) -> None:
-        """Wait until each session knows what the others have declared so far."""
-        meeting = next(self._meetings)
-        inboxes: list[Inbox[Presence]] = []
+        """Wait until each session has all that the others have declared and put so far.
+
+        Both are waited for: Zenoh's declarations overtake messages, and until the declarations are
+        there a message goes to everybody, also to who subscribes while it is on its way.
+        """
+        key = f"@meeting/{next(self._meetings)}"
+        tokens: list[Inbox[Presence]] = []
+        messages: list[Inbox[Sample]] = []
         handles = []
         for session in sessions:
-            inbox = self.inbox()
-            inboxes.append(inbox)
-            handles.append(session.watch_alive(f"@meeting/{meeting}/*", inbox))
+            tokens.append(self.inbox())
+            messages.append(self.inbox())
+            handles.append(session.watch_alive(f"{key}/*", tokens[-1]))
+            handles.append(session.subscribe(key, messages[-1], history=False))
         for session in sessions:
-            handles.append(session.declare_alive(f"@meeting/{meeting}/{session.session_id}"))
-        for inbox in inboxes:
+            handles.append(session.declare_alive(f"{key}/{session.session_id}"))
+        for inbox in tokens:
+            inbox.wait_for(len(sessions))
+        for session in sessions:
+            publisher = session.publisher(key)
+            handles.append(publisher)
+            publisher.put(b"")
+        for inbox in messages:
             inbox.wait_for(len(sessions))
         for handle in handles:
             handle.close()

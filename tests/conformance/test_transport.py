@@ -242,14 +242,16 @@ def test_closed_latched_publisher_is_forgotten(network):
 
 def test_without_history_the_latched_message_does_not_come(network):
     a, b = network.session(), network.session()
-    network.meet(a, b)  # zenoh sends what is put before that to everybody
     publisher = a.publisher(GOAL, "", LATCH)
     publisher.put(b"1")
-    inbox = network.inbox()
-    b.subscribe(GOAL, inbox, history=False)
     network.meet(a, b)
+    without, asked = network.inbox(), network.inbox()
+    b.subscribe(GOAL, without, history=False)
+    b.subscribe(GOAL, asked)
+    asked.wait_for(1)
     publisher.put(b"2")
-    assert payloads(inbox.wait_for(1)) == [b"2"]
+    assert payloads(asked.wait_for(2)) == [b"1", b"2"]
+    assert payloads(without.wait_for(1)) == [b"2"]
 
 
 # -- caches, in the way of zenoh's advanced publishers ---------------------------------------------

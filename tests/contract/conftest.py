@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from actionlib_core.action.client import TerminalState
+from actionlib_core.goal.states import Status
 from actionlib_core.node import Node
 from actionlib_core.transport.faulty import DELIVERED, FaultyTransport, RandomFaults
 from tests.transports import TRANSPORTS, opened
@@ -48,6 +49,7 @@ class World:
 
     Attributes:
         tells_recalls: A client is told for certain whether a cancelled goal has run.
+        stopped: How a goal ends whose server is stopped while it runs.
 
     Args:
         clock: The clock of all nodes.
@@ -56,6 +58,7 @@ class World:
     """
 
     tells_recalls = True
+    stopped = frozenset({Status.PREEMPTED, Status.ABORTED})
 
     def __init__(
         self, clock: Clock, open_session: Callable[[], Transport], *, late: float = 0.0
@@ -69,6 +72,10 @@ class World:
         node = Node(name, transport=self._open(), clock=self.clock, **kwargs)
         self.nodes.append(node)
         return node
+
+    def type_names(self, *actions: str) -> list[str]:
+        """Return what errors call actions of the package actionlib."""
+        return [f"actionlib/{action}Action" for action in actions]
 
     def text(self, said: str) -> str:
         """Return what a client reads where a server has said something about a goal's end."""

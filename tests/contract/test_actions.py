@@ -23,7 +23,7 @@ from actionlib_core.goal.client import GIVES_WAY_S
 from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from actionlib_core.time import Duration
-from actionlib_core.wire.action_messages import pack_statuses
+from actionlib_core.wire.actions import pack_statuses
 from actionlib_core.wire.encoding import encoding_of
 from actionlib_core.wire.presence import Endpoint, Kind
 
@@ -192,6 +192,38 @@ def test_execute_callback_without_end_or_with_an_exception_aborts(world, caplog)
         assert client.send_goal_and_wait(msg.TestGoal(1), LONG_S) == S.ABORTED
     said = world.text("Exception in execute callback: no battery")
     assert client.get_goal_status_text() == said
+
+
+def no_text(_error):
+    raise ValueError("no text")
+
+
+@pytest.mark.parametrize("base", [Exception, BaseException])
+@pytest.mark.parametrize("style", ["execute", "goal callback"])
+def test_exception_without_a_text_ends_its_goal_too(world, caplog, monkeypatch, style, base):
+    """Its goal stayed ACTIVE for ever, and the server took no other."""
+    mute = type("Mute", (base,), {"__str__": no_text, "__repr__": no_text})
+    reported = world.event()
+    monkeypatch.setattr(threading, "excepthook", lambda args: reported.set())
+
+    def fail(_):
+        raise mute
+
+    if style == "execute":
+        SimpleActionServer("demo", msg.TestAction, fail, node=world.node("server"))
+    else:
+        ActionServer("demo", msg.TestAction, fail, node=world.node("server"))
+    client = simple_client(world)
+    with caplog.at_level(logging.CRITICAL):
+        client.send_goal(msg.TestGoal(1))
+        assert client.wait_for_result(LONG_S)
+    state, said = (S.ABORTED, world.text) if style == "execute" else (S.REJECTED, world.refusal)
+    assert client.get_state() == state
+    callback = "execute callback" if style == "execute" else "goal callback"
+    text = f"Exception in {callback}: <Mute: its text raised ValueError>"
+    assert client.get_goal_status_text() == said(text)
+    if (style, base) != ("execute", Exception):  # that is logged
+        assert reported.wait(LONG_S)
 
 
 def test_goal_callback_style_accepts_and_rejects(world):
@@ -374,6 +406,18 @@ def test_cancel_before_any_server_recalls_the_goal(world, cancel):
     assert client.get_state() == S.RECALLED
 
 
+def test_goal_cancelled_while_it_is_about_to_be_sent_does_not_run(world):
+    """A signal handler cancels between two lines of `send_goal`: the robot drove all the same."""
+    doubler = Doubler(world)
+    client = full_client(world)
+    handle = client.make_goal(msg.TestGoal(5))
+    handle.cancel()
+    client.manager.begin(handle)
+    assert handle.get_terminal_state() is TerminalState.RECALLED
+    assert client.send_goal(msg.TestGoal(6)).wait(LONG_S)
+    assert doubler.runs == [6]
+
+
 def test_stopped_client_says_so_when_goals_are_to_be_cancelled(world):
     client = ActionClient("demo", msg.TestAction, node=world.node("client"))
     client.stop()
@@ -429,7 +473,7 @@ def test_stopped_server_aborts_its_goal_and_its_name_can_be_taken_again(world):
     doubler.wait_started()
     doubler.server.stop()
     assert client.wait_for_result(LONG_S)
-    assert client.get_state() in {S.PREEMPTED, S.ABORTED}
+    assert client.get_state() in world.stopped
     Doubler(world)
     client = simple_client(world)
     assert client.send_goal_and_wait(msg.TestGoal(2), LONG_S) == S.SUCCEEDED
@@ -470,7 +514,7 @@ def test_wrong_type_is_an_error_on_both_sides(world, caplog):
             client.wait_for_server(LONG_S)
         with pytest.raises(TypeMismatchError):
             client.send_goal(client.action_client.types.goal())
-    for name in ("actionlib/TestAction", "actionlib/TestRequestAction"):
+    for name in world.type_names("Test", "TestRequest"):
         assert name in str(caught.value)
 
 

@@ -13,9 +13,10 @@ import pytest
 
 from actionlib_core.action.client import TerminalState
 from actionlib_core.config import Config, Ros2
+from actionlib_core.goal.states import Status
 from actionlib_core.interfaces._ros2 import ros2_registry
 from actionlib_core.transport.faulty import FaultyTransport
-from actionlib_core.wire.ros2.client_port import TEXT_REFUSED
+from actionlib_core.wire.ros2.goal_exchange import TEXT_REFUSED
 from tests.contract.conftest import LATE_S, SEED, SmallFaults, World
 from tests.contract.test_actions import *  # noqa: F403  each test of the suite, with our `world`
 from tests.transports import TRANSPORTS, opened
@@ -28,10 +29,6 @@ if TYPE_CHECKING:
     from actionlib_core.transport import Transport
 
 NOT_ON_ROS2 = {
-    "test_stopped_server_aborts_its_goal_and_its_name_can_be_taken_again": (
-        "the end of a goal is told to who has asked for its result, and a client asks when the goal "
-        "is accepted, which may be after the server has stopped; test_server_over_zenoh has it"
-    ),
     "test_copy_of_a_goal_that_outlives_its_server_does_not_run_at_the_next": (
         "a goal is a request to whoever answers: it names no server, and no copy of it is kept"
     ),
@@ -43,9 +40,6 @@ NOT_ON_ROS2 = {
     ),
     "test_server_behind_a_bridge_is_known_by_its_status_lists": (
         "every server of ROS 2 shows tokens; the bridge speaks our own wire"
-    ),
-    "test_wrong_type_is_an_error_on_both_sides": (
-        "types are told by hashes, which the error names: test_client_port has it"
     ),
     "test_messages_that_cannot_be_read_are_dropped_and_reported_once": (
         "other keys and other messages: test_client_port and test_server_port have it"
@@ -59,6 +53,10 @@ class Ros2World(World):
     """Nodes whose names are on ROS 2, where nothing is said about the end of a goal."""
 
     tells_recalls = False  # a result may overtake the lists that tell
+    stopped = World.stopped | {Status.LOST}  # the result may be asked for when nobody can answer
+
+    def type_names(self, *actions: str) -> list[str]:
+        return [f"actionlib/action/{action}_" for action in actions]
 
     def text(self, said: str) -> str:
         return ""
@@ -87,12 +85,26 @@ class Ros2World(World):
 
 @pytest.fixture(scope="module", autouse=True)
 def definitions() -> None:
-    for name in ("Test", "TwoInts"):
-        ros2_registry("jazzy").define("action", f"actionlib/{name}", DEFINITIONS[name])
+    for name, definition in DEFINITIONS.items():
+        ros2_registry("jazzy").define("action", f"actionlib/{name}", definition)
 
 
 DEFINITIONS = {
     "Test": "int32 goal\n---\nint32 result\n---\nint32 feedback\n",
+    "TestRequest": """\
+int32 terminate_status
+bool ignore_cancel
+string result_text
+int32 the_result
+bool is_simple_client
+builtin_interfaces/Duration delay_accept
+builtin_interfaces/Duration delay_terminate
+builtin_interfaces/Duration pause_status
+---
+int32 the_result
+bool is_simple_server
+---
+""",
     "TwoInts": "int64 a\nint64 b\n---\nint64 sum\n---\n",
 }
 

@@ -21,7 +21,7 @@ from actionlib_core.node import Node
 from actionlib_core.time import Time
 from actionlib_core.transport.faulty import FaultyTransport, RandomFaults, ScriptedFaults
 from actionlib_core.transport.memory import MemoryNetwork
-from actionlib_core.wire.action_messages import pack_statuses
+from actionlib_core.wire.actions import pack_statuses
 from actionlib_core.wire.encoding import encoding_of
 
 ENDS = {"PREEMPTED", "SUCCEEDED", "ABORTED", "REJECTED", "RECALLED"}

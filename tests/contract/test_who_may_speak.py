@@ -25,8 +25,8 @@ from actionlib_core.interfaces.actionlib.msg import TestGoal as Goal
 from actionlib_core.interfaces.actionlib.msg import TestResult as Result
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from actionlib_core.time import Time
-from actionlib_core.wire import server_port
-from actionlib_core.wire.action_messages import (
+from actionlib_core.wire import actions
+from actionlib_core.wire.actions import (
     pack_report,
     pack_statuses,
     unpack_frame,
@@ -77,8 +77,8 @@ def world():
 @pytest.fixture
 def blind(monkeypatch):
     """Servers that do not find each other, as in the moment after they have joined the network."""
-    monkeypatch.setattr(server_port, "list_endpoints", lambda *_, **__: [])
-    monkeypatch.setattr(server_port.ActionServerPort, "_meet_server", lambda *_: None)
+    monkeypatch.setattr(actions, "list_endpoints", lambda *_, **__: [])
+    monkeypatch.setattr(actions.ActionServerPort, "_meet_server", lambda *_: None)
 
 
 @pytest.mark.usefixtures("blind")
@@ -143,7 +143,7 @@ def test_farewell_of_another_server_is_no_proof_that_a_goal_was_not_taken(world,
 
 
 def test_younger_server_gives_way_and_its_goal_is_lost_with_the_reason(world, monkeypatch):
-    monkeypatch.setattr(server_port, "list_endpoints", lambda *_, **__: [])
+    monkeypatch.setattr(actions, "list_endpoints", lambda *_, **__: [])
     elder = world.serve(world.robot)
     world.clock.sleep(1.0)
     younger = world.serve(world.node("second"))

@@ -69,7 +69,7 @@ __all__ = ["ZenohTransport"]
 D = TypeVar("D", bound=Declared)
 
 CLOSE_S = 0.5  # zenoh may take so long to leave the network; it is left behind after that
-LET_GO_S = 0.5  # the interpreter's end waits so long for callbacks that had begun
+LET_GO_S = 2.0  # the interpreter waits so long for what had begun, on a busy computer
 IDLE_S = 0.3  # `close` waits so long for callbacks that are running
 ACCESS_S = 1.0  # longest wait for the other side's access rules
 LIST_ASKS = 2  # questions for tokens of which the first may end too early

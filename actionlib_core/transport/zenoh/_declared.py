@@ -107,7 +107,8 @@ class Publisher(Declared):
             self._check_open()
         self._users.append(None)
         depths, me = inside.depths, get_ident()
-        depths[me] = depths.get(me, 0) + 1  # as `with inside`, in half the time
+        depth = depths.get(me, 0)
+        depths[me] = depth + 1  # as `with inside`, in half the time
         try:
             if self._inlet.closed or process.forked:
                 self._check_open()
@@ -115,8 +116,9 @@ class Publisher(Declared):
         except zenoh.ZError as error:
             raise TransportError(f"{self._key}: cannot send: {error}") from error
         finally:
-            depths[me] -= 1
-            if not depths[me]:
+            if depth:
+                depths[me] = depth
+            else:
                 del depths[me]
             self._users.pop()
             if self._inlet.closed:
@@ -456,6 +458,7 @@ class Asking(Declared):
         self._on_reply = on_reply
         self._on_done = on_done
         self._replying: int | None = None  # thread that is in the callback
+        self._answered = False
         # Dropped when it is over: the token knows the callbacks, which know this object.
         self.token: zenoh.CancellationToken | None = zenoh.CancellationToken()
 
@@ -463,11 +466,15 @@ class Asking(Declared):
         self._inlet.take(self._deliver, raw)
 
     def take_done(self) -> None:
-        self._inlet.take(self._finish, None)
+        if self._answered:
+            self._inlet.take(self._finish, None)
+        else:  # as a link is lost, zenoh says so while it holds a lock that any call of ours needs
+            self._transport.loopback.submit(partial(self._inlet.take, self._finish, None))
 
     def _deliver(self, raw: zenoh.Reply) -> None:
         reply = _convert_reply(raw)
         if reply is not None:
+            self._answered = True
             self._replying = get_ident()
             try:
                 self._on_reply(reply)

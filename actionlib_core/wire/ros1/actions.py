@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING
 from actionlib_core.exceptions import ActionlibError, InterfaceError, Ros1Error, TransportError
 from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
-from actionlib_core.wire.action_messages import (
+from actionlib_core.wire.actions import (
+    ACK,
+    AGAIN,
+    ASK_TIMEOUT_S,
+    FEEDBACK,
+    GOAL,
+    RESULT,
+    STATUS,
     action_keys,
     pack_goal_id,
     pack_status,
@@ -23,14 +30,12 @@ from actionlib_core.wire.action_messages import (
     unpack_report,
     unpack_statuses,
 )
-from actionlib_core.wire.client_port import ACK, AGAIN, ASK_TIMEOUT_S, GOAL
 from actionlib_core.wire.encoding import encoding_of
 from actionlib_core.wire.presence import Kind, parse_token, token_key, with_age
 from actionlib_core.wire.ros1.answers import ACTION_WORDS
 from actionlib_core.wire.ros1.goals import GoalsOfClients, GoalsOfServer, Verdict
 from actionlib_core.wire.ros1.node import ANY
 from actionlib_core.wire.ros1.sides import Typed, type_of
-from actionlib_core.wire.server_port import FEEDBACK, RESULT, STATUS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection

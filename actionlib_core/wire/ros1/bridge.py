@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from actionlib_core.clock._serial import report_thread_exception
 from actionlib_core.exceptions import ActionlibError, Ros1Error
 from actionlib_core.shutdown import current_shutdown
+from actionlib_core.wire import looked_for
 from actionlib_core.wire.presence import parse_token, token_pattern
 from actionlib_core.wire.ros1.actions import ActionBridge
 from actionlib_core.wire.ros1.answers import SystemState
 from actionlib_core.wire.ros1.definitions import Definitions
-from actionlib_core.wire.ros1.node import Ros1Node
+from actionlib_core.wire.ros1.node import ANY, Ros1Node
 from actionlib_core.wire.ros1.plan import Plan, Wanted, make_plan, without
 from actionlib_core.wire.ros1.services import ServiceBridge
 from actionlib_core.wire.ros1.sides import BRIDGE, Sides
@@ -96,6 +97,8 @@ class Ros1Bridge:
         self._is_there = True
         self._closing = False
         self._forget = current_shutdown().at_exit(self.close)
+        lists = looked_for.actions, looked_for.services
+        self._forget_names = [names.on_new(self._wake) for names in lists]
         transport = node.transport
         self._parts = [
             transport.declare_alive(f"{BRIDGES}/{transport.session_id}"),
@@ -147,6 +150,22 @@ class Ros1Bridge:
         """Return the names of all parameters; raises and blocks as `get_param`."""
         return sorted(map(str, self._ros.ask("getParamNames")))
 
+    def state(self) -> SystemState:
+        """Return which nodes of the robot publish, listen and serve, by name.
+
+        Raises:
+            Ros1Error: the master does not answer.
+
+        Blocks: some seconds at most.
+        """
+        return without(self._ros.state(), BRIDGE)
+
+    def published_topics(self) -> dict[str, str]:
+        """Return the topics that nodes of the robot publish, name -> type; as `state`."""
+        topics = self.state().publishers
+        types = self._ros.types()
+        return {topic: types.get(topic, ANY) for topic in sorted(topics)}
+
     def close(self) -> None:
         """Bridge no more; everything is unregistered in ROS 1. A second call does nothing.
 
@@ -157,6 +176,8 @@ class Ros1Bridge:
                 return
             self._closing = True
         self._forget()
+        for forget in self._forget_names:
+            forget()
         self._changed.set()
         self._looked.set()
         self._task.join(CLOSE_S)
@@ -262,7 +283,9 @@ class Ros1Bridge:
         """Bridge what is to be bridged now."""
         state = without(state, BRIDGE)
         ends, elsewhere = self._ends_by_name()
-        plan = make_plan(self._wanted, ends, state, types)
+        names = [*looked_for.actions.names(), *looked_for.services.names()]
+        ros_names = set(filter(None, map(self._sides.ros_name, names)))
+        plan = make_plan(self._wanted, ends, state, types, ros_names)
         for name in elsewhere & {*plan.actions, *plan.topics, *plan.services}:
             error = Ros1Error(name, "it is bridged by another bridge already; expected one.")
             self._ros.report(f"bridge of {name}", error)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING
 
 from actionlib_core.wire.presence import Kind
 from actionlib_core.wire.ros1.answers import ACTION_WORDS, SystemState, find_actions
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     from actionlib_core.wire.presence import Endpoint
 
@@ -30,6 +31,9 @@ class Wanted:
         used: Also all actions and services of the robot, which programs look for before they use
             them, and the topics that programs on our network use.
         all: Also everything that there is.
+        on_demand: Also the actions and topics that programs on our network use, and the actions
+            and services that this program looks for, from then on; nothing else of the robot's.
+        leave_out: Patterns, as `fnmatch` has them, of names that are not, whatever else is asked.
     """
 
     actions: Mapping[str, str] = field(default_factory=dict)
@@ -37,6 +41,8 @@ class Wanted:
     services: frozenset[str] = frozenset()
     used: bool = False
     all: bool = False
+    on_demand: bool = False
+    leave_out: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -71,6 +77,7 @@ def make_plan(
     ends: Mapping[str, list[Endpoint]],
     state: SystemState,
     types: Mapping[str, str],
+    looked_for: Collection[str] = (),
 ) -> Plan:
     """Decide what is bridged.
 
@@ -79,8 +86,10 @@ def make_plan(
         ends: Name in ROS 1 -> the ends of it on our network that belong to no bridge.
         state: Who is there in ROS 1, without bridges.
         types: Topic -> type, as the master knows it.
+        looked_for: The actions and services that this program looks for.
     """
-    follow = wanted.used or wanted.all
+    shows = wanted.used or wanted.all
+    follow = shows or wanted.on_demand
     kinds = {name: {end.kind for end in there} for name, there in ends.items()} if follow else {}
     topics_there = state.publishers.keys() | state.subscribers.keys()
     learned = find_actions(dict(types), topics_there)
@@ -88,8 +97,10 @@ def make_plan(
     for name, there in kinds.items():
         if there & _ACTION:
             actions.setdefault(name, "")
-    if follow:
+    if shows:
         actions = {**learned, **actions}
+    elif follow:
+        actions = {**{name: learned[name] for name in learned.keys() & set(looked_for)}, **actions}
     actions = {name: given or learned.get(name, "") for name, given in actions.items()}
     parts = {f"{name}/{word}" for name in actions for word in ACTION_WORDS}
 
@@ -100,11 +111,17 @@ def make_plan(
     if wanted.all:
         topics.update(dict.fromkeys(state.publishers.keys() - set(_LOGS), True))
     services = {
-        name for name in state.services if follow and name.rpartition("/")[2] not in _OF_EVERY_NODE
+        name for name in state.services if shows and name.rpartition("/")[2] not in _OF_EVERY_NODE
     }
+    if wanted.on_demand:
+        services |= state.services.keys() & set(looked_for)
     services |= wanted.services | {name for name, there in kinds.items() if Kind.SERVICE in there}
+
+    def goes(name: str) -> bool:
+        return not any(fnmatchcase(name, pattern) for pattern in wanted.leave_out)
+
     return Plan(
-        actions,
-        {name: listen for name, listen in topics.items() if name not in parts},
-        {name: name in state.services for name in services},
+        {name: type_name for name, type_name in actions.items() if goes(name)},
+        {name: listen for name, listen in topics.items() if name not in parts and goes(name)},
+        {name: name in state.services for name in services if goes(name)},
     )

@@ -33,8 +33,8 @@ from actionlib_core.wire.ros2.action_messages import (
 )
 from actionlib_core.wire.ros2.attachment import unpack_attachment
 from actionlib_core.wire.ros2.diagnosis import explain_absence, explain_mismatch
-from actionlib_core.wire.ros2.goal_exchange import GoalExchange, Step
-from actionlib_core.wire.ros2.goal_states import CancelCode
+from actionlib_core.wire.ros2.goal_exchange import ENDS, TEXT_UNKNOWN, GoalExchange, Step
+from actionlib_core.wire.ros2.goal_states import CancelCode, reason_of
 from actionlib_core.wire.ros2.graph import ActionServers
 from actionlib_core.wire.ros2.link_probe import LinkProbe
 from actionlib_core.wire.ros2.mapping import action_on_ros2
@@ -47,6 +47,7 @@ from actionlib_core.wire.ros2.names import (
     goal_uuid,
 )
 from actionlib_core.wire.ros2.network import ros_network
+from actionlib_core.wire.ros2.question import Question
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -56,7 +57,7 @@ if TYPE_CHECKING:
     from actionlib_core.goal.ports import ClientListener
     from actionlib_core.node import Node
     from actionlib_core.transport import Closable, Reply, Sample
-    from actionlib_core.wire.action_messages import ActionTypes
+    from actionlib_core.wire.action_types import ActionTypes
     from actionlib_core.wire.ros2.action_messages import Canceling
     from actionlib_core.wire.ros2.graph import End, RosServer
     from actionlib_core.wire.ros2.names import Token
@@ -65,21 +66,10 @@ T = TypeVar("T")
 
 log = logging.getLogger(__name__)
 
-# As ROS 2's own. A question that ends unanswered is asked again. The network keeps something of
-# each question until its time is over, also when it was answered.
-ANSWER_S = 600.0
 AT_ONCE = 8  # goals on their way: a ROS 2 server's queue holds 10 requests and drops the oldest
 PAUSE_S = 0.1  # before a question that was not answered is asked again; then twice as long
 LONGEST_S = 2.0
 LAST_WORDS_S = 0.03  # answers of a server that leaves may come so long after its tokens went
-
-TEXT_REFUSED = "the server refused the goal"
-TEXT_RECALLED = "This goal was canceled before any action server could have it"
-TEXT_UNKNOWN = "the action server does not know this goal: it has restarted or forgotten it"
-TEXT_UNSETTLED = (
-    "the answer to this goal was lost, and the action server does not know it now: it may or may "
-    "not have run"
-)
 
 
 class _Goal:
@@ -98,56 +88,8 @@ class _Goal:
         self.open: dict[End, Closable] = {}  # its questions that are not answered yet
 
 
-class _Question:
-    """A request on its way: its first answer that can be read counts.
-
-    Args:
-        read: Reads an answer; raises ValueError.
-        on_answer: Gets what was read, and the answer.
-    """
-
-    __slots__ = ("_on_answer", "_read", "answered", "over")
-
-    def __init__(self, read: Callable[[bytes], T], on_answer: Callable[[T, Reply], object]) -> None:
-        self._read = read
-        self._on_answer: Callable[[Any, Reply], object] = on_answer
-        self.answered = False
-        self.over = False
-
-    def take(self, reply: Reply) -> str:
-        """Take an answer; return what is wrong with it, or ""."""
-        if self.answered:
-            return ""
-        if reply.error:
-            return reply.payload.decode(errors="replace") or "an error without a text"
-        try:
-            answer = self._read(reply.payload)
-        except ValueError as error:
-            return str(error)
-        self.answered = True
-        self._on_answer(answer, reply)
-        return ""
-
-
 class RosClientPort:
-    """Declares the ends of an action client on a ROS 2 network and speaks through them.
-
-    Args:
-        node: On whose network.
-        name: The action's full name here.
-        types: Its message classes.
-        spawn: Starts a named thread for a burst of feedback.
-
-    Raises:
-        ConfigError: no network of ROS 2 has the name, or the network's distribution has no
-            counterpart of the action or of some of its fields.
-        TransportError: the network cannot be joined.
-
-    Blocks: the first time on a network, until it is joined.
-
-    Threads: any. The listener is called on the network's threads; feedback that comes in a burst is
-        handed on in a thread of its own.
-    """
+    """The ends of an action client on a ROS 2 network; see `ports.make_client_port`."""
 
     def __init__(
         self,
@@ -368,7 +310,7 @@ class RosClientPort:
             self._ask_cancel(goal)
         if Step.KEEPS_RUNNING in step:
             log.warning("action '%s': the server refused to cancel goal %s", self._name, goal.id)
-        for end, status, text in _ENDS:
+        for end, status, text in ENDS:
             if end in step:
                 self._end(goal, status, text)
 
@@ -448,13 +390,21 @@ class RosClientPort:
         with self._lock:
             step = goal.exchange.on_result(code, self._clock.now())
             status = goal.exchange.status
+            goal.open.pop(self._result, None)  # it is over without being taken back
         if Step.END not in step:
             self._do(goal, step)
             return
         self._drop(goal)
-        entry = StatusEntry(goal.id, 0, status, "")
+        text = "" if status is Status.SUCCEEDED else self._reason(reply.payload)
+        entry = StatusEntry(goal.id, 0, status, text)
         session = reply.source or goal.server
         self._listener.on_result(entry, reply.payload, session, answered=True)
+
+    def _reason(self, response: bytes) -> str:
+        try:
+            return reason_of(self._parts.get_result.response.from_cdr(response).result)
+        except (ValueError, ActionlibError):  # reported when the result is read
+            return ""
 
     def _on_result_done(self, goal: _Goal, answered: bool) -> None:
         with self._lock:
@@ -508,9 +458,7 @@ class RosClientPort:
         on_answer: Callable[[T, Reply], object],
         on_done: Callable[[bool], object] = bool,
     ) -> None:
-        """Ask one server.
-
-        A request has an attachment of its own, so that no two are alike.
+        """Ask one server; see `Question`.
 
         Args:
             goal: What it is about; it keeps the question until that ends.
@@ -520,7 +468,6 @@ class RosClientPort:
             on_answer: Gets the first answer that can be read.
             on_done: Gets, in the end, whether there was one; not called for a question taken back.
         """
-        question = _Question(read, on_answer)
 
         def take(reply: Reply) -> None:
             self._hear()
@@ -539,16 +486,9 @@ class RosClientPort:
             if not self._closed:
                 on_done(question.answered)
 
+        question = Question(read, on_answer)
         try:
-            asked = self._network.transport.query(
-                end.key,
-                request,
-                attachment=end.attachment(),
-                best=True,
-                timeout=ANSWER_S,
-                on_reply=take,
-                on_done=done,
-            )
+            asked = question.ask(self._network.transport, end, request, take, done)
         except TransportError as error:
             self._readable.report("ask", error)
             done()
@@ -729,11 +669,3 @@ class RosClientPort:
                 del self._there[server]
         for server in silent:
             self._lose(server, f"has not been heard for {seconds:.1f} s")
-
-
-_ENDS = (
-    (Step.REFUSED, Status.REJECTED, TEXT_REFUSED),
-    (Step.RECALLED, Status.RECALLED, TEXT_RECALLED),
-    (Step.UNKNOWN, Status.LOST, TEXT_UNKNOWN),
-    (Step.UNSETTLED, Status.LOST, TEXT_UNSETTLED),
-)

@@ -20,7 +20,7 @@ from actionlib_core.wire.ros2.names import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from actionlib_core.wire.ros2.graph import ServerChange
     from actionlib_core.wire.ros2.names import Token
@@ -254,23 +254,37 @@ def diagnose_qos(tokens: Iterable[Token]) -> list[Finding]:
     return findings
 
 
-def diagnose_answers(asked: str, seconds: float | None) -> Finding:
-    """Tell how fast a node answers; `seconds` is None when it does not."""
-    if seconds is None:
+def diagnose_answers(seconds: Mapping[str, float | None]) -> Finding:
+    """Tell which nodes answer, and how fast.
+
+    Args:
+        seconds: How long each node took [s], by its full name; None for one that did not answer.
+    """
+    silent = sorted(f"/{node}" for node, took in seconds.items() if took is None)
+    if silent:
+        some = f"{len(silent)} of {len(seconds)} nodes do not answer, though they are there"
         return Finding(
             Level.PROBLEM,
             "answers",
-            f"/{asked} does not answer, though its node is there",
-            "The node hangs or is suspended, or the link is cut: a ROS 2 node is missed only after "
-            "a minute. Try restarting it.",
+            f"{some}: {_listed(silent)}",
+            "They hang or are suspended, or the link is cut: a ROS 2 node is missed only after "
+            "a minute. Try restarting them.",
         )
-    level = Level.OK if seconds < SLOW_S else Level.NOTE
+    slowest, took = max(((node, took or 0.0) for node, took in seconds.items()), key=lambda x: x[1])
+    level = Level.OK if took < SLOW_S else Level.NOTE
     way_out = "" if level is Level.OK else "The link or the robot is slow."
-    return Finding(level, "answers", f"/{asked} answers in {seconds * 1e3:.0f} ms", way_out)
+    told = f"{_named(seconds)}; the slowest, /{slowest}, answers in {took * 1e3:.0f} ms"
+    return Finding(level, "answers", told, way_out)
 
 
-def diagnose_clock(offset_s: float, doubt_s: float) -> Finding:
-    """Tell how far the robot's clock is ahead of ours [s], which is known to `doubt_s`."""
+def diagnose_clock(offsets: Mapping[str, tuple[float, float]]) -> Finding:
+    """Tell how far the nodes' clocks are from ours.
+
+    Args:
+        offsets: How far each node's clock is ahead [s], by its full name, and to what that is
+            known [s].
+    """
+    node, (offset_s, doubt_s) = max(offsets.items(), key=lambda each: abs(each[1][0]) - each[1][1])
     if abs(offset_s) <= CLOCK_OFF_S + doubt_s:
         text = f"the same within {max(abs(offset_s), doubt_s) * 1e3:.0f} ms"
         return Finding(Level.OK, "clock", text)
@@ -278,7 +292,7 @@ def diagnose_clock(offset_s: float, doubt_s: float) -> Finding:
     return Finding(
         Level.PROBLEM,
         "clock",
-        f"the robot's clock is {abs(offset_s):.1f} s {side} this computer's",
+        f"the clock of /{node} is {abs(offset_s):.1f} s {side} this computer's",
         "Stamps of goals are too old or in the future for the robot, which may wait for transforms "
         "or refuse. Set both clocks by one time service, chrony for example.",
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.transport import Quality
+from actionlib_core.wire.end_port import Sender
 from actionlib_core.wire.presence import Endpoint
 from actionlib_core.wire.presence import Kind as EndKind
 from actionlib_core.wire.ros2.attachment import answer_to, unpack_attachment
@@ -16,9 +17,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection
 
     from actionlib_core.node import Node
-    from actionlib_core.transport import Closable, PublisherPort, Query, Reply, Sample
-    from actionlib_core.wire.end_port import OnEnd, Sender
-    from actionlib_core.wire.ros2.graph import End
+    from actionlib_core.transport import Closable, Query, Reply, Sample
+    from actionlib_core.wire.end_port import OnEnd
     from actionlib_core.wire.ros2.mapping import MessageOnRos2
     from actionlib_core.wire.ros2.names import Token
 
@@ -28,17 +28,6 @@ _KINDS = {
     Kind.SERVICE: EndKind.SERVICE,
 }
 _KINDS_THERE = {kind: there for there, kind in _KINDS.items()}
-
-
-class _RosSender:
-    def __init__(self, end: End, convert: Callable[[Any], Any], port: PublisherPort) -> None:
-        self._end = end
-        self._convert = convert
-        self._port = port
-        self.close = port.close
-
-    def put(self, message: Any) -> None:
-        self._port.put(self._convert(message).to_cdr(), self._end.attachment())
 
 
 class RosEndPort:
@@ -100,13 +89,14 @@ class RosEndPort:
         return [self._convert(token) for token in tokens]
 
     def send(self, *, latch: bool) -> Sender:
-        quality = Quality(express=True, cache=LATCHED.depth if latch else 0)
+        quality = Quality(block=False, cache=LATCHED.depth if latch else 0)
         if latch:
             ros = self._network.ros
             self._end = ros.end(Kind.PUBLISHER, self._name_there, self._type, LATCHED)
             self.own = self._convert(self._end.token)
-        port = self._network.transport.publisher(self._end.key, "", quality)
-        return _RosSender(self._end, self._message.to_ros2, port)
+        end, to_ros2 = self._end, self._message.to_ros2
+        port = self._network.transport.publisher(end.key, "", quality)
+        return Sender(lambda it: port.put(to_ros2(it).to_cdr(), end.attachment()), port.close)
 
     def receive(self, callback: Callable[[Sample], None]) -> Closable:
         return self._network.transport.subscribe(self._end.key, callback, cached=LATCHED.depth)

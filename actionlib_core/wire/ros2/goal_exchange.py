@@ -9,16 +9,22 @@ refuses it, so that a second sending that is refused has to be settled in the sa
 from __future__ import annotations
 
 import enum
-from typing import TYPE_CHECKING
 
+from actionlib_core.goal.states import Status
 from actionlib_core.wire.ros2.goal_states import ENDED, CancelCode, GoalCode, to_status
-
-if TYPE_CHECKING:
-    from actionlib_core.goal.states import Status
 
 # A server may forget a goal some time after its end, 10 s by default. Doubt that is settled later
 # than this after the goal was sent is settled no more: it may have run and been forgotten.
 SETTLED_S = 5.0
+
+
+TEXT_REFUSED = "the server refused the goal"
+TEXT_RECALLED = "This goal was canceled before any action server could have it"
+TEXT_UNKNOWN = "the action server does not know this goal: it has restarted or forgotten it"
+TEXT_UNSETTLED = (
+    "the answer to this goal was lost, and the action server does not know it now: it may or may "
+    "not have run"
+)
 
 
 class Phase(enum.Enum):
@@ -57,6 +63,15 @@ class Step(enum.Flag):
     """It is over: nobody can say whether the server has run it."""
     KEEPS_RUNNING = enum.auto()
     """The server has refused to cancel it."""
+
+
+ENDS = (
+    (Step.REFUSED, Status.REJECTED, TEXT_REFUSED),
+    (Step.RECALLED, Status.RECALLED, TEXT_RECALLED),
+    (Step.UNKNOWN, Status.LOST, TEXT_UNKNOWN),
+    (Step.UNSETTLED, Status.LOST, TEXT_UNSETTLED),
+)
+"""The steps with which a goal is over, and its status and text then."""
 
 
 class GoalExchange:

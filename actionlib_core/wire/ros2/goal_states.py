@@ -102,3 +102,30 @@ def draw_tables() -> str:
             f"| {code.value} {code.name.lower()} | `{seen}` | `{never}` | {', '.join(shown)} |"
         )
     return "\n".join(lines) + "\n"
+
+
+def reason_of(result: object) -> str:
+    """Return what a result says about why its goal has failed, "" where its type does not.
+
+    ROS 2 has no text beside a status. Nav2's results have `error_msg` and `error_code`, those of
+    controllers `error_string`.
+    """
+    text = getattr(result, "error_msg", "") or getattr(result, "error_string", "")
+    code = getattr(result, "error_code", 0)
+    words = [text] if isinstance(text, str) and text else []
+    if isinstance(code, int) and code:
+        words.append(f"(error code {code})" if words else f"error code {code}")
+    return " ".join(words)
+
+
+def give_reason(result: object, text: str) -> bool:
+    """Write into a result why its goal has failed, where its type has room and nobody did.
+
+    Returns:
+        Whether it was written; `reason_of` finds it then.
+    """
+    for name in ("error_msg", "error_string"):
+        if getattr(result, name, None) == "":
+            setattr(result, name, text)
+            return True
+    return False

@@ -83,11 +83,11 @@ class LinkProbe:
 
     def _look(self) -> None:
         self._timer = None
-        quiet = self._clock.now() - self.heard
+        left = self.heard + self._every - self._clock.now()  # rounded, it lets time pass
         if not self._wanted():
             self._keep(None)
-        elif quiet < self._every:
-            self._later(self._every - quiet, self._look)
+        elif left > 0:
+            self._later(left, self._look)
         else:
             self._later(min(self._every, WAIT_S), self._judge)
             try:

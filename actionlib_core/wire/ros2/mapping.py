@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from actionlib_core.config import Mapped, Ros2
     from actionlib_core.interfaces._sources import Kind
     from actionlib_core.node import Node
-    from actionlib_core.wire.action_messages import ActionTypes
+    from actionlib_core.wire.action_types import ActionTypes
 
     Convert = Callable[[Any], Any]
 

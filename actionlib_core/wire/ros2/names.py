@@ -25,6 +25,7 @@ UUID_BYTES = 16
 _FORBIDDEN = re.compile(r"[*$?#/%\s]|[^\x20-\x7e]")  # Zenoh's own characters, and the escape of "/"
 _TIMES = re.compile(r"\d*,\d*:\d*,\d*:[0-3]?,\d*,\d*", re.ASCII)
 _UUID = re.compile(r"[0-9a-f]{32}")
+_NUMBER = re.compile(r"[0-9]{1,20}")  # 64 bits
 
 
 class Kind(StrEnum):
@@ -60,7 +61,6 @@ class Qos(NamedTuple):
 
 DEFAULT = Qos()  # services, feedback, and a topic of which nothing was said
 LATCHED = Qos(latched=True, depth=1)  # the status of actions, maps
-SENSOR_DATA = Qos(reliable=False, depth=5)
 _UNWRITTEN_DEPTH = 42  # rmw_zenoh leaves out what equals its own default
 
 
@@ -195,7 +195,7 @@ def parse_token(key: str) -> Token | None:
         return None
     _, domain, session, node_id, entity_id, kind, enclave, namespace, node = words[:NODE_WORDS]
     numbers = (domain, node_id, entity_id)
-    if not all(words[:NODE_WORDS]) or not all(n.isascii() and n.isdecimal() for n in numbers):
+    if not all(words[:NODE_WORDS]) or not all(map(_NUMBER.fullmatch, numbers)):
         return None
     if kind not in _KINDS:
         return None
@@ -276,7 +276,7 @@ def parse_qos(text: str) -> Qos | None:
     ) and history in {"", "1", "2"}
     if not known or not _TIMES.fullmatch(rest):
         return None
-    if depth and not (depth.isascii() and depth.isdecimal()):
+    if depth and not _NUMBER.fullmatch(depth):
         return None
     return Qos(
         reliable=reliability != "2",

@@ -13,12 +13,13 @@ from actionlib_core.node import open_zenoh
 from actionlib_core.transport._keys import key_matches
 from actionlib_core.wire.ros2.graph import RosNode, RosType
 from actionlib_core.wire.ros2.names import HASH_NOT_SUPPORTED
+from actionlib_core.wire.ros2.parameters import serve_parameters
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from actionlib_core.node import Node
-    from actionlib_core.transport import Transport
+    from actionlib_core.transport import Closable, Transport
 
 _ids: weakref.WeakKeyDictionary[Transport, Iterator[int]] = weakref.WeakKeyDictionary()
 """What numbers the nodes and ends of a session, which several nodes of ours may share."""
@@ -81,7 +82,7 @@ class RosNetwork:
 
     Attributes:
         settings: Which network, as the configuration says.
-        ros: Our node there; shown since this was made.
+        ros: Our node there; shown since this was made, with its parameter services.
 
     Args:
         node: Our node; the network is left as it closes.
@@ -98,6 +99,7 @@ class RosNetwork:
         owned = bool(settings.router) and node.owns_transport
         transport = _join(node, settings) if owned else node.transport
         self._owned = transport if owned else None
+        self._parameters: list[Closable] = []
         try:
             ids = _ids.setdefault(transport, itertools.count())
             name = node.full_name
@@ -105,6 +107,7 @@ class RosNetwork:
                 transport, node.clock, domain=settings.domain, full_name=name, ids=ids
             )
             self.ros.show()
+            self._parameters = serve_parameters(self.ros, settings.distro)
             node.on_close(self._close)
         except BaseException:
             self._close()
@@ -128,6 +131,8 @@ class RosNetwork:
         if self._owned is not None:
             self._owned.close()
         elif hasattr(self, "ros"):
+            for declared in reversed(self._parameters):
+                declared.close()
             self.ros.close()
 
 

@@ -36,7 +36,7 @@ from actionlib_core.wire.ros2.action_messages import (
     with_status,
 )
 from actionlib_core.wire.ros2.attachment import answer_to, unpack_attachment
-from actionlib_core.wire.ros2.goal_states import ENDED, CancelCode, GoalCode, to_code
+from actionlib_core.wire.ros2.goal_states import ENDED, CancelCode, GoalCode, give_reason, to_code
 from actionlib_core.wire.ros2.mapping import action_on_ros2
 from actionlib_core.wire.ros2.names import (
     DEFAULT,
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from actionlib_core.goal.ports import ServerListener, StatusEntry
     from actionlib_core.node import Node
     from actionlib_core.transport import Closable, PublisherPort, Query
-    from actionlib_core.wire.action_messages import ActionTypes
+    from actionlib_core.wire.action_types import ActionTypes
     from actionlib_core.wire.ros2.action_messages import Asked
     from actionlib_core.wire.ros2.attachment import Attachment
     from actionlib_core.wire.ros2.graph import End
@@ -93,16 +93,7 @@ class _Undecided(NamedTuple):
 
 
 class RosServerPort:
-    """Declares the ends of an action server on a ROS 2 network and speaks there.
-
-    Args:
-        node: On whose network.
-        name: The action's full name here.
-        types: Its message classes.
-
-    Raises:
-        ConfigError: no network of ROS 2 has the name, or the action has no counterpart there.
-        TransportError: the network cannot be joined.
+    """The ends of an action server on a ROS 2 network; see `ports.make_server_port`.
 
     Threads: any. The listener is called on the network's threads.
     """
@@ -272,7 +263,15 @@ class RosServerPort:
         self._decide(entry.id, accepted=entry.status != Status.REJECTED)
         if entry.status in _BEFORE_CANCEL:
             self.send_status(())  # tells whether it has run, which the result does not
-        self._answer(entry.id, with_status(body, self._code(entry)))
+        self._answer(entry.id, self._response(entry, body))
+
+    def _response(self, entry: StatusEntry, body: bytes) -> bytes:
+        """Return a result's response: with its status and, where its type has that, the reason."""
+        if entry.text and entry.status in {Status.ABORTED, Status.REJECTED}:
+            response = self._response_class.from_cdr(body)
+            if give_reason(response.result, entry.text):
+                body = response.to_cdr()
+        return with_status(body, self._code(entry))
 
     def send_feedback(self, entry: StatusEntry, body: bytes) -> None:
         payload = pack_with_id(goal_uuid(entry.id), body)
@@ -378,7 +377,7 @@ class RosServerPort:
         if entry.status == Status.REJECTED and goal_id in self._undecided:
             return  # about to be answered by who refuses it
         if body is not None:
-            self._answer(goal_id, with_status(body, self._code(entry)))
+            self._answer(goal_id, self._response(entry, body))
         elif entry.status in TERMINAL or entry.status == Status.LOST:
             self._answer(goal_id, self._unknown)
 

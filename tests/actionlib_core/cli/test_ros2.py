@@ -204,3 +204,11 @@ def test_who_waits_for_a_server_without_limit_is_told_where_it_is_looked_for(rob
     timer.cancel()
     assert said.count("no server yet: looked at the program's own network in domain 42") == 1
     late[0].close()
+
+
+@pytest.mark.parametrize("words", [["--ros2", "tcp/a:1"], ["--domain=4"]])
+def test_an_option_of_the_whole_command_after_the_verb_is_told_where_it_belongs(words, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(["topic", "list", *words])
+    assert caught.value.code == 2
+    assert f"Try {words[0].partition('=')[0]} before the verb" in capsys.readouterr().err

@@ -184,6 +184,14 @@ def test_serial_executor_runs_in_order_one_at_a_time(any_clock):
     assert order == list(range(20))
 
 
+def test_join_of_a_serial_executor_waits_for_what_no_thread_has_taken_yet(any_clock):
+    """Between two of its threads the next has not begun, and nothing runs."""
+    executor, ran = SerialExecutor(any_clock, "serial"), []
+    executor._queue.append(lambda: ran.append(1))
+    assert executor.join(5)
+    assert ran == [1]
+
+
 def test_serial_executor_goes_on_after_an_error(any_clock, monkeypatch):
     reported, order = [], []
     monkeypatch.setattr(threading, "excepthook", lambda args: reported.append(args.exc_type))
@@ -197,8 +205,14 @@ def test_serial_executor_goes_on_after_an_error(any_clock, monkeypatch):
 @pytest.mark.parametrize("raised", [SystemExit, KeyboardInterrupt, asyncio.CancelledError])
 def test_serial_executor_goes_on_after_what_ends_a_thread(any_clock, monkeypatch, caplog, raised):
     """What was queued never ran, in silence."""
-    reported, order = [], []
-    monkeypatch.setattr(threading, "excepthook", lambda args: reported.append(args.exc_type))
+    reported, order, all_reported = [], [], any_clock.event()
+
+    def report(args):
+        reported.append(args.exc_type)
+        if len(reported) == 3:
+            all_reported.set()
+
+    monkeypatch.setattr(threading, "excepthook", report)
     executor = SerialExecutor(any_clock, "serial")
     begin = any_clock.event()
 
@@ -220,6 +234,7 @@ def test_serial_executor_goes_on_after_what_ends_a_thread(any_clock, monkeypatch
         assert (reported, len(told)) == ([], 3)
         assert "serial: a callback raised SystemExit: enough" in told[0]
     else:
+        assert all_reported.wait(5)  # by threads that end beside the one that has gone on
         assert (reported, told) == ([raised] * 3, [])
 
 
@@ -231,6 +246,23 @@ def test_serial_executor_of_a_closed_clock_runs_nothing_more():
         executor.submit(lambda: ran.append(1))
         clock.sleep(0.5)
     assert ran == []
+
+
+def test_serial_executor_takes_what_a_signal_handler_submits_amid_a_submit():
+    """The handler waited for ever for the lock of the `submit` that it had interrupted."""
+    clock, order, depth = RealClock(), [], []
+
+    def spawn(target, *, name):
+        depth.append(len(depth))
+        if len(depth) == 1:  # here the signal comes
+            executor.submit(lambda: order.append("handler"))
+        return clock.spawn(target, name=name)
+
+    executor = SerialExecutor(clock, "serial", spawn)
+    program = clock.spawn(lambda: executor.submit(lambda: order.append("program")), name="program")
+    assert program.join(5)
+    assert executor.join(5)
+    assert (order, depth) == (["program", "handler"], [0])
 
 
 def test_serial_executor_accepts_work_from_its_own_work(any_clock):

@@ -15,7 +15,7 @@ from time import sleep as imported_sleep
 
 import pytest
 
-from actionlib_core.clock import Deadlock, VirtualClock, current_clock, use_clock
+from actionlib_core.clock import Deadlock, VirtualClock, _patched, current_clock, use_clock
 
 
 @pytest.fixture
@@ -46,6 +46,26 @@ def test_negative_sleep_raises_as_ever_and_zero_lets_others_run(patched):
     while not flag:
         time.sleep(0)
     assert patched.now() < 0.01
+
+
+def test_ctrl_c_while_names_are_replaced_leaves_python_as_it_was(monkeypatch):
+    real, search, modules = time.sleep, _patched._search, iter(range(1000))
+
+    def interrupted(name, names):
+        if next(modules) == 100:
+            raise KeyboardInterrupt
+        return search(name, names)
+
+    with VirtualClock() as clock:
+        with monkeypatch.context() as patch:
+            patch.setattr(_patched, "_search", interrupted)
+            with pytest.raises(KeyboardInterrupt), clock.patched():
+                pytest.fail("the block is not entered")
+        assert time.sleep is real is imported_sleep
+        with clock.patched():
+            imported_sleep(5)
+        assert clock.now() == 5
+    assert time.sleep is real is imported_sleep
 
 
 def test_python_is_as_it_was_after_the_block():
@@ -255,7 +275,7 @@ def test_threads_and_locks_of_the_house_stay_real(patched):
     from actionlib_core.clock import SerialExecutor
 
     executor = SerialExecutor(patched, "serial")
-    assert type(executor._lock) is type(__import__("_thread").allocate_lock())
+    assert type(executor._busy) is type(__import__("_thread").allocate_lock())
     executor.submit(lambda: time.sleep(5))
     assert executor.join()
     assert patched.now() == 5

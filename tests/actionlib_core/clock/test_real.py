@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 
@@ -119,3 +121,45 @@ def test_what_is_spawned_while_the_program_ends_waits_for_a_thread_that_was_kept
     assert timer.wait(20.0)
     with pytest.raises(RuntimeError, match="can't create new thread"):
         other.spawn(int, name="nobody asked for threads at the end")
+
+
+FORK = """
+import os
+from actionlib_core.clock import RealClock
+
+clock = RealClock()
+held, leave = clock.event(), clock.event()
+clock.spawn(held.clear, name="idle").join()
+clock.call_later(600.0, leave.set)
+
+def hold():
+    with clock._timer_lock:  # as a thread of the parent may have it at this moment
+        held.set()
+        leave.wait()
+
+holder = clock.spawn(hold, name="holder")
+held.wait()
+pid = os.fork()
+if pid == 0:
+    spawned, timed = clock.event(), clock.event()
+    clock.spawn(spawned.set, name="spawned")
+    clock.call_later(0.001, timed.set)
+    print(spawned.wait(60.0), timed.wait(60.0), flush=True)
+    os._exit(0)
+os.waitpid(pid, 0)
+leave.set()
+holder.join()
+timed = clock.event()
+clock.call_later(0.001, timed.set)
+print(timed.wait(60.0), flush=True)
+os._exit(0)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+def test_a_forked_child_has_threads_and_timers_of_its_own():
+    """Its timers never came, as the thread of its parent's timers was not there."""
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", FORK], capture_output=True, text=True, timeout=120
+    )
+    assert done.stdout.split() == ["True", "True", "True"], done.stderr

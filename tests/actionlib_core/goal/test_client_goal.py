@@ -129,6 +129,13 @@ def test_ack_timeout_loses_the_goal():
     assert goal.text == "no action server took this goal within 3 s"
 
 
+def test_attached_goal_cancelled_before_it_is_asked_for_is_cancelled_at_its_server():
+    goal = ClientGoal("g", attached=True)
+    path, duty = goal.cancel(0.0)
+    assert (path, duty) == ((C.WAITING_FOR_CANCEL_ACK,), Duty.CANCEL)
+    assert not goal.over
+
+
 def test_attached_goal_is_asked_for_and_never_sent():
     goal = ClientGoal("g", attached=True)
     assert goal.begin(0.0) is Duty.ASK

@@ -6,11 +6,40 @@ import hypothesis.strategies as st
 import pytest
 from hypothesis import given
 
+from actionlib_core.goal.server import ServerGoal
 from actionlib_core.goal.single import POLICIES, SingleGoal
+from actionlib_core.goal.states import Status
+
+
+class Goal(str):  # noqa: SLOT000  it has an attribute
+    """A goal that tests call by its name."""
+
+    def __init__(self, name):
+        self.record = ServerGoal(name, 0)
+
+
+class Policy(SingleGoal):
+    """The policy, with goals called by their names."""
+
+    def __init__(self, *policy):
+        super().__init__(*policy)
+        self.goals = {}
+
+    def named(self, name):
+        return self.goals.setdefault(name, Goal(name))
+
+    def on_goal(self, name, stamp_ns):
+        return super().on_goal(self.named(name), stamp_ns)
+
+    def on_cancel(self, name, *, recall_waiting):
+        return super().on_cancel(self.named(name), recall_waiting=recall_waiting)
+
+    def end(self, name):
+        self.named(name).record.status = Status.SUCCEEDED
 
 
 def test_newer_goal_preempts_and_the_waiting_one_is_recalled():
-    policy = SingleGoal()
+    policy = Policy()
     assert policy.on_goal("a", 1).announce
     assert policy.accept() == ("a", None)
     first = policy.on_goal("b", 2)
@@ -18,13 +47,13 @@ def test_newer_goal_preempts_and_the_waiting_one_is_recalled():
     second = policy.on_goal("c", 3)
     assert (second.preempt, second.recall) == (True, ("b",))
     assert policy.preempt_requested
-    policy.on_ended("a")
+    policy.end("a")
     assert policy.accept() == ("c", None)
     assert not policy.preempt_requested
 
 
 def test_goal_with_an_older_stamp_is_recalled():
-    policy = SingleGoal()
+    policy = Policy()
     policy.on_goal("a", 5)
     policy.accept()
     decision = policy.on_goal("old", 4)
@@ -34,7 +63,7 @@ def test_goal_with_an_older_stamp_is_recalled():
 
 
 def test_accepting_while_one_runs_pushes_it_aside():
-    policy = SingleGoal()
+    policy = Policy()
     policy.on_goal("a", 1)
     policy.accept()
     policy.on_goal("b", 2)
@@ -42,7 +71,7 @@ def test_accepting_while_one_runs_pushes_it_aside():
 
 
 def test_cancel_of_the_waiting_goal_recalls_it_or_starts_it_preempted():
-    policy = SingleGoal()
+    policy = Policy()
     policy.on_goal("a", 1)
     assert policy.on_cancel("a", recall_waiting=True).recall == ("a",)
     assert policy.accept() == (None, None)
@@ -54,7 +83,7 @@ def test_cancel_of_the_waiting_goal_recalls_it_or_starts_it_preempted():
 
 def test_each_goal_of_a_queue_is_cancelled_for_itself():
     """A cancel counted only for the goal that was next."""
-    policy, names = SingleGoal("queue"), ["a", "b", "c", "d"]
+    policy, names = Policy("queue"), ["a", "b", "c", "d"]
     for name in names:
         policy.on_goal(name, 1)
     assert policy.on_cancel("c", recall_waiting=False).recall == ()
@@ -63,14 +92,14 @@ def test_each_goal_of_a_queue_is_cancelled_for_itself():
     for name in names:
         assert policy.accept()[0] == name
         preempted.append(policy.preempt_requested)
-        policy.on_ended(name)
+        policy.end(name)
     assert preempted == [False, False, True, True]
 
 
 @pytest.mark.parametrize("policy_name", POLICIES)
 def test_cancel_of_a_goal_that_is_withdrawn_preempts_no_other(policy_name):
     """The next goal began as if it had been cancelled."""
-    policy = SingleGoal(policy_name)
+    policy = Policy(policy_name)
     policy.on_goal("a", 1)
     policy.on_cancel("a", recall_waiting=False)
     assert policy.withdraw() == "a"
@@ -80,25 +109,25 @@ def test_cancel_of_a_goal_that_is_withdrawn_preempts_no_other(policy_name):
 
 
 def test_queue_runs_goals_in_order_and_preempts_none():
-    policy = SingleGoal("queue")
+    policy = Policy("queue")
     policy.on_goal("a", 3)
     policy.accept()
     for name, stamp in (("b", 2), ("c", 1)):
         decision = policy.on_goal(name, stamp)
         assert (decision.preempt, decision.recall) == (False, ())
-    policy.on_ended("a")
+    policy.end("a")
     assert policy.accept()[0] == "b"
-    policy.on_ended("b")
+    policy.end("b")
     assert policy.accept()[0] == "c"
 
 
 def test_reject_turns_goals_away_while_one_runs_or_waits():
-    policy = SingleGoal("reject")
+    policy = Policy("reject")
     policy.on_goal("a", 1)
     assert policy.on_goal("b", 2).reject == "b"
     policy.accept()
     assert policy.on_goal("c", 3).reject == "c"
-    policy.on_ended("a")
+    policy.end("a")
     assert policy.on_goal("d", 4).announce
 
 
@@ -112,7 +141,7 @@ def test_unknown_policy_names_the_known():
     st.lists(st.tuples(st.sampled_from("gcae"), st.integers(0, 5)), max_size=40),
 )
 def test_every_goal_is_accepted_or_turned_away_once(policy_name, events):
-    policy = SingleGoal(policy_name)
+    policy = Policy(policy_name)
     sent, fate = [], {}
 
     def note(goals, what):
@@ -135,7 +164,7 @@ def test_every_goal_is_accepted_or_turned_away_once(policy_name, events):
             assert pushed is None
             note([new] if new else [], "accepted")
         elif kind == "e" and policy.current:
-            policy.on_ended(policy.current)
+            policy.end(policy.current)
     while policy.waiting:
         note([policy.accept()[0]], "accepted")
     assert set(fate) == set(sent)

@@ -23,7 +23,6 @@ def cable(monkeypatch):
     cable.close()
 
 
-@pytest.mark.timeout(120)
 @pytest.mark.parametrize("broken", [False, True], ids=["it held", "connections were reset"])
 def test_goals_are_lost_while_the_cable_is_cut_and_run_again_after_it(
     own_ros, cable, bridge, node, broken

@@ -18,7 +18,7 @@ from actionlib_core.wire.ros1.actions import action_type
 from actionlib_core.wire.ros1.answers import Names, SystemState
 from actionlib_core.wire.ros1.goals import GoalsOfClients, GoalsOfServer, Verdict
 from actionlib_core.wire.ros1.node import check_master
-from actionlib_core.wire.ros1.plan import Wanted, make_plan, without
+from actionlib_core.wire.ros1.plan import Plan, Wanted, make_plan, without
 from actionlib_core.wire.ros1.publishers import Publishers
 from actionlib_core.wire.ros1.sides import Sides, Typed, type_of
 
@@ -252,11 +252,11 @@ def end(kind, name):
     return Endpoint(kind, name.strip("/"), "a/B", "md5", "session", "node")
 
 
-def plan(wanted, ends=(), state=STATE):
+def plan(wanted, ends=(), state=STATE, looked_for=()):
     by_name = {}
     for each in ends:
         by_name.setdefault(f"/{each.name}", []).append(each)
-    return make_plan(wanted, by_name, state, ACTION_TOPICS)
+    return make_plan(wanted, by_name, state, ACTION_TOPICS, looked_for)
 
 
 def test_names_alone_are_bridged_when_they_are_given():
@@ -282,6 +282,16 @@ def test_what_is_used_here_is_bridged():
     assert made.services == {"/clear": True, "/ours": False}
     assert plan(Wanted(used=True)).topics == {}
     assert plan(Wanted(used=True)).actions == {"/nav": "m/NavAction"}
+
+
+def test_on_demand_nothing_is_bridged_that_nobody_uses():
+    wanted = Wanted(on_demand=True)
+    assert plan(wanted) == Plan({}, {}, {})
+    ends = [end(Kind.SUBSCRIBER, "/scan"), end(Kind.ACTION_CLIENT, "/nav")]
+    made = plan(wanted, ends, looked_for=["/clear", "/nowhere"])
+    assert made == Plan({"/nav": "m/NavAction"}, {"/scan": True}, {"/clear": True})
+    left = plan(Wanted(on_demand=True, leave_out=("/sc*", "*av")), ends, looked_for=["/clear"])
+    assert left == Plan({}, {}, {"/clear": True})
 
 
 def test_all_is_all_but_the_log_and_the_topics_of_actions():

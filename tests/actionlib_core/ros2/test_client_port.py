@@ -22,10 +22,12 @@ from actionlib_core.node import Node
 from actionlib_core.transport.faulty import FaultyTransport
 from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.wire.ros2.action_messages import pack_accepted
-from actionlib_core.wire.ros2.client_port import ANSWER_S, AT_ONCE
+from actionlib_core.wire.ros2.client_port import AT_ONCE
 from actionlib_core.wire.ros2.goal_exchange import SETTLED_S
 from actionlib_core.wire.ros2.graph import RosNode
+from actionlib_core.wire.ros2.link_probe import LinkProbe
 from actionlib_core.wire.ros2.names import Kind, goal_uuid
+from actionlib_core.wire.ros2.question import ANSWER_S
 from tests.ros2_server import Ros2Server
 
 
@@ -528,6 +530,24 @@ def test_silent_server_that_is_heard_again_gets_its_goals_back(world):
     assert server.sent == [uuid]
 
 
+def test_look_that_rounding_makes_come_too_early_lets_time_pass(clock):
+    asked = []
+
+    def ask():
+        asked.append(clock.now())
+        return contextlib.ExitStack()
+
+    probe = LinkProbe(clock, 5.0, ask, lambda: True, asked.append)
+    clock.sleep(26.5)
+    probe.watch()
+    clock.sleep(4.8)
+    probe.hear()
+    assert clock.now() + 0.2 + (5.0 - 0.2) - probe.heard < 5.0
+    clock.sleep(5.5)
+    probe.close()
+    assert asked == [pytest.approx(36.3)]
+
+
 def test_probe_can_be_left_out(world):
     server, client = world.server(), world.client(world.node(world.link, probe=0.0))
     handle, uuid, _ = begin(server, client)
@@ -545,13 +565,13 @@ def test_probe_can_be_left_out(world):
 def test_client_shows_its_node_and_five_ends_and_takes_them_back(world):
     looker = RosNode(world.session(), world.clock, domain=0, full_name="looker")
     client = ActionClient("fib", Fibonacci, node=world.mission)
-    tokens = looker.list()
+    tokens = [token for token in looker.list() if token.kind is not Kind.SERVICE]  # parameters
     assert sorted(token.kind for token in tokens) == sorted(
         [Kind.NODE, *3 * [Kind.CLIENT], *2 * [Kind.SUBSCRIPTION]]
     )
     assert {token.node for token in tokens} == {"mission"}
     client.stop()
-    assert [token.kind for token in looker.list()] == [Kind.NODE]
+    assert {token.kind for token in looker.list()} == {Kind.NODE, Kind.SERVICE}
 
 
 def test_closed_client_leaves_no_question_open(world):

@@ -19,8 +19,8 @@ from actionlib_core.wire.ros2.names import (
     DEFAULT,
     HASH_NOT_SUPPORTED,
     LATCHED,
-    SENSOR_DATA,
     Kind,
+    Qos,
     Token,
     action_names,
 )
@@ -90,7 +90,12 @@ def test_latched_and_lossy_topics_are_named():
     found = diagnose_qos(
         [
             end(Kind.PUBLISHER, "map", "nav_msgs/msg/OccupancyGrid", qos=LATCHED),
-            end(Kind.PUBLISHER, "scan", "sensor_msgs/msg/LaserScan", qos=SENSOR_DATA),
+            end(
+                Kind.PUBLISHER,
+                "scan",
+                "sensor_msgs/msg/LaserScan",
+                qos=Qos(reliable=False, depth=5),
+            ),
             end(Kind.SUBSCRIPTION, "odom", "nav_msgs/msg/Odometry", qos=None),
             *action(),
         ]
@@ -104,13 +109,21 @@ def test_latched_and_lossy_topics_are_named():
     [(0.01, Level.OK), (-0.05, Level.OK), (3.0, Level.PROBLEM), (-0.5, Level.PROBLEM)],
 )
 def test_clocks_that_differ(offset, level):
-    assert diagnose_clock(offset, 0.02).level is level
+    clocks = {"nav": (0.0, 0.001), "amcl": (offset, 0.02)}
+    found = diagnose_clock(clocks)
+    assert found.level is level
+    assert ("/amcl" in found.text) == (level is Level.PROBLEM)
 
 
 def test_nodes_that_do_not_answer():
-    assert diagnose_answers("nav/get_parameters", None).level is Level.PROBLEM
-    assert diagnose_answers("nav/get_parameters", 0.01).level is Level.OK
-    assert diagnose_answers("nav/get_parameters", 2.0).level is Level.NOTE
+    silent = diagnose_answers({"nav": None, "amcl": 0.01})
+    assert silent.level is Level.PROBLEM
+    assert "/nav" in silent.text
+    assert "/amcl" not in silent.text
+    assert diagnose_answers({"nav": 0.0, "amcl": 0.01}).level is Level.OK
+    slow = diagnose_answers({"nav": 2.0, "amcl": 0.01})
+    assert slow.level is Level.NOTE
+    assert "/nav, answers in 2000 ms" in slow.text
 
 
 def test_humble_is_told_by_its_hashes():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -14,6 +15,8 @@ from actionlib_core.wire.ros2.goal_states import (
     TO_STATUS_NEVER_ACTIVE,
     GoalCode,
     draw_tables,
+    give_reason,
+    reason_of,
     to_code,
     to_status,
 )
@@ -62,3 +65,35 @@ def test_the_table_of_the_documentation_is_the_one_that_runs() -> None:
         assert f"| {code.value} {code.name.lower()} |" in drawn
     for status in Status:
         assert f"`{status.name}`" in drawn
+
+
+@pytest.mark.parametrize(
+    ("fields", "reason"),
+    [
+        ({}, ""),
+        ({"error_code": 0, "error_msg": ""}, ""),
+        ({"error_code": 9000, "error_msg": "no way"}, "no way (error code 9000)"),
+        ({"error_code": 9000, "error_msg": ""}, "error code 9000"),
+        ({"error_code": -5, "error_string": "goal tolerance"}, "goal tolerance (error code -5)"),
+        ({"error_code": SimpleNamespace(val=1)}, ""),
+        ({"error_msg": 7, "error_code": "7"}, ""),
+    ],
+)
+def test_reason_in_a_result(fields, reason):
+    assert reason_of(SimpleNamespace(**fields)) == reason
+
+
+@pytest.mark.parametrize(
+    ("fields", "given"),
+    [
+        ({}, False),
+        ({"error_msg": ""}, True),
+        ({"error_string": ""}, True),
+        ({"error_msg": "said"}, False),
+        ({"error_msg": 0}, False),
+    ],
+)
+def test_reason_for_a_result(fields, given):
+    result = SimpleNamespace(**fields)
+    assert give_reason(result, "no way") is given
+    assert (reason_of(result) == "no way") is given

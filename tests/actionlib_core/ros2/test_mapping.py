@@ -16,7 +16,7 @@ from actionlib_core.interfaces.nav2_msgs.action import NavigateToPose
 from actionlib_core.interfaces.std_srvs.srv import SetBool
 from actionlib_core.node import Node
 from actionlib_core.transport.memory import MemoryNetwork
-from actionlib_core.wire.action_messages import ActionTypes
+from actionlib_core.wire.action_types import ActionTypes
 from actionlib_core.wire.ros2.mapping import (
     action_on_ros2,
     find_network,

@@ -14,7 +14,6 @@ from actionlib_core.wire.ros2.names import (
     DEFAULT,
     LATCHED,
     NO_GOAL,
-    SENSOR_DATA,
     ActionNames,
     Kind,
     Qos,
@@ -164,9 +163,15 @@ def test_any_text_is_a_token_or_none(text: str) -> None:
     "@ros2_lv/42/a/0/0/SS/%/%/n/%x/T",
     "@ros2_lv/42/a/0/0/SS/%/%/n/%x//h/::,10:,:,:,,",
     "@other/42/a/0/0/NN/%/%/n",
+    f"@ros2_lv/{9:0>5000}/a/0/0/NN/%/%/n",
+    f"@ros2_lv/42/a/0/{9:0>5000}/NN/%/%/n",
 ])  # fmt: skip
 def test_what_is_no_token(key: str) -> None:
     assert parse_token(key) is None
+
+
+def test_quality_of_service_that_nobody_could_have_written() -> None:
+    assert parse_qos(f"::,{9:0>5000}:,:,:,,") is None
 
 
 @pytest.mark.parametrize(("part", "value"), [
@@ -189,7 +194,7 @@ def test_a_key_that_no_node_could_read_is_not_made(full_name: str) -> None:
 @pytest.mark.parametrize(("quality", "text"), [
     (DEFAULT, "::,10:,:,:,,"),
     (LATCHED, ":1:,1:,:,:,,"),
-    (SENSOR_DATA, "2::,5:,:,:,,"),
+    (Qos(reliable=False, depth=5), "2::,5:,:,:,,"),
     (Qos(latched=True, depth=1000, rest=",:10,0:,,"), ":1:,1000:,:10,0:,,"),
     (Qos(depth=42, keep_all=True), "::2,:,:,:,,"),
 ])  # fmt: skip

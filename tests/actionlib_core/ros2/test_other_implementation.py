@@ -48,10 +48,16 @@ def answer(request):
 
 server = sdk.ROS2ServiceServer("/other_flag", "std_srvs/srv/SetBool", answer, **flag, **where)
 client = sdk.ROS2ServiceClient("/our_flag", "std_srvs/srv/SetBool", **flag, **where)
+parameters = sdk.ROS2ServiceClient(
+    "/mission/get_parameter_types", "rcl_interfaces/srv/GetParameterTypes",
+    request_definition="string[] names\\n", response_definition="uint8[] types\\n", **where
+)
 say("ready")
 for line in sys.stdin:
     if line == "speak\\n":
         speaker.publish(data="good morning")
+    elif line == "parameters\\n":
+        say("types", parameters.call(names=["use_sim_time"]).types.tolist())
     else:
         response = client.call(data=True)
         say("answer", response.success, response.message)
@@ -112,4 +118,6 @@ def test_topics_and_services_both_ways(robot: Ros2Robot, other: subprocess.Popen
     assert heard == [String(data="good morning")]
     tell(other, "call")
     assert wait_for(other, "answer") == "answer True ours"
+    tell(other, "parameters")
+    assert wait_for(other, "types") == "types [1]"
     assert proxy(data=True) == SetBool.Response(success=False, message="other")

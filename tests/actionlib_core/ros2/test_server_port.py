@@ -17,6 +17,7 @@ from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.goal.states import Status
 from actionlib_core.interfaces import ros2
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseFeedback
+from actionlib_core.interfaces.nav2_msgs.action import NavigateToPose
 from actionlib_core.interfaces.ros2.test_msgs.action import Fibonacci
 from actionlib_core.node import Node
 from actionlib_core.transport.memory import MemoryNetwork
@@ -32,6 +33,7 @@ from actionlib_core.wire.ros2.attachment import Attachment, pack_attachment
 from actionlib_core.wire.ros2.goal_states import GoalCode
 from actionlib_core.wire.ros2.graph import RosType
 from actionlib_core.wire.ros2.names import NO_GOAL, Kind
+from actionlib_core.wire.ros2.parameters import SERVICES
 from actionlib_core.wire.ros2.server_port import DECISION_S, choose_cancelled, list_skipped
 from tests.ros2_client import Ros2Client
 
@@ -129,6 +131,23 @@ def test_a_goal_from_acceptance_to_result(world: World) -> None:
     world.settle()
     assert codes(client) == {uuid: 4}
     assert client.problems == []
+
+
+@pytest.mark.parametrize(("own", "said"), [("", "no way"), ("blocked", "blocked")])
+def test_the_reason_of_a_failure_is_in_the_result(world: World, own: str, said: str) -> None:
+    ActionServer("drive", NavigateToPose, world.goals.append, node=world.node)
+    session = world.network.session()
+    client = Ros2Client(session, world.clock, "drive", NavigateToPose)
+    world.closing += [session.close, client.close]
+    assert client.ready.wait(5.0)
+    uuid = new_id()
+    client.send(uuid, NavigateToPose.Goal())
+    early = client.result(uuid)
+    world.clock.sleep(0.01)
+    world.goals[0].set_accepted()
+    world.goals[0].set_aborted(NavigateToPose.Result(error_code=7, error_msg=own), "no way")
+    for asked in (early, client.result(uuid)):
+        assert client.end_of(asked) == (6, NavigateToPose.Result(error_code=7, error_msg=said))
 
 
 def test_statuses_are_sent_when_something_changes_and_not_again(world: World) -> None:
@@ -421,7 +440,10 @@ def test_the_tokens_of_a_server(world: World) -> None:
     action_server = world.serve()
     client = world.client()
     tokens = [t for t in client.node.list() if t.session == world.node.transport.session_id]
-    assert sorted((t.kind, t.name) for t in tokens) == sorted(
+    assert {t.name for t in tokens if t.name.startswith("robot/")} == {
+        f"robot/{service}" for service in SERVICES
+    }
+    assert sorted((t.kind, t.name) for t in tokens if not t.name.startswith("robot/")) == sorted(
         [
             (Kind.NODE, ""),
             (Kind.SERVICE, "fib/_action/send_goal"),

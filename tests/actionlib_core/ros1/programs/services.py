@@ -1,4 +1,4 @@
-"""Services of ROS 1: serves `NAME`; each line of standard input `SERVICE BOOL` is a call,
+"""Services of ROS 1: serves each `NAME`; each line of standard input `SERVICE BOOL` is a call,
 `SERVICE persistent` two on one connection."""
 
 import sys
@@ -15,7 +15,7 @@ def handle(request):
     return SetBoolResponse(True, "by ROS 1")
 
 
-service = rospy.Service(sys.argv[1], SetBool, handle)
+services = [rospy.Service(name, SetBool, handle) for name in sys.argv[1:]]
 print("ready", flush=True)
 for line in sys.stdin:
     name, value = line.split()

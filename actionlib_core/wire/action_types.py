@@ -1,0 +1,51 @@
+"""The message classes of an action, which the user gives as one class."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from actionlib_core.exceptions import ActionException
+
+
+@dataclass(frozen=True, slots=True)
+class ActionTypes:
+    """The message classes of an action.
+
+    Attributes:
+        action: XAction, as the user gave it.
+        action_goal: XActionGoal, with header and goal id around the goal; that of a ROS 2 action
+            never travels, nor do the next two.
+        action_result: XActionResult, with header and status around the result.
+        action_feedback: XActionFeedback, with header and status around the feedback.
+        goal: XGoal.
+        result: XResult.
+        feedback: XFeedback.
+    """
+
+    action: Any
+    action_goal: Any
+    action_result: Any
+    action_feedback: Any
+    goal: Any
+    result: Any
+    feedback: Any
+
+    @classmethod
+    def of(cls, spec: Any) -> ActionTypes:
+        """Read the classes off an action class, as ROS 1 code does.
+
+        Raises:
+            ActionException: `spec` is not the class of an action.
+        """
+        try:
+            example = spec()
+            parts = example.action_goal, example.action_result, example.action_feedback
+            inner = parts[0].goal, parts[1].result, parts[2].feedback
+        except (AttributeError, TypeError) as error:
+            raise ActionException(
+                f"ActionSpec: got {spec!r}; expected an action class such as "
+                "actionlib_core.interfaces.move_base_msgs.msg.MoveBaseAction. Try the name that "
+                "ends with 'Action'."
+            ) from error
+        return cls(spec, *(type(part) for part in parts), *(type(part) for part in inner))

@@ -1,0 +1,676 @@
+"""An action on our own wire: its keys, the bytes of its messages, and both ends that speak it.
+
+The five topics of ROS 1 actionlib under the action's name, each with its ROS message, and two
+additions of ours: clients acknowledge results on `ack`, and a query on `result` asks for what was
+missed. `docs/wire_protocol.md` describes them for writers of other clients.
+"""
+
+from __future__ import annotations
+
+import logging
+import struct
+import threading
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from actionlib_core.exceptions import ActionlibError, ServerConflictError, TransportError
+from actionlib_core.goal.ports import StatusEntry
+from actionlib_core.interfaces._message import codecs_of
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
+from actionlib_core.transport import Quality
+from actionlib_core.wire.arrivals import Bursts, Readable
+from actionlib_core.wire.encoding import encoding_of
+from actionlib_core.wire.presence import (
+    Kind,
+    find_mismatch,
+    in_conflict,
+    is_younger,
+    list_endpoints,
+    parse_token,
+    token_key,
+    token_pattern,
+    with_age,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from actionlib_core.goal.ports import ClientListener, ServerListener
+    from actionlib_core.node import Node
+    from actionlib_core.transport import (
+        Closable,
+        Presence,
+        PublisherPort,
+        Query,
+        Reply,
+        Sample,
+        Transport,
+    )
+    from actionlib_core.wire.action_types import ActionTypes
+    from actionlib_core.wire.presence import Endpoint
+
+log = logging.getLogger(__name__)
+
+ASK_TIMEOUT_S = 2.0
+GOAL = Quality(express=True, block=True)
+AGAIN = Quality(express=True, block=False)  # what is repeated anyway need not wait for a full link
+ACK = Quality(express=False, block=False)
+FAREWELL_LIST_S = 0.2
+RESULT = Quality(express=True, block=True)
+RESULT_OR_NOT = Quality(express=True, block=False)  # a client that misses it asks for it
+FEEDBACK = Quality(express=False, block=True)
+STATUS = Quality(express=False, block=False)  # said again every second: never worth waiting
+
+_U32 = struct.Struct("<I")
+_HEADER = struct.Struct("<IIII")  # seq, stamp, length of the frame_id
+_ID = struct.Struct("<III")  # stamp, length of the id
+_FRONT = struct.Struct("<IIIIIII")  # a header with an empty frame_id, then stamp, length of the id
+_TAIL = struct.Struct("<BI")  # status, length of its text
+_NS = 1_000_000_000
+
+
+class ActionKeys(NamedTuple):
+    """The keys of one action."""
+
+    goal: str
+    cancel: str
+    status: str
+    feedback: str
+    result: str
+    ack: str
+
+
+def action_keys(name: str) -> ActionKeys:
+    """Return the keys of the action `name` (resolved, no slash in front)."""
+    return ActionKeys(*(f"{name}/{word}" for word in ActionKeys._fields))
+
+
+_CUT_SHORT = (struct.error, IndexError)
+
+
+def _too_short(what: str, payload: bytes) -> ValueError:
+    return ValueError(f"{what}: got {len(payload)} bytes that end too early")
+
+
+# ROS 1 writes a message as its fields one after another, without gaps. So an XActionGoal is a
+# header and a goal id in front of the bytes of the XGoal, and the front can be written and read
+# without making objects of it. These functions are on the way of every goal, which is why they do
+# not call each other where a line more does.
+
+
+def pack_goal(
+    sent_ns: int, goal_id: str, goal_stamp_ns: int, goal: bytes, server: str = ""
+) -> bytes:
+    """Write an XActionGoal: header, goal id, goal; `server` is the token of the one it is for."""
+    frame, raw = server.encode(), goal_id.encode()
+    header = _HEADER.pack(0, sent_ns // _NS, sent_ns % _NS, len(frame))
+    front = _ID.pack(goal_stamp_ns // _NS, goal_stamp_ns % _NS, len(raw))
+    return b"".join((header, frame, front, raw, goal))
+
+
+def unpack_goal(payload: bytes) -> tuple[str, int, bytes]:
+    """Read an XActionGoal: its goal id, its stamp [ns], the bytes of the XGoal.
+
+    Raises:
+        ValueError: the bytes are cut short or are not text where text belongs.
+    """
+    try:
+        at = 16 + int(_U32.unpack_from(payload, 12)[0])
+        secs, nsecs, length = _ID.unpack_from(payload, at)
+    except _CUT_SHORT as error:
+        raise _too_short("XActionGoal", payload) from error
+    at, end = at + 12, at + 12 + length
+    if end > len(payload):
+        raise _too_short("XActionGoal", payload)
+    return payload[at:end].decode(), secs * _NS + nsecs, payload[end:]
+
+
+def pack_goal_id(goal_id: str, stamp_ns: int) -> bytes:
+    """Write an actionlib_msgs/GoalID."""
+    raw = goal_id.encode()
+    return _ID.pack(stamp_ns // _NS, stamp_ns % _NS, len(raw)) + raw
+
+
+def unpack_goal_id(payload: bytes) -> tuple[str, int]:
+    """Read an actionlib_msgs/GoalID: the id, its stamp [ns].
+
+    Raises:
+        ValueError: the bytes are cut short or are not text where text belongs.
+    """
+    try:
+        secs, nsecs, length = _ID.unpack_from(payload, 0)
+    except _CUT_SHORT as error:
+        raise _too_short("GoalID", payload) from error
+    if len(payload) < 12 + length:
+        raise _too_short("GoalID", payload)
+    return payload[12 : 12 + length].decode(), secs * _NS + nsecs
+
+
+def pack_status(entry: StatusEntry) -> bytes:
+    """Write an actionlib_msgs/GoalStatus."""
+    goal_id, stamp_ns, status, text = entry
+    raw_id, raw = goal_id.encode(), text.encode()
+    front = _ID.pack(stamp_ns // _NS, stamp_ns % _NS, len(raw_id))
+    return b"".join((front, raw_id, _TAIL.pack(status, len(raw)), raw))
+
+
+def unpack_status(payload: bytes) -> StatusEntry:
+    """Read an actionlib_msgs/GoalStatus.
+
+    Raises:
+        ValueError: the bytes are cut short or are not text where text belongs.
+    """
+    try:
+        return _read_status(payload, 0)[0]
+    except _CUT_SHORT as error:
+        raise _too_short("GoalStatus", payload) from error
+
+
+def pack_report(sent_ns: int, entry: StatusEntry, body: bytes) -> bytes:
+    """Write an XActionResult or XActionFeedback: header, status, result or feedback."""
+    goal_id, stamp_ns, status, text = entry
+    raw_id, raw = goal_id.encode(), text.encode()
+    sent, stamp = divmod(sent_ns, _NS), divmod(stamp_ns, _NS)
+    front = _FRONT.pack(0, *sent, 0, *stamp, len(raw_id))
+    return b"".join((front, raw_id, _TAIL.pack(status, len(raw)), raw, body))
+
+
+def unpack_report(payload: bytes) -> tuple[StatusEntry, int]:
+    """Read the front of an XActionResult or XActionFeedback: status, where the rest begins.
+
+    Raises:
+        ValueError: the bytes are cut short or are not text where text belongs.
+    """
+    try:
+        return _read_status(payload, 16 + int(_U32.unpack_from(payload, 12)[0]))
+    except _CUT_SHORT as error:
+        raise _too_short("XActionResult or XActionFeedback", payload) from error
+
+
+def pack_statuses(sent_ns: int, entries: Iterable[StatusEntry], frame: str = "") -> bytes:
+    """Write an actionlib_msgs/GoalStatusArray; a `frame` makes it a farewell or its answer."""
+    raw, parts = frame.encode(), list(map(pack_status, entries))
+    header = _HEADER.pack(0, sent_ns // _NS, sent_ns % _NS, len(raw))
+    return b"".join((header, raw, _U32.pack(len(parts)), *parts))
+
+
+def unpack_statuses(payload: bytes) -> list[StatusEntry]:
+    """Read an actionlib_msgs/GoalStatusArray.
+
+    Raises:
+        ValueError: the bytes are cut short or are not text where text belongs.
+    """
+    entries = []
+    try:
+        at = 16 + int(_U32.unpack_from(payload, 12)[0])
+        (count,) = _U32.unpack_from(payload, at)
+        at += 4
+        for _ in range(count):
+            entry, at = _read_status(payload, at)
+            entries.append(entry)
+    except _CUT_SHORT as error:
+        raise _too_short("GoalStatusArray", payload) from error
+    return entries
+
+
+def unpack_frame(payload: bytes) -> str:
+    """Read the frame id of the header that a message begins with.
+
+    Raises:
+        ValueError: the bytes are cut short or are not text where text belongs.
+    """
+    length = int.from_bytes(payload[12:16], "little")
+    if len(payload) < 16 + length:
+        raise _too_short("Header", payload)
+    return payload[16 : 16 + length].decode()
+
+
+def _read_status(payload: bytes, at: int) -> tuple[StatusEntry, int]:
+    """Read a GoalStatus that begins at `at`; return also where the rest begins."""
+    secs, nsecs, length = _ID.unpack_from(payload, at)
+    at, end = at + 12, at + 12 + length
+    status, length = _TAIL.unpack_from(payload, end)  # fails if the id is cut short
+    goal_id = payload[at:end].decode()
+    at, end = end + 5, end + 5 + length
+    if end > len(payload):
+        raise IndexError(end)
+    return StatusEntry(goal_id, secs * _NS + nsecs, status, payload[at:end].decode()), end
+
+
+# -- the two ends ------------------------------------------------------------------------------
+
+
+class _Publishers(dict[tuple[str, Any, Quality], "PublisherPort"]):
+    """The publishers of one end by key, message class and quality; made when first asked for.
+
+    Args:
+        transport: Where.
+        stopped: Why there is none any more, once they are closed.
+    """
+
+    def __init__(self, transport: Transport, stopped: str) -> None:
+        super().__init__()
+        self._transport = transport
+        self._stopped = stopped
+        self._lock = threading.RLock()  # a signal handler may send amid the first sending
+        self._closed = False
+
+    def __missing__(self, which: tuple[str, Any, Quality]) -> PublisherPort:
+        key, message_class, quality = which
+        with self._lock:
+            if self._closed:
+                raise TransportError(self._stopped)
+            publisher = self.get(which)  # another thread may have just made it
+            if publisher is None:
+                encoding = encoding_of(message_class)
+                publisher = self[which] = self._transport.publisher(key, encoding, quality)
+        return publisher
+
+    def take_all(self) -> list[PublisherPort]:
+        """Return all there are, which are to be closed; there will be no others."""
+        with self._lock:
+            self._closed = True
+            publishers = list(self.values())
+            self.clear()
+        return publishers
+
+
+class ActionClientPort:
+    """The keys of an action client; see `ports.make_client_port`."""
+
+    def __init__(
+        self,
+        node: Node,
+        name: str,
+        types: ActionTypes,
+        spawn: Callable[[Callable[[], object], str], object],
+    ) -> None:
+        self._transport = node.transport
+        self._clock = node.clock
+        self._name = name
+        self._types = types
+        self._keys = action_keys(name)
+        self._declared: list[Closable] = []
+        self._readable = Readable(log)
+        action = types.action
+        self.endpoint = node.endpoint(Kind.ACTION_CLIENT, name, action._type, action._md5sum)
+        self._encodings = encoding_of(GoalStatusArray), encoding_of(types.action_result)
+        stopped = f"action '{name}': the client is stopped."
+        self._publishers = _Publishers(node.transport, stopped)
+        self._goals = self._publishers[self._keys.goal, types.action_goal, GOAL]
+        self.is_heard = self._goals.matching
+        self.pack_goal = codecs_of(types.goal)[0]
+        self.read_feedback = codecs_of(types.feedback)[1]
+        self.read_result = codecs_of(types.result)[1]
+        self._feedback: Bursts[Sample] = Bursts(node.clock, spawn, self._on_feedback)
+
+    def open(self, listener: ClientListener) -> None:
+        self._listener = listener
+        transport, keys = self._transport, self._keys
+        # The token after the subscriptions: a server that sees it may speak at once. Servers are
+        # looked for last, as goals go out to those that are found.
+        self._declared = [
+            transport.subscribe(keys.status, self._on_status, history=False),
+            transport.subscribe(keys.feedback, self._feedback.take, history=False),
+            transport.subscribe(keys.result, self._on_result, history=False),
+            transport.declare_alive(token_key(self.endpoint)),
+            transport.watch_alive(token_pattern(Kind.ACTION_SERVER, self._name), self._on_presence),
+        ]
+
+    def close(self) -> None:
+        declared = [*self._publishers.take_all(), *self._declared]
+        self._declared = []
+        for entry in reversed(declared):
+            entry.close()
+
+    def explain_absence(self) -> str:
+        return ""
+
+    def send_goal(
+        self,
+        goal_id: str,
+        stamp_ns: int,
+        body: bytes,
+        server: Endpoint | None,
+        *,
+        wait: bool = True,
+    ) -> None:
+        """Send an XActionGoal; its frame id is the token of the server that it is for."""
+        token = token_key(server) if server is not None else ""
+        goals = (
+            self._goals
+            if wait
+            else self._publishers[self._keys.goal, self._types.action_goal, AGAIN]
+        )
+        goals.put(pack_goal(stamp_ns, goal_id, stamp_ns, body, token))
+
+    def send_cancel(self, goal_id: str, stamp_ns: int, *, wait: bool = True) -> None:
+        cancels = self._publishers[self._keys.cancel, GoalID, GOAL if wait else AGAIN]
+        cancels.put(pack_goal_id(goal_id, stamp_ns))
+
+    def acknowledge(self, goal_ids: list[str], *, farewell: bool = False) -> None:
+        """Acknowledge results, and maybe a farewell: the frame id is our token then.
+
+        Never waits: what is lost is sent again when the result, or the farewell, is repeated.
+        """
+        entries = [StatusEntry(goal_id, 0, 0, "") for goal_id in goal_ids]
+        frame = token_key(self.endpoint) if farewell else ""
+        acks = self._publishers[self._keys.ack, GoalStatusArray, ACK]
+        acks.put(pack_statuses(self._clock.time_ns(), entries, frame))
+
+    def ask(self, goal_id: str, on_done: Callable[[], None]) -> None:
+        self._transport.query(
+            self._keys.result,
+            pack_goal_id(goal_id, 0),
+            encoding=encoding_of(GoalID),
+            timeout=ASK_TIMEOUT_S,
+            on_reply=self._on_reply,
+            on_done=on_done,
+        )
+
+    # -- what arrives --------------------------------------------------------------------------
+
+    # Feedback may wait for the rest of a burst: what came before a status or a result goes first.
+
+    def _on_status(self, sample: Sample) -> None:
+        if self._feedback.waiting or self._feedback.lock.locked():
+            self._feedback.flush()
+        # One comparison of strings in place of a call, for each status of each server.
+        if sample.encoding != self._encodings[0] and not self._readable.check(
+            sample, GoalStatusArray
+        ):
+            return
+        try:
+            entries, frame = unpack_statuses(sample.payload), unpack_frame(sample.payload)
+        except ValueError as error:
+            self._report("a status", error)
+            return
+        server = parse_token(frame) if frame else None
+        if server is None:
+            self._listener.on_statuses(entries, sample.source)
+        elif server.session == sample.source:
+            self._listener.on_farewell(entries, server)
+        else:
+            self._listener.on_stranger(sample.source)
+
+    def _on_feedback(self, sample: Sample) -> None:
+        if self._readable.check(sample, self._types.action_feedback):
+            try:
+                entry, start = unpack_report(sample.payload)
+            except ValueError as error:
+                self._report("feedback", error)
+            else:
+                self._listener.on_feedback(entry, sample.payload[start:], sample.source)
+
+    def _on_result(self, sample: Sample) -> None:
+        if self._feedback.waiting or self._feedback.lock.locked():
+            self._feedback.flush()
+        if sample.encoding != self._encodings[1] and not self._readable.check(
+            sample, self._types.action_result
+        ):
+            return
+        try:
+            entry, start = unpack_report(sample.payload)
+        except ValueError as error:
+            self._report("a result", error)
+        else:
+            self._listener.on_result(entry, sample.payload[start:], sample.source)
+
+    def _on_reply(self, reply: Reply) -> None:
+        self._feedback.flush()
+        payload, listener = reply.payload, self._listener
+        try:
+            if reply.error:
+                self._report("an answer", payload.decode(errors="replace"))
+            elif reply.encoding == encoding_of(GoalStatus):
+                listener.on_answer(unpack_status(payload))
+            elif reply.encoding == self._encodings[1]:
+                entry, start = unpack_report(payload)
+                listener.on_result(entry, payload[start:], "", answered=True)
+            else:
+                self._report("an answer", f"unknown encoding {reply.encoding!r}")
+        except ValueError as error:
+            self._report("an answer", error)
+
+    def _report(self, what: str, error: object) -> None:
+        """Report a message that is dropped; once of a kind, a server may go on like this."""
+        text = f"action '{self._name}': {what} cannot be read: {error}"
+        self._readable.report(what, ActionlibError(text))
+
+    def _on_presence(self, presence: Presence) -> None:
+        server = parse_token(presence.key)
+        if server is None:
+            return
+        if not presence.alive:
+            self._feedback.flush()
+            self._listener.on_server_gone(server)
+            return
+        error = find_mismatch([server], self.endpoint)
+        if error is not None:
+            self._readable.report(f"{server.session} {server.type} {server.md5}", error)
+        self._listener.on_server(server, error)
+
+
+class ActionServerPort:
+    """Declares the keys of an action server and speaks on them.
+
+    Args:
+        node: On whose network.
+        name: The action's full name.
+        types: Its message classes.
+
+    Threads: any. The listener is called on the network's threads.
+    """
+
+    send_accepted = None
+
+    def __init__(self, node: Node, name: str, types: ActionTypes) -> None:
+        self._node = node
+        self._clock = node.clock
+        self._types = types
+        self._name = name
+        self._keys = action_keys(name)
+        self._lock = threading.Lock()  # `close` is called by two threads at once
+        self._declared: list[Closable] = []
+        stopped = f"action {name!r}: the server is stopped. Try ending goals before."
+        self._publishers = _Publishers(node.transport, stopped)
+        self._token: Closable | None = None
+        self._clients: dict[str, Endpoint] = {}  # by token
+        self._unaware: set[str] = set()  # tokens of clients that the farewell has not reached
+        self._readable = Readable(log)
+        self._goal_encoding = encoding_of(types.action_goal)
+        self._read_goal = codecs_of(types.goal)[1]
+        self.pack_result = codecs_of(types.result)[0]
+        self.pack_feedback = codecs_of(types.feedback)[0]
+        action = types.action
+        endpoint = node.endpoint(Kind.ACTION_SERVER, name, action._type, action._md5sum)
+        self.endpoint = with_age(endpoint, node.clock.time_ns())
+        self._own_key = token_key(self.endpoint)
+
+    def open(self, listener: ServerListener) -> None:
+        self._listener = listener
+        transport, keys = self._node.transport, self._keys
+        there = list_endpoints(transport, kind=Kind.ACTION_SERVER, name=self._name)
+        if there:
+            raise self._conflict(there[0])
+        try:
+            # The token after the rest: a client that sees it sends its goals at once.
+            self._declared = [
+                transport.subscribe(keys.goal, self._on_goal, history=False),
+                transport.subscribe(keys.cancel, self._on_cancel, history=False),
+                transport.subscribe(keys.ack, self._on_ack, history=False),
+                transport.queryable(keys.result, self._on_query),
+                transport.queryable(keys.goal, self._on_goal_query),
+            ]
+            self._token = transport.declare_alive(self._own_key)
+            self._declared += [
+                self._token,
+                transport.watch_alive(token_pattern(None, self._name), self._on_presence),
+            ]
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        with self._lock:
+            declared, self._declared = self._declared, []
+            declared.extend(self._publishers.take_all())
+            token, self._token = self._token, None
+        # The token goes last: while it shows, a client that is not heard knows that it is not.
+        declared.sort(key=lambda entry: entry is token)
+        for entry in declared:
+            entry.close()
+
+    def has_clients(self) -> bool:
+        return bool(self._clients)
+
+    def begin_farewell(self) -> bool:
+        if not self._publishers[self._keys.status, GoalStatusArray, RESULT].matching():
+            return False
+        unaware = set(self._clients)
+        if not unaware:  # a server that has just started may not have heard of them yet
+            pattern = token_pattern(Kind.ACTION_CLIENT, self._name)
+            unaware = set(self._node.transport.list_alive(pattern, FAREWELL_LIST_S))
+        self._unaware = unaware
+        return True
+
+    def is_farewell_heard(self) -> bool:
+        return not self._unaware
+
+    def send_farewell(self, taken: Iterable[StatusEntry]) -> None:
+        """Send a GoalStatusArray whose frame id is our token."""
+        payload = pack_statuses(self._clock.time_ns(), taken, self._own_key)
+        self._publishers[self._keys.status, GoalStatusArray, RESULT].put(payload)
+
+    def send_status(self, entries: Iterable[StatusEntry]) -> None:
+        statuses = self._publishers[self._keys.status, GoalStatusArray, STATUS]
+        statuses.put(pack_statuses(self._clock.time_ns(), entries))
+
+    def send_result(self, entry: StatusEntry, body: bytes, *, wait: bool = True) -> None:
+        quality = RESULT if wait else RESULT_OR_NOT
+        results = self._publishers[self._keys.result, self._types.action_result, quality]
+        results.put(pack_report(self._clock.time_ns(), entry, body))
+
+    def send_feedback(self, entry: StatusEntry, body: bytes) -> None:
+        feedback = self._publishers[self._keys.feedback, self._types.action_feedback, FEEDBACK]
+        feedback.put(pack_report(self._clock.time_ns(), entry, body))
+
+    # -- what arrives --------------------------------------------------------------------------
+
+    def _on_goal(self, sample: Sample) -> None:
+        if sample.encoding != self._goal_encoding and not self._readable.check(
+            sample, self._types.action_goal
+        ):
+            return
+        try:
+            receiver = unpack_frame(sample.payload)
+            goal_id, stamp_ns, body = unpack_goal(sample.payload)
+            if receiver not in {"", self._own_key} and self._is_of_another(receiver):
+                return
+            content = self._read_goal(body)
+        except (ValueError, ActionlibError) as error:
+            self._report_unreadable("a goal", sample, error)
+            return
+        self._listener.on_goal(goal_id, stamp_ns, content, sample.source)
+
+    def _is_of_another(self, frame: str) -> bool:
+        """Return whether a goal is a late copy of one for another server of this name."""
+        server = parse_token(frame)
+        return (
+            server is not None and server.kind is Kind.ACTION_SERVER and server.name == self._name
+        )
+
+    def _on_cancel(self, sample: Sample) -> None:
+        if not self._readable.check(sample, GoalID):
+            return
+        try:
+            goal_id, stamp_ns = unpack_goal_id(sample.payload)
+        except ValueError as error:
+            self._report_unreadable("a cancel", sample, error)
+            return
+        self._listener.on_cancel(goal_id, stamp_ns)
+
+    def _on_ack(self, sample: Sample) -> None:
+        try:
+            entries = unpack_statuses(sample.payload)
+            self._unaware.discard(unpack_frame(sample.payload))
+        except ValueError as error:
+            self._report_unreadable("an acknowledgement", sample, error)
+            return
+        self._listener.on_acknowledged([entry.id for entry in entries])
+
+    def _on_query(self, query: Query) -> None:
+        """Answer what became of a goal; without an id, the status list."""
+        goal_id = self._read_question(query)
+        if goal_id:
+            entry, body = self._listener.find_end(goal_id)
+            if body is None:
+                query.reply(pack_status(entry), encoding_of(GoalStatus))
+            else:
+                report = pack_report(self._clock.time_ns(), entry, body)
+                query.reply(report, encoding_of(self._types.action_result))
+        elif goal_id is not None:
+            statuses = pack_statuses(self._clock.time_ns(), self._listener.list_goals())
+            query.reply(statuses, encoding_of(GoalStatusArray))
+        query.finish()
+
+    def _on_goal_query(self, query: Query) -> None:
+        """Answer what a goal was."""
+        goal_id = self._read_question(query)
+        if goal_id is not None:
+            found = self._listener.find_goal(goal_id)
+            if found is None:
+                query.reply_error(
+                    f"action '{self._name}': goal {goal_id!r} is not known, or no more"
+                )
+            else:
+                stamp_ns, content = found
+                goal = pack_goal(self._clock.time_ns(), goal_id, stamp_ns, content.to_bytes())
+                query.reply(goal, encoding_of(self._types.action_goal))
+        query.finish()
+
+    def _read_question(self, query: Query) -> str | None:
+        """Return the goal id that a query is about; None when it was refused."""
+        try:
+            return unpack_goal_id(query.payload)[0]
+        except ValueError as error:
+            query.reply_error(f"action '{self._name}': {error}; expected an actionlib_msgs/GoalID")
+            return None
+
+    def _report_unreadable(self, what: str, sample: Sample, error: Exception) -> None:
+        """Report a message that is dropped; a sender that goes on like this is told of once."""
+        text = f"action '{self._name}': {what} of session {sample.source} cannot be read: {error}"
+        self._readable.report(f"{sample.source} {what}", ActionlibError(text))
+
+    # -- who is there --------------------------------------------------------------------------
+
+    def _on_presence(self, presence: Presence) -> None:
+        other = parse_token(presence.key)
+        if other is None or other == self.endpoint:
+            return
+        if other.kind is Kind.ACTION_SERVER and presence.alive:
+            self._meet_server(other)
+        elif other.kind is Kind.ACTION_CLIENT:
+            self._meet_client(presence, other)
+
+    def _meet_server(self, other: Endpoint) -> None:
+        if is_younger(self.endpoint, other):
+            self._listener.on_conflict(self._conflict(other))
+        else:
+            log.error("%s", self._conflict(other, stays=True))
+
+    def _conflict(self, other: Endpoint, *, stays: bool = False) -> ServerConflictError:
+        return ServerConflictError(self._name, *in_conflict(self.endpoint, other, stays=stays))
+
+    def _meet_client(self, presence: Presence, client: Endpoint) -> None:
+        if presence.alive:
+            self._clients[presence.key] = client
+            error = find_mismatch([client], self.endpoint)
+            if error is not None:
+                self._readable.report(f"{client.session} {client.type} {client.md5}", error)
+        elif self._clients.pop(presence.key, None) is not None:
+            if presence.key in self._unaware:
+                self._unaware.discard(presence.key)
+                self._listener.on_acknowledged([])
+            clients = list(self._clients.values())  # another thread may change it
+            if not any(end.session == client.session for end in clients):
+                self._listener.on_client_lost(client.session)
