@@ -8,6 +8,8 @@ wanted and a file of the project asks for it, gets one.
 
 from __future__ import annotations
 
+import linecache
+import re
 import sys
 from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
@@ -23,7 +25,6 @@ from actionlib_core.interfaces import (
     define_message,
     define_service,
 )
-from actionlib_core.suggest import did_you_mean
 from smachpy.compat import MODULES as SMACH_MODULES
 from smachpy.ros1 import python2
 from smachpy.ros1.session import session
@@ -41,7 +42,8 @@ OLD_NAMES: Final = frozenset(
     {
         *("PyKDL", "actionlib", "dynamic_reconfigure", "rospkg", "rosparam", "rospy", "rostest"),
         *("roslib", "rosunit", "smach", "smach_ros", "tf", "tf2_geometry_msgs", "tf2_ros"),
-        "tf_conversions",
+        *("genpy", "message_filters", "rosgraph", "rosnode", "rosservice", "rostopic"),
+        *("tf_conversions", "pnp_cmd_ros"),
     }
 )
 """The packages of ROS 1 whose modules are here."""
@@ -55,11 +57,19 @@ ALIASES: Final = {
     "actionlib.handle_tracker_deleter": "actionlib_core.action.compat",
     "actionlib.server_goal_handle": "actionlib_core.action.server",
     "actionlib.status_tracker": "actionlib_core.action.compat",
+    "roslib.rostime": "smachpy.ros1.names.rospy.rostime",
+    "sensor_msgs.point_cloud2": "smachpy.ros1.names.point_cloud2",
     "smach.exceptions": "smachpy.exceptions",
     "smach.log": "smachpy.log",
     "smach.util": "smachpy.util",
     "smach_ros.introspection": "smachpy.network.server",
     "smach_ros.util": "smachpy.util",
+    "tf2_geometry_msgs.tf2_geometry_msgs": "smachpy.ros1.names.tf2_geometry_msgs",
+    "tf2_ros.buffer": "smachpy.ros1.names.tf2_ros",
+    "tf2_ros.buffer_interface": "smachpy.ros1.names.tf2_ros",
+    "tf2_ros.static_transform_broadcaster": "smachpy.ros1.names.tf2_ros",
+    "tf2_ros.transform_broadcaster": "smachpy.ros1.names.tf2_ros",
+    "tf2_ros.transform_listener": "smachpy.ros1.names.tf2_ros",
 }
 """Other module names -> module here."""
 
@@ -76,18 +86,22 @@ class MissingPackageError(ModuleNotFoundError):
         line: In which line of it.
     """
 
-    def __init__(self, name: str, file: str, line: int, near: str) -> None:
+    def __init__(self, name: str, file: str, line: int) -> None:
         self.file, self.line = file, line
         package = name.partition(".")[0]
-        what = "message package" if name.endswith((".msg", ".srv")) else "module"
-        super().__init__(
-            f"{file}:{line}: {what} {package!r} is missing: got no definition or module of it; "
-            "expected one in the script's folder, in a package beside it (msg, srv, action, src), "
-            f"in a folder of SMACHPY_INTERFACE_PATH, or installed.{near} Try setting "
-            f"SMACHPY_INTERFACE_PATH=FOLDER, where FOLDER/{package}/msg is, or --stub-missing for "
-            "a stand-in.",
-            name=name,
-        )
+        if re.search(rf"\b{package}\.(msg|srv)\b", f"{name} {linecache.getline(file, line)}"):
+            text = (
+                f"message package {package!r} is missing: got no definition of it; expected one in "
+                "the script's folder, in a package beside it (msg, srv, action) or in a folder of "
+                f"SMACHPY_INTERFACE_PATH. Try setting SMACHPY_INTERFACE_PATH=FOLDER, where "
+                f"FOLDER/{package}/msg is,"
+            )
+        else:
+            text = (
+                f"module {name!r} is missing; expected it in the script's folder, in a package "
+                f"beside it (src, scripts) or installed. Try installing it,"
+            )
+        super().__init__(f"{file}:{line}: {text} or --stub-missing for a stand-in.", name=name)
 
 
 class _Alias(Loader):
@@ -166,13 +180,12 @@ class OldNames(MetaPathFinder):
     ) -> ModuleSpec | None:
         """Find a module; None leaves it to the finders after this one."""
         del target
+        home = self._home_of(fullname)
+        if home is not None:
+            return _alias(fullname, home)
         top, _, below = fullname.partition(".")
         if top in {"smachpy", "actionlib_core", "viz", "missions"} or fullname in self._busy:
             return None
-        if top in OLD_NAMES:
-            home = self._home_of(fullname)
-            if home is not None:
-                return _alias(fullname, home)
         if below.partition("._")[0] in _SECTIONS and "._" in below:
             return ModuleSpec(fullname, _Generated())
         if below and isinstance(sys.modules.get(top), StubModule):
@@ -200,8 +213,11 @@ class OldNames(MetaPathFinder):
         return isinstance(getattr(module, "__loader__", None), OldSourceLoader)
 
     def _home_of(self, fullname: str) -> str | None:
-        if fullname in ALIASES:
-            return ALIASES[fullname]
+        # `from sensor_msgs import point_cloud2` asks by the name that the package has here
+        old = fullname.removeprefix(f"{INTERFACES}.").removeprefix(f"{NAMES}.")
+        alias = ALIASES.get(old)
+        if alias is not None or fullname.partition(".")[0] not in OLD_NAMES:
+            return alias
         home = f"{NAMES}.{fullname}"
         try:
             return home if find_spec(home) is not None else None
@@ -234,7 +250,8 @@ class OldNames(MetaPathFinder):
         elif name in sys.stdlib_module_names and not _lies_in(self.project.folder, name):
             return None
         else:
-            places = [*self.project.source_roots(), *_folder_of_importer(self.project)]
+            added = [Path(place) for place in sys.path if place and self.project.holds(place)]
+            places = [*self.project.source_roots(), *_folder_of_importer(self.project), *added]
         for place in places:
             for file in (place / name / "__init__.py", place / f"{name}.py"):
                 if file.is_file():
@@ -254,9 +271,11 @@ class OldNames(MetaPathFinder):
         if importer is None or not self.project.holds(importer[0]) or fullname in _NEVER_STUBBED:
             return None
         if path is not None:
-            parent = sys.modules.get(fullname.rpartition(".")[0])
+            above = fullname.rpartition(".")[0]
+            parent = sys.modules.get(above)
             lacks = isinstance(getattr(parent, "__loader__", None), OldSourceLoader)
-            if not (isinstance(parent, StubModule) or (lacks and self._stub_missing)):
+            lacks = lacks and self._stub_missing
+            if not (lacks or isinstance(parent, StubModule) or self.claims(above)):
                 return None  # its package was found, and Python says what it lacks
         elif self._is_elsewhere(fullname):
             return None
@@ -264,10 +283,7 @@ class OldNames(MetaPathFinder):
             session().stand_in(f"module {fullname}")
             return ModuleSpec(fullname, _Stub(), is_package=True)
         file, line = importer
-        known = [*OLD_NAMES, *self.project.packages()]
-        raise MissingPackageError(
-            fullname, file, line, did_you_mean(fullname.partition(".")[0], known)
-        )
+        raise MissingPackageError(fullname, file, line)
 
     def _is_elsewhere(self, fullname: str) -> bool:
         """Tell whether the finders after this one have a module."""

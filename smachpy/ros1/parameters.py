@@ -15,8 +15,10 @@ from actionlib_core.suggest import did_you_mean
 from actionlib_core.yaml_text import load_yaml
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
+    from collections.abc import Collection, Iterator, Mapping
     from pathlib import Path
+
+    from actionlib_core.wire.ros1.answers import SystemState
 
 
 class ParameterFileError(ActionlibError):
@@ -32,13 +34,19 @@ class ParameterFileError(ActionlibError):
 
 
 class Robot(Protocol):
-    """A real robot, whose parameters are read."""
+    """A real robot, whose parameters and topics are read."""
 
     def get_param(self, name: str) -> Any:
         """Return a value, or a tree of them as a dict; raises KeyError when there is none."""
 
     def param_names(self) -> list[str]:
         """Return the full names of all values."""
+
+    def state(self) -> SystemState:
+        """Return which of its nodes publish, listen and serve."""
+
+    def published_topics(self) -> Mapping[str, str]:
+        """Return the topics that it publishes, full name -> type."""
 
 
 class Parameters:

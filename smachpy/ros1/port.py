@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from smachpy.ros1 import python2
 from smachpy.ros1.extra import import_extra
+from smachpy.ros1.hook import OLD_NAMES
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -95,11 +96,9 @@ def port(source: bytes, filename: str) -> Ported:
     metadata = import_extra("libcst.metadata", "smachpy port")
     text = python2.read(source)
     notes: list[tuple[int, str]] = []
-    try:
-        ast.parse(text, filename)
-    except SyntaxError:
-        text = python2.convert(python2.straight(text))
-        ast.parse(text, filename)
+    converted = python2.to_text(text, filename)
+    if converted != text:
+        text = converted
         notes.append((1, "it was Python 2: look at divisions of whole numbers, and at text"))
     wrapper = metadata.MetadataWrapper(cst.parse_module(text))
     main = _find_main(ast.parse(text))
@@ -107,14 +106,27 @@ def port(source: bytes, filename: str) -> Ported:
     notes += main.notes if main is not None else []
     module = wrapper.visit(transformer)
     code = str(module.code)
-    if any(isinstance(n, ast.Name) and n.id == "rospy" for n in ast.walk(ast.parse(code))):
-        notes.append((1, "rospy is still used: such a script runs by `smachpy run --ros1 FILE`"))
-    else:
+    if not any(isinstance(n, ast.Name) and n.id == "rospy" for n in ast.walk(ast.parse(code))):
         code = str(module.visit(_forget(cst, "rospy")).code)
+    left = _old_names(code)
+    if left:
+        used = f"{', '.join(left)} {'is' if len(left) == 1 else 'are'} still used"
+        notes.append((1, f"{used}: such a script runs by `smachpy run --ros1 FILE`"))
     code = _add_imports(code, transformer)
     if transformer.main_line and main is None:
         notes.append((transformer.main_line, _WANTS_FUNCTION))
     return Ported(code, sorted({*notes, *transformer.notes}))
+
+
+def _old_names(code: str) -> list[str]:
+    """Return the packages of ROS 1 that a source imports."""
+    found = set()
+    for node in ast.walk(ast.parse(code)):
+        if isinstance(node, ast.Import):
+            found |= {alias.name.partition(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            found.add((node.module or "").partition(".")[0])
+    return sorted(found & OLD_NAMES)
 
 
 def port_file(path: Path) -> Ported:

@@ -5,15 +5,17 @@ from __future__ import annotations
 import contextlib
 import gc
 import linecache
+import os
 import signal
 import sys
 import threading
 import traceback
 import types
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.clock import Deadlock, RealClock, VirtualClock, current_clock, use_clock
+from actionlib_core.interfaces import InterfaceError
 from actionlib_core.node import Node, get_node, use_node
 from actionlib_core.shutdown import Shutdown, use_shutdown
 from actionlib_core.suggest import did_you_mean
@@ -22,13 +24,18 @@ from smachpy.exceptions import SmachError
 from smachpy.machines.container import Container, below
 from smachpy.ros1 import python2, session
 from smachpy.ros1.dry import nothing_done
+from smachpy.ros1.hook import INTERFACES, MissingPackageError
 from smachpy.ros1.install import install
+from smachpy.ros1.project import Project
 from smachpy.ros1.session import Session, Stop
-from smachpy.run.root import OBSERVERS
+from smachpy.run.threads import OBSERVERS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
     from types import FrameType
+
+_MASTER: Final = ("ROS_MASTER_URI", "http://localhost:11311")
+"""What every shell of ROS 1 has in its environment, so that scripts read it unasked."""
 
 LOAD_S = 10.0
 """Longest time that a script may take to build its machine [s]."""
@@ -80,6 +87,8 @@ def run_script(script: Path, argv: Sequence[str] = (), *, call: str = "") -> Any
     main.__file__ = str(path)
     main.__dict__["__builtins__"] = __builtins__
     before = sys.modules.get("__main__"), sys.argv, list(sys.path)
+    shell = {} if _MASTER[0] in os.environ else dict([_MASTER])
+    os.environ.update(shell)
     sys.modules["__main__"] = main
     sys.argv = [str(path), *argv]
     sys.path.insert(0, str(path.parent))
@@ -97,6 +106,8 @@ def run_script(script: Path, argv: Sequence[str] = (), *, call: str = "") -> Any
         return function()
     finally:
         sys.argv, sys.path[:] = before[1], before[2]
+        for name in shell:
+            os.environ.pop(name, None)
         if before[0] is not None:
             sys.modules["__main__"] = before[0]
 
@@ -196,14 +207,28 @@ def _build(path: Path, argv: Sequence[str], call: str, made: Session) -> str:
 def where_raised(error: BaseException, script: Path) -> str:
     """Return an error with the line of the script's project that it comes from."""
     frames = traceback.extract_tb(error.__traceback__)
-    root = str(script.resolve().parent)
-    own = [frame for frame in frames if frame.filename.startswith(root)]
-    text = f"{type(error).__name__}: {error}"
-    if not own:
+    project = Project(script)
+    own = [frame for frame in frames if project.holds(frame.filename)]
+    text = f"{type(error).__name__}: {error}{_ways_out(error)}"
+    if not own or isinstance(error, MissingPackageError):
         return text
     last = own[-1]
     source = linecache.getline(last.filename, last.lineno or 0).strip()
     return f"{last.filename}:{last.lineno}: {text}" + (f"\n    {source}" if source else "")
+
+
+def _ways_out(error: BaseException) -> str:
+    """Return what helps where messages lack something; "" for other errors."""
+    if isinstance(error, InterfaceError) and "unknown type" in str(error):
+        return "\nTry --stub-missing for a stand-in."
+    module = str(getattr(error, "name", "")).removeprefix(f"{INTERFACES}.")
+    package, _, section = module.partition(".")
+    if not (isinstance(error, ImportError) and section in {"msg", "srv"}):
+        return ""
+    return (
+        f". Try putting the package's own definitions in FOLDER/{package}/{section}, with "
+        "SMACHPY_INTERFACE_PATH=FOLDER, or --stub-missing for a stand-in."
+    )
 
 
 def _node_in_force(_name: str) -> Node:

@@ -7,6 +7,7 @@ meaning: `/` between whole numbers gives a fraction, strings are text.
 from __future__ import annotations
 
 import ast
+import contextlib
 import difflib
 import re
 from functools import lru_cache
@@ -17,22 +18,34 @@ from actionlib_core.exceptions import ActionlibError
 if TYPE_CHECKING:
     from types import CodeType
 
-# Rewriting for looks, and implicit relative imports, which the import hook finds (`hook`).
-_NOT_WANTED: Final = frozenset({"buffer", "idioms", "import", "set_literal", "ws_comma", "apply"})
+# Rewriting for looks, what `_GoneNames` does, and implicit relative imports (`hook` finds them).
+_NOT_WANTED: Final = frozenset(
+    {"buffer", "idioms", "import", "set_literal", "types", "ws_comma", "apply"}
+)
 # For source that is Python 3 by its grammar: names that are gone.
 _NAMES: Final = (
     *("basestring", "dict", "execfile", "getcwdu", "has_key", "imports", "itertools", "long"),
-    *("next", "raw_input", "reduce", "reload", "standarderror", "types", "unicode", "urllib"),
-    *("xrange",),
+    *("metaclass", "next", "nonzero", "raw_input", "reduce", "reload", "standarderror"),
+    *("unicode", "urllib", "xrange"),
 )
 _GONE: Final = re.compile(
     r"\b(basestring|execfile|getcwdu|has_key|iteritems|iterkeys|itervalues|raw_input|unicode"
     r"|xrange|unichr|viewitems|viewkeys|viewvalues|StandardError|izip|imap|ifilter"
-    r"|string\.(atof|atoi|atol|find|rfind|join|lower|replace|split|strip|upper)"
-    r"|Queue|ConfigParser|cPickle|StringIO|urllib2|Tkinter|tkMessageBox|thread|commands|setdefaultencoding)\b"
-    r"|(?<!\.)\b(cmp|long|reduce|reload)\s*\(|\.next\(\)"
+    r"|string\.(atof|atoi|atol|find|rfind|join|lower|replace|split|strip|upper|letters|lowercase"
+    r"|uppercase|maketrans)"
+    r"|Queue|ConfigParser|cPickle|c?StringIO|urllib2|urlparse|httplib|xmlrpclib|SocketServer|copy_reg"
+    r"|__builtin__|Tkinter|tkMessageBox|thread|commands|setdefaultencoding|__nonzero__|__metaclass__)\b"
+    r"|(?<!\.)\b(apply|cmp|long|reduce|reload)\s*\(|\.next\(\)"
+    r"|\.(keys|values|items)\(\)(\[|\.(sort|index)\()"
 )
+# A print statement that Python 3 reads as a shift.
+_SHIFTED_PRINT: Final = re.compile(r"^[ ]*print\s*>>", re.MULTILINE)
 _INDENT: Final = re.compile(r"^[ ]*\t[ \t]*", re.MULTILINE)
+# What Python 3 says of Python 2: of such a source the error is the one that Python 2 would find.
+_LOOKS_OLD: Final = re.compile(
+    "Missing parentheses in call|multiple exception types|leading zeros in decimal"
+    "|invalid decimal literal|inconsistent use of tabs"
+)
 _CODING: Final = re.compile(rb"^[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+)")
 
 
@@ -63,13 +76,48 @@ def to_code(source: bytes, filename: str) -> CodeType:
 def to_tree(source: bytes, filename: str) -> ast.Module:
     """Parse a source; as `to_code`."""
     text = read(source)
-    try:
-        tree = ast.parse(text, filename)
-    except SyntaxError as error:
-        return _convert(straight(text), filename, error)
-    if _GONE.search(text):
-        return _parse_as(text, convert(text, _NAMES), filename)
+    converted = _convert(text, filename)
+    tree = ast.parse(converted, filename)
+    _GoneNames(tree).visit(tree)
+    before, after = text.splitlines(), converted.splitlines()
+    if len(before) != len(after):
+        lines = _line_map(before, after)
+        for node in ast.walk(tree):
+            place: Any = node
+            if hasattr(place, "lineno"):
+                place.lineno = lines[place.lineno]
+                if getattr(place, "end_lineno", None):
+                    place.end_lineno = max(lines[place.end_lineno], place.lineno)
     return tree
+
+
+def to_text(text: str, filename: str) -> str:
+    """Return a source as Python 3 source; what Python 3 takes as it is stays, letter for letter.
+
+    Raises:
+        SyntaxError, MissingExtraError: As `to_code`.
+    """
+    converted = _convert(text, filename)
+    tree = ast.parse(converted, filename)
+    names = _GoneNames(tree)
+    names.visit(tree)
+    lines = [line.encode() for line in converted.splitlines(keepends=True)]
+    last = (len(lines) + 1, 0)
+    for (line, column, end_line, end), made in sorted(names.changes, reverse=True, key=_outermost):
+        if (end_line, end) > last:
+            continue  # a part of what was written already
+        last = (line, column)
+        new = "; ".join(ast.unparse(each) for each in made)
+        new = f"({new})" if isinstance(made[0], ast.Lambda) else new
+        whole = lines[line - 1][:column] + new.encode() + lines[end_line - 1][end:]
+        lines[line - 1 : end_line] = [whole]
+    return b"".join(lines).decode()
+
+
+def _outermost(change: tuple[tuple[int, int, int, int], list[ast.AST]]) -> tuple[int, ...]:
+    """Order changes by their end, the larger one first of two that end together."""
+    line, column, end_line, end = change[0]
+    return end_line, end, -line, -column
 
 
 def read(source: bytes) -> str:
@@ -92,17 +140,29 @@ def straight(text: str) -> str:
     return _INDENT.sub(lambda match: match[0].expandtabs(8), text)
 
 
-def _convert(text: str, filename: str, error: SyntaxError) -> ast.Module:
-    """Parse what is no Python 3 as it stands: with spaces for tabs, or as Python 2."""
+def _convert(text: str, filename: str) -> str:
+    """Return what Python 3 can parse: as it stands, with spaces for tabs, or from Python 2."""
     try:
-        return ast.parse(text, filename)
-    except SyntaxError:
-        pass
+        ast.parse(text, filename)
+    except SyntaxError as error:
+        return _from_python2(straight(text), filename, error)
+    if _SHIFTED_PRINT.search(text):
+        return convert(straight(text))
+    return convert(text, _NAMES) if _GONE.search(text) else text
+
+
+def _from_python2(text: str, filename: str, error: SyntaxError) -> str:
+    with contextlib.suppress(SyntaxError):
+        ast.parse(text, filename)
+        return text
     try:
         converted = convert(text)
-    except SyntaxError:
-        raise error from None
-    return _parse_as(text, converted, filename)
+    except SyntaxError as other:
+        if not _LOOKS_OLD.match(error.msg or ""):
+            raise error from None
+        raise Python2Error(filename, other.lineno or 0, other.msg) from None
+    ast.parse(converted, filename)
+    return converted
 
 
 def convert(text: str, names: tuple[str, ...] | None = None) -> str:
@@ -123,7 +183,7 @@ def convert(text: str, names: tuple[str, ...] | None = None) -> str:
     except parse_error as error:
         context: Any = getattr(error, "context", None)
         line = context[1][0] if context else 0
-        raise Python2Error("<old source>", line, f"no Python 2 either: {error}") from error
+        raise Python2Error("<old source>", line, "syntax that is no Python 2 either") from error
 
 
 @lru_cache(maxsize=2)
@@ -142,33 +202,62 @@ def _tool(names: tuple[str, ...] | None) -> tuple[Any, type[Exception]]:
     return tool, (parse.ParseError, tokenize.TokenError)  # type: ignore[return-value]
 
 
-def _parse_as(text: str, converted: str, filename: str) -> ast.Module:
-    """Parse the converted source, with the lines of the original in every node."""
-    tree = ast.parse(converted, filename)
-    if any(word in text for word in ("string", "setdefaultencoding", "cmp")):
-        tree = _GoneFunctions(tree).visit(tree)
-    before, after = text.splitlines(), converted.splitlines()
-    if len(before) != len(after):
-        lines = _line_map(before, after)
-        for node in ast.walk(tree):
-            place: Any = node
-            if hasattr(place, "lineno"):
-                place.lineno = lines[place.lineno]
-                if getattr(place, "end_lineno", None):
-                    place.end_lineno = max(lines[place.end_lineno], place.lineno)
-    return tree
-
-
 def _raise_on(*_args: Any, **_kwargs: Any) -> None:
     """Raise what the caller has just caught."""
     raise  # noqa: PLE0704  called where it was caught
 
 
-class _GoneFunctions(ast.NodeTransformer):
-    """Calls methods of text in place of the functions that the module `string` had.
+_TYPES: Final = {
+    **dict.fromkeys(("DictType", "DictionaryType"), "dict"),
+    **dict.fromkeys(("ClassType", "TypeType"), "type"),
+    **dict.fromkeys(("InstanceType", "ObjectType"), "object"),
+    **dict.fromkeys(("IntType", "LongType"), "int"),
+    **dict.fromkeys(("StringType", "UnicodeType"), "str"),
+    "BooleanType": "bool",
+    "BufferType": "memoryview",
+    "ComplexType": "complex",
+    "FileType": "__import__('io').IOBase",
+    "FloatType": "float",
+    "ListType": "list",
+    "SliceType": "slice",
+    "StringTypes": "(str,)",
+    "TupleType": "tuple",
+    "UnboundMethodType": "type(lambda: None)",
+    "XRangeType": "range",
+}
+"""What the module `types` had, as an expression."""
+_ABSTRACT: Final = (
+    *("Callable", "Container", "Hashable", "Iterable", "Iterator", "Mapping", "MutableMapping"),
+    *("MutableSequence", "MutableSet", "Sequence", "Set", "Sized"),
+)
+_MOVED: Final = {
+    **{f"types.{name}": made for name, made in _TYPES.items()},
+    **{f"string.{name}": f"string.ascii_{name}" for name in ("letters", "lowercase", "uppercase")},
+    **{f"collections.{name}": f"__import__('collections.abc').abc.{name}" for name in _ABSTRACT},
+    **{
+        f"{np}.{name}": name
+        for np in ("np", "numpy")
+        for name in ("bool", "float", "int", "object")
+    },
+    "base64.decodestring": "base64.decodebytes",
+    "base64.encodestring": "base64.encodebytes",
+    "inspect.getargspec": "inspect.getfullargspec",
+    "string.maketrans": "str.maketrans",
+    "sys.maxint": "sys.maxsize",
+    "time.clock": "time.process_time",
+}
+"""Attributes of modules that are gone, in Python 3 or since, as an expression."""
 
-    `reload(sys); sys.setdefaultencoding("utf-8")` does nothing: text has no encoding any more.
-    `cmp` is there unless the module has one, also as an argument of `sorted` and `sort`.
+
+class _GoneNames(ast.NodeTransformer):
+    """Puts what there is in place of what is gone: names, functions, arguments.
+
+    Functions of the module `string` become methods of text. `reload(sys)` and
+    `sys.setdefaultencoding("utf-8")` do nothing: text has no encoding any more. `cmp` is there
+    unless the module has one, also as an argument of `sorted` and `sort`; so is `apply`.
+
+    Attributes:
+        changes: Where something was, (line, column, end line, end column), and what it is now.
     """
 
     _METHODS = frozenset({
@@ -181,12 +270,29 @@ class _GoneFunctions(ast.NodeTransformer):
     _COMPARE: Final = "lambda a, b: (a > b) - (a < b)"
 
     def __init__(self, tree: ast.AST) -> None:
+        self.changes: list[tuple[tuple[int, int, int, int], list[ast.AST]]] = []
+        self._read = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
         self._own = {
             getattr(n, "id", getattr(n, "name", getattr(n, "arg", "")))
             for n in ast.walk(tree)
             if isinstance(n, ast.FunctionDef | ast.alias | ast.arg)
             or (isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store))
         }
+
+    def visit(self, node: ast.AST) -> Any:
+        """Visit a node, and note it when it is another one then."""
+        place: Any = node
+        before = ast.unparse(node.func) if isinstance(node, ast.Call) else ""
+        known = [each.arg for each in node.keywords] if isinstance(node, ast.Call) else []
+        made = super().visit(node)
+        changed = made is not node or (
+            isinstance(made, ast.Call)
+            and (before != ast.unparse(made.func) or known != [each.arg for each in made.keywords])
+        )
+        if changed:
+            span = place.lineno, place.col_offset, place.end_lineno, place.end_col_offset
+            self.changes.append((span, made if isinstance(made, list) else [made]))
+        return made
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
         if node.id != "cmp" or "cmp" in self._own or not isinstance(node.ctx, ast.Load):
@@ -199,20 +305,64 @@ class _GoneFunctions(ast.NodeTransformer):
             return ast.copy_location(ast.Pass(), node)
         return self.generic_visit(node)
 
+    def visit_ImportFrom(self, node: ast.ImportFrom) -> Any:
+        gone = {"types": _TYPES, "collections": _ABSTRACT}.get(node.module or "")
+        if gone is None or node.level:
+            return node
+        star = node.names[0].name == "*"
+        if star and node.module == "types":
+            wanted = [ast.alias(name) for name in sorted(self._read & set(gone))]
+        else:
+            wanted = [alias for alias in node.names if alias.name in gone]
+        left = node.names if star else [alias for alias in node.names if alias not in wanted]
+        if not wanted:
+            return node
+        made: list[Any] = [ast.ImportFrom(node.module, left, 0)] if left else []
+        for alias in wanted:
+            name = ast.Name(alias.asname or alias.name, ast.Store())
+            made.append(ast.Assign([name], _at(node, _MOVED[f"{node.module}.{alias.name}"])))
+        return [ast.fix_missing_locations(ast.copy_location(each, node)) for each in made]
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
+        self.generic_visit(node)
+        if isinstance(node.value, ast.Name) and isinstance(node.ctx, ast.Load):
+            moved = _MOVED.get(f"{node.value.id}.{node.attr}")
+            if moved is not None:
+                return _at(node, moved)
+        return node
+
     def visit_Call(self, node: ast.Call) -> ast.AST:
         self.generic_visit(node)
-        if ast.unparse(node.func).rpartition(".")[2] in {"sort", "sorted"}:
+        function: Any = node.func
+        name = ast.unparse(function)
+        word = getattr(function, "attr", name)
+        if word in {"sort", "sorted"}:
+            if word == "sort" and len(node.args) == 1 and not node.keywords:
+                node.keywords = [ast.keyword("cmp", node.args.pop())]
             for keyword in node.keywords:
                 if keyword.arg == "cmp":
                     wrap: Any = _at(keyword.value, "__import__('functools').cmp_to_key(None)")
                     wrap.args = [keyword.value]
                     keyword.arg, keyword.value = "key", wrap
+            return ast.fix_missing_locations(node)
+        if name == "apply" and "apply" not in self._own and node.args:
+            node.func, *rest = node.args
+            named = [ast.keyword(None, each) for each in rest[1:]]
+            node.args = [ast.Starred(each, ast.Load()) for each in rest[:1]]
+            node.keywords = [*named, *node.keywords]
+            return ast.fix_missing_locations(node)
+        if not isinstance(function, ast.Attribute):
             return node
-        function: Any = node.func
-        if not (isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name)):
-            return node
-        if function.value.id != "string" or not node.args:
-            return node
+        if word == "isAlive" and not node.args and "isAlive" not in self._own:
+            function.attr = "is_alive"
+        elif name == "yaml.load" and len(node.args) == 1 and not node.keywords:
+            function.attr = "safe_load"  # PyYAML wants a loader by now
+        elif isinstance(function.value, ast.Name) and function.value.id == "string" and node.args:
+            self._use_method(node, function)
+        return node
+
+    def _use_method(self, node: ast.Call, function: Any) -> None:
+        """Make a call of `string.split(text)` and the like one of `text.split()`."""
         if function.attr in self._METHODS:
             function.value, *node.args = node.args
         elif function.attr in self._CONVERSIONS:
@@ -222,10 +372,9 @@ class _GoneFunctions(ast.NodeTransformer):
             space = ast.copy_location(ast.Constant(" "), function)
             function.value = node.args[1] if len(node.args) > 1 else space
             function.attr, node.args = "join", node.args[:1]
-        return node
 
 
-def _at(place: ast.expr, source: str) -> ast.expr:
+def _at(place: ast.AST, source: str) -> ast.expr:
     """Parse an expression and give all of it the lines of another one."""
     made = ast.parse(source, mode="eval").body
     for node in ast.walk(made):

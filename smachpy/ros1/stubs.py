@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import builtins
+import re
 import sys
 import types
 from dis import opname
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
 
 _ACTION_ENDS = ("ActionGoal", "ActionResult", "ActionFeedback", "Action")
 
+_MARKS = frozenset({"_md5sum", "nsecs", "to_nsec"})
+"""By these a message or a time is known, which a stand-in is not."""
+
 
 class Anything:
     """A value that allows everything; in sums it is 0, as a list empty, as a condition true.
@@ -41,7 +45,7 @@ class Anything:
         self.__dict__["_stub_name"] = name
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("__") and name.endswith("__"):
+        if (name.startswith("__") and name.endswith("__")) or name in _MARKS:
             raise AttributeError(name)
         return Anything(f"{self.__dict__.get('_stub_name', 'stub')}.{name}")
 
@@ -202,25 +206,40 @@ class StubSection(types.ModuleType):
 
     def __init__(self, name: str, known: Any = None) -> None:
         super().__init__(name, "Stand-ins for the interfaces of a package that is missing.")
-        self.__all__: list[str] = list(known.__all__) if known is not None else []
         self.__file__ = None
         self.__path__: list[str] = []
         self._package, _, self._kind = name.partition(".")
         self._known = known
+        self._names: list[str] = list(known.__all__) if known is not None else []
 
     def __getattr__(self, name: str) -> Any:
+        if name == "__all__":
+            used = [each for each in unbound_names(sys._getframe(1)) if each[0].isupper()]
+            return [*self._names, *(each for each in used if each not in self._names)]
         if name.startswith("_"):
             raise AttributeError(name)
-        if name in self.__all__:
-            try:
-                return getattr(self._known, name)
-            except InterfaceError:  # it uses a type that is missing
-                return stand_in_class(name)
+        if name in self._names:
+            return self._resolved(name)
         session().stand_in(f"{self._package}/{name}")
         make = _service if self._kind == "srv" else _message
         value = make(self._package, name)
         setattr(self, name, value)
         return value
+
+    def _resolved(self, name: str) -> Any:
+        """Return a class that is there; types that it uses and nobody has are empty."""
+        made: set[str] = set()
+        while True:
+            try:
+                return getattr(self._known, name)
+            except InterfaceError as error:
+                unknown = set(re.findall(r"unknown type: got '(\w+/\w+)'", str(error))) - made
+                if not unknown:
+                    return stand_in_class(name)
+                made |= unknown
+                for each in sorted(unknown):
+                    define_message(each, "")
+                    session().stand_in(each)
 
 
 def _message(package: str, name: str) -> type:
@@ -239,7 +258,8 @@ def _action_part(package: str, base: str, end: str) -> type:
 
     action = define_action(f"{package}/{base}", "---\n---\n")
     for part in ("Goal", "Result", "Feedback"):
-        permissive(get_message(f"{package}/{base}{part}"))
+        loose = permissive(get_message(f"{package}/{base}{part}"))
+        _fill(get_message(f"{package}/{base}Action{part}"), part.lower(), loose)
     return (
         action
         if end == "Action"
@@ -250,10 +270,23 @@ def _action_part(package: str, base: str, end: str) -> type:
 def _service(package: str, name: str) -> type:
     base = name.removesuffix("Request").removesuffix("Response")
     service = define_service(f"{package}/{base}", "---\n")
+    service._request_class = permissive(service._request_class)
+    service._response_class = permissive(service._response_class)
     if name == base:
         return service
-    kind = service._request_class if name.endswith("Request") else service._response_class
-    return permissive(kind)
+    return service._request_class if name.endswith("Request") else service._response_class
+
+
+def _fill(holder: Any, field: str, loose: type) -> None:
+    """Let new messages of a class hold a permissive one in a field."""
+    plain = holder.__init__
+
+    def make(self: Any, *args: Any, **fields: Any) -> None:
+        plain(self, *args, **fields)
+        if not isinstance(getattr(self, field), loose):
+            setattr(self, field, loose())
+
+    holder.__init__ = make
 
 
 _loose: dict[str, type] = {}
@@ -262,9 +295,22 @@ _loose: dict[str, type] = {}
 def permissive(kind: type) -> type:
     """Return a subclass of a message class without fields that takes and gives every field."""
     name = kind._type  # type: ignore[attr-defined]
+    if issubclass(kind, _Loose):
+        return kind
     if name not in _loose:
-        _loose[name] = type(kind.__name__, (_Loose, kind), {})
+        made: Any = type(kind.__name__, (_Loose, kind), {})
+        made.__slots__ = _EveryName()
+        _loose[name] = made
     return _loose[name]
+
+
+class _EveryName(tuple[str, ...]):
+    """No fields to go through, and every field when asked for one."""
+
+    __slots__ = ()
+
+    def __contains__(self, name: object) -> bool:
+        return True
 
 
 class _Loose:

@@ -3,7 +3,14 @@ import rospy
 import smach
 import tf2_ros
 import tf2_geometry_msgs
+import sensor_msgs.point_cloud2 as pc2
+from dynamic_reconfigure.msg import Config, DoubleParameter
 from geometry_msgs.msg import TransformStamped, PointStamped
+from sensor_msgs import point_cloud2
+from sensor_msgs.msg import PointField
+from std_msgs.msg import Header
+from tf2_geometry_msgs.tf2_geometry_msgs import do_transform_pose
+from tf2_ros.buffer import Buffer
 
 
 class Look(smach.State):
@@ -29,7 +36,13 @@ class Look(smach.State):
 
 
 rospy.init_node("look")
-buffer = tf2_ros.Buffer(rospy.Duration(1200.0))
+cloud = pc2.create_cloud_xyz32(Header(frame_id="map"), [(1, 2, 3), (float("nan"), 5, 6)])
+assert list(pc2.read_points(cloud, field_names=("z", "x"), skip_nans=True)) == [(3.0, 1.0)]
+assert point_cloud2.read_points_list(cloud, uvs=[[0, 0]])[0].y == 2.0
+fields = [PointField("n", 2, PointField.UINT16, 1), PointField("d", 8, PointField.FLOAT64, 1)]
+assert list(pc2.read_points(pc2.create_cloud(Header(), fields, [(7, 0.5), (8, 1.5)]), ["d"])) == [(0.5,), (1.5,)]
+assert Config(doubles=[DoubleParameter("gain", 2.0)]).doubles[0].value == 2.0
+buffer = Buffer(rospy.Duration(1200.0))
 listener = tf2_ros.TransformListener(buffer)
 t = TransformStamped()
 t.header.stamp = rospy.Time.now()

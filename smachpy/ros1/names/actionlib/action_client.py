@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from actionlib_core.action.client import ActionClient as _ActionClient
@@ -13,6 +14,7 @@ from actionlib_core.action.client import TerminalState as TerminalState
 from actionlib_core.action.client import get_name_of_constant as get_name_of_constant
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus as GoalStatus
 from smachpy.ros1.session import session
+from smachpy.ros1.until_end import until_end
 
 
 class ActionClient(_ActionClient[Any]):
@@ -21,9 +23,12 @@ class ActionClient(_ActionClient[Any]):
     def __init__(self, ns: str, ActionSpec: Any) -> None:
         session().on_action(ns)
         super().__init__(ns, ActionSpec)
+        self.ns = ns
 
     def wait_for_server(self, timeout: Any = 0.0) -> bool:
-        """Wait for a server; a dry program is told that there is one."""
-        return session().dry or super().wait_for_server(timeout)
+        """Wait for a server, until the program is to end; a dry one is told that there is one."""
+        return session().dry or until_end(
+            f"a server of action {self.ns!r}", partial(super().wait_for_server, timeout), bool
+        )
 
     wait_for_action_server_to_start = wait_for_server

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.action.simple_client import SimpleActionClient as _SimpleActionClient
 from actionlib_core.action.simple_client import SimpleGoalState as SimpleGoalState
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus as GoalStatus
 from smachpy.ros1.session import session
+from smachpy.ros1.until_end import until_end
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -19,12 +21,15 @@ class SimpleActionClient(_SimpleActionClient[Any]):
     def __init__(self, ns: str, ActionSpec: Any) -> None:
         session().on_action(ns)
         super().__init__(ns, ActionSpec)
+        self.ns = ns
         self._result_class = type(ActionSpec().action_result.result)
 
     def wait_for_server(self, timeout: Any = 0.0) -> bool:
-        """Wait for a server; 0 waits for ever."""
+        """Wait for a server; 0 waits until the program is to end, which ends every wait."""
         session().check_time()
-        return session().dry or super().wait_for_server(timeout)
+        return session().dry or until_end(
+            f"a server of action {self.ns!r}", partial(super().wait_for_server, timeout), bool
+        )
 
     def send_goal(
         self,
@@ -47,9 +52,15 @@ class SimpleActionClient(_SimpleActionClient[Any]):
         return super().send_goal_and_wait(goal, execute_timeout, preempt_timeout)
 
     def wait_for_result(self, timeout: Any = 0.0) -> bool:
-        """Wait for the end of the goal; 0 waits for ever."""
+        """Wait for the end of the goal; 0 waits until the program is to end, as above."""
         session().check_time()
-        return session().dry or super().wait_for_result(timeout)
+        if session().dry:
+            return True
+        wait = partial(super().wait_for_result, timeout)
+        handle = self.gh
+        if handle is None or handle.manager.callbacks.is_inside():  # a goal's end, not callbacks
+            return wait()
+        return until_end(f"the result of action {self.ns!r}", wait, lambda: handle.goal.over)
 
     def get_result(self) -> Any:
         """Return the result of the goal."""

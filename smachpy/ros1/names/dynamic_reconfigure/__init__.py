@@ -1,6 +1,24 @@
-"""dynamic_reconfigure, as far as mission scripts use it: the client."""
+"""dynamic_reconfigure, as far as mission scripts use it: the client and the messages."""
 
 from __future__ import annotations
+
+from typing import Any
+
+from actionlib_core.interfaces import define_message, define_service
+
+for _name, _type in (("Bool", "bool"), ("Int", "int32"), ("Str", "string"), ("Double", "float64")):
+    define_message(f"dynamic_reconfigure/{_name}Parameter", f"string name\n{_type} value\n")
+define_message(
+    "dynamic_reconfigure/GroupState", "string name\nbool state\nint32 id\nint32 parent\n"
+)
+Config: Any = define_message(
+    "dynamic_reconfigure/Config",
+    "BoolParameter[] bools\nIntParameter[] ints\nStrParameter[] strs\nDoubleParameter[] doubles\n"
+    "GroupState[] groups\n",
+)
+Reconfigure: Any = define_service(
+    "dynamic_reconfigure/Reconfigure", "Config config\n---\nConfig config\n"
+)
 
 
 class DynamicReconfigureException(Exception):  # noqa: N818  ROS's name

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core.interfaces import define_message, define_service
-from smachpy.ros1.names.dynamic_reconfigure import DynamicReconfigureParameterException
+from smachpy.ros1.names.dynamic_reconfigure import (
+    Config,
+    DynamicReconfigureParameterException,
+    Reconfigure,
+)
 from smachpy.ros1.names.rospy.exceptions import ROSException
 from smachpy.ros1.names.rospy.service import ServiceProxy
 from smachpy.ros1.names.rospy.topics import Subscriber
@@ -13,20 +16,6 @@ from smachpy.ros1.session import session
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-for _name, _type in (("Bool", "bool"), ("Int", "int32"), ("Str", "string"), ("Double", "float64")):
-    define_message(f"dynamic_reconfigure/{_name}Parameter", f"string name\n{_type} value\n")
-define_message(
-    "dynamic_reconfigure/GroupState", "string name\nbool state\nint32 id\nint32 parent\n"
-)
-Config: Any = define_message(
-    "dynamic_reconfigure/Config",
-    "BoolParameter[] bools\nIntParameter[] ints\nStrParameter[] strs\nDoubleParameter[] doubles\n"
-    "GroupState[] groups\n",
-)
-Reconfigure: Any = define_service(
-    "dynamic_reconfigure/Reconfigure", "Config config\n---\nConfig config\n"
-)
 
 
 class Client:

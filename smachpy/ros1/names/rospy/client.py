@@ -6,7 +6,7 @@ Source:
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, NoReturn
 
 from actionlib_core.node import get_node
 from actionlib_core.pubsub.service_proxy import wait_for_service as _wait_for_service
@@ -16,9 +16,10 @@ from smachpy.ros1.names.rospy.core import init_node as init_node
 from smachpy.ros1.names.rospy.core import myargv as myargv
 from smachpy.ros1.names.rospy.core import on_shutdown as on_shutdown
 from smachpy.ros1.names.rospy.core import spin as spin
-from smachpy.ros1.names.rospy.exceptions import ROSException, as_rospy
+from smachpy.ros1.names.rospy.exceptions import ROSException, ROSInterruptException, as_rospy
 from smachpy.ros1.names.rospy.names import get_name, get_namespace, resolve_name
 from smachpy.ros1.session import session
+from smachpy.ros1.until_end import until_end
 
 _NO_DEFAULT: Final = object()
 
@@ -100,9 +101,17 @@ def wait_for_message(topic: str, topic_type: Any, timeout: Any = None) -> Any:
     if topic_type.__name__ == "AnyMsg":
         from smachpy.ros1.names.rospy.topics import wait_for_any
 
-        return wait_for_any(topic, _limit(timeout))
+        limit = _limit(timeout)
+        return until_end(
+            f"a message on topic {topic!r}", lambda: wait_for_any(topic, limit), _interrupted
+        )
+    limit = _limit(timeout)
     with as_rospy():
-        return _wait_for_message(topic, topic_type, _limit(timeout))
+        return until_end(
+            f"a message on topic {topic!r}",
+            lambda: _wait_for_message(topic, topic_type, limit),
+            _interrupted,
+        )
 
 
 def wait_for_service(service: str, timeout: Any = None) -> None:
@@ -121,8 +130,15 @@ def wait_for_service(service: str, timeout: Any = None) -> None:
     now = session()
     now.check_time()
     if not now.dry:
+        limit = _limit(timeout)
         with as_rospy():
-            _wait_for_service(service, _limit(timeout))
+            until_end(
+                f"service {service!r}", lambda: _wait_for_service(service, limit), _interrupted
+            )
+
+
+def _interrupted() -> NoReturn:
+    raise ROSInterruptException("rospy shutdown")
 
 
 def _limit(timeout: Any) -> float | None:
@@ -131,10 +147,17 @@ def _limit(timeout: Any) -> float | None:
 
 
 def get_published_topics(namespace: str = "/") -> list[list[str]]:
-    """Return [topic, type] of all topics below `namespace` that somebody publishes."""
+    """Return [topic, type] of all topics below `namespace` that somebody publishes.
+
+    Those of a real robot (`--ros1-robot`) are among them, whether or not anybody listens to them.
+    """
     prefix = namespace if namespace.endswith("/") else f"{namespace}/"
     ends = list_endpoints(get_node().transport, kind=Kind.PUBLISHER)
     found = {(f"/{end.name}", end.type) for end in ends}
+    robot = session().parameters.robot
+    if robot is not None:
+        with as_rospy():
+            found |= set(robot.published_topics().items())
     return [list(pair) for pair in sorted(found) if pair[0].startswith(prefix)]
 
 
@@ -144,15 +167,24 @@ class MasterProxy:
     target = "http://localhost:11311"
 
     def getSystemState(self) -> tuple[int, str, list[list[list[Any]]]]:
-        """Return publishers, subscribers and services as ROS's master does."""
+        """Return publishers, subscribers and services as ROS's master does, a robot's too."""
         found: dict[Kind, dict[str, list[str]]] = {
             kind: {} for kind in (Kind.PUBLISHER, Kind.SUBSCRIBER, Kind.SERVICE)
         }
         for end in list_endpoints(get_node().transport):
             if end.kind in found:
                 found[end.kind].setdefault(f"/{end.name}", []).append(f"/{end.node}")
+        robot = session().parameters.robot
+        if robot is not None:
+            with as_rospy():
+                there = robot.state()
+            parts = there.publishers, there.subscribers, there.services
+            for kind, part in zip(found, parts, strict=True):
+                for name, nodes in part.items():
+                    found[kind].setdefault(name, []).extend(nodes)
         state = [
-            [[n, sorted(nodes)] for n, nodes in sorted(ends.items())] for ends in found.values()
+            [[n, sorted(set(nodes))] for n, nodes in sorted(ends.items())]
+            for ends in found.values()
         ]
         return 1, "current system state", state
 
