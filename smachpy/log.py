@@ -7,7 +7,7 @@ By default messages go to `logging.getLogger("smachpy")`, so they are filtered a
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from smachpy.machines.problems import Problems
 
@@ -17,15 +17,34 @@ if TYPE_CHECKING:
 _logger = logging.getLogger("smachpy")
 
 
-class _Loggers(NamedTuple):
-    info: Callable[[str], object]
-    warn: Callable[[str], object]
-    debug: Callable[[str], object]
-    error: Callable[[str], object]
+_STANDARD = (_logger.info, _logger.warning, _logger.debug, _logger.error)
 
 
-_STANDARD = _Loggers(_logger.info, _logger.warning, _logger.debug, _logger.error)
-_current = [_STANDARD]
+class Messages:
+    """The functions for messages in force; what runs machines calls them directly.
+
+    Attributes:
+        logger: The standard library's logger, to which messages go by default.
+        are_own: They go to functions of the program instead.
+    """
+
+    __slots__ = ("are_own", "debug", "error", "info", "logger", "warn")
+
+    def __init__(self) -> None:
+        self.use(_STANDARD)
+
+    def use(self, functions: tuple[Callable[[str], object], ...]) -> None:
+        """Send messages to these from now on."""
+        self.info, self.warn, self.debug, self.error = functions
+        self.are_own = functions != _STANDARD
+        self.logger = _logger
+
+    def all(self) -> tuple[Callable[[str], object], ...]:
+        """Return them, in the order in which `set_loggers` takes them."""
+        return self.info, self.warn, self.debug, self.error
+
+
+MESSAGES = Messages()
 
 
 def set_loggers(
@@ -43,46 +62,40 @@ def set_loggers(
     for name, function in (("info", info), ("warn", warn), ("debug", debug), ("error", error)):
         problems.function(name, function, f"{name}(text)", 1, optional=False)
     problems.raise_all()
-    given = _Loggers(info, warn, debug, error)
-    _current[0] = _STANDARD if given == _STANDARD else given
+    MESSAGES.use((info, warn, debug, error))
 
 
 def current_loggers() -> tuple[Callable[[str], object], ...]:
     """Return the functions in force, in the order in which `set_loggers` takes them."""
-    return _current[0]
+    return MESSAGES.all()
 
 
 def loginfo(msg: str) -> None:
     """Log what the machine does."""
-    _current[0].info(msg)
+    MESSAGES.info(msg)
 
 
 def logwarn(msg: str) -> None:
     """Log something that is probably not meant so."""
-    _current[0].warn(msg)
+    MESSAGES.warn(msg)
 
 
 def logerr(msg: str) -> None:
     """Log an error."""
-    _current[0].error(msg)
+    MESSAGES.error(msg)
 
 
 def logdebug(msg: str) -> None:
     """Log details."""
-    _current[0].debug(msg)
-
-
-def is_info_wanted() -> bool:
-    """Tell whether `loginfo` goes anywhere."""
-    return _current[0] is not _STANDARD or _logger.isEnabledFor(logging.INFO)
+    MESSAGES.debug(msg)
 
 
 def log_exception(msg: str, error: BaseException) -> None:
     """Log an error with the traceback of `error`."""
-    if _current[0] is _STANDARD:
+    if not MESSAGES.are_own:
         _logger.error(msg, exc_info=error)
         return
     import traceback
 
     text = "".join(traceback.format_exception(error))
-    _current[0].error(f"{msg}\n{text}")
+    MESSAGES.error(f"{msg}\n{text}")

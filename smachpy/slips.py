@@ -26,18 +26,19 @@ class SlipWarning(UserWarning):
     """A program does what SMACH accepted and this package refuses elsewhere."""
 
 
-_accepting = [False]
+ACCEPTING = [False]
+"""Whether slips are accepted now; see `accepting`."""
 _told: set[tuple[str, int, str]] = set()
 
 
 def accepting() -> bool:
     """Tell whether slips are accepted now."""
-    return _accepting[0]
+    return ACCEPTING[0]
 
 
 def set_accepting(on: bool) -> None:
     """Accept slips from now on, or refuse them; which ones were told is forgotten."""
-    _accepting[0] = on
+    ACCEPTING[0] = on
     _told.clear()
 
 
@@ -50,7 +51,7 @@ def accepts(problem: str) -> bool:
     Warns:
         SlipWarning: it may; once for each line of the program and problem.
     """
-    if not _accepting[0]:
+    if not ACCEPTING[0]:
         return False
     frame = _program_frame(sys._getframe(1))  # as `warnings` looks for its caller
     file, line = (frame.f_code.co_filename, frame.f_lineno) if frame else ("smachpy", 0)

@@ -29,7 +29,18 @@ def _program_ends() -> bool:
     return shutdown.requested()
 
 
-_check: list[Callable[[], bool]] = [_program_ends]
+class _ShutdownCheck:
+    """What says whether the program is shutting down.
+
+    Attributes:
+        is_own: `set_shutdown_check` was called.
+    """
+
+    function: Callable[[], bool] = staticmethod(_program_ends)
+    is_own = False
+
+
+SHUTDOWN_CHECK = _ShutdownCheck()
 
 
 def is_shutdown() -> bool:
@@ -37,7 +48,7 @@ def is_shutdown() -> bool:
 
     By the check of `set_shutdown_check`, else by `actionlib_core.shutdown`.
     """
-    return _check[0]()
+    return SHUTDOWN_CHECK.function()
 
 
 def set_shutdown_check(cb: Callable[[], bool]) -> None:
@@ -49,17 +60,12 @@ def set_shutdown_check(cb: Callable[[], bool]) -> None:
     problems = Problems("set_shutdown_check")
     problems.function("cb", cb, "cb()", 0, optional=False)
     problems.raise_all()
-    _check[0] = cb
+    SHUTDOWN_CHECK.function, SHUTDOWN_CHECK.is_own = cb, True
 
 
 def reset_shutdown_check() -> None:
     """Forget what `set_shutdown_check` was given."""
-    _check[0] = _program_ends
-
-
-def has_shutdown_check() -> bool:
-    """Tell whether `set_shutdown_check` was called."""
-    return _check[0] is not _program_ends
+    SHUTDOWN_CHECK.function, SHUTDOWN_CHECK.is_own = _program_ends, False
 
 
 def has_smach_interface(obj: object) -> bool:

@@ -6,13 +6,12 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.action.simple_server import SimpleActionServer
-from actionlib_core.wire.action_messages import ActionTypes
+from actionlib_core.wire.action_types import ActionTypes
 from smachpy import log
 from smachpy.events import UserdataWritten
 from smachpy.exceptions import did_you_mean
 from smachpy.machines.problems import Problems
-from smachpy.run.grace import request_soon
-from smachpy.run.origin import asking
+from smachpy.run.grace import asking, request_soon
 from smachpy.slips import accepts
 from smachpy.userdata.user_data import Remapper, UserData
 

@@ -195,6 +195,7 @@ class GoalExchange:
         accepted: The server has begun with the goal.
         result: The result message once it is there, else None.
         unanswered: No server has said a word about the goal.
+        adopted: An earlier process has sent it.
 
     Threads: everything belongs to the state's thread, apart from `hurry` and from what the client
         tells: that is only noted, under the client's lock.
@@ -214,6 +215,7 @@ class GoalExchange:
     ) -> None:
         self.run = run
         self.goal_id = ""
+        self.adopted = False
         self._client = client
         self._wake = wake
         self._scope = scope
@@ -268,12 +270,15 @@ class GoalExchange:
             kept: What the journal knows of it.
             ack_timeout: When no server knows of it within so long [s] it is LOST.
         """
+        self.adopted = True
         if kept["taken_ns"] is not None:
             clock = self._wake.clock
             self.run.on_taken(clock.now() - (clock.time_ns() - kept["taken_ns"]) / 1e9)
             self._is_taken_kept = True
         if kept["status"]:  # it had ended
             self.goal_id = kept["id"]
+            if self._preempt_requested():  # as it was when the goal was stopped
+                self.run.on_preempt()
             self.run.on_end(kept["status"], kept["text"])
             self._kept_result = kept["result"]
             return
@@ -359,7 +364,8 @@ class GoalExchange:
         if run.status == "LOST" and self.unanswered:
             return  # what follows is decided after this, and again by a process that goes on
         if self._journal is not None and self._frame is not None:
-            self._journal.goal_done(self._frame, self.goal_id, run.status, run.text, self.result)
+            facts = (self.goal_id, run.status, run.text, self.result)
+            self._journal.goal_done(self._frame, *facts, preempted=run.preempted)
             if handle.goal.over and run.status != "LOST":
                 handle.acknowledge()
 

@@ -145,9 +145,9 @@ class Incoming:
 
 
 def _slot_problems(name: str, slots: tuple[str, ...], message_class: Any) -> list[str]:
-    known = list(message_class.__slots__)
+    known = message_class.__slots__
     return [
-        f"{name}_slots: got {slot!r}; expected fields of {message_class._type}: {known}."
+        f"{name}_slots: got {slot!r}; expected fields of {message_class._type}: {list(known)}."
         f"{did_you_mean(slot, known)}"
         for slot in slots
         if slot not in known

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypedDict
 from actionlib_core.action.client import ActionClient
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.node import get_node
-from actionlib_core.wire.action_messages import ActionTypes
+from actionlib_core.wire.action_types import ActionTypes
 from smachpy import log
 from smachpy.actions.goal_run import ABORTED, OUTCOMES, PREEMPTED, STOPPED, GoalExchange, GoalRun
 from smachpy.actions.interface import adopt_interface
@@ -17,11 +17,10 @@ from smachpy.actions.wakeup import Wakeup
 from smachpy.context import current_frame
 from smachpy.machines.problems import Problems
 from smachpy.machines.state import Shown, State, get_options
-from smachpy.run.child import on_preempt
 from smachpy.run.frame import current_scope
-from smachpy.run.grace import inherited_grace
+from smachpy.run.grace import inherited_grace, on_preempt
 from smachpy.run.interrupt import Interruption
-from smachpy.run.runner import Timeout
+from smachpy.run.step import Timeout
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -37,6 +36,9 @@ __all__ = ["ActionStateOptions", "SimpleActionState"]
 
 SHORTEST_ACK_S = 1.0
 """A server that is there is given this long to answer, however short `server_wait_timeout` is."""
+
+ASKED_AGAIN_S = 5.0
+"""After a resume, what had asked a state to stop has this long to ask again [s]."""
 
 MARGIN_S = 5.0
 INHERITED_MARGIN_S = 1.0
@@ -248,6 +250,10 @@ class SimpleActionState(State):
         """Follow the goal that an earlier process has sent; None: a new one is to be sent."""
         journal = frame.run.journal
         assert journal is not None
+        if kept.get("preempted") and not kept["stopped"]:
+            # It had ended because its state was asked to stop. Who asked goes on, too, and asks
+            # again: a concurrence, say, when all its children are back.
+            State.wait_preempt(self, ASKED_AGAIN_S)
         exchange = self.__exchange_goal(ud, limit, frame, kept)
         assert exchange is not None
         status = exchange.run.status
@@ -364,6 +370,11 @@ class SimpleActionState(State):
         text = f"{where}: goal {exchange.goal_id} on '{self.__action_name}': {run.reason}"
         if run.abandoned:
             return f"{text}. It was abandoned and may still run."
+        if exchange.unanswered and exchange.adopted:
+            return (
+                f"{text}. An earlier process had sent it. Try idempotent=True where a goal that "
+                "may have run can be sent anew, or resume= where the state is to decide."
+            )
         if exchange.unanswered:
             name = self.__types.action._type
             return (

@@ -21,6 +21,7 @@ _RULES: Final = {
     "comment": "net-label",
     "condition": "net-label",
     "arc": "net-label",
+    "number": "net-label",
     "xml": "net-label",
     "resume": "net-label",
     "unmatched": "net-unmatched",

@@ -7,14 +7,14 @@ dataclass costs more than that.
 
 The events of one run, in order, rebuild it: `Started` and `Finished` enclose it; `Entered` and
 `Left` enclose every state below the root, containers included. A state that raised has `Failed`
-in place of `Left`.
+in place of `Left`. When another process goes on with a run, its events begin with `Recovered`.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from typing import Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from smachpy.userdata.shown import (
     DEEPEST,
@@ -26,6 +26,9 @@ from smachpy.userdata.shown import (
     text_of,
 )
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
 
 class Started(NamedTuple):
     """A root container began to run."""
@@ -34,6 +37,28 @@ class Started(NamedTuple):
     t: float
     stamp_ns: int
     initial: tuple[str, ...] = ()
+
+
+class Recovered(NamedTuple):
+    """Another process goes on with a durable run; in place of `Started`.
+
+    What was under way goes on: records of a buffer have no `Entered` for it, so that those of all
+    processes, one after the other, are one run.
+
+    Attributes:
+        mission: Id of the mission.
+        began_ns: When the run began [ns since the epoch].
+        outages: Pairs (from, to) [ns since the epoch] in which no process ran it, this one last.
+        active: Pairs (path, since when [ns since the epoch]) of the states that go on.
+    """
+
+    path: str
+    t: float
+    stamp_ns: int
+    mission: str
+    began_ns: int
+    outages: tuple[tuple[int, int], ...] = ()
+    active: tuple[tuple[str, int], ...] = ()
 
 
 class Finished(NamedTuple):
@@ -333,6 +358,7 @@ class GoalDone(NamedTuple):
 
 Event: TypeAlias = (
     Started
+    | Recovered
     | Finished
     | Entered
     | Left
@@ -398,6 +424,29 @@ def asker_text(source: str, by: str, why: str) -> str:
 def answered_text(answer: str, by: str) -> str:
     """Return how a question was answered, in one phrase for people."""
     return f"answered {answer} by {by}" if by else f"nobody answered: {answer}"
+
+
+def recovered_text(outages: Sequence[Sequence[int]]) -> str:
+    """Return that a run goes on after the last of its outages, in one phrase for people."""
+    seconds = (outages[-1][1] - outages[-1][0]) / 1e9 if outages else 0.0
+    return f"goes on after an outage of {span_text(seconds)}"
+
+
+def outages_text(outages: Sequence[Sequence[int]]) -> str:
+    """Return how often and how long no process ran a mission: "2, 3 min 20"; "" for never."""
+    seconds = sum(end - begin for begin, end in outages) / 1e9
+    return f"{len(outages)}, {span_text(seconds)}" if outages else ""
+
+
+def span_text(seconds: float) -> str:
+    """Return a span of time as people say it: "3.2 s", "75 s", "3 min 20", "2 h 05"."""
+    if seconds < 10:  # noqa: PLR2004
+        return f"{seconds:.1f} s"
+    whole = int(seconds)
+    if whole < 120:  # noqa: PLR2004
+        return f"{whole} s"
+    minutes, rest = divmod(whole, 60)
+    return f"{minutes} min {rest:02}" if minutes < 120 else f"{minutes // 60} h {minutes % 60:02}"  # noqa: PLR2004
 
 
 def to_record(event: Event) -> dict[str, Any]:
@@ -494,7 +543,8 @@ def _fields_of(value: Any, room: Room, depth: int) -> Any:
     """A message, or a ROS time or duration, by its fields; None when it is none."""
     if hasattr(value, "_md5sum") and hasattr(value, "__slots__"):
         fields = {name: getattr(value, name, None) for name in value.__slots__}
-        return {"$msg": value._type, "fields": _plain(fields, room, depth + 1)}
+        return {"$msg": str(value._type), "fields": _plain(fields, room, depth + 1)}
     if hasattr(value, "to_nsec") and hasattr(value, "nsecs"):
-        return {"secs": value.secs, "nsecs": value.nsecs}
+        parts = {"secs": value.secs, "nsecs": value.nsecs}
+        return {name: _plain(part, room, depth + 1) for name, part in parts.items()}
     return None

@@ -118,6 +118,7 @@ class EventBuffer:
         self._on_news = on_news
         self._name = name
         self._read_path = ""
+        self._goes_on: set[str] = set()  # states of an earlier process that were not entered yet
         self._lock = threading.Lock()
         self._seq = 0
         self._clock: Clock | None = None
@@ -145,7 +146,12 @@ class EventBuffer:
                 self.quiet = False
             self._set_clock()
             places = range(0, len(found), SLOTS)
-            return [self._number(record) for at in places for record in self._records(found, at)]
+            return [
+                self._number(record)
+                for at in places
+                for record in self._records(found, at)
+                if not self._is_known(record)
+            ]
 
     # -- for the machinery ---------------------------------------------------------------------
 
@@ -240,6 +246,17 @@ class EventBuffer:
             path = f"{what}/{entered.label}"
             yield {"kind": "Entered", "path": path, "t": t, "stamp_ns": stamp}
 
+    def _is_known(self, record: dict[str, Any]) -> bool:
+        """Tell whether a record says that a state begins that an earlier process has begun."""
+        kind, path = record["kind"], record["path"]
+        if kind == "Recovered":
+            self._goes_on = {path for path, _ in record["active"]}
+        if not self._goes_on or kind not in {"Entered", "Left", "Failed"}:
+            return False
+        known = path in self._goes_on
+        self._goes_on.discard(path)
+        return known and kind == "Entered"
+
     def _number(self, record: dict[str, Any]) -> dict[str, Any]:
         self._seq += 1
         record["seq"] = self._seq
@@ -247,8 +264,13 @@ class EventBuffer:
             record["dropped"], self._missing = self._missing, 0
         self._last_ns = record["stamp_ns"]
         if self._name:
-            record["path"] = self._name + record["path"].removeprefix(self._read_path)
+            record["path"] = self._named(record["path"])
+            if record["kind"] == "Recovered":
+                record["active"] = [[self._named(path), at] for path, at in record["active"]]
         return record
+
+    def _named(self, path: str) -> str:
+        return self._name + path.removeprefix(self._read_path)
 
 
 class RawEventBuffer(EventBuffer):
@@ -293,7 +315,7 @@ class RawEventBuffer(EventBuffer):
             return events
 
 
-_OPENS = {"Started": "", "Entered": "", "GoalSent": "goal of "}
+_OPENS = {"Started": "", "Recovered": "", "Entered": "", "GoalSent": "goal of "}
 _CLOSES = {"Finished": "", "Left": "", "Failed": "", "GoalDone": "goal of "}
 _WITHIN = {
     **dict.fromkeys(("PreemptRequested", "PreemptServiced", "Abandoned"), ""),

@@ -17,10 +17,9 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from smachpy import log
 from smachpy.events import Paused, Resumed
 from smachpy.exceptions import SmachError, did_you_mean
-from smachpy.run.child import ContainerData, on_preempt
+from smachpy.run.child import ContainerData
 from smachpy.run.frame import SUBSCRIPTIONS
-from smachpy.run.grace import ask_child, request_soon
-from smachpy.run.origin import asking
+from smachpy.run.grace import ask_child, asking, on_preempt, request_soon
 from smachpy.run.visit import Override
 
 if TYPE_CHECKING:
@@ -162,7 +161,7 @@ class Control:
         """
         above, _, label = path.rpartition("/")
         frame = self._frame_at(above, path)
-        is_machine = hasattr(frame.container._smachpy, "transitions")
+        is_machine = hasattr(frame.data, "transitions")
         if label not in frame.container.get_children() or not is_machine:
             known = sorted(frame.container.get_children())
             raise ControlError(path, f"no jump there; children: {known}", self.active())
@@ -227,14 +226,22 @@ class Control:
             return
         self._hold(frame, path, reason)
 
-    def hold(self, frame: Frame, path: str, reason: str) -> None:
+    def hold(
+        self, frame: Frame, path: str, reason: str, *, until: Callable[[], bool] | None = None
+    ) -> None:
         """Pause, and hold the state at `path`, which runs, until an operator says what to do.
+
+        Args:
+            frame: Where it runs.
+            path: Its path.
+            reason: Why, for the event.
+            until: Looked at after `release`, too: whether it need not be held any more.
 
         Blocks: as `pass_gate`.
         """
         self._watch()
         self._pause()
-        self._hold(frame, path, reason)
+        self._hold(frame, path, reason, until)
 
     def release(self, path: str) -> None:
         """Let the state at `path` look again whether it is called off, if a pause holds it back."""
@@ -267,7 +274,9 @@ class Control:
             self._steps -= 1
             return True
 
-    def _hold(self, frame: Frame, path: str, reason: str) -> None:
+    def _hold(
+        self, frame: Frame, path: str, reason: str, until: Callable[[], bool] | None = None
+    ) -> None:
         event = frame.run.clock.event(f"control of {path}")
         with self._lock:
             self._waiting[path] = event
@@ -278,6 +287,8 @@ class Control:
             while self._paused and not self._take_step():
                 visit = frame.visit
                 if container._preempt_requested or (visit is not None and visit.is_asked()):
+                    return
+                if until is not None and until():
                     return
                 event.wait()
                 event.clear()
@@ -326,6 +337,8 @@ class Control:
 
     def _stop_at(self, frame: Frame, step: Step, path: str, override: Override | None) -> None:
         self._watch()
+        if frame.run.journal is not None:
+            frame.run.journal.asked_one(frame, step, override)
         if not ask_child(frame, step, override):
             raise ControlError(path, "it has just ended", self.active())
         with self._lock:

@@ -2,10 +2,11 @@
 
 The first line is the header: `format` "smachpy-run", `version`, `machine` (a
 `smachpy.introspection.StateRecord`), `stamp_ns` and `base`, the `RunState` before
-the first event, or null. Every further line is an event (`smachpy.events.to_record`) with a number
-`seq`. Where events are missing it jumps, and the next event has their number, `dropped`; what goes
-on in the end is told all the same (`events.buffer`). A last line that was cut off by a crash is
-left out when reading.
+the first event, or null; of a durable mission also `run`, which names this run of it: the process
+that goes on with the mission goes on with the file, or writes another one of the same `run`. Every
+further line is an event (`smachpy.events.to_record`) with a number `seq`. Where events are missing
+it jumps, and the next event has their number, `dropped`; what goes on in the end is told all the
+same (`events.buffer`). A last line that was cut off by a crash is left out when reading.
 
 Lines of kind "Observed" are no events of the machine: they hold what the robot's topics told
 (`smachpy.network.observations`).
@@ -16,7 +17,7 @@ from __future__ import annotations
 import heapq
 import json
 from collections import deque
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,7 +32,7 @@ from smachpy.exceptions import SmachError
 from smachpy.introspection import StateRecord, describe
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
     from typing import Self, TextIO
 
     from smachpy.machines.container import Container
@@ -94,6 +95,7 @@ class Recording:
         observed: What the robot's topics told meanwhile, numbered from 1 in `n`.
         made_ns: When it really began; `stamp_ns` is another date if the mission's time was virtual.
         definitions: Texts of the mission's own message types, as `interface_texts` returns them.
+        run: Names the run of a durable mission, which may be in several files; "" for others.
     """
 
     path: Path
@@ -105,6 +107,7 @@ class Recording:
     observed: list[dict[str, Any]] = field(default_factory=list)
     made_ns: int = 0
     definitions: dict[str, str] = field(default_factory=dict)
+    run: str = ""
 
     @property
     def dropped(self) -> int:
@@ -121,6 +124,7 @@ class Recording:
             "observed": self.observed,
             "problems": [],
             "control": None,
+            "run": self.run,
         }
 
 
@@ -128,30 +132,38 @@ class Recorder:
     """Writes the events of a machine to a file; a context manager.
 
     Args:
-        path: The file; it must not exist yet.
+        path: The file; it must not exist yet, unless it is of the durable run that `machine` goes
+            on with: then the rest of the run is appended.
         machine: The machine.
+        run: Names the durable run, `smachpy.durable.recorder.Recorder.run`; "" for others.
 
     Attributes:
         path: The file.
+        earlier: The records that were in the file.
 
     Raises:
-        RecordingError: the file exists or cannot be made.
+        RecordingError: the file exists or cannot be made, or what is in it cannot be read.
 
     Threads: the machine never waits for the disk; another thread writes.
     """
 
-    def __init__(self, path: str | Path, machine: Container) -> None:
+    def __init__(self, path: str | Path, machine: Container, *, run: str = "") -> None:
         self.path = Path(path)
+        self.earlier: list[dict[str, Any]] = []
         clock = current_clock()
         self._executor = SerialExecutor(clock, f"recording {self.path.name}")
         self._failed = self._closed = False
         self._unwritten = 0
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._file: TextIO = self.path.open("x", encoding="utf-8")
-            made_ns = RealClock().time_ns()
-            self._file.write(header_line(describe(machine), clock.time_ns(), made_ns=made_ns))
-            self._file.flush()
+            if run and run_of(self.path) == run:
+                self._file = self._continued()
+            else:
+                self.path.parent.mkdir(parents=True, exist_ok=True)
+                self._file = self.path.open("x", encoding="utf-8")
+                made_ns = RealClock().time_ns()
+                header = header_line(describe(machine), clock.time_ns(), made_ns=made_ns, run=run)
+                self._file.write(header)
+                self._file.flush()
         except FileExistsError as error:
             raise RecordingError(
                 path, "the file exists; expected a new name, runs are never overwritten."
@@ -161,6 +173,14 @@ class Recorder:
         self._observed: deque[dict[str, Any]] = deque(maxlen=WAITING_OBSERVED)
         self._types: set[str] = set()  # of goals, whose definitions were looked for
         self._buffer = machine.event_buffer(self._on_news, limit=WAITING_EVENTS)
+
+    def _continued(self) -> TextIO:
+        """Open the file behind its last whole line: what was cut off is gone."""
+        self.earlier = read_recording(self.path).events
+        with self.path.open("rb+") as file:
+            kept = file.read().rfind(b"\n") + 1
+            file.truncate(kept)
+        return self.path.open("a", encoding="utf-8")
 
     def __enter__(self) -> Self:
         return self
@@ -271,9 +291,10 @@ def header_line(
     base: dict[str, Any] | None = None,
     *,
     made_ns: int | None = None,
+    run: str = "",
 ) -> str:
     """Return the first line of a file; `made_ns` is the real date where time is virtual."""
-    header = {
+    header: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
         "stamp_ns": stamp_ns,
@@ -281,6 +302,8 @@ def header_line(
         "base": base,
         "made_ns": stamp_ns if made_ns is None else made_ns,
     }
+    if run:
+        header["run"] = run
     return json.dumps(header) + "\n"
 
 
@@ -349,11 +372,23 @@ def _read_header(path: Path, line: str) -> Recording:
                     dict(facts)
         stamp_ns = _check_stamp(int(header["stamp_ns"]))
         made_ns = _check_stamp(int(header.get("made_ns", stamp_ns)))  # older files have none
-        return Recording(path, record, stamp_ns, base, made_ns=made_ns)
+        run = header.get("run", "")
+        if not isinstance(run, str):
+            raise TypeError(f"run: {run!r:.60}")
+        return Recording(path, record, stamp_ns, base, made_ns=made_ns, run=run)
     except _MALFORMED as error:
         raise RecordingError(
             path, f"line 1: got no header ({error}); expected a file of `smachpy run --record`."
         ) from error
+
+
+def run_of(path: Path) -> str:
+    """Return what names the durable run that a file holds; "" when it is none, or no recording."""
+    try:
+        with path.open("rb") as file:
+            return _read_header(path, file.readline().decode("utf-8", "replace")).run
+    except (OSError, RecordingError):
+        return ""
 
 
 def _check_stamp(stamp_ns: int) -> int:
@@ -364,7 +399,7 @@ def _check_stamp(stamp_ns: int) -> int:
 
 def _read_event(path: Path, number: int, line: str) -> dict[str, Any]:
     try:
-        event: dict[str, Any] = json.loads(line)
+        event: dict[str, Any] = json.loads(line, parse_constant=str)  # browsers know no NaN
         for name, kind in _FIELDS.items():
             if type(event[name]) is not kind:
                 raise ValueError(f"{name}: {event[name]!r}")
@@ -372,6 +407,8 @@ def _read_event(path: Path, number: int, line: str) -> dict[str, Any]:
         for name in _TEXTS & event.keys():
             if not isinstance(event[name], str | None):
                 raise TypeError(f"{name}: {event[name]!r}")
+        if event["kind"] == "Recovered":
+            _check_recovered(event)
         dropped = event.get("dropped", 0)
         if type(dropped) is not int or dropped < 0:
             raise ValueError(f"dropped: {dropped!r}")
@@ -380,6 +417,17 @@ def _read_event(path: Path, number: int, line: str) -> dict[str, Any]:
             path, f"line {number}: got {line[:60]!r} ({error}); expected an event."
         ) from error
     return event
+
+
+def _check_recovered(event: dict[str, Any]) -> None:
+    _check_stamp(int(event["began_ns"]))
+    for begin, end in event["outages"]:
+        _check_stamp(int(begin))
+        _check_stamp(int(end))
+    for path, since in event["active"]:
+        if not isinstance(path, str):
+            raise TypeError(f"active: {path!r}")
+        _check_stamp(int(since))
 
 
 def find_recordings(places: Iterable[str | Path]) -> list[Path]:
@@ -403,13 +451,17 @@ def each_recording(places: Iterable[str | Path]) -> Iterator[Recording]:
     """Yield the files that are named, and those in the folders that are named, sorted.
 
     Each is read when it is asked for. What is in a folder and is no recording is named in the log
-    and left out.
+    and left out. Files of a folder that hold parts of one durable run, as several computers wrote
+    them, are one recording, with the path of the first part.
 
     Raises:
         RecordingError: there is no such file or folder, or a file that is named cannot be read.
     """
     for place in places:
-        for path in find_recordings([place]):
+        paths = find_recordings([place])
+        runs = [run_of(path) for path in paths]
+        parts: dict[str, list[Recording]] = {}
+        for path, run in zip(paths, runs, strict=True):
             try:
                 recording = read_recording(path)
             except RecordingError as error:
@@ -417,4 +469,23 @@ def each_recording(places: Iterable[str | Path]) -> Iterator[Recording]:
                     raise
                 log.logwarn(f"{error} It is left out.")
                 continue
-            yield recording
+            if run and runs.count(run) > 1:
+                parts.setdefault(run, []).append(recording)
+            else:
+                yield recording
+        yield from map(joined, parts.values())
+
+
+def joined(parts: Sequence[Recording]) -> Recording:
+    """Return the recordings of one durable run as one; its machine is that of the last one."""
+    ordered = sorted(parts, key=lambda part: part.stamp_ns)
+    last = ordered[-1]
+    observed = [one for part in ordered for one in part.observed]
+    return replace(
+        ordered[0],
+        record=last.record,
+        events=list(_numbered(event for part in ordered for event in part.events)),
+        cut=last.cut,
+        observed=[{**one, "n": number} for number, one in enumerate(observed, 1)],
+        definitions={k: v for part in ordered for k, v in part.definitions.items()},
+    )

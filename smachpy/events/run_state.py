@@ -23,6 +23,9 @@ _OF_VISIT = ("question", "marking", "fired", "held")
 CUT_SHORT = "a new run began before it ended"
 """Text of a LOST goal whose run was cut short."""
 
+NOT_RECORDED = "its end was not recorded"
+"""Text of a LOST goal that ended while no process wrote it down."""
+
 ENDED_GOALS = 20
 """Number of ended goals that are kept."""
 
@@ -32,7 +35,8 @@ class RunState:
 
     Attributes:
         data: The facts. Times are nanoseconds since the Unix epoch.
-            run: number of runs begun; started, ended, outcome: of the newest run;
+            run: number of runs begun; started, ended, outcome: of the newest run; outages: pairs
+            [from, to] in which no process ran it, absent when there were none;
             states: by path: visits, since (None while it does not run), left (when it last ended),
             outcome, outcomes (times each), seconds (in finished visits), error, preempt (when it
             was asked to stop), asked (by whom: `source`, `by`, `why` and `grace` of the
@@ -63,6 +67,7 @@ class RunState:
         }
         self._fold: dict[str, Callable[[dict[str, Any]], None]] = {
             "Started": self._on_started,
+            "Recovered": self._on_recovered,
             "Finished": self._on_finished,
             "Entered": self._on_entered,
             "Left": lambda record: self._leave(record, record["outcome"]),
@@ -115,6 +120,7 @@ class RunState:
     def _on_started(self, record: dict[str, Any]) -> None:
         self.data["run"] += 1
         self.data.update(started=record["stamp_ns"], ended=None, outcome=None)
+        self.data.pop("outages", None)
         # What an earlier run of this root left open was cut short: nothing will say that it ended.
         root, below = record["path"], f"{record['path']}/"
         for path, state in self.data["states"].items():
@@ -124,6 +130,29 @@ class RunState:
             if goal["ended"] is None and goal["path"].startswith(below):  # GoalDone may come late
                 goal.update(status="LOST", text=CUT_SHORT, ended=record["stamp_ns"])
         self._on_entered(record)
+
+    def _on_recovered(self, record: dict[str, Any]) -> None:
+        """What is known of the run goes on; how what else ran has ended was not recorded."""
+        known, stamp = self.data["started"] is not None, record["stamp_ns"]
+        if not known:
+            self.data.update(run=self.data["run"] + 1, started=record["began_ns"])
+        self.data.update(ended=None, outcome=None, outages=list(map(list, record["outages"])))
+        active = dict(record["active"])
+        for path, state in self.data["states"].items():
+            if state["since"] is not None and path not in active:
+                state.update(since=None, left=stamp, waits=None, **_NOT_ASKED)
+        for path, since in active.items():
+            state = self._state(path)
+            if state["since"] is None and state.get("left", -1) >= since:  # the process's own end
+                _reopen(state, since)
+            elif state["since"] is None:
+                state["visits"] += 1
+                state.update(attempt=1)
+            first = since if state["since"] is None else state["since"]
+            state.update(since=first, waits=None, error=None, **_NOT_ASKED)
+        for goal in self.data["goals"].values():
+            if goal["ended"] is None and goal["path"] not in active:
+                goal.update(status="LOST", text=NOT_RECORDED, ended=stamp)
 
     def _on_finished(self, record: dict[str, Any]) -> None:
         outcome = record["outcome"] or RAISED
@@ -250,3 +279,13 @@ class RunState:
                 result=record["result"],
                 ended=record["stamp_ns"],
             )
+
+
+def _reopen(state: dict[str, Any], since: int) -> None:
+    """Take the last end of a state back: it has not ended."""
+    state["seconds"] = max(0.0, state["seconds"] - (state["left"] - since) / 1e9)
+    outcome, outcomes = state["outcome"], state["outcomes"]
+    outcomes[outcome] -= 1
+    if not outcomes[outcome]:
+        del outcomes[outcome]
+    state["outcome"] = next(reversed(outcomes), None)

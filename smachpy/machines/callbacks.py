@@ -8,6 +8,7 @@ from smachpy import log
 from smachpy.events.buffer import LONGEST, EventBuffer
 from smachpy.machines.problems import Problems
 from smachpy.run.callback import call_bounded
+from smachpy.run.child import EPOCH
 from smachpy.run.frame import SUBSCRIPTIONS
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ class Callbacks:
         """Call `start_cb(userdata, initial_states, *cb_args)` at the start of each run."""
         call = "start_cb(userdata, initial_states, *cb_args)"
         self._smachpy.start_cbs.append(_checked("start_cb", start_cb, call, 2, cb_args))
+        EPOCH.value += 1
 
     def register_transition_cb(
         self, transition_cb: Callable[..., object], cb_args: Iterable[Any] = ()
@@ -47,6 +49,7 @@ class Callbacks:
         self._smachpy.transition_cbs.append(
             _checked("transition_cb", transition_cb, call, 2, cb_args)
         )
+        EPOCH.value += 1
         SUBSCRIPTIONS.version = object()
 
     def register_termination_cb(
@@ -57,6 +60,7 @@ class Callbacks:
         self._smachpy.termination_cbs.append(
             _checked("termination_cb", termination_cb, call, 3, cb_args)
         )
+        EPOCH.value += 1
 
     def call_start_cbs(self) -> None:
         """Call the start callbacks; one that raises is reported, the others still run."""
@@ -138,6 +142,7 @@ class Callbacks:
         self.__subscriptions_changed()
 
     def __subscriptions_changed(self) -> None:
+        EPOCH.value += 1
         SUBSCRIPTIONS.version = object()
         frame = self._smachpy.frame or self._smachpy.root
         if frame is not None:

@@ -22,11 +22,11 @@ from smachpy.machines.problems import Problems
 from smachpy.machines.rules import Rule, all_of, any_of, as_rules, decide, n_of
 from smachpy.machines.state import DataOf
 from smachpy.machines.validate import ChildSpec, ConcurrenceSpec, concurrence_problems
-from smachpy.run.branches import Group
 from smachpy.run.callback import call_bounded
 from smachpy.run.child import ContainerData
+from smachpy.run.grace import asking
 from smachpy.run.interrupt import Interruption
-from smachpy.run.origin import asking
+from smachpy.run.threads import Group
 from smachpy.run.visit import End
 from smachpy.slips import accepting, accepts
 
@@ -37,9 +37,9 @@ if TYPE_CHECKING:
 
     from smachpy.introspection import Kind
     from smachpy.machines.state import State, StateOptions
-    from smachpy.run.branches import ChildBranch
     from smachpy.run.frame import Frame
     from smachpy.run.step import Step
+    from smachpy.run.threads import ChildBranch
     from smachpy.userdata.user_data import UserData
 
 __all__ = ["Concurrence", "Rule", "all_of", "any_of", "n_of"]
@@ -244,6 +244,8 @@ class Concurrence(Container):
 
     def __shared_states(self, where: str) -> Iterator[str]:
         """Yield the states that two branches would run at the same time."""
+        if len(self._smachpy.children) == 1:
+            return
         branch_of: dict[int, str] = {}
         for label, child in self._smachpy.children.items():
             for state in {id(state): state for state in below(child)}.values():
@@ -299,7 +301,8 @@ class Concurrence(Container):
             return self.__outcome(frame, group)
         finally:
             frame.group = None  # else run and branches would wait for the garbage collector
-            group.end_run()
+            if not group.started:
+                group.let_go()
 
     def _smachpy_terminal_labels(self, frame: Frame) -> list[str]:  # noqa: ARG002  that of any container
         return list(self._smachpy.children)
@@ -340,7 +343,8 @@ class Concurrence(Container):
                         group.ask(group.running())
                 except Interruption as error:
                     self.__stop_calling(group, error)
-        group.raise_errors(failure)
+        if group.failed:
+            group.raise_errors(failure)
         if group.interruption is not None:
             raise group.interruption
 
@@ -362,7 +366,7 @@ class Concurrence(Container):
             return  # an outcome that a child did not live to give would pass for one that runs
         try:
             answer = call_bounded(
-                self, group.frame, self._smachpy.child_termination_cb, (group.outcomes(),)
+                self, group.frame, self._smachpy.child_termination_cb, (_outcomes(group),)
             )
         except Exception as error:
             raise InvalidUserCodeError(
@@ -395,7 +399,7 @@ class Concurrence(Container):
         It answers a preempt only if every child behind it answered: when one just finished its
         work, the machine above must not take the outcome for the end of the preempt.
         """
-        outcomes = group.outcomes()
+        outcomes = _outcomes(group)
         answered = [b.step.label for b in group.branches if b.answered]
         asked = self._preempt_requested
         if self._smachpy.outcome_cb is not None:
@@ -403,14 +407,15 @@ class Concurrence(Container):
             if answer is not None:
                 frame.answered = asked and len(answered) == len(outcomes)
                 return answer
-        ruled = decide(self._smachpy.rules, outcomes)
+        ruled = decide(self._smachpy.rules, outcomes) if self._smachpy.rules else None
         if ruled is not None:
             outcome, rule = ruled
             frame.answered = asked and set(rule.met_by(outcomes)) <= set(answered)
             return outcome
         frame.answered = asked and bool(answered)
         if frame.answered and self.__may_end_preempted():
-            frame.emit_own(Preempted, "")
+            if frame.run.watched:
+                frame.emit_own(Preempted, "")
             return "preempted"
         return self._smachpy.default_outcome
 
@@ -436,3 +441,8 @@ class Concurrence(Container):
             f"{frame.path}: outcome_cb: got {answer!r}; expected one of {sorted(known)}."
             f"{did_you_mean(answer, known)}"
         )
+
+
+def _outcomes(group: Group) -> dict[str, str | None]:
+    """Return label -> outcome of the branches, None for those that run."""
+    return {branch.step.label: branch.outcome for branch in group.branches}

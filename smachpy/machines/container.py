@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import _signal  # type: ignore[import-not-found]  # `signal` without its enums
 import contextlib
+import functools
 import inspect
+import itertools
+import signal
+import sys
 import threading
-from functools import partial
+from types import MethodType
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
 
 from actionlib_core.clock import RealClock
-from smachpy import log
 from smachpy.context import THREAD
 from smachpy.events import Preempted
 from smachpy.exceptions import (
@@ -17,19 +21,18 @@ from smachpy.exceptions import (
     InvalidStateError,
     did_you_mean,
 )
+from smachpy.log import MESSAGES
 from smachpy.machines.callbacks import Callbacks
 from smachpy.machines.construction import Openable
 from smachpy.machines.problems import Problems, takes
-from smachpy.machines.state import CBState, DataOf, Shown, State, get_options
-from smachpy.run.child import EPOCH, ContainerData, on_preempt
+from smachpy.machines.state import CBState, DataOf, Shown, State
+from smachpy.run.child import EPOCH, ContainerData
 from smachpy.run.frame import Frame, clock_of_run
-from smachpy.run.grace import forget_visit, request, request_soon
+from smachpy.run.grace import REQUESTING, asking, leave, on_preempt, request, request_soon
 from smachpy.run.interrupt import Interruption
 from smachpy.run.options import retry_problems
-from smachpy.run.origin import REQUESTING, asking, signal_being_handled
-from smachpy.run.root import execute_root
-from smachpy.run.runner import runner_of
-from smachpy.run.step import Step
+from smachpy.run.step import Step, get_options, runner_of
+from smachpy.run.threads import already_runs, execute_root
 from smachpy.run.visit import Origin
 from smachpy.slips import accepts
 from smachpy.userdata.typed import CheckedDict
@@ -37,6 +40,7 @@ from smachpy.userdata.user_data import Remapper, UserData, data_of, reset, typed
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from types import CodeType, FrameType
     from typing import Unpack
 
     from smachpy.events.control import Control
@@ -208,12 +212,12 @@ class Container(Openable, Callbacks, State):
         assert isinstance(state, State)
         self._smachpy.children[label] = state
         self._smachpy.remappings[label] = names
-        self._smachpy.plan = None
+        self._smachpy.plan = self._smachpy.plain_plan = None
 
     def _smachpy_exchange(self, label: str, state: State) -> None:
         """Put another state in the place of a child; for doubles, between two runs."""
         self._smachpy.children[label] = state
-        self._smachpy.plan = None
+        self._smachpy.plan = self._smachpy.plain_plan = None
 
     def __no_child(self, key: str) -> NoReturn:
         labels = sorted(self.get_children())
@@ -241,16 +245,19 @@ class Container(Openable, Callbacks, State):
         first: Frame | None = THREAD.get()
         parent = None if first is None else first.innermost
         if first is None or parent is None:
-            run = partial(Container.execute, self)
-            return execute_root(self, run, get_options(self), parent_ud)
-        frame, step = Frame(self, parent), parent.step
-        callback = parent.container._smachpy.callback
+            return execute_root(self, MethodType(Container.execute, self), parent_ud)
+        step = parent.step
+        frame = Frame()
+        frame.container, frame.data, frame.parent = self, self._smachpy, parent
+        frame.run, frame.first = parent.run, first
+        frame.above, frame.visit, frame.answered = step, None, False
+        callback = parent.data.callback
         if callback is not None and callback.parent is parent:
             step = callback.step  # a callback of the parent runs this container
         if step is None or step.state is self:
             return self.__run(frame, parent_ud)
-        if self._smachpy.frame is not None:
-            raise self.__already_runs(frame)
+        if frame.data.frame is not None:
+            raise already_runs(frame.path)
         # A state runs this container by hand, maybe in a thread that it has started: a preempt of
         # the state is one of the container.
         token = None
@@ -270,7 +277,7 @@ class Container(Openable, Callbacks, State):
 
     def __run(self, frame: Frame, parent_ud: UserData | Remapper | None) -> str:
         """Run in `frame`: copy the keys, call the callbacks, run the children."""
-        data = self._smachpy
+        data = frame.data
         plan = data.plan
         if plan is None or plan.userdata is not self.userdata or plan.epoch != EPOCH.value:
             plan = data.plan = self.__current_plan(frame, plan)
@@ -303,13 +310,13 @@ class Container(Openable, Callbacks, State):
                 data.frame = None
                 data.answered = frame.answered
             if raised or self._preempt_requested or frame.visit is not None or data.end_waiters:
-                self.__leave(frame)
+                leave(frame)
 
     def __run_inside(self, frame: Frame, parent_ud: UserData | Remapper | None) -> str:
         """Run for code of the user around it, whose grace pauses as the children have theirs."""
         data = self._smachpy
         if data.frame is not None:
-            raise self.__already_runs(frame)
+            raise already_runs(frame.path)
         around = data.callback
         around.end()
         try:
@@ -340,11 +347,6 @@ class Container(Openable, Callbacks, State):
         step, frame.step = frame.step, None
         return [] if step is None else [step.label]
 
-    def __already_runs(self, frame: Frame) -> InvalidStateError:
-        return InvalidStateError(
-            f"{frame.path}: execute: got a second call while it runs; expected one run at a time."
-        )
-
     def __current_plan(self, frame: Frame, plan: Any) -> Any:
         """Return a plan for the states as they are now.
 
@@ -353,11 +355,11 @@ class Container(Openable, Callbacks, State):
         """
         epoch = EPOCH.value
         if plan is None or plan.userdata is not self.userdata or plan.is_stale():
-            where = frame.path
-            is_root = self._smachpy.root is not None
-            problems = [*self.__own_problems(where)] if is_root else []
-            problems += self.find_problems(where)
-            if problems:
+            is_root = self._smachpy.root is not None and self._smachpy.options.retry is not None
+            own = self.__own_problems if is_root else lambda _where: ()
+            if any((*own(""), *self.find_problems(""))):
+                where = frame.path  # which takes a while, so it was left out
+                problems = [*own(where), *self.find_problems(where)]
                 raise InconsistentMachineError(f"{type(self).__name__} {where!r}", problems)
             plan = self._smachpy_compile()
         plan.epoch = epoch
@@ -379,28 +381,14 @@ class Container(Openable, Callbacks, State):
         callback = data.code[0] if isinstance(state, CBState) else None
         is_async = inspect.iscoroutinefunction(execute) or inspect.iscoroutinefunction(callback)
         kind: Any = type(state)
-        is_own = kind._smachpy_is_container and (
-            kind.execute is not kind._smachpy_execute or "execute" in vars(state)
+        is_own = (
+            kind._smachpy_is_container
+            and getattr(execute, "__func__", None) is not kind._smachpy_execute
         )
         window = Remapper(self.userdata, data.input_keys, data.output_keys, names)
         options = get_options(state)
         run = runner_of(state, options, execute, is_async=is_async, is_callback=is_own)
         return Step(label, state, window, run)
-
-    def __leave(self, frame: Frame) -> None:
-        """Forget the run; with it ends the preempt that belonged to it."""
-        data = self._smachpy
-        with frame.run.lock:
-            if frame.dead:
-                return
-            if data.frame is None:
-                self._preempt_requested = False
-            if frame.step is not None:  # what a child that raised asked itself
-                frame.step.state._preempt_requested = False
-        if frame.visit is not None:
-            forget_visit(frame)
-        for ended in tuple(data.end_waiters):
-            ended.set()
 
     def request_preempt(self, *, by: str = "") -> None:
         """Ask the container and all active states below it to stop.
@@ -452,14 +440,14 @@ class Container(Openable, Callbacks, State):
             if key in parent_ud:
                 ud[key] = parent_ud[key]
             else:
-                log.logwarn(f"{type(self).__name__}: input key {key!r} has no value to copy.")
+                MESSAGES.warn(f"{type(self).__name__}: input key {key!r} has no value to copy.")
 
     def __copy_output_keys(self, ud: UserData, parent_ud: UserData | Remapper) -> None:
         for key in self._smachpy.output_keys:
             if key in ud:
                 parent_ud[key] = ud[key]
             else:
-                log.logwarn(f"{type(self).__name__}: output key {key!r} has no value to copy.")
+                MESSAGES.warn(f"{type(self).__name__}: output key {key!r} has no value to copy.")
 
     @Shown
     def control(self) -> Control:
@@ -530,3 +518,61 @@ def _key_problems(container: Container, where: str) -> Iterator[str]:
                     f"{key!r}; expected one of {sorted(fields.types)}."
                     f"{did_you_mean(key, fields.types)}"
                 )
+
+
+_MOST_ARGUMENTS = 4  # of a signal handler: itself, the number, the interrupted frame, one more
+
+
+def signal_being_handled() -> str:
+    """Return the name of the signal whose handler, the program's own, is running here, or "".
+
+    A handler is found by its code, or, when it has given the signal another handler already, by
+    what Python calls it with: the number and the interrupted frame, which is its caller.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return ""
+    handlers: dict[CodeType, int] = {}
+    for number in range(1, signal.NSIG):
+        handler = _signal.getsignal(number)
+        if handler is None or isinstance(handler, int):  # not Python's, ignored, or the default
+            continue
+        code = _code_of(handler)
+        if code is not None:
+            handlers[code] = number
+    frame: FrameType | None = sys._getframe(1)
+    while frame is not None:
+        found = handlers.get(frame.f_code)
+        if found is None and frame.f_back is not None:
+            found = _number_given(frame)
+        if found is not None:
+            return signal.Signals(found).name
+        frame = frame.f_back
+    return ""
+
+
+def _code_of(handler: Any) -> CodeType | None:
+    """Return the code of a handler: a function, a method, a partial, or an object to call."""
+    while isinstance(handler, functools.partial):
+        handler = handler.func
+    function = getattr(handler, "__func__", handler)
+    code = getattr(function, "__code__", None)
+    if code is None and callable(handler):
+        code = getattr(getattr(type(handler), "__call__", None), "__code__", None)  # noqa: B004
+    return code
+
+
+def _number_given(frame: FrameType) -> int | None:
+    """Return the signal's number if `frame` was called as signal handlers are."""
+    code = frame.f_code
+    names = code.co_varnames[: code.co_argcount + bool(code.co_flags & inspect.CO_VARARGS)]
+    if not names or len(names) > _MOST_ARGUMENTS:
+        return None
+    local = frame.f_locals
+    given: list[Any] = []
+    for name in names:
+        value = local.get(name)
+        given += value if isinstance(value, tuple) else [value]
+    for number, interrupted in itertools.pairwise(given):
+        if interrupted is frame.f_back and isinstance(number, int):
+            return int(number) if number in signal.valid_signals() else None
+    return None

@@ -23,7 +23,7 @@ from smachpy.run.callback import call_bounded
 from smachpy.run.child import ContainerData
 from smachpy.run.grace import end_visit, unknown_outcome
 from smachpy.run.interrupt import Interruption
-from smachpy.run.runner import run_watched, user_error
+from smachpy.run.step import run_watched, user_error
 from smachpy.run.visit import End, Why
 from smachpy.slips import accepting
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import inspect
 from threading import TIMEOUT_MAX
 from typing import (
     TYPE_CHECKING,
@@ -17,16 +15,17 @@ from typing import (
     overload,
 )
 
-from smachpy.context import current_path
+from actionlib_core.clock import current_clock
+from smachpy.context import THREAD, current_path
 from smachpy.exceptions import InvalidStateError
 from smachpy.introspection import Structure
 from smachpy.machines.names import name_of, unique_names
 from smachpy.machines.problems import Problems, as_number, unknown_arguments
-from smachpy.run.child import StateData, on_preempt
+from smachpy.run.child import StateData
 from smachpy.run.frame import clock_of_run, current_scope
-from smachpy.run.grace import PreemptNotice, mark_preempt, note_serviced
+from smachpy.run.grace import REQUESTING, PreemptNotice, mark_preempt, note_serviced, on_preempt
 from smachpy.run.options import NAMES, NO_OPTIONS, Options, Retry, changed
-from smachpy.run.origin import REQUESTING
+from smachpy.run.step import get_options
 from smachpy.slips import accepts
 from smachpy.util import has_smach_interface
 
@@ -36,7 +35,7 @@ if TYPE_CHECKING:
 
     from actionlib_core.clock import Clock
     from smachpy.introspection import Kind
-    from smachpy.run.frame import Scope
+    from smachpy.run.frame import Frame, Scope
     from smachpy.run.options import Result
     from smachpy.userdata.user_data import Remapper, UserData
 
@@ -154,8 +153,13 @@ class State:
 
     # The instance's own data is in its __dict__, which comes before this.
     _smachpy: DataOf[StateData] = DataOf(StateData)
+    _smachpy_is_made = False
     _smachpy_kind: ClassVar[Kind] = "state"
+    _outcomes = Shown(lambda state: set(state._smachpy.outcomes))
+    _input_keys = Shown(lambda state: set(state._smachpy.input_keys))
+    _output_keys = Shown(lambda state: set(state._smachpy.output_keys))
     _smachpy_is_container: ClassVar[bool] = False
+    _smachpy_grace: Callable[[Any], Any] | None = None
     _preempt_requested: bool = False  # SMACH's name for it, which programs use
 
     def __init__(
@@ -168,8 +172,12 @@ class State:
     ) -> None:
         problems = Problems(type(self).__name__)
         both = problems.names("io_keys", io_keys)
-        # A second call begins anew with the same data: machines and waiting threads know it.
-        data = vars(self).setdefault("_smachpy", type(self)._smachpy.kind())
+        # On the instance, where Python finds it much faster; for that no `vars(self)` here either.
+        self._preempt_requested = False
+        if not self._smachpy_is_made:
+            self._smachpy = type(self)._smachpy.kind()
+            self._smachpy_is_made = True
+        data = self._smachpy  # a second call keeps it: machines and waiting threads know it
         data.outcomes = problems.names("outcomes", outcomes)
         data.input_keys = tuple(dict.fromkeys((*problems.names("input_keys", input_keys), *both)))
         data.output_keys = tuple(
@@ -252,7 +260,9 @@ class State:
         """Say that the request was answered; the machine follows the outcome then."""
         if self._preempt_requested:
             self._preempt_requested = False
-            note_serviced(self)
+            first = THREAD.get()
+            if first is not None and first.run.watched:
+                note_serviced(self)
 
     def recall_preempt(self) -> None:
         """Take a request back."""
@@ -313,11 +323,6 @@ class State:
 
         return forget_both
 
-    def _smachpy_grace(self, inherited: Grace) -> Grace:
-        """Return how long the state has after a preempt [s], given what its containers say."""
-        own: Grace = self._smachpy.options.preempt_timeout
-        return inherited if own == "inherit" else own
-
     # -- for those who write states ------------------------------------------------------------
 
     # The library itself calls the functions behind these three: a user's state may use the names.
@@ -367,31 +372,6 @@ class State:
         data.outcomes = tuple(dict.fromkeys((*data.outcomes, *data.options.made_outcomes())))
 
 
-_HOOKS = (("on_enter", 2), ("on_exit", 3), ("resume", 2), ("on_resume", 2))
-"""Methods that are options, and how many arguments they take."""
-
-
-def get_options(state: State) -> Options:
-    """Return the options of `state`, hooks that are methods of its class included.
-
-    A method `on_enter(self, userdata)` or `on_exit(self, userdata, outcome)` is a hook, and so are
-    `resume(self, userdata)` and `on_resume(self, userdata)`; a method of one of these names with
-    other arguments is the state's own.
-    """
-    data = state._smachpy
-    known, options = data.with_hooks, data.options
-    if known is not None and known[0] is options:
-        return known[1]  # looking for methods takes longer than running a small machine
-    hooks = {
-        name: getattr(state, name)
-        for name, count in _HOOKS
-        if getattr(options, name) is None and _is_hook(type(state), name, count)
-    }
-    found = dataclasses.replace(options, **hooks) if hooks else options
-    data.with_hooks = options, found
-    return found
-
-
 def set_options(state: State, **options: Unpack[StateOptions]) -> None:
     """Change options of `state`; they hold from its next run on.
 
@@ -411,20 +391,6 @@ def set_options(state: State, **options: Unpack[StateOptions]) -> None:
     data.changed()
 
 
-def _is_hook(kind: type, name: str, count: int) -> bool:
-    """Tell whether the method `name` of a class takes `count` arguments, no fewer and no more."""
-    method = inspect.getattr_static(kind, name, None)
-    if not inspect.isfunction(method) or inspect.iscoroutinefunction(method):
-        return False
-    code = method.__code__
-    return (
-        code.co_argcount == count
-        and not method.__defaults__
-        and not code.co_kwonlyargcount
-        and not code.co_flags & (inspect.CO_VARARGS | inspect.CO_VARKEYWORDS)
-    )
-
-
 def _wait_preempt(state: State, argument: str, seconds: float | None) -> bool:
     """Wait for a preempt of `state`, at most `seconds`; tell whether there is one."""
     if seconds is not None and not (type(seconds) in {float, int} and 0 <= seconds <= TIMEOUT_MAX):
@@ -435,7 +401,8 @@ def _wait_preempt(state: State, argument: str, seconds: float | None) -> bool:
         problems.raise_all()
     if state._preempt_requested:
         return True
-    wake = clock_of_run().event()
+    first: Frame | None = THREAD.get()
+    wake = (current_clock() if first is None else first.run.clock).event()
     forget = on_preempt(state, wake.set)
     try:
         wake.wait(seconds)

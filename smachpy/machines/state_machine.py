@@ -21,12 +21,11 @@ from smachpy.machines.old_states import adopt_slips, as_state
 from smachpy.machines.problems import Problems
 from smachpy.machines.state import DataOf, Shown
 from smachpy.machines.validate import ChildSpec, MachineSpec, machine_problems
-from smachpy.run.child import ContainerData
-from smachpy.run.frame import SUBSCRIPTIONS
-from smachpy.run.grace import end_visit, forget_visit, request_soon, unknown_outcome
+from smachpy.run.child import EPOCH, ContainerData
+from smachpy.run.frame import SUBSCRIPTIONS, Frame
+from smachpy.run.grace import asking, end_visit, forget_visit, leave, request_soon, unknown_outcome
 from smachpy.run.interrupt import Interruption
-from smachpy.run.origin import asking
-from smachpy.run.runner import (
+from smachpy.run.step import (
     only_buffer,
     publish_left,
     publish_raised,
@@ -44,7 +43,6 @@ if TYPE_CHECKING:
     from smachpy.events.buffer import EventBuffer
     from smachpy.introspection import Kind
     from smachpy.machines.state import State, StateOptions
-    from smachpy.run.frame import Frame
     from smachpy.run.step import Following, Step
     from smachpy.userdata.user_data import UserData
 
@@ -52,9 +50,15 @@ __all__ = ["StateMachine"]
 
 
 class _Plan:
-    """A state machine, compiled: each step knows what comes after each of its outcomes."""
+    """A state machine, compiled: each step knows what comes after each of its outcomes.
 
-    __slots__ = ("epoch", "steps", "userdata")
+    Attributes:
+        epoch: `EPOCH.value` for which it holds.
+        first: The step with which it begins.
+    """
+
+    __slots__ = ("epoch", "first", "steps", "userdata")
+    first: Step
 
     def __init__(
         self,
@@ -68,6 +72,7 @@ class _Plan:
         self.steps = steps
         ends = {outcome: End(outcome) for outcome in outcomes}
         for label, step in steps.items():
+            step.nested = _nested(step)
             for outcome in step.state._smachpy.outcomes:
                 target = transitions[label].get(outcome)
                 if target in steps:
@@ -77,6 +82,17 @@ class _Plan:
 
     def is_stale(self) -> bool:
         return any(step.is_stale() for step in self.steps.values())
+
+
+def _nested(step: Step) -> MachineData | None:
+    """Return the data of a child that the loop of its parent may enter without a call.
+
+    None for a child with options around it or an `execute` of its own, which is to be called.
+    """
+    state, execute = step.state, step.execute
+    if not isinstance(state, StateMachine) or getattr(execute, "__self__", None) is not state:
+        return None
+    return state._smachpy if getattr(execute, "__func__", None) is Container.execute else None
 
 
 class MachineData(ContainerData):
@@ -262,6 +278,7 @@ class StateMachine(Container):
                 self._smachpy.next_initial = labels[0]
             else:
                 self._smachpy.initial = labels[0]
+            EPOCH.value += 1
         if userdata is not None:
             self.userdata.update(userdata)
 
@@ -335,190 +352,284 @@ class StateMachine(Container):
         return _Plan(self.userdata, steps, self._smachpy.outcomes, self._smachpy.transitions)
 
     def _smachpy_run_children(self, frame: Frame, plan: _Plan) -> str:
-        data = self._smachpy
+        data: Any = frame.data
         resumed = None if frame.run.journal is None else frame.run.journal.resumed_label(frame)
         if data.start_cbs and resumed is None:
             self.call_start_cbs()
         label, data.next_initial = resumed or data.next_initial or data.initial, None
         assert label is not None
+        assert data.initial is not None
+        hears = data.start_cbs or data.transition_cbs or data.termination_cbs
+        copies = data.input_keys or data.output_keys
+        is_more = hears or copies or data.listeners or data.buffers
+        plan.first = plan.steps[data.initial]
+        data.plain_plan = None if is_more else plan
         logged = frame.run.logged
         if logged:
             log.loginfo(f"{frame.path}: starting in {label!r}, keys {self.userdata.keys()}")
-        following: Following = plan.steps[label]
-        while not following.final:
+        outcome = _run(frame, plan.steps[label]).outcome
+        if logged:
+            log.loginfo(f"{frame.path}: {frame.step.label!r} ended it with {outcome!r}")
+        return outcome
+
+
+def _run(base: Frame, step: Step) -> End:  # noqa: C901, PLR0912, PLR0915  see below
+    """Run step after step; return how the machine ends, with the last step in its frame.
+
+    This is the hot path, so it is one loop. While nobody watches, waits or asks for a preempt, a
+    transition is one call, one look-up and a few flags. A nested machine of which nobody hears, and
+    that copies no keys, is entered and left right here without a call, in a third of the time:
+    `frame` is the innermost one, `machine` and `data` are its own, and those above are its
+    `parent`s. All other containers are called, and `Container.execute` does for them what is done
+    here; so are all while somebody watches, as the events of a child belong around its call.
+
+    Args:
+        base: The frame of this machine.
+        step: The child with which it begins.
+    """
+    frame, run, first = base, base.run, base.first
+    machine: Any = base.container
+    data: Any = base.data
+    parent: Any
+    state: Any
+    following: Following = step
+    try:
+        while True:
             try:
-                following = self.__loop(frame, following, data)
+                while True:
+                    while following.final:
+                        if frame is base:
+                            return following
+                        outcome, parent = following.outcome, frame.parent
+                        first.innermost = parent
+                        if data.frame is frame:  # as at the end of `Container._run`
+                            data.frame = None
+                            data.answered = frame.answered
+                        if (
+                            machine._preempt_requested
+                            or frame.visit is not None
+                            or data.end_waiters
+                        ):
+                            leave(frame)
+                        frame = parent
+                        machine = frame.container
+                        data = frame.data
+                        step = frame.step
+                        if machine._preempt_requested or frame.visit is not None:
+                            following = _follow_asked(frame, step, outcome)
+                        else:
+                            try:
+                                following = step.next[outcome]
+                            except KeyError:
+                                _raise_bad_outcome(frame, step, outcome)
+                    step = following
+                    # First the mark, then the look: see `smachpy.run.grace.ask`.
+                    frame.step = step
+                    if machine._preempt_requested or frame.visit is not None or data.transition_cbs:
+                        following = _careful(frame, step)
+                        continue
+                    if run.watched:
+                        if run.careful:
+                            following = _careful(frame, step)
+                        elif (buffer := only_buffer(frame)) is not None:
+                            following = _buffered(frame, step, buffer)
+                        else:
+                            following = _follow(frame, step, run_watched(frame, step))
+                        continue
+                    state, nested = step.state, step.nested
+                    if nested is not None and nested.frame is None:
+                        plan = nested.plain_plan
+                        if (
+                            plan is not None
+                            and plan.epoch == EPOCH.value
+                            and plan.userdata is state.userdata
+                        ):
+                            parent, frame, machine = frame, Frame(), state
+                            frame.container = machine
+                            frame.data = data = nested
+                            frame.parent = parent
+                            frame.run = run
+                            frame.first = first
+                            frame.above = step
+                            frame.visit = None
+                            frame.answered = False
+                            data.frame = first.innermost = frame
+                            following = plan.first
+                            continue
+                    execute = step.execute  # called right here, it would be found slower
+                    outcome = execute(step.userdata)
+                    if (
+                        machine._preempt_requested
+                        or frame.visit is not None
+                        or state._preempt_requested
+                    ):
+                        following = _follow_asked(frame, step, outcome)
+                    else:
+                        try:
+                            following = step.next[outcome]
+                        except (KeyError, TypeError):
+                            _raise_bad_outcome(frame, step, outcome)
             except Interruption:
-                if frame.dead:
-                    raise
-                following = self.__follow_asked(frame, frame.step, "preempted")
+                following = _follow_interrupted(frame)
             except SmachError:
                 raise
             except Exception as error:
                 step = frame.step
                 raise user_error(step.path_in(frame), step.state, error) from error
-        outcome = following.outcome
-        if logged:
-            log.loginfo(f"{frame.path}: {frame.step.label!r} ended it with {outcome!r}")
-        return outcome
+    finally:
+        while frame is not base:  # something was raised: the machines on the way are left
+            machine, parent = frame.container, frame.parent
+            first.innermost = parent
+            data = frame.data
+            if data.frame is frame:
+                data.frame = None
+                data.answered = frame.answered
+            leave(frame)
+            frame = parent
 
-    def __loop(self, frame: Frame, step: Step, data: MachineData) -> End:
-        """Run step after step; return how the machine ends, with the last step in the frame.
 
-        This is the hot path. While nobody watches, waits or asks for a preempt, a transition is
-        one call, one look-up and a few flags.
-        """
-        run = frame.run
-        while True:
-            frame.step = step  # first the mark, then the look: see `smachpy.run.grace.ask`
+def _buffered(frame: Frame, step: Step, buffer: EventBuffer) -> Following:
+    """Run step after step as `_run` does while one buffer is all that wants to know.
+
+    Returns how the machine goes on when something else comes up. A loop of its own, because
+    one entry says that a step ended and that the next began, with one look at the clock: there
+    is nothing in between, and a recorded transition costs little more than a plain one.
+    """
+    run, subscriptions, container = frame.run, SUBSCRIPTIONS, frame.container
+    version = subscriptions.version
+    if frame.data.transition_cbs or run.careful:
+        return step
+    base, now = frame.path, run.clock.now
+    run.flush()
+    buffer.put((now(), base, None, None, step))
+    while True:
+        rounds, note = buffer.room()
+        for _ in rounds:
+            try:
+                window = step.watched_userdata(frame) if step.writes else step.userdata
+                outcome = step.execute(window)
+            except BaseException as error:
+                publish_raised(frame, error)
+                raise
             if (
-                self._preempt_requested
+                container._preempt_requested
                 or frame.visit is not None
-                or data.transition_cbs
-                or run.careful
+                or step.state._preempt_requested
             ):
-                following = self.__careful(frame, step)
-            elif run.watched:
-                buffer = only_buffer(frame)
-                if buffer is not None:
-                    following = self.__buffered(frame, step, buffer)
-                else:
-                    following = self.__follow(frame, step, run_watched(frame, step))
-            else:
-                outcome = step.execute(step.userdata)
-                if (
-                    self._preempt_requested
-                    or frame.visit is not None
-                    or step.state._preempt_requested
-                ):
-                    following = self.__follow_asked(frame, step, outcome)
-                else:
-                    try:
-                        following = step.next[outcome]
-                    except (KeyError, TypeError):
-                        self.__raise_bad_outcome(frame, step, outcome)
+                publish_left(frame, step, outcome)
+                return _follow_asked(frame, step, outcome)
+            try:
+                following: Following = step.next[outcome]
+            except (KeyError, TypeError):
+                publish_left(frame, step, outcome)
+                _raise_bad_outcome(frame, step, outcome)
             if following.final:
+                buffer.put((now(), base, step, outcome, None))
                 return following
+            frame.step = following  # first the mark, then the look
+            if (
+                container._preempt_requested
+                or frame.visit is not None
+                or subscriptions.version is not version
+            ):
+                frame.step = step
+                publish_left(frame, step, outcome)
+                frame.step = following
+                return following
+            note((now(), base, step, outcome, following))
+            if buffer.quiet:
+                buffer.ring()
             step = following
 
-    def __buffered(self, frame: Frame, step: Step, buffer: EventBuffer) -> Following:
-        """Run step after step as `_loop` does while one buffer is all that wants to know.
 
-        Returns how the machine goes on when something else comes up. A loop of its own, because
-        one entry says that a step ended and that the next began, with one look at the clock: there
-        is nothing in between, and a recorded transition costs little more than a plain one.
-        """
-        run, subscriptions = frame.run, SUBSCRIPTIONS
-        version = subscriptions.version
-        if self._smachpy.transition_cbs or run.careful:
-            return step
-        base, now = frame.path, run.clock.now
-        run.flush()
-        buffer.put((now(), base, None, None, step))
-        while True:
-            rounds, note = buffer.room()
-            for _ in rounds:
-                try:
-                    window = step.watched_userdata(frame) if step.writes else step.userdata
-                    outcome = step.execute(window)
-                except BaseException as error:
-                    publish_raised(frame, error)
-                    raise
-                if (
-                    self._preempt_requested
-                    or frame.visit is not None
-                    or step.state._preempt_requested
-                ):
-                    publish_left(frame, step, outcome)
-                    return self.__follow_asked(frame, step, outcome)
-                try:
-                    following: Following = step.next[outcome]
-                except (KeyError, TypeError):
-                    publish_left(frame, step, outcome)
-                    self.__raise_bad_outcome(frame, step, outcome)
-                if following.final:
-                    buffer.put((now(), base, step, outcome, None))
-                    return following
-                frame.step = following  # first the mark, then the look
-                if (
-                    self._preempt_requested
-                    or frame.visit is not None
-                    or subscriptions.version is not version
-                ):
-                    frame.step = step
-                    publish_left(frame, step, outcome)
-                    frame.step = following
-                    return following
-                note((now(), base, step, outcome, following))
-                if buffer.quiet:
-                    buffer.ring()
-                step = following
-
-    def __careful(self, frame: Frame, step: Step) -> Following:
-        """Run one step with everything that may want to know of it."""
-        run = frame.run
-        visit = frame.visit
-        if visit is not None and visit.step is not step:  # it had ended when it was asked
-            forget_visit(frame)
-        if run.control is not None:
-            run.control.pass_gate(frame, step)
-            if frame.visit is not None and not self._preempt_requested:  # called off meanwhile
-                return self.__follow_asked(frame, step, "preempted")
-        if run.has_shutdown_check and is_shutdown():
-            with asking("shutdown", "", "the shutdown check says so"):
-                request_soon(self)
-        if self._preempt_requested:
-            return self.__preempted(frame, step)
-        outcome = run_watched(frame, step) if run.watched else step.execute(step.userdata)
-        following = self.__follow(frame, step, outcome)
-        if following.final or not (self._smachpy.transition_cbs or run.logged):
-            return following
-        frame.step = following
-        if run.logged:
-            log.loginfo(f"{frame.path}: {step.label!r} -{outcome}-> {following.label!r}")
-        return self.__call_between(frame, following)
-
-    def __call_between(self, frame: Frame, following: Step) -> Following:
-        """Call the transition callbacks; return what comes then."""
-        try:
-            self.call_transition_cbs()
-        except Interruption:
-            if frame.dead:
-                raise
-            return self.__preempted(frame, following)
+def _careful(frame: Frame, step: Step) -> Following:
+    """Run one step with everything that may want to know of it."""
+    run = frame.run
+    visit = frame.visit
+    if visit is not None and visit.step is not step:  # it had ended when it was asked
+        forget_visit(frame)
+    if run.control is not None:
+        run.control.pass_gate(frame, step)
+        called_off = frame.visit is not None and not frame.container._preempt_requested
+        if called_off:
+            return _follow_asked(frame, step, "preempted")
+    if run.has_shutdown_check and is_shutdown():
+        with asking("shutdown", "", "the shutdown check says so"):
+            request_soon(frame.container)
+    if frame.container._preempt_requested:
+        return _preempted(frame, step)
+    outcome = run_watched(frame, step) if run.watched else step.execute(step.userdata)
+    following = _follow(frame, step, outcome)
+    if following.final or not (frame.data.transition_cbs or run.logged):
         return following
+    frame.step = following
+    if run.logged:
+        log.loginfo(f"{frame.path}: {step.label!r} -{outcome}-> {following.label!r}")
+    return _call_between(frame, following)
 
-    def __follow(self, frame: Frame, step: Step, outcome: Any) -> Following:
-        """Return what comes after `step`, whether somebody asked or not."""
-        if self._preempt_requested or frame.visit is not None or step.state._preempt_requested:
-            return self.__follow_asked(frame, step, outcome)
-        try:
-            following: Following = step.next[outcome]
-        except (KeyError, TypeError):
-            self.__raise_bad_outcome(frame, step, outcome)
-        return following
 
-    def __follow_asked(self, frame: Frame, step: Step, outcome: Any) -> Following:
-        """Return what comes after `step` when somebody may have asked it to stop meanwhile."""
-        decision = end_visit(frame, outcome)
-        if decision.why is Why.STOPPED:
-            return self.__preempted(frame, step)
-        if decision.why is Why.JUMPED:
-            frame.emit_own(Jumped, decision.target)
-            steps: dict[str, Following] = self._smachpy.plan.steps
-            return step if decision.target == step.label else steps[decision.target]
-        following: Following = decision.target
-        return following
+def _call_between(frame: Frame, following: Step) -> Following:
+    """Call the transition callbacks; return what comes then."""
+    container: Any = frame.container
+    try:
+        container.call_transition_cbs()
+    except Interruption:
+        if frame.dead:
+            raise
+        return _preempted(frame, following)
+    return following
 
-    def __preempted(self, frame: Frame, step: Step) -> End:
-        """End because of a preempt; `step` was not started, or finished in vain."""
-        frame.answered = True
-        frame.emit_own(Preempted, step.label)
-        return PREEMPTED
 
-    def __raise_bad_outcome(self, frame: Frame, step: Step, outcome: object) -> NoReturn:
-        outcomes = step.state._smachpy.outcomes
-        raise unknown_outcome(step.path_in(frame), outcomes, outcome) from None
+def _follow(frame: Frame, step: Step, outcome: Any) -> Following:
+    """Return what comes after `step`, whether somebody asked or not."""
+    if (
+        frame.container._preempt_requested
+        or frame.visit is not None
+        or step.state._preempt_requested
+    ):
+        return _follow_asked(frame, step, outcome)
+    try:
+        following: Following = step.next[outcome]
+    except (KeyError, TypeError):
+        _raise_bad_outcome(frame, step, outcome)
+    return following
+
+
+def _follow_asked(frame: Frame, step: Step, outcome: Any) -> Following:
+    """Return what comes after `step` when somebody may have asked it to stop meanwhile."""
+    decision = end_visit(frame, outcome)
+    if decision.why is Why.STOPPED:
+        return _preempted(frame, step)
+    if decision.why is Why.JUMPED:
+        frame.emit_own(Jumped, decision.target)
+        steps: dict[str, Following] = frame.data.plan.steps
+        return step if decision.target == step.label else steps[decision.target]
+    following: Following = decision.target
+    return following
+
+
+def _follow_interrupted(frame: Frame) -> Following:
+    """Return what comes after a child that was interrupted."""
+    if frame.dead:
+        raise Interruption
+    try:
+        return _follow_asked(frame, frame.step, "preempted")
+    except Interruption:  # a second one was on its way
+        if frame.dead:
+            raise
+        return _preempted(frame, frame.step)
+
+
+def _preempted(frame: Frame, step: Step) -> End:
+    """End because of a preempt; `step` was not started, or finished in vain."""
+    frame.answered = True
+    frame.emit_own(Preempted, step.label)
+    return PREEMPTED
+
+
+def _raise_bad_outcome(frame: Frame, step: Step, outcome: object) -> NoReturn:
+    outcomes = step.state._smachpy.outcomes
+    raise unknown_outcome(step.path_in(frame), outcomes, outcome) from None
 
 
 def _current(machine: StateMachine, name: str) -> Any:

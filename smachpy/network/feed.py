@@ -7,7 +7,8 @@
     <server>/smach/value         a userdata value in full (`smachpy.network.values`)
 
 The history is a JSON object: `epoch` (an id that changes when the machine's server restarts),
-`session` (id of the network session, which tells two servers of one name apart), `description`,
+`session` (id of the network session, which tells two servers of one name apart), `run` (names a
+durable run, which another process may have begun; "" for others), `description`,
 `problems` (found by `smachpy.checks`), `base` (a `RunState` of the events that are no longer kept),
 `events` (the newest, as they were sent), `observed` (what the robot's topics told, of late, as sent
 on <server>/smach/observed), `control` (paused and breakpoints; null if the server takes no
@@ -28,14 +29,14 @@ from actionlib_core.interfaces.std_srvs.srv import Trigger
 from actionlib_core.pubsub.service import Service
 from actionlib_core.pubsub.topic import Publisher
 from actionlib_core.wire.presence import Kind, token_pattern
-from smachpy.events import Started, record_text
+from smachpy.events import Recovered, Started, record_text
 from smachpy.events.run_state import RunState
 from smachpy.introspection import describe
 from smachpy.network.robot_topics import RobotTopics
 from smachpy.network.values import serve_values
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from actionlib_core.node import Node
     from actionlib_core.transport import Presence
@@ -58,6 +59,8 @@ KEPT_BYTES = 8_000_000
 
 STOP_S = 1.0
 
+_BEGINS = frozenset({Started.__name__, Recovered.__name__})
+
 
 class Feed:
     """Sends the description and the events of a machine, and keeps the newest events.
@@ -72,6 +75,7 @@ class Feed:
         node: Where to send.
         control: The server of commands; None if the machine takes none.
         robot: Tells what the robot's topics say; None listens to those below `node`'s name space.
+        earlier: Records of what another process did of the run that this one goes on with.
         on_paths: Called with path -> kind of its newest event, for the events that were just sent.
     """
 
@@ -84,6 +88,7 @@ class Feed:
         *,
         control: ControlServer | None = None,
         robot: RobotTopics | None = None,
+        earlier: Sequence[dict[str, Any]] = (),
         on_paths: Callable[[dict[str, str]], object] = lambda _kinds: None,
     ) -> None:
         self._machine = machine
@@ -95,6 +100,10 @@ class Feed:
         self._kept: deque[tuple[dict[str, Any], str]] = deque()
         self._kept_bytes = 0
         self._base = RunState()
+        self._run = "" if machine._smachpy.journal is None else machine._smachpy.journal.run
+        self._before = earlier[-1]["seq"] if earlier else 0
+        for record in earlier:
+            self._keep(record, record_text(record))
         self._queue: deque[str] = deque()
         self._queued_bytes = 0
         self._executor = SerialExecutor(node.clock, f"events of {server_name}")
@@ -180,8 +189,11 @@ class Feed:
             wanted = self._is_open and self._events.get_num_connections() > 0
             for record in self._buffer.read():
                 kinds[record["path"]] = record["kind"]
-                if record["kind"] == Started.__name__:
+                if record["kind"] in _BEGINS:
                     self._executor.submit(self._describe)
+                    journal = self._machine._smachpy.journal
+                    self._run = "" if journal is None else journal.run
+                record["seq"] += self._before
                 text = record_text(record)
                 self._keep(record, text)
                 if wanted:
@@ -212,6 +224,7 @@ class Feed:
         head = {
             "epoch": self._epoch,
             "session": self._session,
+            "run": self._run,
             "description": json.loads(self._description),
             "problems": self._problems,
             "control": None if self._control is None else self._control.state(),

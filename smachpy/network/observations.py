@@ -10,11 +10,14 @@ A record has `kind` "Observed", `path` "", `stamp_ns` (when it came, by the miss
 - "map": `resolution` [m], `width`, `height`, `origin`, a pose; `cells`, base64 of zlib of one byte
   a cell, row 0 at the bottom: 0 free, 1 occupied, 2 unknown.
 - "value": `name`, `value`, `unit`.
+- "values": `topic`, its name below the mission's name space; `values`, number by path within its
+  message ("linear.x"). `robot` is "".
 """
 
 from __future__ import annotations
 
 import base64
+import itertools
 import math
 import zlib
 from typing import TYPE_CHECKING, Any, Final
@@ -43,10 +46,15 @@ TOPICS: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
 }
 """Type of a topic -> what it tells, and the names that it usually has."""
 
+NUMBERS: Final = "numbers"
+"""What any other topic tells, if its messages are small (`is_small`); its name stands for the
+robot's."""
+
 POSE_S: Final = 0.2
 """Between two poses of a robot that moves [s]."""
 SCAN_S: Final = 0.5
 VALUE_S: Final = 1.0
+NUMBERS_S: Final = 0.5
 MAP_S: Final = 2.0
 _NEAR_M, _NEAR_RAD = 0.01, 0.02  # a pose this near to the one before is the same
 _MOST_RAYS: Final = 181
@@ -56,6 +64,10 @@ _OCCUPIED, _FREE = 65, 25  # [%] as map_saver of ROS draws the line
 _STANDS: Final = 1e-3  # [m/s] and [rad/s]: slower is at rest
 _MOST_FRAMES: Final = 32  # between a frame and the map
 _MOST_SCOPES: Final = 1000
+_MOST_NUMBERS: Final = 32  # of one message
+_MOST_ITEMS: Final = 8  # of an array
+_NUMERIC: Final = ("bool", "int", "uint", "float", "double")
+_BYTES: Final = frozenset({"uint8", "int8", "char", "byte", "octet"})
 
 
 def role_of(type_name: str, name: str) -> tuple[str, str] | None:
@@ -72,6 +84,50 @@ def role_of(type_name: str, name: str) -> tuple[str, str] | None:
         if name.endswith(f"/{usual}"):
             return role, name.removesuffix(f"/{usual}")
     return None
+
+
+def is_small(message: Any) -> bool:
+    """Whether messages of this kind have numbers to plot, and none of their arrays can be long.
+
+    Arrays of bytes and of messages can be, as in images, clouds and paths.
+
+    Args:
+        message: One with the values that it has when it is made.
+    """
+    kinds = list(_kinds(message))
+    may_be_long = any(
+        kind.endswith("[]") and (kind[:-2] in _BYTES or "/" in kind) for kind in kinds
+    )
+    return not may_be_long and any(kind.startswith(_NUMERIC) for kind in kinds)
+
+
+def _kinds(message: Any) -> Iterator[str]:
+    """Yield the types of a message's fields and of those within, but not of headers."""
+    for name, kind in zip(message.__slots__, message._slot_types, strict=True):
+        value = getattr(message, name)
+        if not hasattr(value, "_slot_types"):
+            yield kind
+        elif not kind.endswith("Header"):
+            yield from _kinds(value)
+
+
+def _numbers(message: Any, path: str = "") -> Iterator[tuple[str, float]]:
+    """Yield path and value of each finite number, but not of headers and of long fixed arrays."""
+    for name, kind in zip(message.__slots__, message._slot_types, strict=True):
+        value, here = getattr(message, name), f"{path}{name}"
+        if hasattr(value, "_slot_types"):
+            if not kind.endswith("Header"):
+                yield from _numbers(value, f"{here}.")
+        elif isinstance(value, list | tuple):
+            if kind.endswith("[]") or len(value) <= _MOST_ITEMS:
+                items = enumerate(value[:_MOST_ITEMS])
+                yield from ((f"{here}.{i}", float(item)) for i, item in items if _is_finite(item))
+        elif _is_finite(value):
+            yield here, float(value)
+
+
+def _is_finite(value: Any) -> bool:
+    return isinstance(value, bool | int | float) and math.isfinite(value)
 
 
 class Observer:
@@ -193,6 +249,14 @@ class Observer:
         if facts != told and (told is None or stamp_ns - told_ns >= MAP_S * 1e9):
             self._told["map", robot] = stamp_ns, facts
             yield "map", facts
+
+    def _take_numbers(self, topic: str, message: Any, stamp_ns: int) -> Iterator[Any]:
+        if not self._is_due("numbers", topic, stamp_ns, NUMBERS_S):
+            return
+        found = dict(itertools.islice(_numbers(message), _MOST_NUMBERS))
+        if found:
+            values = {path: round(value, 6) for path, value in found.items()}
+            yield "values", {"robot": "", "topic": topic, "values": values}
 
     def _take_battery(self, robot: str, message: Any, stamp_ns: int) -> Iterator[Any]:
         if self._is_due("battery", robot, stamp_ns, VALUE_S):

@@ -36,7 +36,7 @@ from smachpy import log
 from smachpy.exceptions import SmachError
 from smachpy.machines.container import control_of
 from smachpy.network.values import find_state
-from smachpy.run.origin import asking
+from smachpy.run.grace import asking
 from smachpy.userdata.user_data import UserData
 
 if TYPE_CHECKING:

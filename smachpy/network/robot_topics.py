@@ -15,7 +15,7 @@ from actionlib_core.node import get_node
 from actionlib_core.pubsub.topic import Subscriber
 from actionlib_core.wire.presence import Kind, parse_token, token_pattern
 from smachpy.events import record_text
-from smachpy.network.observations import Observer, role_of
+from smachpy.network.observations import NUMBERS, Observer, is_small, role_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,14 +38,16 @@ MOST_TOPICS: Final = 400
 
 
 CLOSE_S: Final = 1.0
+_HAVE_NUMBERS: Final = frozenset({"battery", "odometry"})
+"""Roles of topics whose numbers are told as well: voltage, speed."""
 
 
 class RobotTopics:
     """Tells what robots' topics say, while somebody wants to know: poses, scans, plans, maps, ...
 
     It listens to topics with the types and names of `observations.TOPICS` below the node's name
-    space, and to `/map` and `/tf`, over every wire that the node's configuration names. A context
-    manager.
+    space, to every other topic there whose messages are small and have numbers, and to `/map` and
+    `/tf`, over every wire that the node's configuration names. A context manager.
 
     Args:
         node: Where, and by whose clock; the node in force when None.
@@ -57,7 +59,8 @@ class RobotTopics:
     def __init__(self, node: Node | None = None) -> None:
         self._node = get_node() if node is None else node
         self._lock = threading.Lock()
-        self._telling = threading.Lock()  # around calls of listeners: records keep their order
+        # Around calls of listeners, so that records keep their order. A listener may leave.
+        self._telling = threading.RLock()
         self._executor = SerialExecutor(self._node.clock, "robot topics")
         self._observer = Observer()
         self._listeners: list[Callable[[dict[str, Any]], object]] = []
@@ -80,6 +83,8 @@ class RobotTopics:
         """Tell `listener` everything from now on; returns how to end that.
 
         Records are numbered from 1 in `n`; see `observations` for their other fields, and `kept`.
+        What ends it waits for a call that is under way, 1 s at most: what the listener uses can
+        be closed then.
 
         Raises:
             TransportError: the network of a ROS 2 robot cannot be joined.
@@ -112,6 +117,7 @@ class RobotTopics:
             self._listeners.clear()
         self._end()
         self._executor.join(CLOSE_S)
+        self._wait_for_calls()
 
     def _leave(self, listener: Callable[[dict[str, Any]], object]) -> None:
         with self._lock:
@@ -121,6 +127,11 @@ class RobotTopics:
             last = not self._listeners
         if last:
             self._end()
+        self._wait_for_calls()
+
+    def _wait_for_calls(self) -> None:
+        if self._telling.acquire(timeout=CLOSE_S):
+            self._telling.release()
 
     def _begin(self) -> None:
         node = self._node
@@ -158,7 +169,9 @@ class RobotTopics:
         inside = not space or end.name.startswith(f"{space}/")
         if not inside and end.name not in {"map", "tf", "tf_static"}:
             return None
-        return role_of(end.type, end.name.removeprefix(f"{space}/") if inside else end.name)
+        # Whose it is, is said with the whole name, as events say which action a goal was sent to.
+        found = role_of(end.type, end.name)
+        return found or ((NUMBERS, self._inside(end.name)) if inside else None)
 
     def _change(self, end: Endpoint, key: str, *, alive: bool) -> None:
         scope = self._scope(end)
@@ -176,15 +189,19 @@ class RobotTopics:
         if not wanted:
             return
         try:
+            kind = self._class(end)
+            if scope[0] == NUMBERS and not is_small(kind()):
+                return
             made = Subscriber(
                 f"/{end.name}",
-                self._class(end),
-                partial(self._on_message, *scope),
+                kind,
+                partial(self._on_message, *scope, self._inside(end.name)),
                 queue_size=20,
                 node=self._node,
             )
         except ActionlibError as error:
-            logger.warning("robot topics: %s", error)
+            level = logging.DEBUG if scope[0] == NUMBERS else logging.WARNING
+            logger.log(level, "robot topics: %s", error)  # of types that nobody here knows, too
             return
         with self._lock:
             spare = made if end.name in self._topics or not self._listeners else None
@@ -200,11 +217,16 @@ class RobotTopics:
             return class_of(self._node, end)
         return get_message(end.type)
 
-    def _on_message(self, role: str, robot: str, message: Any) -> None:
+    def _inside(self, name: str) -> str:
+        return name.removeprefix(f"{self._node.namespace.strip('/')}/")
+
+    def _on_message(self, role: str, robot: str, topic: str, message: Any) -> None:
         stamp_ns = self._node.clock.time_ns()
         with self._telling:
             with self._lock:
                 records = self._observer.take(role, robot, message, stamp_ns)
+                if role in _HAVE_NUMBERS:
+                    records += self._observer.take(NUMBERS, topic, message, stamp_ns)
                 for record in records:
                     self._keep(record)
                 listeners = list(self._listeners)

@@ -44,7 +44,7 @@ from smachpy.userdata.json_text import dumps, loads
 from smachpy.userdata.user_data import UserData, data_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from actionlib_core.node import Node
     from actionlib_core.time import Duration
@@ -330,6 +330,7 @@ class IntrospectionServer:
         node: Where to send; the current node when None.
         robot: Tells viewers what the robot's topics say; None: what is said below `node`'s name
             space, while somebody looks.
+        earlier: Records of what another process did of the run that this one goes on with.
 
     Raises:
         InvalidStateError: `state` is no container, or a name is no text.
@@ -348,7 +349,9 @@ class IntrospectionServer:
         control: bool = False,
         node: Node | None = None,
         robot: RobotTopics | None = None,
+        earlier: Sequence[dict[str, Any]] = (),
     ) -> None:
+        self._earlier = earlier
         self._server_name = server_name
         self._robot = robot
         self._state = _checked("IntrospectionServer", server_name, "state", state, path)
@@ -379,7 +382,11 @@ class IntrospectionServer:
                 control = ControlServer(name, state, path, node)
                 parts.callback(control.close)
             self._feed = Feed(
-                name, state, path, node, control=control, robot=self._robot, on_paths=self._mark
+                *(name, state, path, node),
+                control=control,
+                robot=self._robot,
+                earlier=self._earlier,
+                on_paths=self._mark,
             )
             parts.callback(self._feed.close)
             if self._obey:

@@ -14,7 +14,6 @@ from smachpy.run.child import StateData
 from smachpy.run.frame import Frame
 from smachpy.run.grace import ask, forget_visit
 from smachpy.run.interrupt import Interruption
-from smachpy.run.step import Step
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -24,22 +23,29 @@ if TYPE_CHECKING:
 
 
 class _Code:
-    """Stands where a visit expects a state: the function has no options and no outcomes."""
+    """Stands where a visit expects a step and its state: no options, outcomes or userdata."""
 
     _preempt_requested = False
     _smachpy_is_container = False
+    _smachpy_grace = None
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self._smachpy = StateData()
+        self.label = name_of(function)
         self.execute = function
+
+    @property
+    def state(self) -> _Code:
+        """The code itself."""
+        return self
 
     def request_preempt(self) -> None:
         """Nothing: a function cannot be told."""
 
     _smachpy_request_preempt: ClassVar[object] = request_preempt
 
-    def _smachpy_grace(self, inherited: Any) -> Any:
-        return inherited
+    def cut_off(self) -> None:
+        """Nothing: it has no userdata, and nothing follows it."""
 
 
 class CallbackFrame(Frame):
@@ -50,13 +56,14 @@ class CallbackFrame(Frame):
 
     def __init__(self, container: Parent, parent: Frame, function: Callable[..., Any]) -> None:
         self.container = container
+        self.data = container._smachpy
         self.parent = parent
         self.run = parent.run
         self.first = parent.first
         above = parent.step
         self._is_hook = above is not None and above.state is container  # called around its run
         self._path = parent.here() if self._is_hook else parent.path
-        self._step = Step(name_of(function), _Code(function), None, function)
+        self._step = _Code(function)
 
     def here(self) -> str:
         """Return the container's path."""
@@ -87,7 +94,7 @@ class CallbackFrame(Frame):
         """The callback runs from here on."""
         container, parent = self.container, self.parent
         self.step = self._step
-        container._smachpy.callback = self
+        self.data.callback = self
         assert parent is not None
         visit = parent.visit if self._is_hook else None
         if container._preempt_requested or (visit is not None and visit.is_asked()):
@@ -97,7 +104,7 @@ class CallbackFrame(Frame):
     def end(self) -> None:
         """The callback has returned, raised, was interrupted, or runs the container now."""
         self.step = None  # first the mark, then the look: see `smachpy.run.grace.ask`
-        data = self.container._smachpy
+        data = self.data
         if data.callback is self:
             data.callback = None
         if self.visit is not None:

@@ -11,6 +11,7 @@ from smachpy.machines.names import unique_names
 from smachpy.run.options import NO_OPTIONS
 
 if TYPE_CHECKING:
+    import threading
     from collections.abc import Callable, Iterable, Mapping
     from typing import Self, TypeAlias
 
@@ -25,7 +26,10 @@ if TYPE_CHECKING:
 
 
 class _Epoch:
-    """Counts changes of states' interfaces, so that nobody has to look at every state."""
+    """Counts changes of what machines were compiled from, so that nobody has to look everywhere.
+
+    That is the interfaces of states, and the callbacks, listeners and initial states of machines.
+    """
 
     value = 0
 
@@ -101,7 +105,10 @@ class ContainerData(StateData):
         context_kwargs: What `opened` was given.
         frame: Where it runs; None between runs, and between two attempts of one run.
         root: The root's frame while it runs as the root of a machine.
+        lock: That of its runs as a root; made once, as that takes as long as entering a machine.
         plan: Its children, compiled; None when they have changed.
+        plain_plan: The plan of a state machine, as long as entering it takes no more than making a
+            frame: nobody hears of it, and no keys are copied. None: it has to be called.
         listeners: Called at each event of it and of all below it.
         buffers: Take these events down.
         control: The operator's control, once somebody asked for it.
@@ -125,8 +132,10 @@ class ContainerData(StateData):
         "is_passing_on",
         "journal",
         "listeners",
+        "lock",
         "open_tokens",
         "origin",
+        "plain_plan",
         "plan",
         "remappings",
         "root",
@@ -147,7 +156,9 @@ class ContainerData(StateData):
         self.context_kwargs: dict[str, Any] = {}
         self.frame: Frame | None = None
         self.root: Frame | None = None
+        self.lock: threading.RLock | None = None
         self.plan: Any = None
+        self.plain_plan: Any = None
         self.listeners: tuple[Callable[[Event], object], ...] = ()
         self.buffers: tuple[EventBuffer, ...] = ()
         self.control: Gate | None = None
@@ -186,7 +197,10 @@ class Child(Protocol):
     def request_preempt(self) -> None:
         """Ask it to stop; may be the user's."""
 
-    def _smachpy_grace(self, inherited: Any) -> Any: ...
+    @property
+    def _smachpy_grace(self) -> Callable[[Any], Any] | None:
+        """Its own rule: what it makes of the grace of its containers; None: its option."""
+        ...
 
 
 class Parent(Child, Protocol):
@@ -206,24 +220,3 @@ class Parent(Child, Protocol):
     def get_children(self) -> Mapping[str, Any]:
         """Return label -> child."""
         ...
-
-
-def on_preempt(state: Child, callback: Callable[[], object]) -> Callable[[], None]:
-    """Call `callback` on each request to `state`, at once if there is one.
-
-    Returns:
-        Forgets the callback.
-
-    Threads: the callback runs in the requester's thread with the run's lock held, maybe in a signal
-        handler: it must not wait, and is none of the user's (`smachpy.run.grace.PreemptNotice`).
-    """
-    callbacks = state._smachpy.preempt_callbacks
-    callbacks.append(callback)
-    if state._preempt_requested:
-        callback()
-
-    def forget() -> None:
-        if callback in callbacks:
-            callbacks.remove(callback)
-
-    return forget

@@ -1,13 +1,12 @@
 """Where we are: the chain of running containers, in a context variable.
 
-A `Run` belongs to one execution of a root; every container below it has a `Frame`. The frames
+A `Run` belongs to one execution of a root; every container in it has a `Frame`. The frames
 know the path and the listeners, so that states need to know neither.
 """
 
 from __future__ import annotations
 
 import threading
-from collections import deque
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -17,15 +16,15 @@ from smachpy import log
 from smachpy.context import current_frame
 from smachpy.events import CallbackFailed
 from smachpy.machines.names import name_of
-from smachpy.util import has_shutdown_check
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections import deque
+    from collections.abc import Callable, Mapping, Sequence
 
     from actionlib_core.clock import Clock
     from smachpy.events import Event
     from smachpy.events.buffer import EventBuffer
-    from smachpy.run.child import Child, Parent
+    from smachpy.run.child import Child, ContainerData, Parent
     from smachpy.run.grace import Visit
 
 
@@ -51,10 +50,19 @@ class RunJournal(Protocol):
     What a visit does is written before it is done or told. A run that goes on in another process
     is entered down to the states that were active; for the containers and states on the way the
     journal says where they were.
+
+    Attributes:
+        run: Names the run, in its recordings and to viewers.
     """
+
+    run: str
 
     def attach(self, root: Frame) -> None:
         """Keep the run that begins in `root`, or go on with it."""
+
+    def recovered(self) -> tuple[Any, ...] | None:
+        """Return what the event `Recovered` tells, of a run that goes on; None: it begins."""
+        ...
 
     def finish(self, outcome: str) -> None:
         """Write that the run ends."""
@@ -87,6 +95,33 @@ class RunJournal(Protocol):
     def check_items(self, frame: Frame, count: int) -> None:
         """Check that there were not fewer items than before the resume."""
 
+    def fired(
+        self,
+        frame: Frame,
+        transitions: Sequence[str],
+        marking: Sequence[str],
+        ends: Sequence[str],
+        begins: Sequence[str],
+    ) -> None:
+        """Write that transitions of the plan of `frame` have fired, by their ids.
+
+        `marking` has the ids of the places that hold tokens now, `ends` the labels of the actions
+        that have to stop, if they run, and `begins` of those that begin.
+        """
+
+    def note_conditions(self, frame: Frame) -> None:
+        """Write what the conditions of the plan of `frame` are worth now, if that has changed."""
+
+    def resumed_plan(self, frame: Frame) -> tuple[Sequence[str], Mapping[str, Any]] | None:
+        """Return where the plan of `frame` goes on; None: it begins.
+
+        Returns:
+            The ids of the places that hold tokens, and label -> visit of each action that runs or
+            has ended: outcome (None: runs), begun_ns [ns since the epoch]; stopping: it runs, a
+            transition has let it stop; again: it begins anew after that.
+        """
+        ...
+
     def began_inside(self, frame: Frame) -> bool:
         """Tell whether what `frame` runs is a container whose children had begun."""
         ...
@@ -106,8 +141,20 @@ class RunJournal(Protocol):
     def retried(self, frame: Frame, attempt: int, wait: float, reason: str) -> None:
         """Write that attempt number `attempt` has ended, and the next begins in `wait` [s]."""
 
-    def asked(self, frame: Frame, origin: tuple[str, str, str]) -> None:
-        """Write that somebody asked the container of `frame` to stop."""
+    def asked(self, frame: Frame, origin: tuple[str, str, str]) -> bool:
+        """Write that somebody asked the container of `frame` to stop.
+
+        Returns:
+            Whether the journal asks it itself, once all that was active has been entered again:
+            what is not entered could not stop its goal.
+        """
+        ...
+
+    def asked_one(self, frame: Frame, step: Any, override: Any) -> None:
+        """Write that an operator asked the child of `step` to stop, and what he wants instead.
+
+        A run that goes on asks it again.
+        """
 
     def check_value(self, frame: Frame, path: str, key: str, value: Any) -> None:
         """Raise if the state at `path` may not write `value`, as it cannot be kept."""
@@ -118,8 +165,9 @@ class RunJournal(Protocol):
     def goal_of(self, frame: Frame) -> dict[str, Any] | None:
         """Return the goal that the state had sent before the resume, or None.
 
-        Its id, action, taken_ns (when a server took it [ns since the epoch]), status, text and
-        result (if it had ended), and stopped: the end of the process had cancelled it.
+        Its id, action, taken_ns (when a server took it [ns since the epoch]), status, text,
+        preempted and result (if it had ended; preempted: the state had been asked to stop), and
+        stopped: the end of the process had cancelled it.
         """
         ...
 
@@ -129,8 +177,10 @@ class RunJournal(Protocol):
     def goal_taken(self, frame: Frame, goal_id: str) -> None:
         """Write that a server has the goal."""
 
-    def goal_done(self, frame: Frame, goal_id: str, status: str, text: str, result: Any) -> None:
-        """Write how the goal ended."""
+    def goal_done(
+        self, frame: Frame, goal_id: str, status: str, text: str, result: Any, *, preempted: bool
+    ) -> None:
+        """Write how the goal ended, and whether its state had been asked to stop."""
 
     def once(self, frame: Frame, key: str, call: Callable[[], Any]) -> Any:
         """Return what `call` returned for `key` in this visit; call it if it has not."""
@@ -150,10 +200,14 @@ class Group(Protocol):
 class Run:
     """One execution of a root container, shared by all frames below it.
 
+    It is what the top frame of a machine is besides (`smachpy.run.threads.Root`): one object, as a
+    small machine takes little longer to run than that takes to make.
+
     Attributes:
         clock: The clock of the run.
         watched: Somebody wants to see each transition.
-        careful: Somebody wants more than to see them: a log, an operator, a shutdown check.
+        careful: Somebody wants more than to see them: a log, an operator, a shutdown check. Then it
+            is watched, too.
         logged: Transitions go to the log.
         has_shutdown_check: `set_shutdown_check` was called.
         control: The operator's control, once somebody asked for it.
@@ -165,27 +219,15 @@ class Run:
             the log.
     """
 
-    __slots__ = (
-        "careful",
-        "clock",
-        "control",
-        "has_shutdown_check",
-        "journal",
-        "lock",
-        "logged",
-        "pending",
-        "watched",
-    )
-
-    def __init__(self, clock: Clock) -> None:
-        self.clock = clock
-        self.logged = log.is_info_wanted()
-        self.has_shutdown_check = has_shutdown_check()
-        self.watched = self.careful = self.logged or self.has_shutdown_check
-        self.control: Gate | None = None
-        self.journal: RunJournal | None = None
-        self.lock = threading.RLock()
-        self.pending: deque[Callable[[], object]] = deque()
+    clock: Clock
+    watched: bool
+    careful: bool
+    logged: bool
+    has_shutdown_check: bool
+    control: Gate | None
+    journal: RunJournal | None
+    lock: threading.RLock
+    pending: deque[Callable[[], object]]
 
     def flush(self) -> None:
         """Tell what was noted; never with a lock held.
@@ -254,10 +296,11 @@ class Subscribers:
 
 
 class Frame:
-    """One running container, or a thread in which one child runs (`smachpy.run.branches.Branch`).
+    """One running container, or a thread in which one child runs (`smachpy.run.threads.Branch`).
 
     Attributes:
         container: The container.
+        data: What the library knows of it; here Python finds it several times faster than there.
         parent: The frame around it; None for the top, in which the root runs.
         run: What all frames of this execution share.
         step: What runs now: anything with `label` and `state`; None between runs.
@@ -265,6 +308,7 @@ class Frame:
         group: The children of a concurrence, while they run.
         answered: The container ends because a request to stop was taken up.
         dead: The thread was left behind.
+        above: What the parent runs while this frame lives: this container.
         first: The frame with which its thread begins.
         innermost: Of the first frame of a thread: the innermost one that runs there.
         thread: Of the first frame of a thread: the thread's identifier.
@@ -272,11 +316,15 @@ class Frame:
         ended: The child of a `Branch` has ended, and was reported.
     """
 
-    # Entering a container is a hot path: what is rarely set stands here, not in __init__.
+    # Entering a container is a hot path: what is rarely set stands here, and there is no __init__,
+    # which takes as long as all else that a frame needs: who enters one sets the rest.
     run: Run
-    step: Any
     first: Frame
     innermost: Frame | None
+    container: Parent
+    data: ContainerData
+    parent: Frame | None
+    step: Any = None
     visit: Visit | None = None
     group: Group | None = None
     answered = False
@@ -286,15 +334,7 @@ class Frame:
     can_be_left = False
     subscribers: Subscribers | None = None
     _path: str | None = None
-
-    def __init__(self, container: Parent, parent: Frame) -> None:
-        self.container = container
-        self.parent: Frame | None = parent
-        self.run = parent.run
-        self.first = parent.first
-        self.step = None
-        self.visit = None  # read at every step: on the instance that is three times as fast
-        self._above = parent.step  # what the parent runs while this frame lives: this container
+    above: Any = None
 
     @property
     def path(self) -> str:
@@ -303,7 +343,7 @@ class Frame:
         if path is None:
             parent = self.parent
             assert parent is not None
-            above = self._above
+            above = self.above
             path = self._path = parent.path if above is None else f"{parent.path}/{above.label}"
         return path
 
@@ -318,7 +358,7 @@ class Frame:
 
     def is_in_child(self) -> bool:
         """Tell whether a child runs, or a callback of the child, which is a container."""
-        step, callback = self.step, self.container._smachpy.callback
+        step, callback = self.step, self.data.callback
         if step is None or callback is None or callback.parent is not self:
             return step is not None
         return step.state is self.container  # a hook of the root; else the child comes after it
@@ -376,7 +416,7 @@ class Frame:
             above = parent.subscribers
             if above is None or above.version is not version:
                 above = parent.find_subscribers()
-        data = container._smachpy
+        data = self.data
         if above is None or parent is None or parent.container is not container:
             for buffer in data.buffers:
                 buffer.begin(self.here() if parent is None else self.path, self.run.clock)

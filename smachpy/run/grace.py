@@ -8,13 +8,15 @@ thread of its own. Graces end on the clock's thread, which waits for no listener
 
 from __future__ import annotations
 
+import contextlib
 import inspect
 import sys
 import threading
+from contextvars import ContextVar
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from smachpy.context import current_frame, current_path
+from smachpy.context import THREAD, current_frame, current_path
 from smachpy.events import (
     Abandoned,
     Finished,
@@ -27,16 +29,15 @@ from smachpy.events import (
 from smachpy.exceptions import InvalidTransitionError, did_you_mean
 from smachpy.run.frame import clock_of_run
 from smachpy.run.interrupt import Interruption, interrupt, take_back
-from smachpy.run.origin import REQUESTING, asking, current_origin
-from smachpy.run.visit import IS_ASKED, STEPS, Decision, Effect, Event, Phase, Why, after
+from smachpy.run.visit import IS_ASKED, STEPS, Decision, Effect, Event, Origin, Phase, Why, after
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator
 
     from actionlib_core.clock import Task, Timer
+    from actionlib_core.shutdown import Shutdown
     from smachpy.run.child import Child, Parent
     from smachpy.run.frame import Frame, Run
-    from smachpy.run.step import Step
     from smachpy.run.visit import Override
 
 DEFAULT_GRACE_S = 10.0
@@ -72,7 +73,7 @@ class Visit:
         "timeout",
     )
 
-    def __init__(self, frame: Frame, step: Step, phase: Phase = Phase.RUNNING) -> None:
+    def __init__(self, frame: Frame, step: Any, phase: Phase = Phase.RUNNING) -> None:
         self.phase = phase
         self.step = step
         self.by_timeout = False
@@ -159,7 +160,7 @@ class Visit:
             else:
                 mark_preempt(state)
         except Exception as error:  # noqa: BLE001  its siblings are told all the same
-            self._frame.note_failure(self._frame.here(), state.request_preempt, error)
+            self._frame.note_failure(self._frame.here(), _request_of(state), error)
 
     def _call_override(self) -> None:
         state, frame = self.step.state, self._frame
@@ -170,7 +171,7 @@ class Visit:
         try:
             self.override_call = frame.run.clock.spawn(call, name=f"request_preempt of {path}")
         except Exception as error:  # noqa: BLE001  no thread, for one: told, as what it raises is
-            frame.note_failure(path, state.request_preempt, error)
+            frame.note_failure(path, _request_of(state), error)
 
     def _arm_grace(self) -> None:
         state = self.step.state
@@ -245,8 +246,8 @@ class Visit:
                 if each.step is not None:
                     each.step.cut_off()
                     each.step.state._preempt_requested = False
-                data = each.container._smachpy
-                data.plan = None
+                data = each.data
+                data.plan = data.plain_plan = None
                 if data.callback is each:
                     data.callback = None
                 if data.frame is each:
@@ -306,7 +307,80 @@ class Visit:
     }
 
 
+# -- who asks -----------------------------------------------------------------------------------
+#
+# A request is passed on to every active state in the thread that makes it, so what is said once
+# holds for all of them.
+
+REQUESTING: ContextVar[object] = ContextVar("smachpy_requesting", default=None)
+"""The state whose `request_preempt` runs here: a second call from within changes nothing."""
+
+
+class _Said(threading.local):
+    """What was said in this thread; not in the context, which tasks would inherit."""
+
+    origin: Origin | None = None
+
+
+_said = _Said()
+
+
+@contextlib.contextmanager
+def asking(source: str, by: str = "", why: str = "") -> Iterator[None]:
+    """Say who asks for the preempts that this thread requests inside the `with` block.
+
+    Inside another such block it changes nothing: the outer one knows where the wish came from.
+    """
+    before = _said.origin
+    if before is None:
+        _said.origin = Origin(source, by, why)
+    try:
+        yield
+    finally:
+        _said.origin = before
+
+
+@contextlib.contextmanager
+def shutdown_asking(shutdown: Shutdown) -> Iterator[None]:
+    """Say that the program's end asks, and the signal that requested it."""
+    reason = shutdown.reason or ""
+    with asking("signal" if reason.startswith("SIG") else "shutdown", reason):
+        yield
+
+
+def current_origin() -> Origin:
+    """Return who asks in this thread: what was said, else what can be seen."""
+    said = _said.origin
+    if said is not None:
+        return said
+    first: Frame | None = THREAD.get()
+    if first is not None and first.innermost is not None:
+        return Origin("state", first.innermost.here())
+    return Origin("program", threading.current_thread().name)
+
+
 # -- asking --------------------------------------------------------------------------------------
+
+
+def on_preempt(state: Child, callback: Callable[[], object]) -> Callable[[], None]:
+    """Call `callback` on each request to `state`, at once if there is one.
+
+    Returns:
+        Forgets the callback.
+
+    Threads: the callback runs in the requester's thread with the run's lock held, maybe in a signal
+        handler: it must not wait, and is none of the user's (`PreemptNotice`).
+    """
+    callbacks = state._smachpy.preempt_callbacks
+    callbacks.append(callback)
+    if state._preempt_requested:
+        callback()
+
+    def forget() -> None:
+        if callback in callbacks:
+            callbacks.remove(callback)
+
+    return forget
 
 
 def mark_preempt(state: Child) -> None:
@@ -328,9 +402,17 @@ def mark_preempt(state: Child) -> None:
 
 def has_own_request(state: Child) -> bool:
     """Tell whether `request_preempt` is the user's."""
-    kind: Any = type(state)
-    own = kind.request_preempt is not kind._smachpy_request_preempt
-    return own or "request_preempt" in vars(state)
+    try:
+        function = getattr(state.request_preempt, "__func__", None)
+    except Exception:  # noqa: BLE001  a property of the user's: reported where it is called
+        return True
+    return function is not type(state)._smachpy_request_preempt
+
+
+def _request_of(state: Child) -> Any:
+    """Return the function `request_preempt` of `state` to be named, without running a property."""
+    found = inspect.getattr_static(state, "request_preempt")
+    return getattr(found, "fget", None) or found
 
 
 def ask(frame: Frame, step: Any = None, *, timeout: float | None = None) -> bool:
@@ -367,7 +449,7 @@ def ask(frame: Frame, step: Any = None, *, timeout: float | None = None) -> bool
     return True
 
 
-def ask_child(frame: Frame, step: Step, override: Override | None = None) -> bool:
+def ask_child(frame: Frame, step: Any, override: Override | None = None) -> bool:
     """Ask the child of `step` to stop, but not its container; tell whether it ran."""
     with frame.run.lock:
         asked = ask(frame, step)
@@ -425,8 +507,8 @@ def request(container: Parent, only: Frame | None = None) -> Run | None:
         with frame.run.lock:
             if data.is_passing_on or (only is not None and only is not frame):
                 return None
-            if frame.run.journal is not None:
-                frame.run.journal.asked(frame, origin)
+            if frame.run.journal is not None and frame.run.journal.asked(frame, origin):
+                return None
             if frame is data.root:
                 ask(frame)
             elif frame is data.frame or frame is data.callback:
@@ -440,7 +522,7 @@ def _pass_on_reported(container: Parent, frame: Frame) -> None:
     try:
         pass_on(container)
     except Exception as error:  # noqa: BLE001  reported: all that runs was asked
-        frame.note_failure(frame.path, container.request_preempt, error)
+        frame.note_failure(frame.path, _request_of(container), error)
 
 
 def request_soon(container: Parent, only: Frame | None = None) -> None:
@@ -466,7 +548,7 @@ def call_override(state: Child, frame: Frame | None, path: str) -> None:
     except BaseException as error:  # a border: reported, and without effect on others
         if frame is None:
             raise
-        frame.note_failure(path or frame.path, state.request_preempt, error)
+        frame.note_failure(path or frame.path, _request_of(state), error)
         frame.run.flush()
 
 
@@ -517,8 +599,9 @@ class PreemptNotice:
 
 def note_serviced(state: Child) -> None:
     """Publish that `state`, which runs in this context, takes its request up."""
-    frame: Frame | None = current_frame()
-    if frame is None or not frame.run.watched:
+    first: Frame | None = THREAD.get()
+    frame = None if first is None else first.innermost
+    if frame is None:
         return
     visit = frame.visit
     if visit is not None and visit.step is frame.step and visit.step.state is state:
@@ -535,6 +618,22 @@ def forget_visit(frame: Frame) -> None:
         visit.happen(Event.END)
     if visit.override_call is not None:
         visit.settle()
+
+
+def leave(frame: Frame) -> None:
+    """Forget the run of the container of `frame`; with it ends the preempt that belonged to it."""
+    container, data, step = frame.container, frame.data, frame.step
+    with frame.run.lock:
+        if frame.dead:
+            return
+        if data.frame is None:
+            container._preempt_requested = False
+        if step is not None:  # what a child that raised asked itself
+            step.state._preempt_requested = False
+    if frame.visit is not None:
+        forget_visit(frame)
+    for ended in tuple(data.end_waiters):
+        ended.set()
 
 
 # -- its end -----------------------------------------------------------------------------------
@@ -605,7 +704,10 @@ def unknown_outcome(path: str, outcomes: Iterable[str], got: object) -> InvalidT
 
 def grace_of(frame: Frame, state: Child) -> float | None:
     """Return the seconds that a child has after a request; None for as long as it likes."""
-    grace: Any = state._smachpy_grace(inherited_grace(frame))
+    rule, grace = state._smachpy_grace, state._smachpy.options.preempt_timeout
+    if grace == "inherit" or rule is not None:
+        inherited = inherited_grace(frame)
+        grace = inherited if rule is None else rule(inherited)
     if grace == "inherit":
         return DEFAULT_GRACE_S
     return None if grace is None else float(grace)
@@ -614,7 +716,7 @@ def grace_of(frame: Frame, state: Child) -> float | None:
 def inherited_grace(frame: Frame | None) -> Any:
     """Return the `preempt_timeout` of the nearest container that has one, else "inherit"."""
     while frame is not None:
-        grace = frame.container._smachpy.options.preempt_timeout
+        grace = frame.data.options.preempt_timeout
         if grace != "inherit":
             return grace
         frame = frame.parent

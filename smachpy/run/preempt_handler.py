@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from smachpy import log
 from smachpy.machines.problems import Problems
-from smachpy.run.origin import shutdown_asking
+from smachpy.run.grace import shutdown_asking
 
 if TYPE_CHECKING:
     from collections.abc import Callable

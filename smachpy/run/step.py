@@ -1,20 +1,43 @@
-"""A container, compiled: one record per child with all that running it needs, looked up once."""
+"""A child, ready to run: compiled, its options around it, its events, and what its errors say."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+import dataclasses
+import inspect
+import os
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 
-from smachpy.events import UserdataWritten
-from smachpy.run.interrupt import Interruption
-from smachpy.run.visit import End
+import actionlib_core
+from actionlib_core import shutdown
+from smachpy.context import current_frame
+from smachpy.events import Entered, Failed, Left, Retried, UserdataWritten
+from smachpy.exceptions import InvalidUserCodeError
+from smachpy.machines.names import name_of
+from smachpy.run.callback import call_bounded
+from smachpy.run.frame import SUBSCRIPTIONS, clock_of_run
+from smachpy.run.grace import ask, asking, on_preempt, request_soon, shutdown_asking
+from smachpy.run.interrupt import Interruption, ProgramEnds
+from smachpy.run.options import NO_OPTIONS
+from smachpy.run.visit import Again, End, Event, after_attempt
+from smachpy.slips import ACCEPTING
 from smachpy.userdata.user_data import Remapper, revoke
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    import asyncio
+    from collections.abc import Callable, Coroutine
 
+    from actionlib_core.clock import Timer
+    from smachpy.events.buffer import EventBuffer
     from smachpy.run.child import Child
     from smachpy.run.frame import Frame
+    from smachpy.run.options import Options
 
+TRACE_LINES: Final = 6
+_OURS: Final = tuple(
+    os.path.dirname(os.path.abspath(path)) + os.sep  # noqa: PTH100, PTH120  texts
+    for path in (actionlib_core.__file__ or "", os.path.dirname(__file__))  # noqa: PTH120
+)
+"""Folders of our packages; a package's is that of its `__init__.py`."""
 
 _new = tuple.__new__  # half the time of a NamedTuple's own
 
@@ -28,21 +51,24 @@ class Step:
         execute: Runs it: its own `execute`, or that with its options around it.
         userdata: Its window into the container's userdata; what `execute` was given, for a root.
         next: Outcome -> what comes then.
+        nested: The child's data, if it is a machine that the loop of the one above may enter.
         interface: The child's interface version that this was compiled from.
         writes: It may write userdata.
+        watched_window: The newest window that reports writes; None when its run has ended.
     """
 
     __slots__ = (
         "_base",
         "_path",
-        "_window",
         "execute",
         "final",
         "interface",
         "label",
+        "nested",
         "next",
         "state",
         "userdata",
+        "watched_window",
         "writes",
     )
     final: Literal[False]
@@ -57,10 +83,11 @@ class Step:
         self.execute = execute
         self.userdata = userdata
         self.next: dict[str, Any] = {}
+        self.nested: Any = None
         self.interface = data.version
         self.writes = bool(data.output_keys)
         self._base = self._path = ""
-        self._window: _WatchedRemapper | None = None
+        self.watched_window: _WatchedRemapper | None = None
 
     def is_stale(self) -> bool:
         """Tell whether the child's interface has changed."""
@@ -69,13 +96,9 @@ class Step:
     def cut_off(self) -> None:
         """Let a thread that was left behind in this child get no further, and write nothing."""
         self.next = _Nowhere()
-        for window in (self.userdata, self._window):
+        for window in (self.userdata, self.watched_window):
             if isinstance(window, Remapper):
                 revoke(window)
-
-    def forget_frame(self) -> None:
-        """Keep nothing of the run that has ended."""
-        self._window = None
 
     def path_in(self, frame: Frame) -> str:
         """Return the child's path."""
@@ -87,9 +110,11 @@ class Step:
 
     def watched_userdata(self, frame: Frame) -> Remapper:
         """Return a window that reports each write."""
-        window = self._window
+        window = self.watched_window
         if window is None or window._scope_of[0] is not frame:  # noqa: SLF001  its own module
-            window = self._window = _WatchedRemapper(self.userdata, frame, self.path_in(frame))
+            window = self.watched_window = _WatchedRemapper(
+                self.userdata, frame, self.path_in(frame)
+            )
         return window
 
 
@@ -130,3 +155,433 @@ class _WatchedRemapper(Remapper):
 
     def __setattr__(self, name: str, value: Any) -> None:
         self[name] = value
+
+
+# -- with its options around it ----------------------------------------------------------------
+
+
+_HOOKS = (("on_enter", 2), ("on_exit", 3), ("resume", 2), ("on_resume", 2))
+"""Methods that are options, and how many arguments they take."""
+
+
+def get_options(state: Child) -> Options:
+    """Return the options of `state`, hooks that are methods of its class included.
+
+    A method `on_enter(self, userdata)` or `on_exit(self, userdata, outcome)` is a hook, and so are
+    `resume(self, userdata)` and `on_resume(self, userdata)`; a method of one of these names with
+    other arguments is the state's own.
+    """
+    data = state._smachpy
+    known, options = data.with_hooks, data.options
+    if known is not None and known[0] is options:
+        return known[1]  # looking for methods takes longer than running a small machine
+    hooks = {
+        name: getattr(state, name)
+        for name, count in _HOOKS
+        if getattr(options, name) is None and _is_hook(type(state), name, count)
+    }
+    found = dataclasses.replace(options, **hooks) if hooks else options
+    data.with_hooks = options, found
+    return found
+
+
+def _is_hook(kind: type, name: str, count: int) -> bool:
+    """Tell whether the method `name` of a class takes `count` arguments, no fewer and no more."""
+    method = inspect.getattr_static(kind, name, None)
+    if not inspect.isfunction(method) or inspect.iscoroutinefunction(method):
+        return False
+    code = method.__code__
+    return (
+        code.co_argcount == count
+        and not method.__defaults__
+        and not code.co_kwonlyargcount
+        and not code.co_flags & (inspect.CO_VARARGS | inspect.CO_VARKEYWORDS)
+    )
+
+
+def runner_of(
+    state: Child,
+    options: Options,
+    execute: Callable[[Any], Any],
+    *,
+    is_async: bool = False,
+    is_callback: bool = False,
+) -> Callable[[Any], Any]:
+    """Return `execute` with `options` around it: itself when it asks for nothing more.
+
+    Args:
+        state: The child.
+        options: Its options.
+        execute: Runs it.
+        is_async: `execute` is a coroutine function.
+        is_callback: `execute` is code of the user around a container's own.
+    """
+    if is_async:
+        execute = _Async(state, execute)
+    if is_callback:
+        execute = _OwnExecute(state, execute)
+    if ACCEPTING[0]:
+        execute = _EndsWithProgram(execute)
+    plain = options is NO_OPTIONS or (
+        options.timeout is None
+        and options.retry is None
+        and options.on_enter is None
+        and options.on_exit is None
+        and not options.on_exception
+    )
+    return execute if plain else _WithOptions(state, options, execute)
+
+
+class _Async:
+    """Runs a state's coroutine; a preempt cancels it."""
+
+    def __init__(self, state: Child, execute: Callable[[Any], Coroutine[Any, Any, Any]]) -> None:
+        self._state: Any = state
+        self._execute = execute
+
+    def __call__(self, userdata: Any) -> Any:
+        return clock_of_run().run_async(self._main(userdata))
+
+    async def _main(self, userdata: Any) -> Any:
+        import asyncio
+
+        loop = asyncio.get_running_loop()
+        task = asyncio.ensure_future(self._execute(userdata))
+
+        def cancel() -> None:
+            loop.call_soon_threadsafe(_cancel, task)
+
+        forget = on_preempt(self._state, cancel)
+        try:
+            return await task
+        except asyncio.CancelledError as error:
+            if not self._state.preempt_requested():
+                own = asyncio.current_task()
+                if own is not None and own.cancelling():
+                    raise  # somebody ends the loop: Ctrl-C in a program that handles it itself
+                raise RuntimeError("the coroutine was cancelled, by no preempt") from error
+            self._state.service_preempt()
+            return "preempted"
+        finally:
+            forget()
+
+
+def _cancel(task: asyncio.Task[Any]) -> None:
+    task.cancel()
+
+
+class _OwnExecute:
+    """Runs a container's `execute` that is the user's: bounded by the grace but in the container's.
+
+    A container has no grace of its own, as its children have theirs.
+    """
+
+    def __init__(self, container: Any, execute: Callable[[Any], Any]) -> None:
+        self._container = container
+        self._execute = execute
+
+    def __call__(self, userdata: Any) -> Any:
+        frame: Frame | None = current_frame()
+        assert frame is not None  # a container runs it
+        return call_bounded(self._container, frame, self._execute, (userdata,))
+
+
+class _EndsWithProgram:
+    """Runs a state whose waits raise `ProgramEnds`: it was preempted then, as its machine is.
+
+    The wait may have heard of the program's end before the machine has, so the machine is asked
+    here.
+    """
+
+    def __init__(self, execute: Callable[[Any], Any]) -> None:
+        self._execute = execute
+
+    def __call__(self, userdata: Any) -> Any:
+        try:
+            return self._execute(userdata)
+        except Exception as error:
+            frame: Frame | None = current_frame()
+            asked = shutdown.requested() and frame is not None and not frame.dead
+            if not asked or not isinstance(error, ProgramEnds):
+                raise
+            while frame is not None and frame.parent is not None:
+                frame = frame.parent
+            assert frame is not None
+            if not frame.container._preempt_requested:
+                with shutdown_asking(shutdown.current_shutdown()):
+                    request_soon(frame.container)
+            raise Interruption from error
+
+
+class _WithOptions:
+    """Runs a state with its hooks, timeout, retry and handlers of exceptions."""
+
+    def __init__(self, state: Child, options: Options, execute: Callable[[Any], Any]) -> None:
+        self._state = state
+        self._options = options
+        self._execute = execute
+
+    def __call__(self, userdata: Any) -> Any:
+        options = self._options
+        frame: Frame | None = current_frame()
+        assert frame is not None  # a container runs it
+        journal = frame.run.journal
+        if options.on_enter is not None and (journal is None or not journal.began_inside(frame)):
+            _call_hook(frame, self._state, options.on_enter, userdata)
+        outcome = self._attempts(frame, userdata)
+        if options.on_exit is not None:
+            _call_hook(frame, self._state, options.on_exit, userdata, outcome)
+        return outcome
+
+    def _attempts(self, frame: Frame, userdata: Any) -> Any:
+        """Run until an attempt is good, or the last one was made, or somebody asks it to stop."""
+        state, attempt = self._state, 1
+        if frame.run.journal is not None:
+            attempt, wait = frame.run.journal.attempt(frame)
+            if wait and _waits_in_vain(state, wait):
+                return "preempted"
+        return self._try(frame, userdata, attempt)
+
+    def _try(self, frame: Frame, userdata: Any, attempt: int) -> Any:
+        state, options = self._state, self._options
+        while True:
+            timer, passed = None, False
+            if options.timeout is not None:
+                timer = Timeout(frame, options.timeout)
+                passed = timer.begin()
+            result: Any = None
+            timed_out = False
+            try:
+                result = "preempted" if passed else self._execute(userdata)
+            except (Exception, Interruption) as error:
+                if frame.dead:
+                    raise
+                result = error
+            finally:
+                if timer is not None:
+                    timed_out = timer.end(result)
+            asked = state._preempt_requested or (frame.visit is not None and frame.visit.is_asked())
+            decision = after_attempt(
+                result, options, attempt, asked=asked, timed_out=timed_out, applies=_applies
+            )
+            if isinstance(decision, Again):
+                wait, result = decision
+                _tell_retried(frame, attempt, wait, _reason(result))
+                if not (wait and _waits_in_vain(state, wait)):
+                    attempt += 1
+                    continue
+                decision = after_attempt(
+                    result, options, attempt, asked=True, timed_out=False, applies=_applies
+                )
+            if isinstance(decision, BaseException):
+                raise decision
+            return decision
+
+
+def _tell_retried(frame: Frame, attempt: int, wait: float, reason: str) -> None:
+    if frame.run.journal is not None:
+        frame.run.journal.retried(frame, attempt, wait, reason)
+    frame.emit(Retried, attempt, reason)
+
+
+def _call_hook(frame: Frame, state: Any, hook: Callable[..., object], *arguments: Any) -> None:
+    try:
+        if state._smachpy_is_container:  # a leaf's grace covers its hooks
+            call_bounded(state, frame, hook, arguments)
+        else:
+            hook(*arguments)
+    except Exception as error:
+        where = frame.here()
+        name = name_of(hook)
+        raise InvalidUserCodeError(
+            f"{where}: hook {name} raised {type(error).__name__}: {error}", path=where
+        ) from error
+
+
+def _waits_in_vain(state: Child, seconds: float) -> bool:
+    """Wait between two attempts; tell whether somebody asked `state` to stop meanwhile."""
+    wake = clock_of_run().event()
+    forget = on_preempt(state, wake.set)
+    try:
+        wake.wait(seconds)
+    finally:
+        forget()
+    return state._preempt_requested
+
+
+class Timeout:
+    """Asks what `frame` runs to stop when its time, `seconds`, is over."""
+
+    def __init__(self, frame: Frame, seconds: float) -> None:
+        self._frame = frame
+        self._step: Step = frame.step
+        self._seconds = seconds
+        self._passed = False
+        self._ended = False  # both are changed with the run's lock held
+        self._timer: Timer | None = None
+
+    def begin(self) -> bool:
+        """Let the time begin; tell whether it passed before this process, with nothing to go on."""
+        journal, frame = self._frame.run.journal, self._frame
+        left = self._seconds if journal is None else journal.time_left(frame, self._seconds)
+        if left > 0.0:
+            self.start(left)
+            return False
+        self.over()
+        return journal is not None and not journal.goes_on(frame)
+
+    def start(self, left: float) -> None:
+        """Let the time be over in `left` seconds."""
+        self._timer = self._frame.run.clock.call_later(left, self.over)
+
+    def is_alone(self) -> bool:
+        """Tell whether the time is over and nobody else wants the child to stop."""
+        visit = self._frame.visit
+        return self._passed and visit is not None and visit.step is self._step and visit.by_timeout
+
+    def end(self, result: object) -> bool:
+        """The attempt has ended with `result`; tell whether nothing but the timeout had asked.
+
+        Then the request ends with the attempt, and the next one begins anew. A request of somebody
+        else stays.
+        """
+        if self._timer is not None:
+            self._timer.cancel()
+        frame = self._frame
+        with frame.run.lock:
+            self._ended = True
+            if not self._passed or frame.dead:
+                return False
+        visit = frame.visit
+        if visit is None or visit.step is not self._step:
+            return False
+        if frame.run.watched and visit.has_answered(result):
+            visit.service()
+        with frame.run.lock:
+            alone = visit.by_timeout and not frame.dead
+            if alone:
+                visit.happen(Event.NEXT_ATTEMPT)
+        visit.settle()
+        return alone
+
+    def over(self) -> None:
+        """The time is over; only the first call counts."""
+        frame = self._frame
+        with asking("timeout", frame.here(), f"{self._seconds:g} s"), frame.run.lock:
+            if self._passed or self._ended or frame.dead:
+                return
+            self._passed = ask(frame, self._step, timeout=self._seconds)
+        frame.run.flush_soon()
+
+
+def _reason(result: Any) -> str:
+    return f"{type(result).__name__}: {result}" if isinstance(result, Exception) else str(result)
+
+
+def _applies(wanted: Callable[[BaseException], bool], error: BaseException) -> bool:
+    """Tell whether `wanted` is true of `error`, or of what a container made it from.
+
+    Several children of a concurrence may have raised; an error that nobody wants must not
+    disappear beside one that somebody does, so it must be true of all. A group that a state
+    itself has raised is one error.
+    """
+    if wanted(error):
+        return True
+    cause = error.__cause__ if isinstance(error, InvalidUserCodeError) else None
+    if cause is None:
+        return False
+    if isinstance(cause, ChildErrors):
+        return wanted(cause) or all(_applies(wanted, one) for one in cause.exceptions)
+    return _applies(wanted, cause)
+
+
+# -- with its events ---------------------------------------------------------------------------
+
+
+def run_watched(frame: Frame, step: Step) -> Any:
+    """Run a step and publish that it was entered and left."""
+    run = frame.run
+    clock = run.clock
+    path = step.path_in(frame)
+    journal = run.journal
+    if journal is not None:
+        ended = journal.enter(frame, step)
+        if ended is not None:
+            return ended
+    if run.pending:
+        run.flush()
+    frame.publish(_new(Entered, (path, clock.now(), clock.time_ns())))
+    try:
+        window = step.watched_userdata(frame) if step.writes else step.userdata
+        if journal is None:
+            outcome = step.execute(window)
+        else:
+            outcome = journal.execute(frame, step, window)
+            journal.leave(frame, step, outcome)
+    except BaseException as error:
+        publish_raised(frame, error)
+        raise
+    if frame.visit is not None or run.pending or run.control is not None:
+        publish_left(frame, step, outcome)
+    else:
+        text = outcome if isinstance(outcome, str) else repr(outcome)  # the machine refuses it next
+        frame.publish(_new(Left, (path, clock.now(), clock.time_ns(), text)))
+    return outcome
+
+
+def publish_raised(frame: Frame, error: BaseException) -> None:
+    """Publish that the step that runs was ended by `error`."""
+    if isinstance(error, Interruption):
+        frame.emit(Left, "preempted")
+    else:
+        frame.emit(Failed, f"{type(error).__name__}: {error}", trace_of(error))
+
+
+def trace_of(error: BaseException) -> str:
+    """Return the innermost lines of user code that an exception came through, a line each."""
+    import traceback  # only where something went wrong
+
+    frames = [
+        one
+        for one in traceback.extract_tb(error.__traceback__)
+        if not one.filename.startswith((*_OURS, "<"))
+    ]
+    lines = (f"{one.filename}:{one.lineno} in {one.name}: {one.line}" for one in frames)
+    return "\n".join(list(lines)[-TRACE_LINES:])
+
+
+def publish_left(frame: Frame, step: Step, outcome: Any) -> None:
+    """Publish that `step` has just ended, and what goes with it."""
+    run = frame.run
+    clock = run.clock
+    visit = frame.visit
+    if visit is not None and visit.step is step and visit.has_answered(outcome):
+        visit.service()
+    if run.pending:
+        run.flush()
+    text = outcome if isinstance(outcome, str) else repr(outcome)
+    frame.publish(_new(Left, (step.path_in(frame), clock.now(), clock.time_ns(), text)))
+    if run.control is not None:
+        run.control.note_outcome(frame, step, outcome)
+
+
+def only_buffer(frame: Frame) -> EventBuffer | None:
+    """Return the buffer that alone hears the events of `frame`; None if there is none."""
+    subscribers = frame.subscribers
+    if subscribers is None or subscribers.version is not SUBSCRIPTIONS.version:
+        subscribers = frame.find_subscribers()
+    return subscribers.buffer
+
+
+# -- what goes wrong ---------------------------------------------------------------------------
+
+
+class ChildErrors(ExceptionGroup[Exception]):
+    """What the children of a concurrence raised; not a group that one of them raised itself."""
+
+
+def user_error(path: str, state: Child, error: BaseException) -> InvalidUserCodeError:
+    """Return the error for code of a state that raised; raise it `from error`."""
+    return InvalidUserCodeError(
+        f"{path}: {type(state).__name__} raised {type(error).__name__}: {error}", path=path
+    )

@@ -9,6 +9,7 @@ Source:
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
@@ -16,6 +17,7 @@ from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.interfaces import ros2
 from actionlib_core.node import get_node
 from actionlib_core.wire.ros2.network import choose_network
+from smachpy.sim.battery import Battery
 from smachpy.sim.behaviors import back_up, spin
 from smachpy.sim.exceptions import NavigationError
 from smachpy.sim.geometry import ORIGIN, wrap_angle
@@ -80,6 +82,9 @@ class Nav2Server:
     Args:
         robot: The robot; nothing else may steer it.
         node: Where it is on the network; None takes the node in force.
+        stepper: Lets time pass for it and for others; None makes one for this robot alone.
+
+    Its battery does not drain: Nav2 has no action by which a mission could charge it.
 
     Raises:
         ConfigError: there are several ROS 2 networks, and none has the names.
@@ -88,13 +93,18 @@ class Nav2Server:
     Threads: `start` and `close` may be called from any thread. A stepper's thread moves the robot.
     """
 
-    def __init__(self, robot: Robot, *, node: Node | None = None) -> None:
+    def __init__(
+        self, robot: Robot, *, node: Node | None = None, stepper: Stepper | None = None
+    ) -> None:
         self._node = node if node is not None else get_node()
         self._clock = clock = self._node.clock
         self._robot = robot
         self._pilot = Pilot(robot)
         control = robot.config.control
-        self._stepper = Stepper(clock, rate=control.rate)
+        self._owns_stepper = stepper is None
+        self._stepper = stepper or Stepper(clock, rate=control.rate)
+        battery = replace(robot.config.battery, charge=1.0, idle_power=0.0, drive_power=0.0)
+        robot.battery = Battery(battery, clock.now())
         self._feedback_period = 1.0 / control.feedback_rate
         self._closing = clock.event("the robot closes")
         self._busy: _Behavior | None = None
@@ -153,7 +163,8 @@ class Nav2Server:
         for behavior in self._behaviors.values():
             behavior.server.stop()
         self._stepper.remove(self)
-        self._stepper.close()
+        if self._owns_stepper:
+            self._stepper.close()
         self._topics.close()
 
     # -- goals: each on its server's thread ----------------------------------------------------

@@ -44,7 +44,8 @@ class RobotProcess(ChildProcess):
         """
         if self.exit_code:
             raise MissionError(
-                self.said or f"the robot process ended with exit code {self.exit_code}"
+                self.said.removeprefix("smachpy: ")
+                or f"the robot process ended with exit code {self.exit_code}"
             )
 
     def on_refusal(self, callback: Callable[[], object]) -> None:

@@ -25,9 +25,11 @@ if TYPE_CHECKING:
 
     from actionlib_core.exceptions import ServerConflictError
     from smachpy.sim.doors import Door
+    from smachpy.sim.nav2 import Nav2Server
     from smachpy.sim.world import Robot, World
 
 _NODE: Final = "move_base"  # base name of each robot's node
+_ROS2_NODE: Final = "simulated_robot"
 
 
 class Simulation:
@@ -36,6 +38,9 @@ class Simulation:
     Args:
         world: The world; its robots must be on it already.
         node: Where it is on the network; the robots get nodes on the same session.
+        on_ros2: The robots are Nav2's, each in its namespace on the network of ROS 2 that the
+            node's configuration says; the doors stay where they are. Each robot joins the networks
+            by itself then, if the node has done so.
 
     Raises:
         MissionError: the robots' control rates differ.
@@ -48,13 +53,14 @@ class Simulation:
         stepper: Lets time pass; hold its lock to change the world while it runs.
     """
 
-    def __init__(self, world: World, *, node: Node | None = None) -> None:
+    def __init__(self, world: World, *, node: Node | None = None, on_ros2: bool = False) -> None:
         self.world = world
         self._node = node if node is not None else get_node()
+        self._on_ros2 = on_ros2
         self.stepper = Stepper(self._node.clock, rate=_rate(world))
         self._surroundings = _Surroundings(self)
         self._nodes: list[Node] = []
-        self.servers: dict[str, RobotServer] = {}
+        self.servers: dict[str, RobotServer | Nav2Server] = {}
         self._closing = self._node.clock.event("the simulation closes")
         self._closed = False
         self._conflict: ServerConflictError | None = None
@@ -86,14 +92,26 @@ class Simulation:
 
     def _start_robot(self, robot: Robot) -> None:
         base = self._node.namespace
-        node = Node(
-            _NODE,
-            transport=self._node.transport,
-            clock=self._node.clock,
-            namespace=f"{base}/{robot.name}" if base else robot.name,
-        )
-        self._nodes.append(node)
-        server = self.servers[robot.name] = RobotServer(robot, node=node, stepper=self.stepper)
+        namespace = f"{base}/{robot.name}" if base else robot.name
+        clock, transport, stepper = self._node.clock, self._node.transport, self.stepper
+        server: RobotServer | Nav2Server
+        if self._on_ros2:
+            from smachpy.sim.nav2 import Nav2Server
+
+            node = Node(
+                _ROS2_NODE,
+                transport=None if self._node.owns_transport else transport,
+                clock=clock,
+                namespace=namespace,
+                config=self._node.config,
+            )
+            self._nodes.append(node)
+            server = Nav2Server(robot, node=node, stepper=stepper)
+        else:
+            node = Node(_NODE, transport=transport, clock=clock, namespace=namespace)
+            self._nodes.append(node)
+            server = RobotServer(robot, node=node, stepper=stepper)
+        self.servers[robot.name] = server
         server.start()
 
     def remove(self, name: str) -> None:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.pubsub.topic import Subscriber
 from smachpy import State, UserData
-from smachpy.run.child import on_preempt
 from smachpy.run.frame import clock_of_run
+from smachpy.run.grace import on_preempt
 
 if TYPE_CHECKING:
     from collections.abc import Callable

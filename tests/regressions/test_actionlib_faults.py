@@ -275,7 +275,7 @@ def test_three_goals_to_a_busy_server_with_the_texts_of_actionlib(pair):
 
 def test_goal_without_id_gets_one_and_cancel_of_an_unknown_id_is_listed(pair):
     """The observed behaviour of ROS 1 on the wire."""
-    from actionlib_core.wire.action_messages import pack_goal, pack_goal_id, unpack_statuses
+    from actionlib_core.wire.actions import pack_goal, pack_goal_id, unpack_statuses
     from actionlib_core.wire.encoding import encoding_of
 
     runs = []

@@ -127,6 +127,16 @@ def test_a_line_of_another_kind_is_named(lines, line, place, tmp_path):
         read_recording(path)
 
 
+@pytest.mark.parametrize("outage", [[2**70, -1], [-1, 2**70], [0, 2**63]])
+def test_both_ends_of_an_outage_are_checked(lines, outage, tmp_path):
+    event = {**json.loads(lines[1]), "kind": "Recovered", "mission": "m", "began_ns": 0}
+    lines[1] = json.dumps({**event, "outages": [outage], "active": []}) + "\n"
+    path = tmp_path / "bad.jsonl"
+    path.write_text("".join(lines))
+    with pytest.raises(RecordingError, match="line 2"):
+        read_recording(path)
+
+
 def damaged(value, rng):
     """Put another value in one place of JSON data."""
     others = [None, -1, 1.5, 10**400, "x", [], {}, [[]], True, float("nan")]

@@ -27,7 +27,7 @@ from smachpy.events import (
     Resumed,
 )
 from smachpy.network.server import IntrospectionServer
-from smachpy.run.child import on_preempt
+from smachpy.run.grace import on_preempt
 
 LONG_S = 20.0
 
@@ -298,6 +298,24 @@ def test_ctrl_c_requests_the_shutdown_whatever_the_root_makes_of_it(what):
         blocked.set()
 
 
+def test_a_request_that_is_a_raising_property_is_reported(clock):
+    class Odd(Work):
+        @property
+        def request_preempt(self):
+            raise OSError("bus")
+
+    machine = both(Odd(30.0), Work(30.0))
+    heard = []
+    machine.subscribe(heard.append)
+    clock.call_later(1.0, machine.request_preempt)
+    assert machine.execute() == "preempted"
+    assert clock.now() == 1.0
+    (failed,) = [e for e in heard if isinstance(e, CallbackFailed)]
+    assert failed.path == "/SM_ROOT/S0"
+    assert failed.callback.endswith("Odd.request_preempt")
+    assert failed.error == "OSError: bus"
+
+
 def test_a_callback_that_raises_does_not_keep_the_others_from_a_request(clock):
     """As a state registers it itself, to be told at once."""
 
@@ -362,8 +380,6 @@ LOCKS = {
     "container": lambda m: m.machine._smachpy.frame.run.lock,
     "child": lambda m: m.machine["S0"]._smachpy.frame.run.lock,
     "feed": lambda m: m.server._feed._lock,
-    "feed's executor": lambda m: m.server._feed._executor._lock,
-    "introspection's executor": lambda m: m.server._topics.executor._lock,
     "network": lambda m: m.network.lock,
     "log": lambda m: m.log.lock,
     "timers": lambda m: m.clock._timer_lock,
@@ -879,3 +895,27 @@ def test_a_callback_that_cannot_be_called_is_refused(bad):
     with pytest.raises(smachpy.InvalidStateError) as caught:
         Work().on_preempt(bad)
     assert len(caught.value.problems) == 1
+
+
+@pytest.mark.parametrize("at", [0.5, 1.5])  # in its hook, and in its child
+def test_a_second_run_is_refused_without_a_trace_on_the_one_that_is_on(clock, at):
+    refused, events = [], []
+    machine = StateMachine(["done", "preempted"], on_enter=lambda _: clock.sleep(1.0))
+    machine.add("WORK", Work(9.0))
+    machine.subscribe(lambda event: events.append(type(event).__name__))
+
+    def run_too():
+        clock.sleep(at)
+        try:
+            machine.execute()
+        except smachpy.InvalidStateError as error:
+            refused.append(error)
+
+    with use_shutdown(Shutdown()) as end:
+        second = clock.spawn(run_too, name="second")
+        clock.call_later(2.0, lambda: end.request("test"))
+        assert machine.execute() == "preempted"  # the program's end still finds it
+        second.join()
+    assert len(refused) == 1
+    assert clock.now() == 2.0
+    assert (events.count("Started"), events.count("Finished")) == (1, 1)

@@ -620,7 +620,7 @@ def test_set_loggers_keeps_its_order_of_arguments():
     from smachpy import log
 
     heard = []
-    before = log._current[0]
+    before = log.current_loggers()
     try:
         smach.set_loggers(*[lambda m, k=k: heard.append((k, m)) for k in ("i", "w", "d", "e")])
         smach.loginfo("1")
@@ -632,7 +632,7 @@ def test_set_loggers_keeps_its_order_of_arguments():
         sm.add("B", Say("done"))
         sm.execute()
     finally:
-        log._current[0] = before
+        log.set_loggers(*before)
     assert heard[:4] == [("i", "1"), ("w", "2"), ("d", "3"), ("e", "4")]
     assert ("i", "/SM_ROOT: 'A' -x-> 'B'") in heard
 
