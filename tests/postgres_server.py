@@ -30,9 +30,14 @@ def programs() -> Path | None:
 
 
 class PostgresServer:
-    """One server with one cluster; `start`, `stop` and `kill` may be called again and again."""
+    """One server with one cluster; `start`, `stop` and `kill` may be called again and again.
 
-    def __init__(self, folder: Path) -> None:
+    Args:
+        folder: Where its files are.
+        primary: The server that it is a standby of, which runs; None: it is one of its own.
+    """
+
+    def __init__(self, folder: Path, primary: PostgresServer | None = None) -> None:
         found = programs()
         assert found is not None, "PostgreSQL is missing: .ci/postgres"
         self._programs = found
@@ -44,6 +49,10 @@ class PostgresServer:
         if os.getuid() == 0:
             folder.chmod(0o777)
             self._as_user = {"user": "nobody", "group": "nogroup", "extra_groups": []}
+        if primary is not None:
+            copy = ("-X", "stream", "-c", "fast", "-R")  # -R: it follows when it is started
+            self._run("pg_basebackup", "-D", self._folder, "-d", primary.url, *copy)
+            return
         self._run(
             "initdb",
             "-D",
@@ -73,6 +82,10 @@ class PostgresServer:
     def kill(self) -> None:
         """End the server as a crash does; it recovers from its log at the next start."""
         self._end("immediate")
+
+    def promote(self) -> None:
+        """Let a standby take over."""
+        self._pg_ctl("promote", "-w", "-t", str(WITHIN_S))
 
     def new_database(self, name: str) -> str:
         """Make an empty database and return its URL."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import uuid
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -15,9 +16,7 @@ from smachpy.durable.processes import this_runner
 from smachpy.durable.recorder import Recorder
 from smachpy.durable.store import INTERRUPTED, OVER, QUEUED, MissionRow, StoreError, open_store
 from smachpy.exceptions import MissionError
-from smachpy.machines.container import below
-from smachpy.run.grace import request_soon
-from smachpy.run.origin import asking
+from smachpy.run.grace import asking, request_soon
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -165,19 +164,20 @@ def kept_mission(
     """Let the one run of `machine` within the block be kept as `mission`, which the store has.
 
     What is raised, and the other arguments, are those of `run_durable`. A runner that says nothing
-    for `lease_s` [s] loses the mission. When another one has taken it over, `on_fenced` is called,
-    in some thread, before the machine is preempted: its goals are the other one's now.
+    for `lease_s` [s] loses the mission; with infinity nothing is renewed, and no cancel is heard
+    of. When another one has taken it over, `on_fenced` is called, in some thread, before the
+    machine is preempted: its goals are the other one's now.
     """
     row = store.mission(mission)
-    _refuse_plans(machine)
     lease = store.claim(mission, this_runner(), seconds=lease_s)
     status = QUEUED if row.status == QUEUED else INTERRUPTED
     try:
         position = read_position(store, mission)
         goes_on = bool(position.visits)
-        shift_ns = 0
+        shift_ns = gone_ns = 0
         if goes_on:
-            gone_ns = current_clock().time_ns() - position.data["last_ns"]
+            alive_ns = max(position.data["last_ns"], round(row.changed * 1e9))
+            gone_ns = max(0, current_clock().time_ns() - alive_ns)
             if max_outage is not None and gone_ns > max_outage * 1e9:
                 raise OutageError(mission, gone_ns / 1e9, max_outage)
             fitted = _fitted(machine, row, position, migrate)
@@ -188,13 +188,14 @@ def kept_mission(
         recorder = Recorder(
             machine,
             Journal(store, lease, position),
+            row=row,
             goes_on=goes_on,
             shift_ns=shift_ns,
+            gone_ns=gone_ns,
         )
         recorder.on_fenced = on_fenced
         if goes_on:
             recorder.restore()
-        status = INTERRUPTED
         data = machine._smachpy
         data.journal = recorder
         try:
@@ -202,21 +203,14 @@ def kept_mission(
                 yield recorder
         finally:
             data.journal = None
+            if position.visits:  # else it has not begun, or ended
+                status = INTERRUPTED
         if recorder.broken is not None:
             raise recorder.broken
     finally:
         with contextlib.suppress(MissionError):  # fenced, or the store is gone: said above
             now = store.mission(mission).status
             store.release(lease, now if now in OVER else status)
-
-
-def _refuse_plans(machine: Container) -> None:
-    plans = [type(each).__name__ for each in below(machine) if each._smachpy_kind == "plan"]
-    if plans:
-        raise MissionError(
-            f"/{machine.name or 'SM_ROOT'}: durable: got a {plans[0]} in it, whose marking is not "
-            "kept; expected state machines, sequences, concurrences and iterators."
-        )
 
 
 def _fitted(machine: Container, row: MissionRow, position: Position, migrate: Any) -> Position:
@@ -245,10 +239,11 @@ def _fitted(machine: Container, row: MissionRow, position: Position, migrate: An
         )
     moved = position.renamed(names)
     missing = structure.missing_paths(moved.visits, new)
+    missing += structure.missing_places(moved.markings, new)
     if missing:
         raise MachineChangedError(
             row.id,
-            [f"{path}: was active and is no more" for path in missing],
+            [f"{each}: was active and is no more" for each in missing],
             "Try '--migrate OLD_PATH=NEW_PATH' for each of them.",
         )
     moved.data["structure"] = new
@@ -287,6 +282,9 @@ def _renewing(
 
     if asked:
         cancel()
+    if math.isinf(lease_s):
+        yield
+        return
     task = clock.spawn(renew, name=f"lease of {lease.mission}")
     try:
         yield

@@ -10,12 +10,19 @@ is beside them:
     Retried            attempt `attempt` has ended; the next begins at `at_ns`
     GoalSent, GoalTaken, GoalDone    a goal is about to be sent, is at a server, has ended
     Once               a call has returned `value` for `key`
-    PreemptRequested   `source`, `by` and `why` asked the container at `path` to stop
-    Recovered          another process goes on; `shift_ns`: how far deadlines have moved
+    Fired              `transitions` of the plan at `path` have fired: its tokens are in `marking`,
+                       the actions at the paths `ends` have to stop, those at `begins` begin
+    Noted              only what stands beside it
+    PreemptRequested   `source`, `by` and `why` asked the container at `path` to stop; with
+                       `override` an operator asked the child there, and wants that outcome or that
+                       label (a pair) next, or neither (None)
+    Recovered          another process goes on; `shift_ns`: how far deadlines have moved;
+                       `gone_ns`: how long none did
     Finished           the run has ended with `outcome`
 
-Any of them may hold `userdata` (path of a container -> key -> encoded value) and `deleted` (path
--> keys): what has changed since the entry before.
+Any of them may hold what has changed since the entry before: `userdata` (path of a container -> key
+-> encoded value), `deleted` (path -> keys), and `conditions` (path of a plan -> `set`: name ->
+truth, `events`: pairs [name, stamp] that no guard has read).
 """
 
 from __future__ import annotations
@@ -24,10 +31,13 @@ import json
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Mapping
 
 VERSION: Final = 1
 """Of entries and snapshots."""
+
+MOST_ENDS: Final = 80
+"""So many ends of children of the root are kept."""
 
 
 OF_PROCESS: Final = frozenset({"signal", "shutdown"})
@@ -41,13 +51,19 @@ class Position:
         data: visits: path -> visit of each state that runs, or that has ended and whose outcome
             has not been followed: in, since_ns (of the attempt), attempt, outcome (None while it
             runs), number (of the iterator's item), goal (action, id, sent_ns, taken_ns, status,
-            text, result, stopped: the end of a process has cancelled it) or None, once (key ->
-            encoded value);
+            text, result, preempted: it ended after its state was asked to stop, stopped: the end of
+            a process has cancelled it) or None, asked (source, by, why, override) if an operator
+            asked it to stop, once (key -> encoded value), begun_ns, entered_ns (which no outage
+            moves); of a plan's action that was asked to stop by a transition also stopping, and
+            again: it begins anew after that;
+            markings: path of a plan that runs -> ids of the places that hold tokens;
+            conditions: as in entries;
             userdata: path of a container -> key -> encoded value;
             preempts: path, source, by and why of each request;
             started_ns, last_ns: stamps of the first entry and of the newest;
-            outages: pairs [from, to] of stamps; finished; outcome; structure: the machine that the
-            paths are of, when it is not the one that the mission began with.
+            outages: pairs [from, to] of stamps; ends: path, begin and end [ns] and outcome of the
+            newest visits of the root's children that have ended; finished; outcome; structure: the
+            machine that the paths are of, when it is not the one that the mission began with.
     """
 
     def __init__(self, data: dict[str, Any] | None = None) -> None:
@@ -55,10 +71,13 @@ class Position:
             "version": VERSION,
             "visits": {},
             "userdata": {},
+            "markings": {},
+            "conditions": {},
             "preempts": [],
             "started_ns": 0,
             "last_ns": 0,
             "outages": [],
+            "ends": [],
             "finished": False,
             "outcome": None,
         }
@@ -74,6 +93,18 @@ class Position:
         """See the class."""
         userdata: dict[str, dict[str, Any]] = self.data["userdata"]
         return userdata
+
+    @property
+    def markings(self) -> dict[str, list[str]]:
+        """See the class."""
+        markings: dict[str, list[str]] = self.data.setdefault("markings", {})
+        return markings
+
+    @property
+    def conditions(self) -> dict[str, dict[str, Any]]:
+        """See the class."""
+        conditions: dict[str, dict[str, Any]] = self.data.setdefault("conditions", {})
+        return conditions
 
     def to_bytes(self) -> bytes:
         """Return it as a snapshot."""
@@ -101,6 +132,7 @@ class Position:
         for container, keys in entry.get("deleted", {}).items():
             for key in keys:
                 self.userdata[container].pop(key, None)
+        self.conditions.update(entry.get("conditions", {}))
 
     def renamed(self, names: Mapping[str, str]) -> Position:
         """Return the position in a machine whose states have other paths.
@@ -118,21 +150,34 @@ class Position:
         visits = {
             new(path): {**visit, "in": new(visit["in"])} for path, visit in self.visits.items()
         }
+        for path, visit in self.visits.items():
+            outcome, label = (visit.get("asked") or {}).get("override") or (None, None)
+            if label is not None:
+                label = new(f"{visit['in']}/{label}").rpartition("/")[2]
+                asked = {**visit["asked"], "override": [outcome, label]}
+                visits[new(path)]["asked"] = asked
         preempts = [{**one, "path": new(one["path"])} for one in self.data["preempts"]]
-        userdata = {new(path): values for path, values in self.userdata.items()}
-        return Position({**self.data, "visits": visits, "preempts": preempts, "userdata": userdata})
+        moved = {
+            facts: {new(path): values for path, values in getattr(self, facts).items()}
+            for facts in ("userdata", "markings", "conditions")
+        }
+        return Position({**self.data, "visits": visits, "preempts": preempts, **moved})
 
     # -- one function for each kind ------------------------------------------------------------
 
     def _end_below(self, path: str) -> None:
         below = f"{path}/"
-        for each in [each for each in self.visits if each.startswith(below)]:
-            del self.visits[each]
+        for facts in (self.visits, self.markings):
+            for each in [each for each in facts if each.startswith(below)]:
+                del facts[each]
+        self.markings.pop(path, None)
 
     def _begin(self, path: str, container: str, stamp_ns: int, number: int | None = None) -> None:
         self.visits[path] = {
             "in": container,
             "since_ns": stamp_ns,
+            "begun_ns": stamp_ns,
+            "entered_ns": stamp_ns,
             "attempt": 1,
             "outcome": None,
             "number": number,
@@ -154,12 +199,26 @@ class Position:
     def _on_left(self, entry: Mapping[str, Any]) -> None:
         path, following = entry["path"], entry.get("next")
         visit = self.visits[path]
+        self._keep_end(path, visit, entry)
         self._end_below(path)
-        if following is None:
+        if visit.get("stopping"):
+            del self.visits[path]
+            if visit.get("again"):
+                self._begin(path, visit["in"], entry["stamp_ns"])
+        elif following is None:
             visit.update(outcome=entry["outcome"], goal=None, once={})
         else:
             del self.visits[path]
             self._begin(following, visit["in"], entry["stamp_ns"])
+
+    def _keep_end(self, path: str, visit: Mapping[str, Any], entry: Mapping[str, Any]) -> None:
+        """Keep how a child of the root ended, for those who look at the mission."""
+        container = self.visits.get(visit["in"])
+        if container is not None and container["in"] == "":
+            began = visit.get("entered_ns", visit["since_ns"])  # older journals have none
+            ends = self.data.setdefault("ends", [])
+            ends.append([path, began, entry["stamp_ns"], entry["outcome"]])
+            del ends[:-MOST_ENDS]
 
     def _on_retried(self, entry: Mapping[str, Any]) -> None:
         self._end_below(entry["path"])
@@ -175,6 +234,7 @@ class Position:
             "status": None,
             "text": "",
             "result": None,
+            "preempted": False,
             "stopped": False,
         }
 
@@ -184,12 +244,38 @@ class Position:
     def _on_goal_done(self, entry: Mapping[str, Any]) -> None:
         goal = self.visits[entry["path"]]["goal"]
         goal.update(status=entry["status"], text=entry["text"], result=entry["result"])
+        goal["preempted"] = entry.get("preempted", False)
 
     def _on_once(self, entry: Mapping[str, Any]) -> None:
         self.visits[entry["path"]]["once"][entry["key"]] = entry["value"]
 
+    def _on_fired(self, entry: Mapping[str, Any]) -> None:
+        self.markings[entry["path"]] = entry["marking"]
+        for path in entry["ends"]:
+            visit = self.visits.get(path)
+            if visit is not None and visit["outcome"] is None:
+                visit["stopping"] = True
+                visit.pop("again", None)
+            elif visit is not None:
+                del self.visits[path]
+        for path in entry["begins"]:
+            visit = self.visits.get(path)
+            if visit is not None and visit.get("stopping"):
+                visit["again"] = True
+            else:
+                self._end_below(path)
+                self._begin(path, entry["path"], entry["stamp_ns"])
+
+    def _on_noted(self, entry: Mapping[str, Any]) -> None:
+        pass
+
     def _on_preempt(self, entry: Mapping[str, Any]) -> None:
         request = {name: entry[name] for name in ("path", "source", "by", "why")}
+        if "override" in entry:
+            visit = self.visits.get(entry["path"])
+            if visit is not None:  # else it has ended meanwhile
+                visit["asked"] = {**request, "override": entry["override"]}
+            return
         self.data["preempts"].append(request)
         if entry["source"] in OF_PROCESS:
             for visit in self.visits.values():
@@ -197,15 +283,21 @@ class Position:
                     visit["goal"]["stopped"] = True
 
     def _on_recovered(self, entry: Mapping[str, Any]) -> None:
-        self.data["outages"].append([self.data["last_ns"], entry["stamp_ns"]])
+        stamp_ns = entry["stamp_ns"]
+        gone_ns = entry.get("gone_ns", stamp_ns)  # older journals do not say
+        self.data["outages"].append([max(self.data["last_ns"], stamp_ns - gone_ns), stamp_ns])
         for visit in self.visits.values():
+            visit["begun_ns"] = visit.get("begun_ns", visit["since_ns"]) + entry["shift_ns"]
             visit["since_ns"] += entry["shift_ns"]
             goal = visit["goal"]
             if goal is not None and goal["taken_ns"] is not None:
                 goal["taken_ns"] += entry["shift_ns"]
+        for known in self.conditions.values():
+            known["events"] = [[name, at + entry["shift_ns"]] for name, at in known["events"]]
 
     def _on_finished(self, entry: Mapping[str, Any]) -> None:
         self.visits.clear()
+        self.markings.clear()
         self.data.update(finished=True, outcome=entry["outcome"])
 
     _FOLD: ClassVar[dict[str, Callable[[Position, Mapping[str, Any]], None]]] = {
@@ -217,15 +309,9 @@ class Position:
         "GoalTaken": _on_goal_taken,
         "GoalDone": _on_goal_done,
         "Once": _on_once,
+        "Fired": _on_fired,
+        "Noted": _on_noted,
         "PreemptRequested": _on_preempt,
         "Recovered": _on_recovered,
         "Finished": _on_finished,
     }
-
-
-def folded(entries: Iterable[Mapping[str, Any]], start: Position | None = None) -> Position:
-    """Return the position after `entries`."""
-    position = start or Position()
-    for entry in entries:
-        position.fold(entry)
-    return position

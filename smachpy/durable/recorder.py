@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from smachpy import log
 from smachpy.durable.codec import decode, encode
@@ -18,26 +18,33 @@ from smachpy.exceptions import InvalidUserCodeError, MissionError
 from smachpy.machines.container import Container, control_of
 from smachpy.machines.names import name_of
 from smachpy.machines.state import get_options
-from smachpy.run.grace import ask, request_soon
+from smachpy.run.grace import ask, ask_child, asking, current_origin, request_soon
 from smachpy.run.interrupt import Interruption
 from smachpy.run.options import ASK
-from smachpy.run.origin import asking
+from smachpy.run.visit import Override
 from smachpy.userdata.kept_types import register_annotations
 from smachpy.userdata.readonly import ATOMS
 from smachpy.userdata.typed import CheckedDict
 from smachpy.userdata.user_data import data_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
     from smachpy.durable.journal import Journal
+    from smachpy.durable.store import MissionRow
     from smachpy.run.frame import Frame, Run
     from smachpy.run.step import Step
 
 _FOUND_AGAIN = frozenset({"timeout", "concurrence", "plan"})
 """Origins of requests that a run which goes on makes itself, when their cause still holds."""
 
+RESUME_S: Final = 2.0
+"""How long those that go on wait for each other, and requests to stop for all of them [s]."""
+
 _MISSING = object()
+
+MOST_TOLD: Final = 500
+"""So many states that go on, and outages, the event `Recovered` tells of."""
 
 
 class Recorder:
@@ -48,8 +55,13 @@ class Recorder:
         journal: Its journal.
         goes_on: Whether the position is that of an earlier process.
         shift_ns: How far deadlines move because no process ran the mission [ns].
+        gone_ns: How long no process has run it [ns].
+        row: What the store knows of the mission.
 
     Attributes:
+        mission: Its id.
+        run: Names this run of it, in its recordings and to viewers: a mission of the same id that
+            was begun anew has another one.
         broken: Why nothing is written any more; None while all is well. The run was preempted.
         on_fenced: Called before that when another runner has the mission, if given.
 
@@ -57,20 +69,34 @@ class Recorder:
     """
 
     def __init__(
-        self, machine: Container, journal: Journal, *, goes_on: bool, shift_ns: int = 0
+        self,
+        machine: Container,
+        journal: Journal,
+        *,
+        row: MissionRow,
+        goes_on: bool,
+        shift_ns: int = 0,
+        gone_ns: int = 0,
     ) -> None:
+        self.mission, self.run = row.id, row.run
         self.broken: Exception | None = None
         self.on_fenced: Callable[[FencedError], object] | None = None
         self._machine = machine
         self._journal = journal
         self._goes_on = goes_on
         self._shift_ns = shift_ns
+        self._gone_ns = gone_ns
         self._run: Run | None = None
         self._root = f"/{machine.name or 'SM_ROOT'}"
         self._resume: dict[str, dict[str, Any]] = {}  # visits that have not gone on yet
         self._now: dict[str, dict[str, Any]] = {}  # those of them that go on now
+        self._markings: dict[str, list[str]] = {}  # of plans that have not gone on yet
+        # They were stopping, and go on to do that; who asked them, and what an operator wants.
+        self._to_stop: list[tuple[Frame, Step, tuple[str, str, str], Override | None]] = []
         preempts = journal.position.data["preempts"] if goes_on else []
         self._preempts = [one for one in preempts if one["source"] not in OF_PROCESS]
+        self._is_late = False  # somebody has waited `RESUME_S` for all to be back
+        self._asks = 0  # states that an operator is asked about now
         self._chosen: set[str] = set()
         self._numbers: dict[str, int] = {}
         self._containers = dict(_containers(machine, self._root))
@@ -82,14 +108,19 @@ class Recorder:
             path: frozenset(get_options(container).transient)
             for path, container in self._containers.items()
         }
+        self._knowledge: dict[str, Any] = {}  # of plans
+        self._known_changes: dict[str, int] = {}
         self._known: dict[str, dict[str, tuple[Any, str]]] = {}
-        for container in self._containers.values():
+        for path, container in self._containers.items():
+            own: Any = container._smachpy
+            if container._smachpy_kind == "plan":
+                self._knowledge[path] = own.knowledge
             data = data_of(container.userdata)
             if isinstance(data, CheckedDict):
                 register_annotations(data.fields.kind)
 
     def restore(self) -> None:
-        """Give the machine the userdata that was kept.
+        """Give the machine the userdata, and its plans the events, that were kept.
 
         Raises:
             MissionError: a value cannot be made from what was kept.
@@ -103,6 +134,9 @@ class Recorder:
             for key, encoded in kept.items():
                 data[key] = decode(encoded)
                 known[key] = (data[key], json.dumps(encoded))
+        for path, conditions in self._journal.position.conditions.items():
+            if path in self._knowledge:
+                self._knowledge[path].restore(conditions, self._shift_ns)
 
     # -- writing -------------------------------------------------------------------------------
 
@@ -190,9 +224,16 @@ class Recorder:
         run.journal = self
         run.watched = run.careful = True
         if self._goes_on:
-            self._write("Recovered", self._root, shift_ns=self._shift_ns)
+            self._write("Recovered", self._root, shift_ns=self._shift_ns, gone_ns=self._gone_ns)
             self._resume = copy.deepcopy(self._journal.position.visits)
+            self._markings = dict(self._journal.position.markings)
             self._now[self._root] = self._resume.pop(self._root)
+            self._back = run.clock.event("the states that were active")
+            if self._resume and self._machine._preempt_requested:
+                # What is active must be entered to be stopped.
+                source, by, why = self._machine._smachpy.origin or ("program", "", "")
+                self._machine._preempt_requested = False
+                self.asked(root, (source, by, why))
             return
         with self._journal.lock:
             facts: dict[str, Any] = {"in": "", "userdata": {}}
@@ -205,6 +246,19 @@ class Recorder:
                         kept[key] = encode(value, key=key, path=path)
                         known[key] = (value, json.dumps(kept[key]))
         self._write("Started", self._root, **facts)
+
+    def recovered(self) -> tuple[Any, ...] | None:
+        """As `RunJournal.recovered`."""
+        if not self._goes_on:
+            return None
+        data = self._journal.position.data
+        active = [
+            (path, visit.get("entered_ns", visit["since_ns"]))  # older journals have none
+            for path, visit in data["visits"].items()
+            if visit["outcome"] is None
+        ]
+        outages = tuple(map(tuple, data["outages"][-MOST_TOLD:]))
+        return self.mission, data["started_ns"], outages, tuple(active[:MOST_TOLD])
 
     def finish(self, outcome: str) -> None:
         """As `RunJournal.finish`."""
@@ -221,12 +275,23 @@ class Recorder:
             self._now.pop(path, None)
             if not self._write_entered(frame, path):
                 outcome = "preempted"
-        elif visit["outcome"] is None:
-            self._now[path] = visit
-            self._ask_again()
         else:
-            self._ask_again()
             outcome = visit["outcome"]
+            if outcome is None:
+                self._now[path] = visit
+                if visit.get("stopping"):
+                    origin = ("plan", frame.path, "before the resume")
+                    self._to_stop.append((frame, step, origin, None))
+                request = visit.get("asked")
+                if request is not None:
+                    origin = (request["source"], request["by"], request["why"])
+                    wanted = request["override"] and Override(*request["override"])
+                    self._to_stop.append((frame, step, origin, wanted))
+            if not self._resume:
+                self._all_are_back()
+            elif outcome is not None or not isinstance(step.state, Container):
+                # What ends now could stop others before they are back, and with them their goals.
+                self._back.wait(RESUME_S)
         if outcome is not None and outcome not in step.next:  # that of a child that was asked
             with asking("program", "journal", "before the resume"), frame.run.lock:
                 ask(frame, step)
@@ -237,22 +302,30 @@ class Recorder:
         """Write that the state at `path` begins; tell whether that worked."""
         facts: dict[str, Any] = {"in": frame.path}
         kind = frame.container._smachpy_kind  # type: ignore[attr-defined]
-        if kind == "concurrence":
+        if kind in {"concurrence", "plan"}:
             facts["beside"] = True
         elif kind == "iterator":
             facts["number"] = self._numbers.get(frame.path, 0)
         if path in self._chosen:
             self._chosen.discard(path)
-            if path in self._journal.position.visits:  # written with the end of the one before
-                if not frame.container._smachpy.transition_cbs:
+            visit = self._journal.position.visits.get(path)
+            # Else it was written with the end of the one before, or with what fired.
+            if visit is not None and not visit.get("stopping"):
+                if not frame.data.transition_cbs:
                     return self.broken is None
                 facts["only_changes"] = True
         return self._write_with(frame, None, "Entered", path, facts)
 
+    def _all_are_back(self) -> None:
+        self._ask_again()
+        self._back.set()
+
     def _ask_again(self) -> None:
-        """Pass the requests to stop on that were made before the resume, once all is back."""
-        if self._resume or not self._preempts:
-            return
+        """Pass the requests to stop on that were made before all was back."""
+        stopping, self._to_stop = self._to_stop, []
+        for frame, step, origin, override in stopping:
+            with asking(*origin):
+                ask_child(frame, step, override)
         preempts, self._preempts = self._preempts, []
         for request in preempts:
             container = self._containers.get(request["path"])
@@ -290,13 +363,35 @@ class Recorder:
         if policy != ASK:
             assert callable(policy)
             return self._call(frame, policy, userdata)
-        path = frame.here()
+        return self._ask_operator(frame)
+
+    def _ask_operator(self, frame: Frame) -> str | None:
+        """Hold the state until an operator says what is to become of it."""
+        from smachpy.durable.question import RESUME, open_question  # it needs the network
+
+        path, state = frame.here(), frame.step.state
         log.logwarn(
             f"{path}: was active when the process ended; an operator decides: resume, to execute "
-            f"it again, or an outcome. Try 'smachpy run ... --view --control'."
+            f"it again, or an outcome. Try 'smachpy answer resume --state {path}', or "
+            "'smachpy run ... --view --control'."
         )
-        control_of(self._machine).hold(frame, path, "resume")
-        return "preempted" if frame.step.state._preempt_requested else None
+        control = control_of(self._machine)
+        outcomes = state.get_registered_outcomes()
+        with open_question(path, outcomes, lambda: control.release(path)) as inbox:
+            with self._journal.lock:
+                self._asks += 1
+            control.hold(frame, path, "resume", until=lambda: inbox.answer is not None)
+        answer, by = inbox.close(RESUME)
+        with self._journal.lock:
+            self._asks -= 1
+            is_last = self._asks == 0
+        if state._preempt_requested:
+            return "preempted"
+        if by:
+            log.loginfo(f"{path}: {by} answered {answer!r}")
+            if is_last:  # the question had paused the machine
+                control.resume()
+        return None if answer == RESUME else answer
 
     def _call(self, frame: Frame, hook: Callable[[Any], Any], userdata: Any) -> Any:
         try:
@@ -324,10 +419,10 @@ class Recorder:
         if target is None:
             if not asked:
                 return  # no such outcome: an error, and nothing that could be followed
-        elif not (asked or target.final) and hasattr(frame.container._smachpy, "transitions"):
+        elif not (asked or target.final) and hasattr(frame.data, "transitions"):
             facts["next"] = f"{frame.path}/{target.label}"
             self._chosen.add(facts["next"])
-        callbacks = frame.container._smachpy.start_cbs
+        callbacks = frame.data.start_cbs
         self._write_with(frame, None if callbacks else step, "Left", path, facts)
 
     # -- where containers and states were ------------------------------------------------------
@@ -337,7 +432,9 @@ class Recorder:
 
     def resumes(self, frame: Frame) -> bool:
         """As `RunJournal.resumes`."""
-        return bool(self._resume) and bool(self._children(frame.path))
+        return frame.path in self._markings or (
+            bool(self._resume) and bool(self._children(frame.path))
+        )
 
     def resumed_label(self, frame: Frame) -> str | None:
         """As `RunJournal.resumed_label`."""
@@ -365,7 +462,70 @@ class Recorder:
 
     def began_inside(self, frame: Frame) -> bool:
         """As `RunJournal.began_inside`."""
-        return bool(self._resume) and bool(self._children(frame.here()))
+        path = frame.here()
+        return path in self._markings or (bool(self._resume) and bool(self._children(path)))
+
+    # -- plans ---------------------------------------------------------------------------------
+
+    def fired(
+        self,
+        frame: Frame,
+        transitions: Sequence[str],
+        marking: Sequence[str],
+        ends: Sequence[str],
+        begins: Sequence[str],
+    ) -> None:
+        """As `RunJournal.fired`."""
+        path = frame.path
+        if path not in self._containers:
+            return
+        facts: dict[str, Any] = {
+            "transitions": list(transitions),
+            "marking": list(marking),
+            "ends": [f"{path}/{label}" for label in ends],
+            "begins": [f"{path}/{label}" for label in begins],
+            **self._new_conditions(frame),
+        }
+        self._chosen.update(facts["begins"])
+        self._write_with(frame, None, "Fired", path, facts)
+
+    def note_conditions(self, frame: Frame) -> None:
+        """As `RunJournal.note_conditions`."""
+        facts = self._new_conditions(frame)
+        if facts and frame.path in self._containers:
+            self._write("Noted", frame.path, **facts)
+
+    def _new_conditions(self, frame: Frame) -> dict[str, Any]:
+        """Return, for an entry, the conditions that have changed in the plan and below it."""
+        found: dict[str, Any] = {}
+        for path, knowledge in self._knowledge.items():
+            is_here = path == frame.path or path.startswith(f"{frame.path}/")
+            if is_here and self._known_changes.get(path, 0) != knowledge.changes:
+                self._known_changes[path], found[path] = knowledge.kept(frame.run.clock)
+        return {"conditions": found} if found else {}
+
+    def resumed_plan(self, frame: Frame) -> tuple[list[str], dict[str, Any]] | None:
+        """As `RunJournal.resumed_plan`."""
+        path = frame.path
+        marking = self._markings.pop(path, None)
+        if marking is None:
+            return None
+        children: dict[str, Any] = {}
+        for child in self._children(path):
+            visit = self._resume[child]
+            label = child[len(path) + 1 :]
+            has_more = visit["goal"] is not None or child in self._markings
+            if visit["outcome"] is not None:
+                del self._resume[child]
+            elif visit.get("stopping") and not (has_more or self._children(child)):
+                del self._resume[child]  # it has nothing to go on with, only to stop
+                if not visit.get("again"):
+                    continue
+                visit = {**visit, "stopping": False}
+            children[label] = visit
+        if not self._resume:
+            self._all_are_back()
+        return marking, children
 
     def attempt(self, frame: Frame) -> tuple[int, float]:
         """As `RunJournal.attempt`."""
@@ -397,15 +557,38 @@ class Recorder:
             is_inside = frame.path in self._containers
             self._write_with(frame if is_inside else None, None, "Retried", path, facts)
 
-    def asked(self, frame: Frame, origin: tuple[str, str, str]) -> None:
+    def asked(self, frame: Frame, origin: tuple[str, str, str]) -> bool:
         """As `RunJournal.asked`."""
         path = frame.here() if frame.parent is None else frame.path
         source, by, why = origin
         request = {"path": path, "source": source, "by": by, "why": why}
         known = self._journal.position.data["preempts"]
-        if source in _FOUND_AGAIN or path not in self._containers or request in known:
-            return
-        self._write("PreemptRequested", **request)
+        if source in _FOUND_AGAIN or path not in self._containers:
+            return False
+        if request not in known:
+            self._write("PreemptRequested", **request)
+        if not self._resume or self._is_late:
+            return False
+        if request not in self._preempts:
+            self._preempts.append(request)
+            assert self._run is not None
+            self._run.clock.call_later(RESUME_S, self._give_up_waiting)
+        return True
+
+    def asked_one(self, frame: Frame, step: Step, override: Override | None) -> None:
+        """As `RunJournal.asked_one`."""
+        path = step.path_in(frame)
+        if path in self._journal.position.visits:
+            source, by, why = current_origin()
+            wanted = None if override is None else [override.outcome, override.label]
+            facts = {"source": source, "by": by, "why": why, "override": wanted}
+            self._write("PreemptRequested", path, **facts)
+
+    def _give_up_waiting(self) -> None:
+        """Stop what is back, when an operator holds the rest."""
+        if self._resume:
+            self._is_late = True
+            self._ask_again()
 
     # -- userdata ------------------------------------------------------------------------------
 
@@ -448,11 +631,15 @@ class Recorder:
         if self._has_goal(frame, goal_id):
             self._write("GoalTaken", frame.here(), goal_id=goal_id)
 
-    def goal_done(self, frame: Frame, goal_id: str, status: str, text: str, result: Any) -> None:
+    def goal_done(
+        self, frame: Frame, goal_id: str, status: str, text: str, result: Any, *, preempted: bool
+    ) -> None:
         """As `RunJournal.goal_done`."""
         if self._has_goal(frame, goal_id):
             kept = None if result is None else encode(result, key="result", path=frame.here())
             facts = {"goal_id": goal_id, "status": status, "text": text, "result": kept}
+            if preempted:
+                facts["preempted"] = True
             self._write("GoalDone", frame.here(), **facts)
 
     def _has_goal(self, frame: Frame, goal_id: str) -> bool:

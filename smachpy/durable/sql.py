@@ -94,11 +94,6 @@ class Dialect:
 class Cursor(Protocol):
     """What both databases' cursors offer within a transaction."""
 
-    @property
-    def rowcount(self) -> int:
-        """How many rows the last statement changed."""
-        ...
-
     def execute(self, sql: str, values: Sequence[Any] = (), /) -> object:
         """Run a statement."""
         ...
@@ -216,8 +211,8 @@ class SqlStore(ABC):
             self._do(
                 cursor,
                 "UPDATE smachpy_missions SET status = ?, owner = ?, mark = ?, lease_end = ?, "
-                "fence = ?, changed = ? WHERE id = ?",
-                *(RUNNING, runner, self._mark, now + seconds, fence + 1, now, id),
+                "fence = ? WHERE id = ?",
+                *(RUNNING, runner, self._mark, now + seconds, fence + 1, id),
             )
             return Lease(id, fence + 1, runner)
 
@@ -229,10 +224,11 @@ class SqlStore(ABC):
 
         def work(cursor: Cursor, _: bool) -> bool:
             cancel = self._fenced(cursor, lease)[0]
+            now = self._now(cursor)
             self._do(
                 cursor,
-                "UPDATE smachpy_missions SET lease_end = ? WHERE id = ?",
-                *(self._now(cursor) + seconds, lease.mission),
+                "UPDATE smachpy_missions SET lease_end = ?, changed = ? WHERE id = ?",
+                *(now + seconds, now, lease.mission),
             )
             return cancel
 
@@ -323,8 +319,8 @@ class SqlStore(ABC):
             self._do(
                 cursor,
                 "UPDATE smachpy_missions SET status = ?, owner = NULL, mark = NULL, "
-                "lease_end = NULL, changed = ? WHERE id = ?",
-                *(status, self._now(cursor), lease.mission),
+                "lease_end = NULL WHERE id = ?",
+                *(status, lease.mission),
             )
 
         self._transact(work)
@@ -383,11 +379,13 @@ class SqlStore(ABC):
             (status,) = self._known(cursor, id, "status" + self.dialect.for_update)
             if status in OVER and not again:
                 raise MissionOverError(self.where, id, status)
-            self._do(
-                cursor,
-                "UPDATE smachpy_missions SET cancel = 1, changed = ?, status = ? WHERE id = ?",
-                *(self._now(cursor), CANCELLED if status == QUEUED else status, id),
-            )
+            self._do(cursor, "UPDATE smachpy_missions SET cancel = 1 WHERE id = ?", id)
+            if status == QUEUED:
+                self._do(
+                    cursor,
+                    "UPDATE smachpy_missions SET status = ?, changed = ? WHERE id = ?",
+                    *(CANCELLED, self._now(cursor), id),
+                )
 
         self._transact(work)
 

@@ -4,10 +4,17 @@ The file is in WAL mode, so that readers see the journal while a mission writes 
 transaction is one append to the log beside it, `FILE-wal`. SQLite keeps a checksum for each page of
 that log: a transaction that was written in part is as if it had not been begun
 (https://sqlite.org/fileformat2.html#walformat).
+
+To SQLite a file without its log is a whole one, as it was earlier. So the file itself says in a bit
+of `PRAGMA user_version`, `_NEEDS_LOG`, that its log must be there. The log says the contrary, so
+that whoever takes all of it into the file (SQLite does when the last connection is closed, also
+that of another program) and deletes it, deletes the bit too.
 """
 
 from __future__ import annotations
 
+import contextlib
+import os
 import sqlite3
 import threading
 from pathlib import Path
@@ -24,6 +31,8 @@ T = TypeVar("T")
 
 _APPLICATION: Final = 0x736D6A6C
 """Marks the file as a journal of smachpy ("smjl", `PRAGMA application_id`)."""
+
+_NEEDS_LOG: Final = 1 << 16
 
 _REASONS: Final[dict[int, tuple[Reason, str]]] = {
     sqlite3.SQLITE_BUSY: (
@@ -68,8 +77,9 @@ class SQLiteStore(SqlStore):
         super().__init__()
         if synchronous not in {"FULL", "NORMAL"}:
             raise ValueError(f"synchronous: got {synchronous!r}; expected 'FULL' or 'NORMAL'.")
-        file = Path(path)
+        self._file = file = Path(path).absolute()
         self.where = str(path)
+        self._marked: tuple[int, int] | None = None  # inode and time of the file when it was
         self._lock = threading.Lock()
         if create:
             self._make_folder(file.parent)
@@ -77,8 +87,9 @@ class SQLiteStore(SqlStore):
             raise StoreError(self.where, "got no such file; expected a journal.", reason="missing")
         mode = "rwc" if create else "rw"
         try:
+            self._check_log()
             self._connection = sqlite3.connect(
-                f"{file.absolute().as_uri()}?mode={mode}",
+                f"{file.as_uri()}?mode={mode}",
                 uri=True,
                 timeout=patience,
                 isolation_level=None,  # transactions are begun and ended here, by name
@@ -87,9 +98,10 @@ class SQLiteStore(SqlStore):
         except sqlite3.Error as error:
             raise self._error(error) from error
         try:
-            self._transact(self._check, reads=True)  # before anything is written
+            version = self._transact(self._check, reads=True)  # before anything is written
             self._pragmas(synchronous)
-            self._transact(self._make_tables)
+            if version != VERSION:  # a new file, or a process was killed as it set the mark
+                self._transact(self._make_tables)
         except sqlite3.Error as error:
             self._connection.close()
             raise self._error(error) from error
@@ -110,9 +122,37 @@ class SQLiteStore(SqlStore):
             problem = f"got {error.strerror} for its folder; expected one that can be made."
             raise StoreError(self.where, problem, reason=reason) from error
 
-    def _check(self, cursor: Cursor, _: bool) -> None:
-        """Refuse a file that is no journal, or one of a newer version."""
-        version = self._one(cursor, "PRAGMA user_version")[0]
+    def _check_log(self) -> None:
+        """Refuse a file without the log that it needs, and a log without its file."""
+        log = self._file.with_name(f"{self._file.name}-wal")
+        if log.exists():
+            # SQLite makes the file first, and would delete the log of one that is empty.
+            if log.stat().st_size and not (self._file.exists() and self._file.stat().st_size):
+                raise self._incomplete("the file itself", self._file.name)
+        # Looked for again: another process may have begun to use the file meanwhile.
+        elif self._file.is_file() and self._needs_log() and not log.exists():
+            raise self._incomplete(f"the log {log.name!r}", log.name)
+
+    def _incomplete(self, what: str, name: str) -> StoreError:
+        return StoreError(
+            self.where,
+            f"{what} is missing, and the newest entries with it; expected both side by side. "
+            f"Nothing was changed. Try a copy that has {name!r}, too.",
+            reason="corrupt",
+        )
+
+    def _needs_log(self) -> bool:
+        """Tell whether the file says that it needs its log."""
+        # `immutable` reads what is in the file itself, and makes neither a lock nor a log.
+        uri = f"{self._file.as_uri()}?mode=ro&immutable=1"
+        with contextlib.closing(sqlite3.connect(uri, uri=True)) as raw:
+            ours = raw.execute("PRAGMA application_id").fetchone()[0] == _APPLICATION
+            return ours and bool(raw.execute("PRAGMA user_version").fetchone()[0] & _NEEDS_LOG)
+
+    def _check(self, cursor: Cursor, _: bool) -> int:
+        """Refuse a file that is no journal, or one of a newer version; return what it says."""
+        says: int = self._one(cursor, "PRAGMA user_version")[0]
+        version = says & ~_NEEDS_LOG
         if self._one(cursor, "PRAGMA application_id")[0] != _APPLICATION:
             if self._one(cursor, "SELECT COUNT(*) FROM sqlite_master")[0] or version:
                 raise StoreError(
@@ -127,20 +167,30 @@ class SQLiteStore(SqlStore):
                 "Try a newer smachpy.",
                 reason="future",
             )
+        return says
 
     def _pragmas(self, synchronous: str) -> None:
         execute = self._connection.execute
-        if execute("PRAGMA journal_mode").fetchone()[0] != "wal":
-            execute("PRAGMA journal_mode = WAL")
+        attempts_left = 10
+        while execute("PRAGMA journal_mode").fetchone()[0] != "wal":
+            attempts_left -= 1
+            try:
+                execute("PRAGMA journal_mode = WAL")
+            except sqlite3.OperationalError:
+                # SQLite does not wait here if two processes, which have both read a new file,
+                # change it at once. A write transaction does wait, for the other one's end.
+                if not attempts_left:
+                    raise
+                execute("BEGIN IMMEDIATE")
+                execute("ROLLBACK")
         execute(f"PRAGMA synchronous = {synchronous}")
 
     def _make_tables(self, cursor: Cursor, _: bool) -> None:
-        if self._one(cursor, "PRAGMA application_id")[0] == _APPLICATION:
-            return
-        for statement in self.dialect.tables():
-            cursor.execute(statement)
+        if self._one(cursor, "PRAGMA application_id")[0] != _APPLICATION:
+            for statement in self.dialect.tables():
+                cursor.execute(statement)
+            cursor.execute(f"PRAGMA application_id = {_APPLICATION}")
         cursor.execute(f"PRAGMA user_version = {VERSION}")
-        cursor.execute(f"PRAGMA application_id = {_APPLICATION}")
 
     def _transact(self, work: Callable[[Cursor, bool], T], *, reads: bool = False) -> T:
         with self._lock:
@@ -155,7 +205,36 @@ class SQLiteStore(SqlStore):
                     raise
             except sqlite3.Error as error:
                 raise self._error(error) from error
+            if not reads:
+                self._mark_file()
             return result
+
+    def _mark_file(self) -> None:
+        """See to it that the file says that it needs its log, whenever a log was taken into it.
+
+        Raises:
+            StoreError: the file was deleted, or another one is in its place.
+        """
+        try:
+            now = os.stat(self._file)  # noqa: PTH116  half the time of Path.stat, at each write
+        except OSError as error:
+            problem = f"got {error.strerror} after a write; expected the file that was opened."
+            raise StoreError(self.where, problem, reason="missing") from error
+        if self._marked == (now.st_ino, now.st_mtime_ns):
+            return
+        if self._marked is not None and self._marked[0] != now.st_ino:
+            problem = "got another file in its place; expected the one that was opened."
+            raise StoreError(self.where, problem, reason="missing")
+        execute = self._connection.execute
+        with contextlib.suppress(sqlite3.Error):  # what was written is safe: the next write tries
+            if not self._needs_log():
+                execute(f"PRAGMA user_version = {VERSION | _NEEDS_LOG}")
+                try:
+                    execute("PRAGMA wal_checkpoint")
+                finally:
+                    execute(f"PRAGMA user_version = {VERSION}")
+            if self._needs_log():
+                self._marked = now.st_ino, self._file.stat().st_mtime_ns
 
     def _verify(self, cursor: Cursor) -> None:
         # A page that lost its parent would only look like fewer entries.

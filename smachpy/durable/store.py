@@ -69,7 +69,8 @@ class MissionRow:
         status: "queued", "running", "interrupted" (its runner is gone), "ended" or "cancelled".
         outcome: How it ended, else None.
         robot: The robot that it needs, None for any.
-        created, changed: Seconds since the Unix epoch.
+        created: When, in seconds since the Unix epoch.
+        changed: Its last sign of life: when an entry was written or its lease renewed.
         owner: The runner that holds it, "host:pid", or None.
         structure: Its machine, as the journal's code writes it.
         version: Version of the entries.
@@ -96,6 +97,11 @@ class MissionRow:
     every: str | None = None
     schedule: str | None = None
     cancel: bool = False
+
+    @property
+    def run(self) -> str:
+        """What names this mission and no other: an id may be used again when one has ended."""
+        return f"{self.id} {round(self.created * 1e6)}"
 
 
 class Store(Protocol):

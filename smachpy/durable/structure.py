@@ -39,7 +39,17 @@ def _facts(record: StateRecord) -> dict[str, Any]:
             f"{edge.source} -{edge.outcome}->": edge.target for edge in record.transitions
         }
         facts["rules"] = sorted(f"{rule.outcome}: {rule.text}" for rule in record.rules)
+    if record.net is not None:
+        facts["places"] = {place.id: place.name for place in record.net.places}
+        facts["net"] = {
+            each.id: f"{each.name!r}: {_arcs(each.inputs)} -> {_arcs(each.outputs)}"
+            for each in record.net.transitions
+        }
     return facts
+
+
+def _arcs(arcs: Iterable[tuple[str, int]]) -> str:
+    return " + ".join(place if weight == 1 else f"{weight} {place}" for place, weight in arcs)
 
 
 def to_bytes(shape: Shape) -> bytes:
@@ -87,4 +97,14 @@ def missing_paths(visits: Mapping[str, Mapping[str, Any]], shape: Shape) -> list
     return sorted(
         {path for path in visits if path not in shape}
         | {path for path in containers if "children" not in shape.get(path, {})}
+    )
+
+
+def missing_places(markings: Mapping[str, Iterable[str]], shape: Shape) -> list[str]:
+    """Return "path: place" for each place that holds tokens in a position and is in no plan."""
+    return sorted(
+        f"{path}: place {place!r}"
+        for path, marking in markings.items()
+        for place in set(marking)
+        if place not in shape.get(path, {}).get("places", {})
     )

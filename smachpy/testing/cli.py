@@ -33,4 +33,6 @@ def run_pytest(arguments: Sequence[str]) -> int:
     """
     import pytest
 
-    return int(pytest.main(list(arguments)))
+    # `smachpy` is imported by now, so pytest cannot rewrite its asserts, and says so once a module.
+    quiet = "ignore:Module already imported:pytest.PytestAssertRewriteWarning"
+    return int(pytest.main(["-W", quiet, *arguments]))

@@ -10,16 +10,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from actionlib_core.clock import Deadlock, TimeLimit, use_clock
-from actionlib_core.node import Node, use_node
+from actionlib_core.node import use_node
 from actionlib_core.shutdown import Shutdown, use_shutdown
 from actionlib_core.transport.memory import MemoryNetwork
-from actionlib_core.wire.presence import Kind
 from smachpy.exceptions import SmachError
 from smachpy.introspection import describe
 from smachpy.machines.container import Container
-from smachpy.run.origin import asking
+from smachpy.run.grace import asking
 from smachpy.testing import session
 from smachpy.testing.doubles import Double, Places
+from smachpy.testing.process import MissionNode, Process
 from smachpy.testing.recorder import STEPS, TURN_STEPS, MissionClock, Recorder, Stuck, Trigger
 from smachpy.testing.runs import Run
 from smachpy.testing.servers import (
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from types import TracebackType
     from typing import Self
 
-    from actionlib_core.wire.presence import Endpoint
     from smachpy.testing.doubles import Replacement
     from smachpy.testing.exploring.exploration import Exploration
 
@@ -108,7 +107,7 @@ class MissionKit:
         self.clock = MissionClock(seed, rate=rate, choose=choose)
         self.network = MemoryNetwork(self.clock)
         self.transport = self.network.session()
-        self.node = _MissionNode("mission", transport=self.transport, clock=self.clock)
+        self.node = MissionNode("mission", transport=self.transport, clock=self.clock)
         self.shutdown = Shutdown()
         self.draws = True
         self.call = "mission"
@@ -119,6 +118,7 @@ class MissionKit:
         self._replacements: list[Replacement] = []
         self._servers: list[ScriptedEnd] = []
         self._stack = contextlib.ExitStack()
+        self._process: Process | None = None
 
     def __enter__(self) -> Self:
         self._stack.enter_context(self.clock)
@@ -243,6 +243,11 @@ class MissionKit:
             except (Exception, Stuck) as error:  # noqa: BLE001  raised again, with what the run did
                 return None, error
 
+        if self._process is not None:
+            try:
+                return self._process.run(execute)
+            except (Deadlock, TimeLimit) as error:
+                return None, error
         try:
             asyncio.get_running_loop()
         except RuntimeError:
@@ -253,6 +258,20 @@ class MissionKit:
         except (Deadlock, TimeLimit) as error:
             return None, error
         return found[0]
+
+    @contextlib.contextmanager
+    def process(self) -> Iterator[Process]:
+        """Let the run in this block be that of a process of its own, which can be killed.
+
+        The run raises `Killed` then; servers and topics of the test go on.
+        """
+        process = self._process = Process(self.clock, self.network)
+        process.node.on_client = self.node.on_client
+        try:
+            with process.current():
+                yield process
+        finally:
+            self._process = None
 
     # -- doubles -------------------------------------------------------------------------------
 
@@ -390,21 +409,6 @@ class MissionKit:
                 f"preempts. Try mission.{what}(..., preempts=1) without it."
             )
         return {"doubles": tuple(self._replacements), "servers": tuple(self._servers)}
-
-
-class _MissionNode(Node):
-    """The mission's node, which tells of the action clients that are made on it.
-
-    Attributes:
-        on_client: Called with the full name and the type of an action, before its client joins.
-    """
-
-    on_client: Callable[[str, str], object] | None = None
-
-    def endpoint(self, kind: Kind, name: str, type_name: str, md5: str) -> Endpoint:
-        if kind is Kind.ACTION_CLIENT and self.on_client is not None:
-            self.on_client(name, type_name)
-        return super().endpoint(kind, name, type_name, md5)
 
 
 def check_machine(given: object, call: str, *, functions: bool = False) -> None:

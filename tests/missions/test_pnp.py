@@ -11,6 +11,9 @@ from actionlib_core.node import Node, use_node
 from actionlib_core.transport.memory import MemoryNetwork
 from missions.pnp.robot import look, say
 from smachpy import State, events
+from smachpy.command import main
+from smachpy.command.surroundings import _robots_of
+from smachpy.exceptions import MissionError
 from smachpy.pnp import load, load_plan
 from smachpy.pnp.mapping import read_mapping
 from smachpy.sim.geometry import Pose2D
@@ -116,3 +119,26 @@ def test_meet(clock):
     assert outcome == "goal"
     assert clock.now() == pytest.approx(5.0)
     assert left[:2] == ["/meet/robot_1#goto_hall", "/meet/robot_0#goto_kitchen"]
+
+
+def test_two_robots_meet_by_the_command_line_alone(capsys):
+    assert main(["run", str(FOLDER / "meet.pnml"), "--time", "virtual", "--plain"]) == 0
+    assert "meet: goal after" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("names", "robots"),
+    [
+        (["/move_base"], ("", 1)),
+        (["/robot_2/move_base", "/robot_2/charge"], ("robot_2", 1)),
+        (["/robot_0/move_base", "/robot_2/move_base", "/speak"], ("", 3)),
+        ([], ("", 1)),
+    ],
+)
+def test_which_robots_a_mission_needs(names, robots):
+    assert _robots_of(dict.fromkeys(names, "")) == robots
+
+
+def test_robots_of_other_names_are_not_brought():
+    with pytest.raises(MissionError):
+        _robots_of(dict.fromkeys(["/left/move_base", "/right/move_base"], ""))

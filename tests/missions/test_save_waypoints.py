@@ -120,6 +120,7 @@ def test_as_a_program_enter_saves_a_waypoint(tmp_path):
         )
 
     robot = start("smachpy.sim", "--child")
+    read_until(robot, "ready")  # the program waits 5 s for it, a busy computer starts it in more
     saver = start("missions.tour.save_waypoints", str(path))
     try:
         read_until(saver, "Enter saves")

@@ -76,6 +76,7 @@ def test_every_mission_succeeds(mission, name):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(300)  # 200 missions; a minute is too little on a busy computer
 @pytest.mark.parametrize("name", RUNS)
 def test_a_hundred_seeds_give_the_same_verdict_twice(name):
     def verdict(seed):
@@ -114,7 +115,7 @@ def dice(seed):
     """Return what chooses outcomes, faults, preempts and turns in an explored run."""
     pick = random.Random(seed).randrange
 
-    def choose(self, where, options, _situation=None):
+    def choose(self, where, options, _situation=None, _key=None):
         self.choices.append(Choice(where, tuple(options), picked := pick(len(options)), None))
         return picked
 
@@ -122,6 +123,7 @@ def dice(seed):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(300)  # 200 missions; a minute is too little on a busy computer
 @pytest.mark.parametrize("name", sorted(listed().keys() - PROCESSES))
 def test_a_hundred_dice_give_the_same_run_of_every_mission_twice(name, monkeypatch):
     machine = make(name)

@@ -7,6 +7,7 @@ import contextlib
 import copy
 import inspect
 import logging
+import math
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,12 +24,14 @@ from smachpy.testing.exploring.explorer import DEFAULTS, FAULTS, Explorer, RunOp
 from smachpy.testing.exploring.search import Search
 from smachpy.testing.exploring.verdicts import judge
 from smachpy.testing.kit import MissionKit, check_machine
+from smachpy.testing.process import Killed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
     from typing import Self, TypeAlias, Unpack
 
     from smachpy.introspection import StateRecord
+    from smachpy.testing.exploring.kills import Journal, Kill
     from smachpy.testing.exploring.search import Choice
     from smachpy.testing.exploring.verdicts import Verdict
     from smachpy.testing.runs import Run
@@ -37,6 +40,7 @@ if TYPE_CHECKING:
 
 COMPUTER = RealClock()  # of the computer: a run's own time is virtual
 SHRINKING_RUNS = 300
+ORDERS = 100
 
 
 class ReplayError(SmachError):
@@ -165,9 +169,8 @@ def explore(
     check_machine(machine, "explore", functions=True)
     own = tuple(invariants)
     on_run = on_run or session.current().on_run
-    begun = COMPUTER.now()
+    budget = _Budget(max_runs, max_time)
     search = Search(max_depth)
-    runs = 0
     stopped_by = ""
     example: Counterexample | None = None
     with Runner("explore", machine, options, merges=not own) as runner:
@@ -176,28 +179,34 @@ def explore(
             return judge(run, error, runner.explorer, grace=grace, invariants=own)
 
         while example is None and (prefix := search.next()) is not None:
-            # There is always one run, however slow the computer is.
-            if runs >= max_runs or (runs > 0 and COMPUTER.now() - begun > max_time):
-                stopped_by = "max_runs" if runs >= max_runs else "max_time"
+            stopped_by = budget.take()
+            if stopped_by:
                 break
             run, error = runner.run(prefix)
-            runs += 1
             if on_run is not None:
                 on_run(run)
             verdict = verdict_on(run, error)
             if verdict is not None:
-                stopped_by = "counterexample"
                 example = _shrunk(runner, verdict_on, max_time, verdict, run)
-            else:
-                search.add(prefix, runner.explorer.choices)
+                break
+            search.add(prefix, runner.explorer.choices)
+            example, stopped_by = _killed_anywhere(runner, verdict_on, budget)
+            if stopped_by:
+                break
+    stopped_by = "counterexample" if example is not None else stopped_by
     stopped_by = stopped_by or ("max_depth" if search.is_cut else "")
     if example is not None and folder is not None:
         file = folder() / f"{example.run.record.label}-counterexample.svg"
         example = replace(example, picture=example.run.draw(file))
-    seconds = COMPUTER.now() - begun
     left_out = runner.explorer.not_raised
     return Exploration(
-        example is None, runs, not stopped_by, stopped_by, example, seconds, left_out
+        example is None,
+        budget.runs,
+        not stopped_by,
+        stopped_by,
+        example,
+        budget.seconds,
+        left_out,
     )
 
 
@@ -214,11 +223,41 @@ def replay(machine: Machine, choices: Sequence[str], **options: Unpack[RunOption
         Exception: what the run raised.
     """
     check_machine(machine, "replay", functions=True)
+    kill = None
     with Runner("replay", machine, options) as runner:
-        run, error = runner.run(choices)
+        if "kill" in runner.options["faults"] and choices:
+            from smachpy.testing.exploring.kills import parse_kill
+
+            kill = parse_kill(choices[-1])
+        run, error = runner.run(choices if kill is None else choices[:-1])
+        if kill is not None:
+            run, error = runner.run((), kill, like=runner.explorer.picks)
     if error is not None:
         raise error
     return run
+
+
+class _Budget:
+    """How many runs there may be, and for how long."""
+
+    def __init__(self, max_runs: int, max_time: float) -> None:
+        self._max_runs, self._max_time = max_runs, max_time
+        self._begun = COMPUTER.now()
+        self.runs = 0
+
+    @property
+    def seconds(self) -> float:
+        """For how long there have been runs [s of the computer]."""
+        return COMPUTER.now() - self._begun
+
+    def take(self) -> str:
+        """Take one run; return why there is none, else ""."""
+        if self.runs >= self._max_runs:
+            return "max_runs"
+        if self.runs > 0 and self.seconds > self._max_time:  # always one, however slow it is here
+            return "max_time"
+        self.runs += 1
+        return ""
 
 
 class Runner:
@@ -238,7 +277,8 @@ class Runner:
     def __init__(
         self, call: str, machine: Machine, given: RunOptions, *, merges: bool = True
     ) -> None:
-        unknown = unknown_arguments(given, DEFAULTS)
+        named = (explore if call == "explore" else replay).__kwdefaults__ or {}
+        unknown = unknown_arguments(given, (*DEFAULTS, *named))
         if unknown:
             raise TypeError(f"{call}: {unknown}")
         options: RunOptions = {**DEFAULTS, **given}
@@ -253,6 +293,8 @@ class Runner:
         self._merges = merges
         self._places = Places()
         self._around = contextlib.ExitStack()
+        self._killed_at: set[object] = set()
+        self.facts: dict[str, Any] = {}
         self._machine: Container
         self._whole: StateRecord | None
 
@@ -271,35 +313,56 @@ class Runner:
         self._restore()
         self._places.restore()
 
-    def _prepare(self) -> None:
-        """Make the machine, and put doubles into it."""
-        self._places.restore()  # the machine before
-        source = self.source
-        machine = self._machine = source if isinstance(source, Container) else source()
-        self._whole = describe(machine) if self.options["doubles"] else None
-        for path, make, made in self.options["doubles"]:
-            made[:] = [self._places.put(machine, path, make)]
-        self.explorer = Explorer(machine, self.options, self._places, merges=self._merges)
-        containers = list(_containers(machine))
+    def _prepare(self, journal: Journal | None = None) -> None:
+        """Make the machine, and put doubles into it.
+
+        Args:
+            journal: That of the run which another process goes on with; None: a new run begins.
+        """
+        if journal is None or not isinstance(self.source, Container):
+            self._places.restore()  # the machine before
+            source = self.source
+            machine = self._machine = source if isinstance(source, Container) else source()
+            self._whole = describe(machine) if self.options["doubles"] else None
+            for path, make, made in self.options["doubles"]:
+                made[:] = [self._places.put(machine, path, make)]
+        machine = self._machine
+        if journal is None:
+            self.explorer = Explorer(machine, self.options, self._places, merges=self._merges)
+        else:
+            self.explorer.go_on(machine, self._places, journal.active())
         self._userdata = [
             (c.userdata, {key: c.userdata[key] for key in c.userdata.keys()})  # noqa: SIM118
-            for c in containers
+            for c in _containers(machine)
         ]
-        states = [state for c in containers for state in c.get_children().values()]
-        self._scripts = [(state, state.script) for state in states if isinstance(state, Double)]
+        self._scripts = [(path, state, state.script) for path, state in _doubles(machine)]
         self._restore()  # so that no run changes what is kept here
+        if journal is not None:
+            for path, double, script in self._scripts:
+                double.script = script[min(journal.ends(path), len(script) - 1) :]
 
     def _restore(self) -> None:
         """Bring the userdata and the test's doubles back to the beginning."""
-        for double, script in self._scripts:
+        for _, double, script in self._scripts:
             double.script = script
         for userdata, values in self._userdata:
             for key in userdata.keys():  # noqa: SIM118
                 del userdata[key]
             userdata.update(copy.deepcopy(values))
 
-    def run(self, prefix: Sequence[int | str]) -> tuple[Run, Exception | None]:
+    def run(
+        self,
+        prefix: Sequence[int | str],
+        kill: Kill | None = None,
+        *,
+        like: Mapping[Hashable, str] | None = None,
+    ) -> tuple[Run, Exception | None]:
         """Run once, with these choices first; what it raised comes back with the run.
+
+        Args:
+            prefix: The choices.
+            kill: Where the process is killed.
+            like: The choices of the run that this one is to be like; `prefix` has only turns then.
 
         Raises:
             ReplayError: it came to other choices.
@@ -313,8 +376,13 @@ class Runner:
         error: Exception | None = None
         # A kit for each run: what still waits in one must not reach into the next.
         kit = MissionKit(choose=explorer.turn, on_run=runs.append)
-        explorer.begin(kit, prefix)
-        unsubscribe = self._machine.subscribe(explorer.on_event)
+        self.journal = None
+        if "kill" in options["faults"]:
+            from smachpy.testing.exploring.kills import Journal  # few tests need journals
+
+            self.journal = Journal(self._machine, kill)
+        begins = None if self.journal is None else self.journal.begins
+        explorer.begin(kit, prefix, picks=like, begins=begins)
         with kit:
             kit.draws, kit.call = False, self._call
             for server in options["servers"]:
@@ -323,16 +391,60 @@ class Runner:
                 explorer.serve_actions()
             try:
                 userdata = copy.deepcopy(options["userdata"])
-                kit(self._machine, userdata, limit=options["limit"], steps=options["steps"])
+                if self.journal is None:
+                    self._execute(kit, userdata)
+                else:
+                    self._execute_kept(kit, userdata, self.journal)
             except Exception as caught:  # noqa: BLE001  judged by the caller
                 error = caught
             finally:
-                unsubscribe()
                 explorer.end()
+            if self.journal is not None:
+                self.facts = self.journal.facts(kit.ends)
         if explorer.mismatch:
             raise ReplayError(explorer.mismatch) from error
-        run = runs[0]
+        run = runs[-1]
         return (run if self._whole is None else replace(run, whole=self._whole)), error
+
+    def kills(self) -> Iterator[Kill]:
+        """Yield the kills to repeat the last run with, each place once; none without that fault.
+
+        The order of threads starts anew in another process, so only runs in which they take turns
+        have them.
+        """
+        explorer, journal = self.explorer, self.journal
+        if journal is None or any(turn.picked for turn in explorer.turns):
+            return
+        from smachpy.testing.exploring.kills import kills_of
+
+        yield from kills_of(journal, self._killed_at)
+
+    def _execute(self, kit: MissionKit, userdata: Mapping[str, Any] | None) -> None:
+        options = self.options
+        unsubscribe = self._machine.subscribe(self.explorer.on_event)
+        try:
+            kit(self._machine, userdata, limit=options["limit"], steps=options["steps"])
+        finally:
+            unsubscribe()
+
+    def _execute_kept(
+        self, kit: MissionKit, userdata: Mapping[str, Any] | None, journal: Journal
+    ) -> None:
+        """Run with a journal, in one process after the other until none is killed."""
+        from smachpy.durable.mission import kept_mission
+
+        store = journal.as_store()
+        while True:
+            try:
+                with kit.process() as process:
+                    journal.die = process.kill
+                    with kept_mission(self._machine, store, "explored", lease_s=math.inf):
+                        self._execute(kit, userdata)
+            except Killed:
+                self._prepare(journal)
+                userdata = None if journal.position.visits else userdata
+            else:
+                return
 
 
 @contextlib.contextmanager
@@ -351,6 +463,17 @@ def _containers(container: Container) -> Iterator[Container]:
     for child in container.get_children().values():
         if isinstance(child, Container):
             yield from _containers(child)
+
+
+def _doubles(container: Container, path: str = "") -> Iterator[tuple[str, Double]]:
+    """Yield the doubles below a container, with their paths."""
+    path = path or f"/{container.name or 'SM_ROOT'}"
+    for label, state in container.get_children().items():
+        where = f"{path}/{label}"
+        if isinstance(state, Container):
+            yield from _doubles(state, where)
+        elif isinstance(state, Double):
+            yield where, state
 
 
 # -- the counterexample ----------------------------------------------------------------------------
@@ -386,10 +509,72 @@ def _shrunk(
         if _size(found, others) < _size(run, choices):
             run, choices, reason = found, others, why.reason
             simpler = _simpler(choices)
-    last = max((number for number, choice in enumerate(choices, 1) if choice.picked), default=0)
-    texts = tuple(map(str, choices[:last]))  # what comes after them is as usual
+    texts = _texts(choices)
     script = _script(runner, texts, reason)
     return Counterexample(reason, run, texts, script, is_cut=late)
+
+
+def _killed_anywhere(
+    runner: Runner,
+    verdict_on: Callable[[Run, Exception | None], Verdict | None],
+    budget: _Budget,
+) -> tuple[Counterexample | None, str]:
+    """Repeat the last run with kills, if there is that fault.
+
+    Returns:
+        The first one that another process goes on with otherwise, and why not all were tried.
+    """
+    explorer, expected = runner.explorer, runner.facts
+    for kill in runner.kills():
+        stopped_by = budget.take()
+        if stopped_by:
+            return None, stopped_by
+        run, error = runner.run((), kill, like=explorer.picks)
+        verdict = verdict_on(run, error)
+        reason = (
+            verdict.reason if verdict is not None else _difference(runner, kill, explorer, expected)
+        )
+        if reason:
+            reason = f"{kill}, it does not go on as without that: {reason}"
+            texts = (*_texts(explorer.choices), str(kill))
+            return Counterexample(reason, run, texts, _script(runner, texts, reason)), ""
+    return None, ""
+
+
+def _texts(choices: list[Choice]) -> tuple[str, ...]:
+    """Return choices as texts, up to the last unusual one: what comes after it is as usual."""
+    last = max((number for number, choice in enumerate(choices, 1) if choice.picked), default=0)
+    return tuple(map(str, choices[:last]))
+
+
+def _difference(runner: Runner, kill: Kill, explorer: Explorer, expected: Mapping[str, Any]) -> str:
+    """Return in what the last run, with a kill, differs from the one without; "" if in nothing."""
+    from smachpy.testing.exploring.kills import difference
+
+    if kill.loses_request:
+        return ""
+    facts = runner.facts
+    found = difference(facts, expected)
+    return "" if found and _is_other_order(runner, explorer.picks, facts) else found
+
+
+def _is_other_order(
+    runner: Runner, picks: Mapping[Hashable, str], facts: Mapping[str, Any]
+) -> bool:
+    """Tell whether the run does that without a kill, too, when its threads go on in another order.
+
+    In another process those that go on at the same moment do so in an order of their own.
+    """
+    search = Search(depth=math.inf)
+    for _ in range(ORDERS):
+        prefix = search.next()
+        if prefix is None:
+            return False
+        runner.run(prefix, like=picks)
+        if runner.facts == facts:
+            return True
+        search.add(prefix, runner.explorer.turns)
+    return False
 
 
 def _simpler(choices: list[Choice]) -> Iterator[tuple[int, ...]]:

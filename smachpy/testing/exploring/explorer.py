@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypedDict
 
@@ -11,7 +12,7 @@ from smachpy.events import Entered, Failed, Finished, Iterated, Left, Retried
 from smachpy.introspection import describe
 from smachpy.machines.container import Container
 from smachpy.machines.state import get_options
-from smachpy.run.origin import asking
+from smachpy.run.grace import asking
 from smachpy.testing.doubles import Double, Places
 from smachpy.testing.exploring.search import Choice
 from smachpy.testing.recorder import STEPS
@@ -20,7 +21,7 @@ from smachpy.testing.servers import Reply
 from smachpy.userdata.readonly import writable
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 
     from actionlib_core.clock import Timer
     from smachpy.events import Event
@@ -31,8 +32,9 @@ if TYPE_CHECKING:
     from smachpy.testing.servers import ScriptedEnd
 
 PREEMPTED = "preempted"
-FAULTS = frozenset({"hang", "raise", "deaf"})
+FAULTS = frozenset({"hang", "raise", "deaf", "kill"})
 STEP_S = 1.0  # how long a double or server takes, unless it outlasts others
+APART_S = 0.001  # so much more for each double, where there are kills
 WITHIN = 0.9  # part of the rest of its timeout for which a double outlasts others
 _OUTSIDE = frozenset({"monitor", "condition", "service"})
 
@@ -77,7 +79,8 @@ class RunOptions(TypedDict, total=False):
         faults: "hang": any leaf may never finish; "raise": may raise a RuntimeError, and whatever
             `on_exception` and `retry` of it and of its containers name, if that can be made from a
             text alone; "deaf": may ignore a preempt. Leaves with a timeout, and watchers beside
-            others, may hang in any case.
+            others, may hang in any case. "kill": each run has a journal, and is repeated with a
+            kill of its process at each write of it, before and after; another process goes on.
         preempts: Most preempts per run; 1.
         interleavings: Whether to vary which thread continues first, and which leaf outlasts the
             others; True.
@@ -127,6 +130,23 @@ DEFAULTS: RunOptions = {
 }
 
 
+@dataclass(slots=True)
+class _Execution:
+    """How far a double is.
+
+    Attributes:
+        begun: When it began [s].
+        until: How long its time passes, or has passed [s].
+        picked: What was chosen last.
+        picks: How many choices were made.
+    """
+
+    begun: float
+    until: float
+    picked: str = OUTLASTS
+    picks: int = 0
+
+
 class Explorer:
     """Makes and notes the choices of one run after the other.
 
@@ -139,6 +159,7 @@ class Explorer:
     Attributes:
         doubles: Paths of the leaves with doubles of the explorer.
         choices: What was chosen in the run, in order.
+        picks: What was chosen, by what a run with a kill finds it by.
         too_long: It had too many leaves.
         mismatch: Why it could not follow the choices that were given.
         not_raised: Names of the exceptions that should be raised and cannot be made.
@@ -173,15 +194,46 @@ class Explorer:
         self._long_s = (options["max_steps"] + 1) * STEP_S
         self.doubles: set[str] = set()
         self._bounded: set[str] = set()
-        self._replace_leaves(places, root, record.path, _kept_by(record, options["keep"]))
+        # Another process may go on in another order with what ends at the same moment.
+        tie_s = APART_S if "kill" in options["faults"] else 0.0
+        self._step_s = {path: STEP_S + n * tie_s for n, path in enumerate(sorted(self._leaves), 1)}
+        self._kept = _kept_by(record, options["keep"])
+        self._replace_leaves(places, root, record.path, self._kept)
         self.choices: list[Choice] = []
+        self.picks: dict[Hashable, str] = {}
+
+    @property
+    def turns(self) -> list[Choice]:
+        """What was chosen for the turns of threads, in order."""
+        return [choice for choice in self.choices if choice.where == TURN]
 
     # -- the run -------------------------------------------------------------------------------
 
-    def begin(self, kit: MissionKit, prefix: Sequence[int | str]) -> None:
-        """Forget the last run; the next one begins with these choices, as indices or texts."""
+    def begin(
+        self,
+        kit: MissionKit,
+        prefix: Sequence[int | str],
+        *,
+        picks: Mapping[Hashable, str] | None = None,
+        begins: Callable[[str], int] | None = None,
+    ) -> None:
+        """Forget the last run.
+
+        Args:
+            kit: What the next one runs in.
+            prefix: The choices that it begins with, as indices or texts.
+            picks: All its choices but the turns of threads, which are those of `prefix` then: those
+                of a run that it is to be like.
+            begins: Counts how often a state has begun. A leaf that is executed again without having
+                begun again was interrupted by a kill, and goes on. None: there are no kills.
+        """
         self._kit, self._clock = kit, kit.clock
         self._prefix = prefix
+        self._given = picks
+        self._begins = begins
+        self._executions: dict[tuple[str, int], _Execution] = {}
+        self._replies: dict[str, int] = {}
+        self.picks = {}
         self.choices = []
         self.too_long = False
         self.mismatch = ""
@@ -199,6 +251,21 @@ class Explorer:
         self._request: Timer | None = None
         self._over = False
 
+    def go_on(self, root: Container, places: Places, active: Iterable[str]) -> None:
+        """Go on with the run in another process.
+
+        Args:
+            root: Its machine.
+            places: Puts the leaves back in the end.
+            active: Paths of the states that are active.
+        """
+        going_on = set(active)
+        self._root = root
+        self._active = {path: t for path, t in self._active.items() if path in going_on}
+        self._hanging.clear()
+        self._over = False
+        self._replace_leaves(places, root, self._root_path, self._kept)  # unless they are there
+
     def end(self) -> None:
         """Cancel a preempt that the run did not wait for."""
         if self._request is not None:
@@ -212,13 +279,26 @@ class Explorer:
             since = max(since, end)
         return total
 
-    def choose(self, where: str, options: Sequence[str], situation: Hashable = None) -> int:
+    def choose(
+        self,
+        where: str,
+        options: Sequence[str],
+        situation: Hashable = None,
+        key: Hashable = None,
+    ) -> int:
         """Choose, as given or the first, and note it.
 
-        A choice without a situation, as of a server, is part of all situations after it.
+        A choice without a situation, as of a server, is part of all situations after it. Its `key`
+        is what a run with a kill finds the choice by, which comes to it at another time.
         """
         number = len(self.choices)
         picked = 0
+        if self._given is not None and where != TURN:
+            wanted = self._given.get(key, "")
+            picked = list(options).index(wanted) if wanted in options else 0
+            number = len(self._prefix)
+        elif self._given is not None:
+            number = sum(choice.where == TURN for choice in self.choices)
         if number < len(self._prefix):
             given = self._prefix[number]
             texts = [f"{where}: {option}" for option in options]
@@ -231,6 +311,8 @@ class Explorer:
                     "machine changed, or does it depend on something outside?"
                 )
         self.choices.append(Choice(where, tuple(options), picked, situation))
+        if key is not None:
+            self.picks[key] = options[picked]
         if situation is None and self._merges:
             self._past.append((where, picked))
         return picked
@@ -274,7 +356,8 @@ class Explorer:
         """Choose whether a preempt comes while a leaf runs that stays as it is."""
         if path in self.doubles or path in self._served or not self._preempts:
             return
-        if self.choose(path, (STAYS, ASKED), self._situation((path, ASKED))):
+        key = (path, ASKED, 0 if self._begins is None else self._begins(path))
+        if self.choose(path, (STAYS, ASKED), self._situation((path, ASKED)), key):
             self._preempts -= 1
             self._request = self._clock.call_later(0.0, self._preempt)  # as soon as it waits
 
@@ -306,7 +389,7 @@ class Explorer:
         """Return what an active state's age [s] means to the rest of the run, if anything."""
         if path in self._timeless or path in self._hanging:
             return -1.0
-        if age > STEP_S and path in self.doubles - self._bounded:
+        if age > self._step_s.get(path, STEP_S) and path in self.doubles - self._bounded:
             return math.inf  # it outlasts others, however long that takes
         return round(age, 6)
 
@@ -338,7 +421,8 @@ class Explorer:
 
     def _choose_reply(self, name: str) -> Reply:
         replies = {**REPLIES, **(PREEMPTED_REPLIES if self._preempts else {})}
-        picked = list(replies)[self.choose(f"server {name}", list(replies))]
+        count = self._replies[name] = self._replies.get(name, 0) + 1
+        picked = list(replies)[self.choose(f"server {name}", list(replies), key=(name, count))]
         if picked in PREEMPTED_REPLIES:
             self._preempts -= 1
             self._clock.call_later(STEP_S, self._preempt)
@@ -372,30 +456,42 @@ class Explorer:
 
     def _execute(self, double: Double, path: str, ud: Any) -> str:
         outcomes = double.get_registered_outcomes()
-        self._attempts[path] = self._attempts.get(path, 0) + 1
-        self._steps += 1
-        if self._steps > self._options["max_steps"]:
-            self.too_long = True
-            self._root.request_preempt()
-            return PREEMPTED if PREEMPTED in outcomes else outcomes[0]
-        self._visits[path] = self._visits.get(path, -1) + 1
         begun = self._clock.now()
-        seconds, picked = STEP_S, OUTLASTS
-        while picked == OUTLASTS:
-            if self._sleep(double, seconds) and PREEMPTED in outcomes:
+        number = 0 if self._begins is None else self._begins(path)
+        execution = self._executions.get((path, number)) if self._begins is not None else None
+        seconds = self._step_s[path]
+        if execution is not None:
+            seconds = max(0.0, execution.until - begun)
+        else:
+            self._attempts[path] = self._attempts.get(path, 0) + 1
+            self._steps += 1
+            if self._steps > self._options["max_steps"]:
+                self.too_long = True
+                self._root.request_preempt()
+                return PREEMPTED if PREEMPTED in outcomes else outcomes[0]
+            self._visits[path] = self._visits.get(path, -1) + 1
+            execution = _Execution(begun, begun + seconds)
+            self._executions[path, number] = execution
+        while execution.picked == OUTLASTS:
+            outlasts = execution.picks > 0
+            if self._sleep(double, seconds, outlasts=outlasts) and PREEMPTED in outcomes:
                 double.service_preempt()
                 return PREEMPTED
-            seconds = self._longer_s(double, path, begun)
-            picked = self._pick(double, path, outcomes, may_outlast=seconds > 0)
+            seconds = self._longer_s(double, path, execution.begun)
+            pick = (path, number, execution.picks)
+            picked = self._pick(double, path, outcomes, pick, may_outlast=seconds > 0)
+            execution.picked, execution.picks = picked, execution.picks + 1
+            execution.until = self._clock.now() + seconds
             if picked == OUTLASTS:
                 self._outlasting.add(path)
+        picked = execution.picked
         for key, value in self._writes.get(path, {}).items():
             ud[key] = value
         return self._act(double, path, picked, outcomes)
 
-    def _sleep(self, double: Double, seconds: float) -> bool:
+    def _sleep(self, double: Double, seconds: float, *, outlasts: bool) -> bool:
         """Let a double's time pass; return whether a preempt ended it."""
-        if seconds <= STEP_S:
+        if not outlasts:
             return double.sleep(seconds)
         if self._clock.limit is not None:
             self._clock.limit += seconds  # a long run, but not an endless one
@@ -425,7 +521,13 @@ class Explorer:
         return 0.0 if left <= STEP_S else min(left, self._long_s)
 
     def _pick(
-        self, double: Double, path: str, outcomes: tuple[str, ...], *, may_outlast: bool
+        self,
+        double: Double,
+        path: str,
+        outcomes: tuple[str, ...],
+        key: Hashable,
+        *,
+        may_outlast: bool,
     ) -> str:
         plain = [outcome for outcome in outcomes if outcome != PREEMPTED] or list(outcomes)
         first = self._visits[path] % len(plain)  # each is the usual one in turn: loops end
@@ -439,7 +541,8 @@ class Explorer:
             options.append(HANGS)
         options += [RAISES, *self._raised.get(path, ())] if "raise" in faults else []
         options += [DEAF] if "deaf" in faults and self._preempts else []
-        return options[self.choose(path, options, self._situation((path, *sorted(options))))]
+        situation = self._situation((path, *sorted(options)))
+        return options[self.choose(path, options, situation, key)]
 
     def _waits(self, double: Double, path: str) -> bool:
         """Tell whether it is a watcher beside others: it is preempted when those end."""
@@ -460,7 +563,9 @@ class Explorer:
             double.wait_preempt()
             self._hanging.discard(path)
             double.service_preempt()
-            return PREEMPTED if PREEMPTED in outcomes else outcomes[0]
+            # After a kill it is not asked again what it says to a timeout that has passed.
+            late = get_options(double).timeout_outcome if self._begins is not None else None
+            return PREEMPTED if PREEMPTED in outcomes else late or outcomes[0]
         if picked in outcomes:
             return picked
         self._preempts -= 1

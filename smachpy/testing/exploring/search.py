@@ -43,7 +43,7 @@ class Search:
         is_cut: There were choices after the `depth`-th.
     """
 
-    def __init__(self, depth: int) -> None:
+    def __init__(self, depth: float) -> None:
         self._depth = depth
         self._waiting: deque[tuple[int, ...]] = deque([()])
         self._seen: set[Hashable] = set()

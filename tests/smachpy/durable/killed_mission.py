@@ -1,14 +1,18 @@
-"""A mission that kills its own process at a write of its journal: run by tests, again and again.
+"""Missions that are killed, each life in a process of its own: run by tests, again and again.
 
-    python killed_mission.py JOURNAL DEEDS KILL_AT WRITTEN
+    python killed_mission.py
 
-KILL_AT 0 never kills. At its end it prints outcome and userdata as a line of JSON.
+Each line of the input is a life to live, a JSON object with the arguments of `live` and, in
+`after`, how many seconds it has at most. The answer is a line, too: its exit code. Processes are
+forked from this one, which has all modules loaded: most of a short life would be imports.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import random
+import select
 import signal
 import sys
 from pathlib import Path
@@ -16,11 +20,17 @@ from typing import Any
 
 import smachpy
 from actionlib_core.interfaces.actionlib.msg import TestAction, TestGoal
-from smachpy import Concurrence, Iterator, SimpleActionState, State, StateMachine
+from actionlib_core.transport import zenoh as _  # noqa: F401  loaded before the fork
+from smachpy import Concurrence, Iterator, Sequence, SimpleActionState, State, StateMachine
 from smachpy.durable.journal import read_position
 from smachpy.durable.sqlite import SQLiteStore
+from smachpy.machines.container import Container
+from smachpy.machines.state import get_options
 
 ACTION = "killed_mission"
+KEYS = ["count", "number", "sum"]
+ENDS = ["succeeded", "aborted", "preempted"]
+GOES = {"succeeded": "ok", "aborted": "bad", "preempted": "bad"}
 
 
 class KillingStore(SQLiteStore):
@@ -41,14 +51,14 @@ class KillingStore(SQLiteStore):
 class Note(State):
     """Writes a line to the file of deeds, once, and counts."""
 
-    def __init__(self, deeds: Path, name: str) -> None:
-        super().__init__(["ok"], io_keys=["count"])
+    def __init__(self, deeds: Path, name: str, **options: Any) -> None:
+        super().__init__(["ok", "again"], io_keys=["count"], **options)
         self.deeds, self.name = deeds, name
 
     def execute(self, userdata: Any) -> str:
         smachpy.once("note", lambda: self.write(userdata.count))
         userdata.count += 1
-        return "ok"
+        return "again" if userdata.count % 2 and get_options(self).retry else "ok"
 
     def write(self, count: int) -> None:
         with self.deeds.open("a") as file:
@@ -76,46 +86,137 @@ def action(**options: Any) -> SimpleActionState:
     )
 
 
+def begin(container: Container, number: int) -> None:
+    container.userdata.count, container.userdata.number, container.userdata.sum = 0, number, 0
+
+
 def build(deeds: Path) -> StateMachine:
     """Note, drive, two branches with goals of their own, and a loop of goals."""
-    ends = ["succeeded", "aborted", "preempted"]
-    goes = {"succeeded": "ok", "aborted": "bad", "preempted": "bad"}
-    keys = {"input_keys": ["number", "sum"], "output_keys": ["number", "sum"]}
     root = StateMachine(["ok", "bad"], name="KILLED")
-    root.userdata.count, root.userdata.number, root.userdata.sum = 0, 0, 0
+    begin(root, 0)
     with root:
-        StateMachine.add("NOTE", Note(deeds, "note"), {"ok": "DRIVE"})
-        StateMachine.add("DRIVE", action(), {**goes, "succeeded": "BOTH"})
+        StateMachine.add("NOTE", Note(deeds, "note"), {"ok": "DRIVE", "again": "bad"})
+        StateMachine.add("DRIVE", action(), {**GOES, "succeeded": "BOTH"})
         both = Concurrence(["ok", "bad"], "bad", outcome_map={"ok": dict.fromkeys("LR", "ok")})
         with both:
             for number, label in ((10, "L"), (20, "R")):
                 branch = StateMachine(["ok", "bad"])
-                branch.userdata.number, branch.userdata.sum, branch.userdata.count = number, 0, 0
+                begin(branch, number)
                 with branch:
-                    StateMachine.add("GO", action(), {**goes, "succeeded": "NOTE"})
-                    StateMachine.add("NOTE", Note(deeds, label))
+                    StateMachine.add("GO", action(), {**GOES, "succeeded": "NOTE"})
+                    StateMachine.add("NOTE", Note(deeds, f"branch {label}"), {"again": "bad"})
                 Concurrence.add(label, branch)
         StateMachine.add("BOTH", both, {"ok": "LOOP"})
-        loop = Iterator(["ok", *ends], it=range(2), exhausted_outcome="ok", **keys)
+        keys = {"input_keys": ["number", "sum"], "output_keys": ["number", "sum"]}
+        loop = Iterator(["ok", *ENDS], it=range(2), exhausted_outcome="ok", **keys)
         with loop:
             Iterator.set_contained_state("GO", action(), loop_outcomes=["succeeded"])
-        StateMachine.add("LOOP", loop, goes | {"ok": "ok"})
+        StateMachine.add("LOOP", loop, GOES | {"ok": "ok"})
     return root
 
 
-def main() -> None:
-    journal, deeds, kill_at, written = sys.argv[1:]
-    store = KillingStore(journal, synchronous="NORMAL")
-    store.left, store.written = int(kill_at), written == "True"
-    machine = build(Path(deeds))
-    print("ready", flush=True)
+class Chance:
+    """Builds a random machine, the same one for each seed, with six leaves or a few more."""
+
+    def __init__(self, seed: int, deeds: Path) -> None:
+        self.random = random.Random(seed)
+        self.deeds = deeds
+        self.leaves = 0
+        self.branches = 0
+
+    def root(self) -> StateMachine:
+        root = self.container("machine", depth=0)
+        assert isinstance(root, StateMachine)
+        root.name = "KILLED"
+        begin(root, 0)
+        return root
+
+    def child(self, depth: int) -> tuple[State, dict[str, str]]:
+        """A state that ends ok or bad, or that is mapped to these."""
+        if depth < 3 and self.leaves < 6 and self.random.random() < 0.5:
+            kinds = ["machine", "sequence", "concurrence", "iterator"]
+            return self.container(self.random.choice(kinds), depth), {}
+        self.leaves += 1
+        kind = self.random.choice(["note", "goal", "goal", "retried"])
+        if kind == "goal":
+            return action(), GOES
+        retry: dict[str, Any] = {"retry": (3, 0.01, ["again"])} if kind == "retried" else {}
+        name = f"{'branch ' if self.branches else ''}{self.leaves} {kind}"
+        return Note(self.deeds, name, **retry), {"ok": "ok", "again": "bad"}
+
+    def container(self, kind: str, depth: int) -> Container:
+        keys = {"input_keys": KEYS, "output_keys": KEYS}
+        number = self.random.randint(1, 2) if depth else 3
+        container: Container
+        if kind == "concurrence":
+            labels = [f"S{i}" for i in range(number + 1)]
+            ends = {"ok": dict.fromkeys(labels, "ok")}
+            container = Concurrence(["ok", "bad"], "bad", outcome_map=ends, **keys)
+            for label in labels:
+                branch = StateMachine(["ok", "bad"])  # with values of its own
+                self.branches += 1
+                begin(branch, 100 * self.branches)
+                state, goes = self.child(depth + 1)
+                branch.add("IN", state, goes)
+                container.add(label, branch)
+        elif kind == "iterator":
+            container = Iterator(["ok", "bad"], it=range(2), exhausted_outcome="ok", **keys)
+            inner = self.container("machine", depth + 1)
+            container.set_contained_state("EACH", inner, loop_outcomes=["ok"])
+        elif kind == "sequence":
+            container = Sequence(["ok", "bad"], connector_outcome="ok", **keys)
+            for i in range(number):
+                container.add(f"S{i}", self.container("machine", depth + 1))
+        else:
+            container = StateMachine(["ok", "bad"], **keys)
+            for i in range(number):
+                state, goes = self.child(depth + 1)
+                following = "ok" if i == number - 1 else f"S{i + 1}"
+                goes = {end: following if to == "ok" else to for end, to in goes.items()}
+                container.add(f"S{i}", state, goes or {"ok": following})
+        return container
+
+
+def live(folder: str, machine: int, kill_at: int = 0, *, written: bool = False) -> None:
+    """Let a mission run, or go on, and write its outcome and userdata to the file `ended`.
+
+    Args:
+        folder: Holds all that outlives the process.
+        machine: Seed of a random machine; 0: the one of `build`.
+        kill_at: The write of the journal that kills; 0: none.
+        written: Whether that one is written first.
+    """
+    home = Path(folder)
+    store = KillingStore(home / "journal.db", synchronous="NORMAL")
+    store.left, store.written = kill_at, written
+    deeds = home / "deeds"
+    root = Chance(machine, deeds).root() if machine else build(deeds)
     if any(row.status == "ended" for row in store.missions()):  # killed after that was written
         position = read_position(store, "m")
         outcome, values = position.data["outcome"], position.userdata["/KILLED"]
     else:
-        outcome, values = smachpy.run_durable(machine, store, mission="m"), machine.userdata
-    userdata = {key: values[key] for key in ("count", "number", "sum")}
-    print(json.dumps({"outcome": outcome, **userdata}), flush=True)
+        outcome, values = smachpy.run_durable(root, store, mission="m"), root.userdata
+    ended = {"outcome": outcome, "writes": -store.left, **{key: values[key] for key in KEYS}}
+    (home / "ended").write_text(json.dumps(ended))
+    store.close()
+
+
+def main() -> None:
+    for line in sys.stdin:
+        life = json.loads(line)
+        after = life.pop("after", None)
+        pid = os.fork()
+        if pid == 0:
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+            sys.stdin = open(os.devnull)  # noqa: SIM115  the parent's is not to be read
+            live(**life)
+            return
+        ends = os.pidfd_open(pid)
+        if after is not None and not select.select([ends], [], [], after)[0]:
+            os.kill(pid, signal.SIGKILL)
+        code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+        os.close(ends)
+        print(code, flush=True)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 import sqlite3
 import subprocess
@@ -62,6 +63,69 @@ def test_a_log_that_was_written_in_part_ends_with_a_whole_transaction(place, tmp
         copy.close()
     assert counts == sorted(counts)
     assert counts[0] < counts[-1] == len(written)
+    store.close()
+
+
+def left_behind(place, folder, *names):
+    """Copy a journal's files of these names, and return the journal of the copy."""
+    folder.mkdir()
+    for name in names:
+        shutil.copy(place.with_name(name), folder / name)
+    return folder / place.name
+
+
+def test_a_file_without_its_log_is_refused(place, tmp_path):
+    store, lease, _ = fill(place, 3)
+    for number in range(3):  # the last one after SQLite has taken the log into the file
+        copy = left_behind(place, tmp_path / f"copy {number}", "journal.db")
+        before = copy.read_bytes()
+        assert "journal.db-wal" in str(refused(copy, "corrupt"))
+        assert copy.read_bytes() == before
+        assert [each.name for each in copy.parent.iterdir()] == ["journal.db"]
+        open_store(place).close()  # the first one still writes
+        for _ in range(number * 400):
+            store.append(lease, [b"more"])
+    store.close()
+    copy = left_behind(place, tmp_path / "closed", "journal.db")
+    with contextlib.closing(open_store(copy)) as whole:
+        assert len(whole.read("m1")[1]) == 1203
+
+
+def test_a_log_without_its_file_is_refused_and_stays(place, tmp_path):
+    store, _, written = fill(place)
+    copy = left_behind(place, tmp_path / "copy", "journal.db-wal")
+    log = copy.with_name("journal.db-wal")
+    before = log.read_bytes()
+    for empty in (False, True):
+        if empty:
+            copy.touch()
+        refused(copy, "corrupt")
+        assert log.read_bytes() == before
+    shutil.copy(place, copy)
+    with contextlib.closing(open_store(copy)) as whole:
+        assert whole.read("m1")[1] == written
+    store.close()
+
+
+def test_a_journal_that_is_deleted_or_replaced_takes_no_more_entries(place):
+    store, lease, _ = fill(place)
+    kept = place.rename(place.with_name("kept.db"))
+    with pytest.raises(StoreError, match="expected the file that was opened"):
+        store.append(lease, [b"x"])
+    place.write_bytes(kept.read_bytes())
+    with pytest.raises(StoreError, match="another file in its place"):
+        store.append(lease, [b"x"])
+    store.close()
+
+
+def test_a_journal_whose_last_reader_took_the_log_in_is_whole(place, tmp_path):
+    store, _, written = fill(place)
+    copy = left_behind(place, tmp_path / "killed", "journal.db", "journal.db-wal")
+    with contextlib.closing(sqlite3.connect(copy)) as other_program:
+        other_program.execute("SELECT * FROM smachpy_missions")
+    assert not copy.with_name("journal.db-wal").exists()
+    with contextlib.closing(open_store(copy)) as whole:
+        assert whole.read("m1")[1] == written
     store.close()
 
 

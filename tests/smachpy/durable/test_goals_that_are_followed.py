@@ -15,7 +15,7 @@ from actionlib_core.interfaces.actionlib.msg import TestFeedback as Feedback
 from actionlib_core.interfaces.actionlib.msg import TestGoal as Goal
 from actionlib_core.interfaces.actionlib.msg import TestResult as Result
 from actionlib_core.node import Node
-from smachpy import SimpleActionState, StateMachine, events
+from smachpy import CBState, Concurrence, SimpleActionState, StateMachine, events
 from smachpy.durable.journal import read_position
 from tests.smachpy.durable.killing_store import Kill, KillingStore
 from tests.two_nodes import TwoNodes
@@ -159,6 +159,49 @@ def test_a_preempt_cancels_it(world: World) -> None:
     assert len(world.ids) == 1
 
 
+def test_one_of_a_mission_that_was_cancelled_meanwhile_is_cancelled(world: World) -> None:
+    """The request was there before the run, which ended at once: the robot drove on."""
+    world.serve()
+    world.kill()
+    world.store.request_cancel("m")
+    assert world.run(world.machine()) == "preempted"
+    assert world.handles[0].get_goal_status().status == 2  # preempted
+    assert len(world.ids) == 1
+
+
+def test_a_request_before_the_run_is_one_of_the_run(world: World) -> None:
+    world.serve()
+    world.kill()
+    machine = world.machine()
+    machine.request_preempt()
+    assert world.run(machine) == "preempted"
+    assert world.handles[0].get_goal_status().status == 2
+
+
+def test_a_branch_that_ends_at_once_lets_the_others_stop_their_goals(world: World) -> None:
+    """It ended its concurrence before they had been entered again."""
+    world.serve()
+
+    def mission(*, dies: bool) -> StateMachine:
+        go = world.machine(dies=dies).get_children()["GO"]
+        branches = Concurrence([*ENDS, "skipped"], "preempted", child_termination_cb=lambda _: True)
+        branches.add("QUICK", CBState(waits, outcomes=["ok"], resume="skip:ok"))
+        branches.add("GO", go)
+        root = StateMachine([*ENDS, "skipped"], name="M")
+        root.add("BOTH", branches)
+        return root
+
+    def waits(_: Any) -> str:
+        world.clock.sleep(100.0)
+        return "ok"
+
+    with pytest.raises(Kill):
+        world.run(mission(dies=True))
+    assert world.run(mission(dies=False)) == "preempted"
+    assert world.handles[0].get_goal_status().status == 2
+    assert len(world.ids) == 1
+
+
 def test_exec_timeout_counts_from_where_the_server_took_it(world: World) -> None:
     world.serve()
     world.kill(exec_timeout=10.0)
@@ -192,6 +235,15 @@ def test_one_that_a_restarted_server_does_not_know(
         world.clock.call_later(9.0, lambda: world.handles[-1].set_succeeded(Result(7)))
     assert world.run(machine) == outcome
     assert len(world.ids) == len(set(world.ids)) == sent
+
+
+def test_the_loss_of_one_names_the_ways_out(world: World, caplog: pytest.LogCaptureFixture) -> None:
+    """It told to start the server, which runs."""
+    server = world.serve()
+    world.kill()
+    world.restart(server)
+    assert world.run(world.machine()) == "aborted"
+    assert "Try idempotent=True" in caplog.text
 
 
 def test_one_that_was_written_and_never_sent_is_sent(world: World) -> None:

@@ -8,17 +8,22 @@ import pytest
 
 import smachpy
 from actionlib_core.clock import VirtualClock, use_clock
+from actionlib_core.node import use_node
 from smachpy import Concurrence, InvalidStateError, NotDurableError, State, StateMachine, events
 from smachpy.durable.journal import read_position
 from smachpy.durable.mission import MachineChangedError, OutageError
 from smachpy.durable.store import FencedError, StoreError
 from smachpy.exceptions import MissionError
-from smachpy.run.origin import asking
+from smachpy.run.grace import asking
+from smachpy.states.questions import AnswerRefusedError, find_questions, give_answer
 from tests.smachpy.durable.killing_store import Kill, KillingStore
+from tests.two_nodes import TwoNodes
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from pathlib import Path
+
+    from actionlib_core.clock import Task
 
 
 class Doing(State):
@@ -133,7 +138,71 @@ def test_options_that_have_no_meaning_are_refused(options: dict[str, Any]) -> No
         Doing(fine, **options)
 
 
-def test_an_operator_is_asked(store: KillingStore) -> None:
+@pytest.fixture
+def world() -> Iterator[TwoNodes]:
+    """A network on which operators are asked, in virtual time."""
+    with TwoNodes() as world, use_node(world.mission):
+        yield world
+
+
+def answer(world: TwoNodes, *answers: str) -> Task:
+    """Let an operator answer the questions that are asked in a second, by path."""
+
+    def reply() -> None:
+        world.clock.sleep(1.0)
+        questions = find_questions(world.robot)
+        assert len(questions) == len(answers)
+        for question, word in zip(questions, answers, strict=True):
+            with pytest.raises(AnswerRefusedError):
+                give_answer(question.service, "perhaps", "Ann", node=world.robot)
+            give_answer(question.service, word, "Ann", node=world.robot)
+            world.clock.sleep(1.0)
+
+    return world.clock.spawn(reply, name="operator")
+
+
+@pytest.mark.parametrize(
+    ("word", "outcome", "executed"), [("resume", "ok", 1), ("late", "late", 0)]
+)
+def test_an_operator_answers_on_the_network(
+    store: KillingStore, world: TwoNodes, word: str, outcome: str, executed: int
+) -> None:
+    kill(store, machine_of(Doing(killed, resume="ask"), Doing(fine)))
+    done: list[str] = []
+
+    def do(*_: object) -> str:
+        done.append("it")
+        return "ok"
+
+    operator = answer(world, word)
+    assert go_on(store, machine_of(Doing(do, resume="ask"), Doing(fine))) == outcome
+    operator.join()
+    assert operator.error is None
+    assert len(done) == executed
+
+
+def test_of_two_states_each_waits_for_its_own_answer(store: KillingStore, world: TwoNodes) -> None:
+    def build(do: Callable[..., str]) -> StateMachine:
+        both = Concurrence(["ok", "bad"], "bad", outcome_map={"ok": {"A": "ok", "B": "late"}})
+        both.add("A", Doing(do, resume="ask"))
+        both.add("B", Doing(do, resume="ask"))
+        root = StateMachine(["ok", "bad"], name="M")
+        root.add("BOTH", both)
+        return root
+
+    def dies(*_: object) -> str:
+        world.clock.sleep(1.0)  # both have begun
+        raise Kill
+
+    kill(store, build(dies))
+    operator = answer(world, "resume", "late")
+    assert go_on(store, build(fine)) == "ok"
+    operator.join()
+    assert operator.error is None
+
+
+def test_an_operator_is_asked(store: KillingStore, world: TwoNodes) -> None:
+    del world
     kill(store, machine_of(Doing(killed, resume="ask")))
     machine = machine_of(Doing(killed, resume="ask"))
 
@@ -258,6 +327,36 @@ def test_an_operators_request_holds_on_and_one_of_a_signal_does_not(
     assert go_on(store, machine_of(Doing(asked))) == expected
 
 
+@pytest.mark.parametrize(
+    ("how", "arguments", "ran", "expected"),
+    [
+        ("force_outcome", ("/M/S0", "late"), ["S0"], "late"),
+        ("jump", ("/M/S2",), ["S0", "S2"], "ok"),
+        ("preempt", ("/M/S0",), ["S0"], "skipped"),
+    ],
+)
+def test_what_an_operator_wants_of_one_state_holds_on(
+    store: KillingStore, how: str, arguments: tuple[str, ...], ran: list[str], expected: str
+) -> None:
+    seen: list[str] = []
+
+    def steered(_: State, __: Any) -> str:
+        getattr(machine.control, how)(*arguments)
+        raise Kill
+
+    def asked(label: str) -> Doing:
+        def do(state: State, _: Any) -> str:
+            seen.append(label)
+            return "skipped" if state.preempt_requested() else "ok"
+
+        return Doing(do)
+
+    machine = machine_of(Doing(steered), Doing(fine), Doing(fine))
+    kill(store, machine)
+    assert go_on(store, machine_of(asked("S0"), asked("S1"), asked("S2"))) == expected
+    assert seen == ran
+
+
 def test_a_branch_that_was_stopped_before_stays_so(store: KillingStore) -> None:
     def wait(state: State, _: Any) -> str:
         state.wait_preempt()
@@ -321,6 +420,24 @@ def test_a_path_that_moved_is_followed(store: KillingStore) -> None:
         go_on(store, kill_again, migrate={"/M/OLD": "/M/NEW"})
     assert go_on(store, machine) == "ok"  # it has been said
     assert entered == ["/M/NEW"]
+
+
+def test_a_jump_goes_to_the_state_that_has_another_name_now(store: KillingStore) -> None:
+    def build(label: str, do: Any) -> StateMachine:
+        machine = StateMachine(["ok", "skipped", "late"], name="M")
+        machine.userdata.value = 0
+        with machine:
+            machine.add("FIRST", Doing(do))
+            machine.add(label, Doing(lambda *_: "late"))
+        return machine
+
+    def steered(_: State, __: Any) -> str:
+        machine.control.jump("/M/OLD")
+        raise Kill
+
+    machine = build("OLD", steered)
+    kill(store, machine)
+    assert go_on(store, build("NEW", fine), migrate={"/M/OLD": "/M/NEW"}) == "late"
 
 
 def test_a_function_may_say_what_has_changed_or_refuse(store: KillingStore) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -142,6 +143,7 @@ def live(tree: Tree, world: World, store: KillingStore) -> tuple[str, dict[str, 
     return outcome, dict(values(machine))
 
 
+@pytest.mark.timeout(300)  # hundreds of runs; on a busy machine they take minutes
 @settings(max_examples=60)
 @given(TREES)
 def test_a_run_killed_at_any_write_ends_as_one_that_is_not(tree: Tree) -> None:
@@ -159,6 +161,7 @@ def test_a_run_killed_at_any_write_ends_as_one_that_is_not(tree: Tree) -> None:
             check_deeds(calm, world, exact=written)
 
 
+@pytest.mark.timeout(300)  # hundreds of runs; on a busy machine they take minutes
 @settings(max_examples=60)
 @given(TREES, st.lists(st.tuples(st.integers(1, 8), st.booleans()), min_size=1, max_size=6))
 def test_a_run_killed_again_and_again_ends_as_one_that_is_not(

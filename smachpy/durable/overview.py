@@ -1,0 +1,59 @@
+"""What a store knows of its missions, for those who look: lists, and viewers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from smachpy.durable import structure
+from smachpy.durable.journal import read_position
+from smachpy.durable.store import StoreError
+
+if TYPE_CHECKING:
+    from smachpy.durable.store import MissionRow, Store
+
+
+def overview(store: Store, row: MissionRow) -> dict[str, Any]:
+    """Return what there is to show of a mission, as plain data.
+
+    Returns:
+        `id`, `name`, `target`, `argv`, `status`, `outcome`, `robot`, `created` and `changed` [s
+        since the epoch] and `owner` of its row; `run`, which its recordings carry as well;
+        `active`, the paths of the innermost states that were begun and have not ended;
+        `began_ns` and `last_ns`, when it began and was written last, null before; `outages`, pairs
+        [ns since the epoch]; `ends`, path, begin, end and outcome of the root's newest children
+        that ended; `current`, path and begin of those that have not; `rows`, the root's children if
+        they run side by side, else null; `problem`, why its journal cannot be read, a
+        `smachpy.durable.store.Reason`, or "".
+
+    Blocks: for the store.
+    """
+    names = "id name target argv status outcome robot created changed owner"
+    facts = {name: getattr(row, name) for name in names.split()}
+    facts.update(run=row.run, active=[], problem="", rows=None)
+    facts.update(began_ns=None, last_ns=None, outages=[], ends=[], current=[])
+    try:
+        position = read_position(store, row.id)
+        shape = structure.from_bytes(row.structure)
+    except StoreError as error:
+        return {**facts, "problem": error.reason}
+    except ValueError:
+        return {**facts, "problem": "corrupt"}
+    data = position.data
+    root = shape.get(f"/{row.name}", {})
+    if root.get("kind") == "concurrence":
+        facts["rows"] = [f"/{row.name}/{label}" for label in root["children"]]
+    begun = {"began_ns": data["started_ns"] or None, "last_ns": data["last_ns"] or None}
+    facts.update(begun, active=position.leaves(), outages=data["outages"])
+    return {
+        **facts,
+        "ends": data.get("ends", []),  # older journals have neither these nor `entered_ns`
+        "current": [
+            [path, visit.get("entered_ns", visit["since_ns"])]
+            for path, visit in position.visits.items()
+            if visit["outcome"] is None and path.count("/") == _DEPTH
+        ],
+    }
+
+
+_DEPTH = 2
+"""Slashes in the path of a child of the root."""

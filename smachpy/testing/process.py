@@ -1,0 +1,143 @@
+"""The process of a mission under test, which can be killed: its threads, timers and session."""
+
+from __future__ import annotations
+
+import contextlib
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from actionlib_core.clock import use_clock
+from actionlib_core.node import Node, use_node
+from actionlib_core.wire.presence import Kind
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Coroutine, Iterator
+
+    from actionlib_core.clock import Event, Timer, VirtualClock
+    from actionlib_core.clock._virtual_parts import VirtualTask
+    from actionlib_core.transport.memory import MemoryNetwork
+    from actionlib_core.wire.presence import Endpoint
+
+T = TypeVar("T")
+
+
+class MissionNode(Node):
+    """The mission's node, which tells of the action clients that are made on it.
+
+    Attributes:
+        on_client: Called with the full name and the type of an action, before its client joins.
+    """
+
+    on_client: Callable[[str, str], object] | None = None
+
+    def endpoint(self, kind: Kind, name: str, type_name: str, md5: str) -> Endpoint:
+        """As `Node.endpoint`."""
+        if kind is Kind.ACTION_CLIENT and self.on_client is not None:
+            self.on_client(name, type_name)
+        return super().endpoint(kind, name, type_name, md5)
+
+
+class Killed(BaseException):
+    """The process of a run was killed.
+
+    No `Exception`: what a mission or a test catches of those does not keep the run alive.
+    """
+
+
+class Process:
+    """The clock of one process of a mission, which knows its threads and timers.
+
+    Args:
+        clock: The clock of the test.
+        network: The network of the test; the process has a session of its own.
+
+    Attributes:
+        node: The node of the process.
+        is_killed: Whether `kill` was called.
+    """
+
+    def __init__(self, clock: VirtualClock, network: MemoryNetwork) -> None:
+        self.is_killed = False
+        self._clock = clock
+        self._tasks: list[VirtualTask] = []
+        self._timers: list[Timer] = []
+        self._session = network.session()
+        self.node = MissionNode("mission", transport=self._session, clock=self)
+
+    @contextlib.contextmanager
+    def current(self) -> Iterator[None]:
+        """Let what begins in this block belong to the process; its end ends the process."""
+        with use_clock(self), use_node(self.node):
+            try:
+                yield
+            finally:
+                if not self.is_killed:
+                    self.node.close()
+
+    def run(self, target: Callable[[], T]) -> T:
+        """Call `target` in a thread of the process.
+
+        Raises:
+            Killed: the process was killed meanwhile; none of its threads runs any more.
+        """
+        found: list[T] = []
+        main = self.spawn(lambda: found.append(target()), name="mission")
+        main.join()
+        if self.is_killed:
+            for task in self._tasks:
+                task.join()
+            raise Killed
+        return found[0]
+
+    def kill(self) -> None:
+        """Do to the process what SIGKILL does: nobody hears of it, no time passes.
+
+        Its threads end where they wait, and what they do on their way out reaches nobody.
+        """
+        self.is_killed = True
+        self._session.kill()
+        for timer in self._timers:
+            timer.cancel()
+        self._clock.stop(self._tasks)
+
+    # -- the protocol of clocks ----------------------------------------------------------------
+
+    @property
+    def numbers(self) -> Iterator[int]:
+        """Counts for ids, those of the test's clock: no two processes have the same."""
+        return self._clock.numbers
+
+    def now(self) -> float:
+        """As `Clock.now`."""
+        return self._clock.now()
+
+    def time_ns(self) -> int:
+        """As `Clock.time_ns`."""
+        return self._clock.time_ns()
+
+    def sleep(self, seconds: float) -> None:
+        """As `Clock.sleep`."""
+        self._clock.sleep(seconds)
+
+    def event(self, name: str = "an event") -> Event:
+        """As `Clock.event`."""
+        return self._clock.event(name)
+
+    def spawn(self, target: Callable[[], object], *, name: str) -> VirtualTask:
+        """As `Clock.spawn`."""
+        task = self._clock.spawn(target, name=name)
+        self._tasks.append(task)
+        if self.is_killed:
+            self._clock.stop([task])
+        return task
+
+    def call_later(self, delay: float, callback: Callable[[], object]) -> Timer:
+        """As `Clock.call_later`."""
+        timer = self._clock.call_later(delay, callback)
+        self._timers.append(timer)
+        if self.is_killed:
+            timer.cancel()
+        return timer
+
+    def run_async(self, main: Coroutine[object, object, Any]) -> Any:
+        """As `Clock.run_async`."""
+        return self._clock.run_async(main)
