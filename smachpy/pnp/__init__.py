@@ -48,6 +48,7 @@ from smachpy.pnp.problems import PlanProblem as PlanProblem
 from smachpy.pnp.reach import Reachable as Reachable
 from smachpy.pnp.reach import explore as explore
 from smachpy.pnp.reading import read_net as read_net
+from smachpy.pnp.server import PNPServer as PNPServer
 from smachpy.pnp.text import parse_pddl as parse_pddl
 from smachpy.pnp.text import parse_plan as parse_plan
 from smachpy.pnp.text import parse_rules as parse_rules

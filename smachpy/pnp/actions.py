@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any, Final
 from smachpy.exceptions import InvalidStateError, did_you_mean
 from smachpy.machines.problems import Problems
 from smachpy.machines.state import State
-from smachpy.run.child import on_preempt
 from smachpy.run.frame import clock_of_run
+from smachpy.run.grace import on_preempt
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
     from smachpy.pnp.knowledge import Knowledge
+    from smachpy.pnp.server import PNPServer
 
 OUTCOMES: Final = ("succeeded", "aborted", "preempted")
 
@@ -81,9 +82,9 @@ class Made:
 class Function:
     """An action that a function does, `function(userdata, *parameters)`.
 
-    It may be `async`; a preempt cancels it then. None and true end with 'succeeded', false with
-    'aborted', a text is the outcome. A parameter of the function that is called `robot` gets the
-    robot's name.
+    It may be `async`; a preempt cancels it then. None and true end with 'succeeded', None after a
+    request to stop with 'preempted', false with 'aborted', a text is the outcome. A parameter of
+    the function that is called `robot` gets the robot's name.
 
     Attributes:
         function: The function.
@@ -164,8 +165,10 @@ class FunctionAction(State):
         """
         return self._outcome(self._function(ud, *self._call.values(ud), **self._kwargs))
 
-    @staticmethod
-    def _outcome(result: Any) -> str:
+    def _outcome(self, result: Any) -> str:
+        if result is None and self.preempt_requested():
+            self.service_preempt()
+            return "preempted"
         if result is None or isinstance(result, bool):
             return "aborted" if result is False else "succeeded"
         outcome: str = result
@@ -295,10 +298,14 @@ class Binder:
             class of states (called with the parameters), a function (called with the userdata and
             the parameters), `Function`, `Goal`, or `Made`.
         built_in: Name -> function that makes the state from the call.
+        server: Does what nothing else does; see `PNPServer`.
     """
 
     def __init__(
-        self, actions: Mapping[str, Any] | None, built_in: Mapping[str, Callable[[Call], State]]
+        self,
+        actions: Mapping[str, Any] | None,
+        built_in: Mapping[str, Callable[[Call], State]],
+        server: PNPServer | None = None,
     ) -> None:
         problems = Problems("actions")
         holds = "name -> state, class of states, function, Function, Goal or Made"
@@ -308,7 +315,10 @@ class Binder:
             if not (isinstance(name, str) and name and fits):
                 problems.add(f"got {name!r}: {given!r}; expected {holds}.")
         problems.raise_all()
+        if server is not None:
+            built_in = {name: built_in[name] for name in built_in.keys() & server.LOCAL}
         self._built_in = built_in
+        self._server = server
         self._taken: dict[int, str] = {}
 
     def has(self, name: str) -> bool:
@@ -325,6 +335,8 @@ class Binder:
         try:
             if given is None and call.action in self._built_in:
                 return self._built_in[call.action](call), ""
+            if given is None and self._server is not None:
+                return self._server.state(call), ""
             if given is None:
                 return Unbound(call), _unknown(call, known)
             return self._made(call, given), ""

@@ -134,7 +134,7 @@ class Action(Part):
         problems = Problems(self.name)
         checked = problems.seconds("within", seconds, optional=False)
         problems.raise_all()
-        return replace(self, seconds=f"{checked:g}")
+        return replace(self, seconds=f"{checked:.9f}".rstrip("0").rstrip("."))
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
@@ -14,7 +15,7 @@ from smachpy.machines.state import DataOf, Shown
 from smachpy.pnp.actions import Binder, Order, SetVariable, Unbound, Wait, WaitFor
 from smachpy.pnp.execution import Execution
 from smachpy.pnp.firing import Table
-from smachpy.pnp.knowledge import EVENT_LIFE_S, Knowledge
+from smachpy.pnp.knowledge import BUILT_IN, EVENT_LIFE_S, Knowledge
 from smachpy.pnp.net import Net
 from smachpy.pnp.plan import Plan, problem_of, understand
 from smachpy.pnp.problems import PlanError, PlanProblem, raise_errors
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from smachpy.introspection import Kind
     from smachpy.machines.state import StateOptions
     from smachpy.pnp.knowledge import Events
+    from smachpy.pnp.server import PNPServer
     from smachpy.run.frame import Frame
     from smachpy.userdata.typed import Fields
     from smachpy.userdata.user_data import UserData
@@ -123,13 +125,10 @@ class Parameters(NamedTuple):
 
     actions: Mapping[str, Any]
     conditions: Mapping[str, Any]
-    strict: bool
-    events: Events
-    event_life: float
-
-
-def _is_built_in(name: str) -> bool:
-    return name == "true" or name.startswith(("timeout_", "equal_", "equals_"))
+    strict: bool = False
+    events: Events = "once"
+    event_life: float = EVENT_LIFE_S
+    server: PNPServer | None = None
 
 
 class PetriNetPlan(Container):
@@ -157,6 +156,7 @@ class PetriNetPlan(Container):
             until "not_" and its name is posted.
         event_life: An event that nobody has read is forgotten after so long [s]; with "once".
         sub_plans: Name of an action -> the plan that does it.
+        server: A robot that does the other actions and knows the other conditions.
         input_keys: Keys copied from the parent's userdata when it starts.
         output_keys: Keys copied to the parent's userdata when it ends.
         name: Name when it is the root; default: the net's.
@@ -190,6 +190,7 @@ class PetriNetPlan(Container):
         events: Events = "once",
         event_life: float = EVENT_LIFE_S,
         sub_plans: Mapping[str, PetriNetPlan] | None = None,
+        server: PNPServer | None = None,
         input_keys: Iterable[str] = (),
         output_keys: Iterable[str] = (),
         name: str | None = None,
@@ -216,7 +217,7 @@ class PetriNetPlan(Container):
         values = _Noting(before) if checked is None else _NotingChecked(checked.fields)
         object.__setattr__(self.userdata, "_data", values)
         data.knowledge = Knowledge(
-            conditions, lambda: self.userdata, events=events, life=event_life
+            conditions, lambda: self.userdata, events=events, life=event_life, server=server
         )
         if any(map(callable, data.knowledge.sources.values())):
             values.on_write = data.knowledge.changed
@@ -225,7 +226,7 @@ class PetriNetPlan(Container):
         given = problems.mapping("actions", actions, "name -> what does it")
         problems.raise_all()
         data.has_actions = bool(given)
-        self.__bind(Binder({**subs, **given}, self.__built_in()))
+        self.__bind(Binder({**subs, **given}, self.__built_in(), server))
 
     def __built_in(self) -> dict[str, Any]:
         return {
@@ -299,31 +300,40 @@ class PetriNetPlan(Container):
         return {p: labels[name] for name, known in executables.items() for p in known.places}
 
     def find_problems(self, where: str) -> tuple[str, ...]:
-        """Return what keeps the plan from running: actions without anything that does them."""
-        unbound = [str(problem) for problem in self.__unbound()]
-        return (*(f"{where}: {problem}" for problem in unbound), *self.__shared_states(where))
+        """Return what keeps the plan from running: wrong labels, actions that nothing does."""
+        errors = [p for p in self._smachpy.net_plan.problems if p.severity == "error"]
+        unbound = self.__unbound()
+        if len(unbound) > 1 and not self._smachpy.has_actions:
+            unbound = [self.__no_actions()]
+        wrong = [f"{where}: {problem}" for problem in (*errors, *unbound)]
+        return (*wrong, *self.__shared_states(where))
 
     def __unbound(self) -> list[PlanProblem]:
         """Return the problems of actions that nothing does, not even a double."""
         data = self._smachpy
         return [p for label, p in data.unbound.items() if isinstance(data.children[label], Unbound)]
 
+    def __no_actions(self) -> PlanProblem:
+        """Return the one problem of a plan of which nobody has said what does its actions."""
+        plan = self._smachpy.net_plan
+        names = sorted({name.rpartition("#")[2].partition("_")[0] for name in plan.executables})
+        text = f"runs once it is said what does its actions: {', '.join(names)}."
+        hint = "Try a file actions.yaml beside it, or actions={...}."
+        return problem_of(plan.net, "unbound", "note", text, hint=hint)
+
     def binding_problems(self) -> tuple[PlanProblem, ...]:
         """Return the actions and conditions that nothing is registered for."""
         plan, knowledge = self._smachpy.net_plan, self._smachpy.knowledge
         found = self.__unbound()
         if found and not self._smachpy.has_actions:
-            names = sorted({name.rpartition("#")[2].partition("_")[0] for name in plan.executables})
-            text = f"runs once it is said what does its actions: {', '.join(names)}."
-            hint = "Try a file actions.yaml beside it, or actions={...}."
-            found = [problem_of(plan.net, "unbound", "note", text, hint=hint)]
+            found = [self.__no_actions()]
         table = _Compiled(self).table
         asked = {
             name: number
             for number, guard in reversed(tuple(enumerate(table.guards)))
             if guard is not None
             for name in guard.atoms()
-            if name not in table.asks
+            if name not in table.asks and not knowledge.asks_server(name)
         }
         if not knowledge.sources:
             names = sorted(asked)
@@ -332,7 +342,7 @@ class PetriNetPlan(Container):
                 found.append(problem_of(plan.net, "unknown-condition", "note", text))
             return tuple(found)
         for name, number in asked.items():
-            if knowledge.source_of(name) is None and not _is_built_in(name):
+            if knowledge.source_of(name) is None and not name.startswith(BUILT_IN):
                 text = (
                     f"asks for {name!r}, which is no condition; expected one of "
                     f"{sorted(knowledge.sources)}, or an event that the program posts."
@@ -483,6 +493,7 @@ def load(
     strict: bool = False,
     events: Events = "once",
     event_life: float = EVENT_LIFE_S,
+    server: PNPServer | None = None,
     **options: Any,
 ) -> PetriNetPlan:
     """Load a plan from a file: `.pnml`, or a text form, `.plan` or `.pddlout`.
@@ -498,25 +509,44 @@ def load(
         strict: Likewise.
         events: Likewise.
         event_life: Likewise.
+        server: Likewise.
         **options: Likewise.
 
     Raises:
         PlanError: it cannot be read, or has errors; all problems at once, its sub-plans' too.
         InvalidStateError: an argument is wrong.
     """
-    parameters = Parameters(actions or {}, conditions or {}, strict, events, event_life)
-    return _load(Path(file), parameters, (), options)
+    parameters = Parameters(actions or {}, conditions or {}, strict, events, event_life, server)
+    plan = read_plan(file, parameters, options)
+    raise_errors(plan.problems)
+    return plan
 
 
 _DEEPEST = 20
 
 
-def _load(
-    file: Path, parameters: Parameters, above: tuple[Path, ...], options: Mapping[str, Any]
+def read_plan(
+    file: Path | str,
+    parameters: Parameters,
+    options: Mapping[str, Any] | None = None,
+    above: tuple[Path, ...] = (),
 ) -> PetriNetPlan:
+    """Load a plan to look at: one with errors in its labels is drawn and checked, but does not run.
+
+    Args:
+        file: As for `load`.
+        parameters: Of the plan and its sub-plans.
+        options: Of the plan.
+        above: The files of the plans that it is a sub-plan of.
+
+    Raises:
+        PlanError: as for `load`, but for errors in its labels.
+        InvalidStateError: an argument is wrong.
+    """
+    file = Path(file)
     net, problems = read_net(file)
     plan = understand(net, strict=parameters.strict, problems=problems)
-    found = list(plan.problems)
+    found: list[PlanProblem] = []
     stack = (*above, file.resolve())
     subs: dict[str, PetriNetPlan] = {}
     for name, known in plan.executables.items():
@@ -529,16 +559,20 @@ def _load(
             found.append(PlanProblem("recursion", "error", text, "", net.file, line))
             continue
         try:
-            subs[name] = _load(part, parameters, stack, {})
+            subs[name] = read_plan(part, parameters, above=stack)
         except PlanError as error:
             found += error.found
     raise_errors(found)
-    return PetriNetPlan(
-        plan,
+    runnable = tuple(problem for problem in plan.problems if problem.severity != "error")
+    machine = PetriNetPlan(
+        replace(plan, problems=runnable),
         parameters.actions,
         parameters.conditions,
         events=parameters.events,
         event_life=parameters.event_life,
         sub_plans=subs,
-        **options,
+        server=parameters.server,
+        **(options or {}),
     )
+    machine._smachpy.net_plan = plan
+    return machine

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any
 from smachpy import log
 from smachpy.events import Fired, HeldBack, Preempted
 from smachpy.exceptions import SmachError
-from smachpy.pnp.actions import take_apart
-from smachpy.run.branches import ChildBranch, Group
+from smachpy.pnp.actions import Order, take_apart
+from smachpy.pnp.firing import called
 from smachpy.run.callback import call_bounded
-from smachpy.run.child import on_preempt
-from smachpy.run.grace import ask_child, end_visit, unknown_outcome
+from smachpy.run.grace import ask_child, asking, end_visit, on_preempt, unknown_outcome
 from smachpy.run.interrupt import Interruption
-from smachpy.run.origin import asking
-from smachpy.run.runner import run_watched, user_error
+from smachpy.run.step import run_watched, user_error
+from smachpy.run.threads import ChildBranch, Group
 from smachpy.run.visit import Why
 
 if TYPE_CHECKING:
@@ -50,7 +49,9 @@ class Branches(Group):
         try:
             self.frame.run.clock.spawn(branch.work, name=branch.here())
         except RuntimeError as error:  # the system gives no more threads
-            branch.end(None, error)
+            waiting = branch.end(None, error)
+            if waiting is not None:
+                waiting.set()
         return branch
 
     def running(self) -> list[Any]:
@@ -120,6 +121,7 @@ class Execution:
         ]
         try:
             with self._knowledge.listening():
+                self._resume()
                 outcome = self._go()
             self._stop_all("the plan has ended")
             self.branches.raise_errors(None)
@@ -159,12 +161,40 @@ class Execution:
             else:
                 return self._stuck(moment)
 
+    def _resume(self) -> None:
+        """Go on where an earlier process was, if the journal knows of one."""
+        journal = self._frame.run.journal
+        resumed = None if journal is None else journal.resumed_plan(self._frame)
+        if resumed is None:
+            return
+        marking, children = resumed
+        numbers, clock = self._net.place_numbers, self._frame.run.clock
+        self.moment = self._table.moment(tuple(sorted(numbers[place] for place in marking)))
+        now, now_ns = clock.now(), clock.time_ns()
+        begun: list[str] = []
+        for label, visit in children.items():
+            if visit.get("stopping"):
+                self.branches.begin(self._steps[label])
+                if visit.get("again"):
+                    self._begin_again.add(label)
+            elif visit["outcome"] is None or isinstance(self._steps[label].state, Order):
+                begun.append(label)  # an order that was obeyed has left no visit
+            else:
+                self._ended[label] = visit["outcome"]
+        self._begin_all(begun)
+        for label in self._since:
+            begun_ns = children[label].get("begun_ns", now_ns)
+            self._since[label] = now - (now_ns - begun_ns) / 1e9
+
     # -- firing --------------------------------------------------------------------------------
 
     def _chosen(self, moment: Moment) -> Jump | None:
         """Return what the guards let happen now."""
         if not moment.candidates:
             return None
+        if not any(moment.guards):
+            moment.free = self._table.jump(moment, (), moment.candidates)
+            return moment.free
         if moment.only is not None:
             key: object = self._ended.get(moment.only)
         else:
@@ -220,39 +250,48 @@ class Execution:
 
     def _take(self, jump: Jump) -> Moment:
         """Fire, begin and end actions; return what follows."""
-        run = self._frame.run
+        run, running = self._frame.run, self._running
         self.moment = moment = jump.moment
         self._told = None
+        ends, begins = jump.ends, jump.begins
+        if running:
+            ends, begins = called(jump.calls, running)
         if run.watched:
+            if run.journal is not None:
+                self._keep(jump.fired, moment, ends, begins)
             self._tell_fired(jump)
-        begun = self._call(jump) if jump.calls else ()
-        if begun:
-            if len(begun) == 1 and moment.only == begun[0] and not self.branches.branches:
-                self._run_here(self._steps[begun[0]])
-            else:
-                for label in begun:
-                    self._begin(label)
+        for label in ends:
+            self._ended.pop(label, None)
+            self._begin_again.discard(label)
+            if label in running:
+                self._end(label, jump)
+        if begins:
+            self._begin_all(begins)
         if self._machine._smachpy.transition_cbs:
             self._machine.call_transition_cbs()
         return moment
 
-    def _call(self, jump: Jump) -> list[str]:
-        """End actions, and return the labels of those that begin."""
-        begun: list[str] = []
-        for label, begins in jump.calls:
-            if not begins:
-                self._ended.pop(label, None)
-                self._begin_again.discard(label)
-                if label in begun:
-                    begun.remove(label)
-                if label in self._running:
-                    self._end(label, jump)
-            elif label not in self._running and label not in begun:
-                self._ended.pop(label, None)
-                begun.append(label)
-        return begun
+    def _keep(
+        self, fired: Sequence[int], moment: Moment, ends: Sequence[str], begins: Sequence[str]
+    ) -> None:
+        """Write what happens to the journal, before anybody acts on it."""
+        net, journal = self._net, self._frame.run.journal
+        assert journal is not None
+        transitions = [net.transitions[number].id for number in fired]
+        marking = [net.places[place].id for place in moment.marking]
+        journal.fired(self._frame, transitions, marking, ends, begins)
 
     # -- actions -------------------------------------------------------------------------------
+
+    def _begin_all(self, labels: Sequence[str]) -> None:
+        """Let actions begin: in this thread, when nothing can happen before the only one ends."""
+        for label in labels:
+            self._ended.pop(label, None)
+        if len(labels) == 1 and self.moment.only == labels[0] and not self.branches.branches:
+            self._run_here(self._steps[labels[0]])
+            return
+        for label in labels:
+            self._begin(label)
 
     def _begin(self, label: str) -> None:
         if any(branch.step.label == label for branch in self.branches.threads()):
@@ -279,7 +318,11 @@ class Execution:
                 frame.step = None
                 return
             try:
-                outcome = self._followed(frame, step, self._once(frame, step))
+                if frame.run.watched or frame.run.control is not None:
+                    outcome = self._once(frame, step)
+                else:
+                    outcome = step.execute(step.userdata)
+                outcome = self._followed(frame, step, outcome)
             except Interruption:
                 if frame.dead:
                     raise
@@ -351,6 +394,9 @@ class Execution:
 
         Blocks: until then.
         """
+        journal = self._frame.run.journal
+        if journal is not None:
+            journal.note_conditions(self._frame)
         self._tell_waiting(moment)
         if not self.branches.reports:
             self.branches.wait_for_news(self._longest_wait(moment))
@@ -478,6 +524,8 @@ class Execution:
             self._stop_all("the plan starts again")
             self._ended.clear()
             self.moment = self._table.moment(self._net.initial)
+            if self._frame.run.journal is not None:
+                self._keep((), self.moment, list(self._steps), ())
             return None
         number = self._net.transition_numbers[which]
         if self._net.has_tokens(self.moment.marking, number):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import math
 import re
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from smachpy.introspection import describe
 from smachpy.machines.concurrence import Concurrence
@@ -16,13 +17,31 @@ from smachpy.outcome_classes import is_good
 from smachpy.pnp.conditions import ConditionError, parse
 from smachpy.pnp.container import PetriNetPlan
 from smachpy.pnp.net import Arc, Net, Place, Transition
+from smachpy.pnp.reach import explore
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from smachpy.introspection import StateRecord
     from smachpy.machines.state import State
 
-MOST_COMBINATIONS = 1000
+PREEMPTED: Final = "preempted"
+MOST_COMBINATIONS: Final = 1000
 """Of the outcomes of a concurrence's children."""
+
+
+class Stop(NamedTuple):
+    """How a child of a concurrence is preempted.
+
+    Attributes:
+        place: Holds a token once it is asked to stop.
+        goes_on: Holds that token before, and again once the child has taken the request up.
+        deep: This is a machine in a machine below the child.
+    """
+
+    place: str
+    goes_on: str
+    deep: bool = False
 
 
 class Exported(NamedTuple):
@@ -45,6 +64,10 @@ def export_net(machine: Container) -> Exported:
     its ends. Outcomes of the machine that sound good lead to the goal, the others to the failed
     plan. Userdata, remappings and options are no part of a net.
 
+    The callbacks of a concurrence that decide are called, once for each combination of outcomes
+    that they can be asked about, and their answers are written: of one that looks at more than its
+    argument, the net knows what it said now.
+
     Raises:
         InconsistentMachineError: the machine does not hold together.
         InvalidStateError: something in it cannot be written as a net; all problems at once.
@@ -66,6 +89,7 @@ class _Writer:
         self._transitions: list[Transition] = []
         self._arcs: list[Arc] = []
         self._states: dict[str, str] = {}
+        self._answers: set[str] = set()  # transitions for what callbacks may be asked about
         self._problems = Problems(f"export of {record.path}")
 
     def write(self, machine: State, record: StateRecord) -> None:
@@ -80,32 +104,54 @@ class _Writer:
 
     def exported(self) -> Exported:
         self._problems.raise_all()
-        return Exported(
-            Net(self._name, tuple(self._places), tuple(self._transitions), tuple(self._arcs)),
-            self._states,
-        )
+        places, transitions, arcs = tuple(self._places), self._transitions, self._arcs
+        net = Net(self._name, places, tuple(transitions), tuple(arcs))
+        if self._answers:
+            reachable = explore(net)
+            gone = {
+                each.id
+                for number, each in enumerate(transitions)
+                if reachable.complete and each.id in self._answers
+                if number not in reachable.fired
+            }
+            transitions = [each for each in transitions if each.id not in gone]
+            arcs = [arc for arc in arcs if not {arc.source, arc.target} & gone]
+            used = {end for arc in arcs for end in (arc.source, arc.target)}
+            places = tuple(place for place in places if place.id in used)
+            net = Net(self._name, places, tuple(transitions), tuple(arcs))
+        return Exported(net, self._states)
 
     def _place(self, name: str, tokens: int = 0) -> str:
         identity = f"p{len(self._places)}"
         self._places.append(Place(identity, name, tokens))
         return identity
 
-    def _fire(self, name: str, inputs: list[str], outputs: list[str]) -> None:
+    def _fire(self, name: str, inputs: list[str], outputs: list[str]) -> str:
         identity = f"t{len(self._transitions)}"
         self._transitions.append(Transition(identity, name))
         self._arcs += [Arc(place, identity) for place in inputs]
         self._arcs += [Arc(identity, place) for place in outputs]
+        return identity
 
-    def _state(self, state: State, record: StateRecord, begin: str) -> dict[str, str]:
+    def _state(
+        self, state: State, record: StateRecord, begin: str, stop: Stop | None = None
+    ) -> dict[str, str]:
         """Add a state that begins at a place; return outcome -> place where it has ended so."""
         if type(state).execute is Container.execute and "execute" not in vars(state):
             if isinstance(state, Concurrence):
+                if stop is not None:
+                    self._problems.add(
+                        f"{record.path}: concurrence: got one that another concurrence preempts; "
+                        "expected machines and states there."
+                    )
                 return self._concurrence(state, record, begin)
             if isinstance(state, StateMachine):
-                return self._machine(state, record, begin)
-        return self._action(record, begin)
+                return self._machine(state, record, begin, stop)
+        return self._action(state, record, begin, stop)
 
-    def _action(self, record: StateRecord, begin: str) -> dict[str, str]:
+    def _action(
+        self, state: State, record: StateRecord, begin: str, stop: Stop | None
+    ) -> dict[str, str]:
         path = record.path.removeprefix(self._root).strip("/") or record.label
         name = re.sub(r"[^\w@#<>+^{},-]", "_", path)
         while name in self._states or name in {"goal", "fail"}:
@@ -126,57 +172,167 @@ class _Writer:
                 )
             ends[outcome] = self._place(_plain(f"{name} {outcome}"))
             self._fire(f"{name}.end [{outcome}]", [place], [ends[outcome]])
+        if stop is not None and isinstance(state, Container) and PREEMPTED not in ends:
+            ends[PREEMPTED] = self._place(_plain(f"{name} {PREEMPTED}"))  # declared or not
+        if stop is not None and PREEMPTED in ends:
+            self._fire(f"{name}.interrupt", [place, stop.place], [ends[PREEMPTED], stop.goes_on])
         return ends
 
-    def _machine(self, machine: StateMachine, record: StateRecord, begin: str) -> dict[str, str]:
+    def _machine(
+        self, machine: StateMachine, record: StateRecord, begin: str, stop: Stop | None
+    ) -> dict[str, str]:
         words = record.path.removeprefix(self._root).strip("/").replace("/", " ")
         entries = {c.label: self._place(_plain(f"{words} {c.label}")) for c in record.children}
         outs = {o: self._place(_plain(f"{words} {o}")) for o in record.outcomes}
+        inner = None
+        if stop is not None:
+            inner = stop._replace(deep=True)
+            if PREEMPTED not in outs:  # it ends so, declared or not
+                outs[PREEMPTED] = self._place(_plain(f"{words} {PREEMPTED}"))
+            for entry in entries.values():  # before the transitions that begin what is next
+                self._fire("stopped", [entry, stop.place], [outs[PREEMPTED], stop.goes_on])
         for label in record.initial:
             self._fire("", [begin], [entries[label]])
         children = machine.get_children()
         for child in record.children:
-            ends = self._state(children[child.label], child, entries[child.label])
+            ends = self._state(children[child.label], child, entries[child.label], inner)
             for edge in record.transitions:
-                if edge.source == child.label and edge.outcome in ends:
-                    target = outs if edge.target_is_outcome else entries
-                    self._fire(_plain(edge.outcome), [ends[edge.outcome]], [target[edge.target]])
+                if edge.source != child.label or edge.outcome not in ends:
+                    continue
+                target = outs if edge.target_is_outcome else entries
+                self._fire(_plain(edge.outcome), [ends.pop(edge.outcome)], [target[edge.target]])
+                if stop and stop.deep and edge.outcome == PREEMPTED and target is entries:
+                    self._problems.add(
+                        f"{child.path}: preempted: got {edge.target!r}; expected an outcome of its "
+                        "machine, as that is in a machine that a concurrence preempts."
+                    )
+            if PREEMPTED in ends:  # undeclared: the machine ends so, too
+                self._fire(PREEMPTED, [ends[PREEMPTED]], [outs[PREEMPTED]])
         return outs
 
     def _concurrence(self, state: Concurrence, record: StateRecord, begin: str) -> dict[str, str]:
         data = state._smachpy
-        if data.outcome_cb is not None or data.child_termination_cb is not None:
-            self._problems.add(
-                f"{record.path}: concurrence: got a callback that decides; expected an outcome_map "
-                "alone: a net holds no Python."
-            )
-            return {}
-        begins = [self._place(_plain(f"{c.label} begins")) for c in record.children]
-        self._fire("fork", [begin], begins)
         children = state.get_children()
-        ends = [
-            self._state(children[child.label], child, place)
-            for child, place in zip(record.children, begins, strict=True)
-        ]
-        count = 1
-        for each in ends:
-            count *= len(each)
+        preempts = data.child_termination_cb is not None
+        begins = [self._place(_plain(f"{c.label} begins")) for c in record.children]
+        asks: dict[str, tuple[str, str]] = {}
+        stops: list[Stop | None] = [None] * len(begins)
+        if preempts:
+            asks = {
+                c.label: (
+                    self._place(_plain(f"{c.label} runs on")),
+                    self._place(_plain(f"{c.label} is to stop")),
+                )
+                for c in record.children
+            }
+            stops = [Stop(stop, goes_on) for goes_on, stop in asks.values()]
+        self._fire("fork", [begin], [*begins, *(goes_on for goes_on, _ in asks.values())])
+        ends = {
+            child.label: self._state(children[child.label], child, place, stop)
+            for child, place, stop in zip(record.children, begins, stops, strict=True)
+        }
+        count = math.prod(2 + len(each) if preempts else len(each) for each in ends.values())
         if count > MOST_COMBINATIONS:
             self._problems.add(
                 f"{record.path}: concurrence: got {count} combinations of outcomes; expected at "
                 f"most {MOST_COMBINATIONS}."
             )
             return {}
+        try:
+            if preempts:
+                ends = self._preempting(state, ends, asks)
+            return self._joined(state, record, ends)
+        except Exception as error:  # noqa: BLE001  the user's callback
+            self._problems.add(
+                f"{record.path}: concurrence: a callback that decides raised "
+                f"{type(error).__name__}: {error}; expected an answer to each combination of "
+                "outcomes."
+            )
+            return {}
+
+    def _joined(
+        self, state: Concurrence, record: StateRecord, ends: dict[str, dict[str, str]]
+    ) -> dict[str, str]:
+        """Add what follows when all children have ended."""
+        data = state._smachpy
         outs: dict[str, str] = {}
-        labels = [child.label for child in record.children]
-        for chosen in itertools.product(*ends):
-            ruled = decide(data.rules, dict(zip(labels, chosen, strict=True)))
-            outcome = data.default_outcome if ruled is None else ruled[0]
+        for chosen in itertools.product(*ends.values()):
+            outcomes: dict[str, str | None] = dict(zip(ends, chosen, strict=True))
+            answer = None if data.outcome_cb is None else data.outcome_cb(dict(outcomes))
+            ruled = decide(data.rules, outcomes)
+            outcome = answer or (data.default_outcome if ruled is None else ruled[0])
+            if outcome not in record.outcomes:
+                raise ValueError(f"outcome_cb returned {outcome!r}")
             if outcome not in outs:
                 outs[outcome] = self._place(_plain(f"{record.label} {outcome}"))
-            places = [each[one] for each, one in zip(ends, chosen, strict=True)]
-            self._fire(_plain(f"join {' '.join(chosen)}"), places, [outs[outcome]])
+            places = [each[one] for each, one in zip(ends.values(), chosen, strict=True)]
+            joined = self._fire(_plain(f"join {' '.join(chosen)}"), places, [outs[outcome]])
+            if data.child_termination_cb is not None:
+                self._answers.add(joined)
         return outs
+
+    def _preempting(
+        self,
+        state: Concurrence,
+        ends: dict[str, dict[str, str]],
+        asks: dict[str, tuple[str, str]],
+    ) -> dict[str, dict[str, str]]:
+        """Add what `child_termination_cb` answers each time a child has ended.
+
+        Args:
+            state: The concurrence.
+            ends: Label -> outcome -> place where the child has ended so.
+            asks: Label -> the place that holds a token while the child runs on, and the one that
+                does when it is asked to stop.
+
+        Returns:
+            As `ends`, after the callback has been asked.
+        """
+        ask = state._smachpy.child_termination_cb
+        assert ask is not None
+        done = {
+            label: {o: self._place(_plain(f"{label} {o} seen")) for o in places}
+            for label, places in ends.items()
+        }
+        for label, places in ends.items():
+            others = [other for other in ends if other != label]
+            # Of each other child: None it runs on, True it is asked to stop, or its outcome.
+            known = [[None, True, *ends[other]] for other in others]
+            for outcome, end in places.items():
+                for stands in itertools.product(*known):
+                    how = dict(zip(others, stands, strict=True))
+                    outcomes = {
+                        each: outcome if each == label else _outcome(how[each]) for each in ends
+                    }
+                    asked = _labels(ask(dict(outcomes)), ends)
+                    before, after = [end], [done[label][outcome]]
+                    for other, stand in how.items():
+                        goes_on, stop = asks[other]
+                        if stand is None:
+                            before.append(goes_on)
+                            after.append(stop if other in asked else goes_on)
+                        else:
+                            place = stop if stand is True else done[other][str(stand)]
+                            before.append(place)
+                            after.append(place)
+                    for own in asks[label]:
+                        name = _plain(f"{label} {outcome}")
+                        self._answers.add(self._fire(name, [*before, own], after))
+        return done
+
+
+def _outcome(stand: object) -> str | None:
+    return stand if isinstance(stand, str) else None
+
+
+def _labels(answer: Any, known: Collection[str]) -> set[str]:
+    """Return the children that an answer of `child_termination_cb` preempts."""
+    if answer is True or answer is False or answer is None:
+        return set(known) if answer else set()
+    labels = {answer} if isinstance(answer, str) else set(answer)
+    if not labels <= set(known):
+        raise ValueError(f"child_termination_cb returned {answer!r}")
+    return labels
 
 
 def _plain(text: str) -> str:

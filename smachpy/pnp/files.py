@@ -6,14 +6,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from smachpy import log
-from smachpy.pnp.container import load
+from smachpy.pnp.container import Parameters, read_plan
 from smachpy.pnp.mapping import Registered, mapping_beside, read_mapping
+from smachpy.pnp.problems import raise_errors
 
 if TYPE_CHECKING:
     from smachpy.pnp.container import PetriNetPlan
 
 
-def load_plan(file: Path | str, mapping: Path | str | None = None) -> PetriNetPlan:
+def load_plan(
+    file: Path | str, mapping: Path | str | None = None, *, to_run: bool = True
+) -> PetriNetPlan:
     """Load a plan, with the actions and conditions that its mapping file names.
 
     What is doubtful about it goes to the log.
@@ -21,6 +24,7 @@ def load_plan(file: Path | str, mapping: Path | str | None = None) -> PetriNetPl
     Args:
         file: The plan.
         mapping: The mapping file (`smachpy.pnp.mapping`); None looks for one beside the plan.
+        to_run: False: a plan with errors in its labels is loaded, too; it does not run.
 
     Raises:
         PlanError: one of the files is wrong; all problems at once.
@@ -28,7 +32,9 @@ def load_plan(file: Path | str, mapping: Path | str | None = None) -> PetriNetPl
     path = Path(file)
     beside = mapping_beside(path) if mapping is None else Path(mapping)
     given = Registered() if beside is None else read_mapping(beside)
-    plan = load(path, given.actions, given.conditions, **given.options)
+    plan = read_plan(path, Parameters(given.actions, given.conditions, **given.options))
+    if to_run:
+        raise_errors(plan.problems)
     for problem in plan.problems:
         if problem.severity == "warning":
             log.logwarn(str(problem))

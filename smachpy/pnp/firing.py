@@ -16,7 +16,7 @@ from smachpy.pnp.conditions import Condition
 from smachpy.pnp.labels import BEGINS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping
+    from collections.abc import Callable, Collection, Container, Mapping
 
     from smachpy.pnp.net import Marking
     from smachpy.pnp.plan import Plan
@@ -63,11 +63,31 @@ class Jump(NamedTuple):
         fired: Transitions, in their order.
         calls: Pairs (label, True: it begins, False: it ends), in their order.
         moment: What follows.
+        ends: Labels of the actions that end, when none runs.
+        begins: Labels of those that begin, likewise.
     """
 
     fired: tuple[int, ...]
     calls: tuple[tuple[str, bool], ...]
     moment: Moment
+    ends: tuple[str, ...]
+    begins: tuple[str, ...]
+
+
+def called(
+    calls: Collection[tuple[str, bool]], running: Container[str]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the labels of the actions that end, and then of those that begin."""
+    ends: list[str] = []
+    begins: list[str] = []
+    for label, begin in calls:
+        if not begin:
+            ends.append(label)
+            if label in begins:
+                begins.remove(label)
+        elif (label not in running or label in ends) and label not in begins:
+            begins.append(label)
+    return tuple(ends), tuple(begins)
 
 
 class Moment:
@@ -78,7 +98,7 @@ class Moment:
         end: Outcome of the plan here: "goal", "fail", or None.
         candidates: Transitions that have their tokens.
         guards: Their guards.
-        free: What happens, when it needs no guard; None else.
+        free: What happens, when it needs no guard and is known already; None else.
         only: The one action that all guards ask about, if they ask nothing else: nothing can
             happen before it ends.
         asks_world: Names that the guards ask the world for.
@@ -170,8 +190,6 @@ class Table:
         found = self._moments.get(marking)
         if found is None:
             found = self._moments[marking] = Moment(self, marking)
-            if found.candidates and not any(found.guards):
-                found.free = self._jump(found, found.candidates)
         return found
 
     def jump(self, moment: Moment, key: object, true: Collection[int]) -> Jump | None:
@@ -205,7 +223,7 @@ class Table:
             for transition in fired
             for name, function in plan.calls[transition]
         )
-        return Jump(tuple(fired), calls, self._made(marking, moment))
+        return Jump(tuple(fired), calls, self._made(marking, moment), *called(calls, ()))
 
     def _made(self, marking: Marking, moment: Moment) -> Moment:
         return moment if marking == moment.marking else self.moment(marking)

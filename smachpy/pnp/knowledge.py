@@ -16,6 +16,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 
+from actionlib_core.clock import current_clock
 from smachpy import log
 from smachpy.exceptions import InvalidUserCodeError
 from smachpy.machines.problems import Problems
@@ -24,10 +25,13 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from actionlib_core.clock import Clock
+    from smachpy.pnp.server import PNPServer
 
 EVENT_LIFE_S: Final = 2.0
 Events: TypeAlias = Literal["once", "lasting"]
 _MOST_EVENTS: Final = 1000
+BUILT_IN: Final = ("timeout_", "equal_", "equals_", "true", "action_failed")
+"""Beginnings of the names that plans answer themselves."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,12 +155,14 @@ class Knowledge:
         events: "once": an event is used up by the first guard that reads it, and forgotten after
             `life`, as in PNP. "lasting": it holds until its opposite is posted.
         life: [s].
+        server: Knows what nobody else knows; see `PNPServer`.
 
     Raises:
         InvalidStateError: an argument is wrong; all problems at once.
 
     Attributes:
         dropped: Events that were dropped because so many waited for a guard.
+        changes: Counts the changes of what `kept` returns.
 
     Threads: `post`, `set` and `subscribe` from any thread; `value` from the plan's and from those
         of its actions.
@@ -169,7 +175,9 @@ class Knowledge:
         *,
         events: Events = "once",
         life: float = EVENT_LIFE_S,
+        server: PNPServer | None = None,
     ) -> None:
+        self._server = server if server is not None and server.conditions else None
         problems = Problems("conditions")
         holds = "name -> function, Expression, TopicCondition, Polled, or true or false"
         self.sources = problems.mapping("conditions", conditions, holds)
@@ -187,7 +195,7 @@ class Knowledge:
         problems.raise_all()
         self._events = events
         self._userdata = userdata
-        self.dropped = 0
+        self.dropped = self.changes = 0
         self._lock = threading.Lock()
         self._posted: deque[tuple[str, float | None]] = deque(maxlen=_MOST_EVENTS)
         self._set: dict[str, bool] = {}
@@ -220,6 +228,7 @@ class Knowledge:
             self.dropped += full
             first = full and self.dropped == 1
             self._posted.append((name, None if clock is None else clock.now()))
+            self.changes += 1
         if first:
             log.logwarn(
                 f"event {name!r}: {_MOST_EVENTS} events wait for a guard: the oldest are dropped, "
@@ -237,6 +246,7 @@ class Knowledge:
                 self._set.pop(name, None)
             else:
                 self._set[name] = bool(value)
+            self.changes += 1
         self.changed()
 
     def changed(self) -> None:
@@ -255,11 +265,39 @@ class Knowledge:
 
         return forget
 
+    # -- for a journal -------------------------------------------------------------------------
+
+    def kept(self, clock: Clock) -> tuple[int, dict[str, Any]]:
+        """Return the count of changes, and what was said and not used up, as plain JSON.
+
+        `set`: name -> truth; `events`: pairs [name, stamp since the epoch [ns]].
+        """
+        with self._lock:
+            now, now_ns = clock.now(), clock.time_ns()
+            events = [
+                [name, now_ns - int((now - (now if since is None else since)) * 1e9)]
+                for name, since in self._posted
+            ]
+            return self.changes, {"set": dict(self._set), "events": events}
+
+    def restore(self, kept: Mapping[str, Any], shift_ns: int) -> None:
+        """Know what `kept` returned in an earlier process, its stamps `shift_ns` later."""
+        clock = current_clock()
+        now, now_ns = clock.now(), clock.time_ns()
+        with self._lock:
+            self._set = dict(kept["set"])
+            self._posted.clear()
+            self._posted.extend(
+                (name, now - (now_ns - at_ns - shift_ns) / 1e9) for name, at_ns in kept["events"]
+            )
+
     @contextlib.contextmanager
     def listening(self) -> Any:
         """Listen to the topics of the conditions while this lasts."""
         topics = {n: s for n, s in self.sources.items() if isinstance(s, TopicCondition)}
         with contextlib.ExitStack() as stack:
+            if self._server is not None:
+                stack.enter_context(self._server.listening(self.changed))
             if topics:
                 from actionlib_core.pubsub.topic import NotingSubscriber
 
@@ -290,13 +328,25 @@ class Knowledge:
                 return source, tuple(parts[count:])
         return None
 
+    def asks_server(self, name: str) -> bool:
+        """Tell whether a robot answers for a name, unless somebody has said it here."""
+        return (
+            self._server is not None
+            and not name.startswith(BUILT_IN)
+            and self.source_of(name) is None
+        )
+
     def is_code(self, name: str) -> bool:
-        """Tell whether code of the user answers for a name."""
+        """Tell whether code of the user, or a robot, answers for a name."""
         found = self.source_of(name)
-        return found is not None and not isinstance(found[0], (bool, Expression))
+        if found is None:
+            return self.asks_server(name)
+        return not isinstance(found[0], (bool, Expression))
 
     def every(self, name: str) -> float | None:
         """Return how often a name is to be asked for [s]; None when its changes are told."""
+        if self._server is not None and self.asks_server(name):
+            return self._server.every
         found = self.source_of(name)
         return found[0].every if found is not None and isinstance(found[0], Polled) else None
 
@@ -317,7 +367,15 @@ class Knowledge:
             _, _, rest = name.partition("_")
             one, _, other = rest.partition("_")
             return self.text(one) == self.text(other)
-        return self._happened(name, now) or self._set.get(name, name == "true")
+        if self._happened(name, now):
+            return True
+        if name not in self._set and self._server is not None and self.asks_server(name):
+            try:
+                return self._server.value(name)
+            except Exception as error:
+                text = f"{path}: condition {name!r}: {error}"
+                raise InvalidUserCodeError(text, path=path) from error
+        return self._set.get(name, name == "true")
 
     def _ask(self, name: str, source: Any, parameters: tuple[str, ...]) -> bool:
         if isinstance(source, bool):
@@ -338,6 +396,7 @@ class Knowledge:
                     hit = True  # the newest one, used up
                     continue
                 kept.appendleft((event, now if since is None else since))
+            self.changes += len(kept) != len(self._posted)
             self._posted = kept
             return hit
 

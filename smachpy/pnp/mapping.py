@@ -15,6 +15,7 @@ conditions:
   seen: {run: "my_robot.eyes:seen", every: 0.5}
 strict: false
 events: once
+server: true      # or {action: ..., conditions: ..., robot: ...}: see `PNPServer`
 """
 
 from __future__ import annotations
@@ -26,10 +27,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.yaml_text import YamlTextError, load_yaml
-from smachpy.exceptions import did_you_mean
+from smachpy.exceptions import InvalidStateError, did_you_mean
 from smachpy.pnp.actions import Goal
 from smachpy.pnp.knowledge import Expression, Polled, TopicCondition
 from smachpy.pnp.problems import PlanProblem, raise_errors
+from smachpy.pnp.server import PNPServer
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -44,7 +46,8 @@ class Registered:
     options: dict[str, Any] = field(default_factory=dict)
 
 
-_TOP: Final = ("actions", "conditions", "strict", "events", "event_life")
+_TOP: Final = ("actions", "conditions", "strict", "events", "event_life", "server")
+_SERVER: Final = ("action", "conditions", "events", "robot", "every", "timeout")
 _GOAL: Final = ("action", "type", "goal", "cases", "timeout", "server_wait_timeout")
 _CONDITION: Final = ("topic", "type", "when", "userdata", "run", "every", "value")
 
@@ -102,9 +105,23 @@ class _Reader:
         for key in ("strict", "events", "event_life"):
             if key in data:
                 found.options[key] = data[key]
+        if data.get("server", False) is not False:
+            found.options["server"] = self._server(data, data["server"])
         if not isinstance(found.options.get("strict", False), bool):
             self.problem(_line(data, "strict"), f"got {data['strict']!r}; expected true or false.")
         return found
+
+    def _server(self, data: Any, given: Any) -> PNPServer | None:
+        if given is True or given is None:
+            return PNPServer()
+        if not self._is_mapping(given, "server", _line(data, "server")):
+            return None
+        self._known(given, _SERVER, "server")
+        try:
+            return PNPServer(**{k: v for k, v in _plain(given).items() if k in _SERVER})
+        except InvalidStateError as error:
+            self.problem(_line(data, "server"), error.message, "server")
+            return None
 
     def _items(self, data: Any, key: str) -> Iterable[tuple[Any, Any]]:
         given = data.get(key)

@@ -6,10 +6,12 @@ Sources: the loader of PetriNetPlans 1.4; ISO/IEC 15909-2:2011, place/transition
 from __future__ import annotations
 
 import re
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 
+from smachpy.exceptions import InvalidStateError
 from smachpy.pnp.net import Arc, Net, Place, Transition
 from smachpy.pnp.problems import PlanProblem, raise_errors
 
@@ -27,6 +29,7 @@ MOST_TOKENS: Final = 1000
 
 _LINE: Final = "{smachpy}line"
 _PLAN_NAME: Final = "PLAN NAME:"
+_NOT_XML: Final = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 @dataclass
@@ -204,7 +207,11 @@ def _read_arc(element: Element, found: _Found) -> None:
     late = late or (target not in found.places and target not in found.transitions)
     if late and found.dialect == "pnp":
         element.set("late", "1")
-    weight = max(1, _number(element, "inscription", 1, found))
+    weight = _number(element, "inscription", 1, found)
+    if weight == 0:
+        text = "inscription: got 0; expected at least 1. It moves no token, and is left out."
+        found.problem("warning", "number", element, text)
+        return
     found.arcs.append((Arc(source, target, weight), element))
 
 
@@ -254,10 +261,7 @@ def _number(element: Element, tag: str, default: int, found: _Found) -> int:
         return default
     text = _text_below(element, tag, found).strip().rpartition(",")[2].strip()
     if re.fullmatch(r"[0-9]{1,9}", text) and int(text) <= MOST_TOKENS:
-        number = int(text)
-        if number == 0 and tag == "inscription":
-            found.problem("error", "number", element, f"{tag}: got 0; expected at least 1.")
-        return number
+        return int(text)
     least = 1 if tag == "inscription" else 0
     expected = f"a whole number from {least} to {MOST_TOKENS}"
     found.problem("error", "number", element, f"{tag}: got {text!r}; expected {expected}.")
@@ -304,7 +308,11 @@ def _name_of(element: Element) -> str:
 
 
 def pnml_text(net: Net, *, dialect: Dialect = "pnp") -> str:
-    """Return a net as the text of a file; reading that gives the same net."""
+    """Return a net as the text of a file; reading that gives the same net.
+
+    Raises:
+        InvalidStateError: a name has a character that XML cannot hold.
+    """
     from xml.etree import ElementTree as ET
 
     is_pnp = dialect == "pnp"
@@ -331,13 +339,21 @@ def pnml_text(net: Net, *, dialect: Dialect = "pnp") -> str:
     for transition in net.transitions:
         element = ET.SubElement(page, "transition", {"id": transition.id})
         add(element, "name", transition.name or " ")
-    for number, arc in enumerate(net.arcs, 1):
-        ends = {"source": arc.source, "target": arc.target}
+    weights: Counter[tuple[str, str]] = Counter()  # two arcs that are alike: not all tools add them
+    for arc in net.arcs:
+        weights[arc.source, arc.target] += arc.weight
+    for number, ((source, target), weight) in enumerate(weights.items(), 1):
+        ends = {"source": source, "target": target}
         element = ET.SubElement(page, "arc", {"id": _free_id(net, f"a{number}"), **ends})
-        if arc.weight > 1:
-            add(element, "inscription", str(arc.weight))
+        if weight > 1:
+            add(element, "inscription", str(weight))
     ET.indent(root)
     text = ET.tostring(root, encoding="unicode")
+    odd = _NOT_XML.search(text)
+    if odd is not None:
+        raise InvalidStateError(
+            f"net {net.name!r}: got {odd[0]!r} in it; expected characters that XML can hold."
+        )
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
 
 

@@ -22,7 +22,7 @@ from smachpy.outcome_classes import outcome_class
 from smachpy.pnp.build import Action, action
 from smachpy.pnp.container import PetriNetPlan
 from smachpy.pnp.files import load_plan
-from smachpy.pnp.knowledge import Knowledge
+from smachpy.pnp.knowledge import Knowledge, Polled
 from smachpy.pnp.text import rule_of
 from smachpy.userdata.user_data import UserData
 
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
     from actionlib_core.clock import Task
     from smachpy.events import Event
+    from smachpy.pnp.server import PNPServer
 
 Status: TypeAlias = Literal["", "run", "success", "failure", "interrupt"]
 
@@ -54,6 +55,7 @@ class PNPCmd:
         actions: As for `PetriNetPlan`.
         conditions: Likewise.
         plan_folder: Where `start_plan` finds plans.
+        server: As for `PetriNetPlan`.
 
     Raises:
         InvalidStateError: an argument is wrong.
@@ -67,13 +69,15 @@ class PNPCmd:
         conditions: Mapping[str, Any] | None = None,
         *,
         plan_folder: Path | str = ".",
+        server: PNPServer | None = None,
     ) -> None:
         problems = Problems(type(self).__name__)
         self._actions = problems.mapping("actions", actions, "name -> what does it")
         problems.raise_all()
         self._folder = plan_folder
         self._userdata = UserData()
-        self._knowledge = Knowledge(conditions, lambda: self._userdata)
+        self._server = server
+        self._knowledge = Knowledge(conditions, lambda: self._userdata, server=server)
         self._lock = threading.Lock()
         self._status: dict[str, Status] = {}
         self._running: dict[str, _Running] = {}
@@ -161,12 +165,11 @@ class PNPCmd:
 
         Threads: any; does not wait.
         """
-        whole = self._part(name, params).name
         with self._lock:
             found = [
                 running.plan
                 for key, running in self._running.items()
-                if key == whole or (not params and key.startswith(f"{whole}_"))
+                if self._is(key, name, params)
             ]
         for plan in found:
             plan.request_preempt(by="PNPCmd")
@@ -185,9 +188,15 @@ class PNPCmd:
         known[cmd](name, params)
 
     def action_status(self, name: str, params: str | Iterable[object] = "") -> Status:
-        """Return "run", how the last run ended, or "" when there was none."""
-        whole = self._part(name, params).name
-        return "run" if whole in self._running else self._status.get(whole, "")
+        """Return "run", how the last run ended, or "" when there was none.
+
+        With no parameters, of any that ran under this name.
+        """
+        if self._tasks_of(name, params):
+            return "run"
+        with self._lock:
+            found = [how for key, how in self._status.items() if self._is(key, name, params)]
+        return found[-1] if found else ""
 
     def running_actions(self) -> list[str]:
         """Return the names of the actions that run."""
@@ -276,31 +285,48 @@ class PNPCmd:
 
     # -- inside --------------------------------------------------------------------------------
 
+    def _is(self, whole: str, name: str, params: str | Iterable[object]) -> bool:
+        """Tell whether the action `whole` is one that a caller means."""
+        meant = self._part(name, params).name
+        return whole == meant or (not params and whole.startswith(f"{meant}_"))
+
+    def _tasks_of(self, name: str, params: str | Iterable[object] = "") -> list[Task | None]:
+        """Return the tasks of the actions that run; None for one that a caller waits for."""
+        with self._lock:
+            running = tuple(self._running.items())
+        return [one.task for key, one in running if self._is(key, name, params)]
+
     def _part(self, name: str, params: str | Iterable[object]) -> Action:
         words = [params] if isinstance(params, str) else list(params)
         return action(name, *[word for word in words if word != ""])
 
     def _begin(self, part: Action) -> _Running:
         net = part.net("PNPCmd")
-        first = PetriNetPlan(net, self._actions)
+        first = PetriNetPlan(net, self._actions, server=self._server)
         names = [n for n in first.plan.externals() if not n.startswith(_BUILT_IN)]
         conditions = {name: self._asking(name) for name in names}
-        plan = PetriNetPlan(net, self._actions, conditions) if names else first
+        plan = first
+        if names:
+            plan = PetriNetPlan(net, self._actions, conditions, server=self._server)
         problems = plan.find_problems("PNPCmd")
         if problems:
             raise InconsistentMachineError("PNPCmd", problems)
         return self._note(part.name, plan)
 
     def _asking(self, name: str) -> Any:
-        return lambda _userdata: self.get_condition(name)
+        def ask(_userdata: object) -> bool:
+            return self.get_condition(name)
+
+        every = self._knowledge.every(name)
+        return ask if every is None else Polled(ask, every)
 
     def _plan_of(self, name: str) -> _Running:
         from smachpy.pnp.container import load
         from smachpy.pnp.reading import plan_file
 
         file = plan_file(self._folder, name)
-        if self._actions:
-            plan = load(file, self._actions, self._knowledge.sources)
+        if self._actions or self._server is not None:
+            plan = load(file, self._actions, self._knowledge.sources, server=self._server)
         else:
             plan = load_plan(file)
         problems = plan.find_problems(name)
@@ -339,5 +365,6 @@ class PNPCmd:
         finally:
             forget()
             with self._lock:
+                self._status.pop(name, None)  # the newest is the last
                 self._status[name] = status
                 del self._running[name]

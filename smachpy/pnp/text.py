@@ -3,7 +3,9 @@
     plan   = item { ";" item } [";"]
     item   = action["|"N] | "<" branch { ":" branch } ">" | term { "||" term }
            | "LABEL"text | "GOTO_LABEL"text | rule            term = action | "{" plan "}"
-    branch = condition "?" [plan]          rule = "!" "*if*" condition "*do*" recovery "!"
+    branch = condition "?" [plan]          rule = ["!"] "*if*" condition "*do*" recovery ["!"]
+
+A blank may stand for the "_" behind "GOTO"; a rule without "!" ends at the next ";".
 
 Source: the generators of PetriNetPlans 1.4. A "#" begins a comment. No threads, time or I/O.
 """
@@ -23,8 +25,9 @@ if TYPE_CHECKING:
     from smachpy.pnp.net import Net
 
 _TOKEN = re.compile(
-    r"\s+|(?P<rule>![^!]*!)|(?P<sign>\|\||[<>{}:;?])|(?P<limit>\|\s*\d+)|(?P<word>[^\s<>{}:;?|!]+)"
+    r"\s+|(?P<rule>![^!]*!|\*if\*[^;]*)|(?P<sign>\|\||[<>{}:;?])|(?P<limit>\|\s*\d+)|(?P<word>[^\s<>{}:;?|!]+)"
 )
+_GOTO = re.compile(r"GOTO[_\s]\s*(\S+)")
 _RULE = re.compile(r"\s*\*(\w+)\*\s*(.*?)\s*\*(\w+)\*\s*(.*?)\s*", re.DOTALL)
 _ER = re.compile(
     r"\s*\*(\w+)\*\s*(.*?)\s*\*(\w+)\*\s*(\S+)\s*\*(\w+)\*\s*(.*?)\s*(?:\*x\*\s*(\d+)\s*)?"
@@ -137,15 +140,12 @@ def _rule(condition: str, recovery: str, file: str, line: int) -> Rule:
     except ConditionError as error:
         raise _error(file, line, f"condition {condition!r}: {error.problem}") from error
     *steps, last = [step.strip() for step in recovery.strip().rstrip(";").split(";")]
-    if last not in LASTS and not last.startswith("GOTO_"):
+    goto = _GOTO.fullmatch(last)
+    if last not in LASTS and goto is None:
         text = f"recovery: got {last!r} at its end; expected one of {list(LASTS)}, or GOTO_LABEL."
         raise _error(file, line, text + did_you_mean(last, LASTS))
     parts = [_act(step, file, line) for step in steps if step]
-    return Rule(condition, tuple(parts), _label(last) if last.startswith("GOTO_") else last)
-
-
-def _label(word: str) -> str:
-    return f"GOTO_{word.removeprefix('GOTO_')}"
+    return Rule(condition, tuple(parts), f"GOTO_{goto[1]}" if goto else last)
 
 
 def _act(step: str, file: str, line: int) -> Action:
@@ -210,7 +210,7 @@ class _Reader:
                 parts.append(self._item(depth))
 
     def _with_rule(self, parts: list[Part], token: _Token) -> Part:
-        match = _RULE.fullmatch(token.text[1:-1])
+        match = _RULE.fullmatch(token.text.strip("!"))
         if match is None or match.group(1, 3) != ("if", "do"):
             text = f"got {token.text!r}; expected '! *if* COND *do* RECOVERY !'."
             raise _error(self._file, token.line, text)
@@ -227,6 +227,11 @@ class _Reader:
             return self._choice(depth)
         if token.kind == "word" and token.text.startswith("GOTO_"):
             return GoTo(self._take().line, token.text.removeprefix("GOTO_"))
+        if token.kind == "word" and token.text == "GOTO":
+            line, label = self._take().line, self._take()
+            if label.kind != "word":
+                raise _error(self._file, line, f"GOTO: got {label.text!r}; expected a label.")
+            return GoTo(line, label.text)
         if token.kind == "word" and token.text.startswith("LABEL"):
             return Mark(self._take().line, token.text)
         parts = [self._term(depth)]

@@ -113,10 +113,11 @@ def test_an_interrupt(clock, then, names, outcome):
     assert clean(net) == []
 
 
-def test_a_limit(clock):
-    net = action("a").within(3).then(action("b")).net()
-    assert ran(net, clock, {"a": 9})[0] == "goal"
-    assert clock.now() == 4.0
+@pytest.mark.parametrize("seconds", [4, 1234567.5, 123456.7, 1e-7])
+def test_a_limit(clock, seconds):
+    net = action("a").within(seconds).net()
+    assert ran(net, clock, {"a": 1e8})[0] == "goal"
+    assert clock.now() == seconds
     assert clean(net) == []
 
 

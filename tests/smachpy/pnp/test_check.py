@@ -7,24 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from smachpy.pnp import Arc, Net, Place, Transition, check_plan, explore, understand
-
-
-def net_of(text):
-    """Return the net of lines "a b -> c : label"; a name with * has a token."""
-    places, transitions, arcs = {}, [], []
-    for number, line in enumerate(filter(None, map(str.strip, text.splitlines()))):
-        ends, _, label = line.partition(" : ")
-        sources, _, targets = ends.partition("->")
-        transitions.append(Transition(f"t{number}", label))
-        for side, names in enumerate((sources, targets)):
-            for word in names.split():
-                name = word.strip("*").replace("~", " ")
-                known = places.setdefault(name, Place(f"p{len(places)}", name))
-                if word.endswith("*"):
-                    places[name] = Place(known.id, name, 1)
-                ends = (known.id, f"t{number}")
-                arcs.append(Arc(*(reversed(ends) if side else ends)))
-    return Net("plan", tuple(places.values()), tuple(transitions), tuple(arcs))
+from tests.smachpy.pnp.nets import net_of
 
 
 def rules(text, **options):
@@ -127,3 +110,14 @@ def test_markings_are_those_of_a_plain_search(seed):
             assert net.has_tokens(at, step)
             at = net.fire(at, step)
         assert at == marking
+
+
+def test_a_search_among_many_tokens_ends_early():
+    places = tuple(Place(f"p{n}", "", 300 * (n == 0)) for n in range(3))
+    transitions = tuple(Transition(f"t{n}") for n in range(3))
+    arcs = tuple(
+        arc for n in range(3) for arc in (Arc(f"p{n}", f"t{n}"), Arc(f"t{n}", f"p{(n + 1) % 3}"))
+    )
+    found = explore(Net("many", places, transitions, arcs))
+    assert not found.complete
+    assert len(found.came) < 3000

@@ -623,3 +623,9 @@ def test_the_structure():
     assert record.net.places[4].role == "goal"
     assert record.net.transitions[0].calls == (("A", "start"),)
     assert smachpy.StateRecord.from_json(record.to_json()) == record
+
+
+def test_a_long_way_without_guards_is_gone():
+    ways = "\n".join(f"p{n}{'*' * (n == 0)} -> p{n + 1}" for n in range(1500))
+    with virtual_time():
+        assert plan_of(f"{ways}\np1500 -> goal").execute() == "goal"

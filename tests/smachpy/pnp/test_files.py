@@ -9,7 +9,17 @@ import pytest
 
 import smachpy
 from smachpy.command import main
-from smachpy.pnp import PlanError, load, load_plan, write_pnml
+from smachpy.exceptions import InconsistentMachineError
+from smachpy.pnp import (
+    PlanError,
+    explore,
+    load,
+    load_plan,
+    parse_plan,
+    parse_pnml,
+    pnml_text,
+    write_pnml,
+)
 from smachpy.pnp.mapping import read_mapping
 from tests.smachpy.pnp.nets import net_of
 
@@ -164,3 +174,44 @@ def test_a_plan_is_loaded_without_the_network():
         "assert not {'zenoh', 'numpy', 'rosbags'} & set(sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_a_plan_with_a_wrong_condition_is_drawn_and_checked_but_not_run(tmp_path, capsys):
+    file = tmp_path / "wrong.pnml"
+    net = net_of("init* -> A.exec : A.start\nA.exec -> goal : A.end [and c]")
+    write_pnml(net, file)
+    with pytest.raises(PlanError) as caught:
+        load_plan(file)
+    assert len(caught.value.problems) == 1
+    plan = load_plan(file, to_run=False)
+    assert plan.plan.net.transitions[1].name == "A.end [and c]"
+    with pytest.raises(InconsistentMachineError):
+        plan.execute()
+    assert main(["check", str(file)]) == 1
+    out = capsys.readouterr().out
+    assert out.count("net-label") == 1
+    assert "inconsistent" not in out
+    assert main(["run", str(file), "--time", "virtual"]) == 2
+
+
+def test_an_arc_that_moves_no_token_is_left_out_with_a_warning():
+    text = pnml_text(net_of("init* -> goal : t"))
+    at = text.index("<arc")
+    arc = '<arc id="zero" source="p0" target="t0"><inscription><value>0</value></inscription></arc>'
+    net, problems = parse_pnml(text[:at] + arc + text[at:])
+    assert len(net.arcs) == 2
+    assert {problem.severity for problem in problems} == {"warning"}
+
+
+@pytest.mark.parametrize("goto", ["GOTO LABEL1", "GOTO_LABEL1"])
+def test_a_blank_may_stand_in_a_jump(goto):
+    net = parse_plan(f"LABEL1; a; < again ? {goto} : done ? b >")
+    same = parse_plan("LABEL1; a; < again ? GOTO_LABEL1 : done ? b >")
+    assert len(explore(net).came) == len(explore(same).came)
+    rule = parse_plan(f"LABEL1; a; b; ! *if* c *do* {goto} !")
+    assert any("b.interrupt [c]" in each.name for each in rule.transitions)
+
+
+def test_a_rule_without_marks_ends_at_the_semicolon():
+    marked = parse_plan("a; ! *if* c *do* skip_action !; b")
+    assert parse_plan("a; *if* c *do* skip_action; b").transitions == marked.transitions

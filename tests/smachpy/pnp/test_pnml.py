@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from smachpy.exceptions import InvalidStateError
 from smachpy.pnp import (
     Arc,
     Net,
@@ -111,7 +112,6 @@ def test_an_arc_between_two_places_is_dropped_in_pnps_dialect_only():
         ("Default,1", "one", "number", 5),
         ("Default,1", "-1", "number", 5),
         ("Default,1", "999999999", "number", 5),
-        ("<inscription><value>1<", "<inscription><value>0<", "number", 14),
         ('id="a2" source="t1" target="p2"/>', 'id="a2" source="t1" target="p2"><type value="inhibitor"/></arc>', "arc", 15),
         ('type="PTNet"', 'type="http://www.pnml.org/version-2009/grammar/highlevelnet"', "xml", 3),
         ("</net>", "</net><net/>", "xml", 2),
@@ -183,6 +183,12 @@ def test_round_trip(net, dialect):
     assert back.arcs == net.arcs
     assert back.name == net.name
     understand(back)
+
+
+@pytest.mark.parametrize("name", ["a\x01b", "\ud800", "\ufffe"])
+def test_a_name_that_xml_cannot_hold_is_not_written(name):
+    with pytest.raises(InvalidStateError, match=r"got '.*' in it"):
+        pnml_text(Net("plan", (Place("p", name),), (), ()))
 
 
 def test_the_2009_form_has_its_namespace(tmp_path):
