@@ -157,7 +157,8 @@ def test_a_program_that_cannot_be_started_is_told(tmp_path, monkeypatch):
 @pytest.mark.usefixtures("any_dot")
 def test_without_any_font_on_the_system_text_has_its_size(tmp_path, monkeypatch):
     def width():
-        text = 'digraph { graph [fontname="Liberation Sans"]; a [fontname="Liberation Sans",label="MISSION", margin=0] }'
+        font = 'fontname="Liberation Sans"'
+        text = f'digraph {{ graph [{font}]; a [{font},label="MISSION", margin=0] }}'
         (result,) = graphviz_process.lay_out(lambda run: run([text]))
         return float(result["objects"][0]["width"])
 

@@ -92,6 +92,20 @@ def test_a_state_that_ended_shows_how(outcome, swatch):
     assert "\u00d73" in look["label"]
 
 
+def test_what_a_monitor_finds_is_drawn_as_no_failure():
+    state = Node("/M/A", "A", "monitor")
+    marks = Marks(visits={"/M/A": 1}, last={"/M/A": "invalid"})
+    assert style.state(state, Diagram(state, marks), DARK)["fillcolor"] == DARK.other.fill
+    args = {"counts": {}, "labelled": True, "implicit": False}
+    arrows = {
+        kind: style.transition(["invalid"], kind, LIGHT, Marks(), **args)
+        for kind in ("monitor", "action")
+    }
+    assert arrows["monitor"]["color"] == LIGHT.edge
+    assert LIGHT.failure.text not in arrows["monitor"]["label"]
+    assert arrows["action"]["color"] == LIGHT.failure.stroke
+
+
 def test_what_a_run_never_touched_stands_back():
     diagram = Diagram(STATE, Marks(visits={"/M": 1}))
     assert style.state(STATE, diagram, LIGHT)["color"] == LIGHT.faint
@@ -105,8 +119,8 @@ def test_tooltips_tell_path_kind_details_and_doc():
 def test_taken_arrows_are_thick_and_counted():
     marks = Marks(visits={"/M": 1})
     args = {"labelled": True, "implicit": False}
-    taken = style.transition(["a", "b"], LIGHT, marks, counts={"a": 2}, **args)
-    spare = style.transition(["a"], LIGHT, marks, counts={}, **args)
+    taken = style.transition(["a", "b"], "state", LIGHT, marks, counts={"a": 2}, **args)
+    spare = style.transition(["a"], "state", LIGHT, marks, counts={}, **args)
     assert float(taken["penwidth"]) > 2
     assert "a&#160;\u00d72" in taken["label"]
     assert spare["color"] != taken["color"]

@@ -100,6 +100,17 @@ def test_the_child_that_stopped_the_others_of_a_concurrence_is_the_cause():
     assert watch.stamp_ns - found.began == 2_000_000_000
 
 
+def test_an_outcome_that_a_callback_chose_is_not_called_the_default():
+    def told(cb):
+        both = Concurrence(outcomes=["low", "aborted"], default_outcome="aborted", outcome_cb=cb)
+        with both:
+            Concurrence.add("WATCH", Waits(2.0, "ok"))
+        return why(*ran(machine([("BOTH", both, {})]))).steps[0].reason
+
+    assert told(lambda _: "low") == "no rule of BOTH names it"
+    assert told(lambda _: None) == "no rule of BOTH names it; its default is aborted"
+
+
 def test_failures_that_were_handled_in_vain_come_first():
     sm = machine(
         [

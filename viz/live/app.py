@@ -16,6 +16,11 @@
     GET  /api/question        the picture of a question that a state asks
     GET  /api/action          what a form for a goal of an action needs
     POST /api/control         a command, or the answer to a question
+    GET  /api/fleet           the live runs together, with what a map of all needs
+    GET  /api/simulations     what may be simulated, and the batches of runs that were started
+    GET  /api/report          the report of one, a page
+    POST /api/simulate        start a batch, or stop one
+    POST /api/mission         resume or cancel a durable mission
     POST /api/action          check or send a goal, or cancel one
 
 Nothing here holds up a machine: a page is sent what it has not seen yet when it can take it, and
@@ -53,6 +58,7 @@ if TYPE_CHECKING:
     from smachpy.introspection import StateRecord
     from viz.live.actions import Actions
     from viz.live.machines import Machine, Machines
+    from viz.live.simulations import Simulations
 
 COALESCE_S = 0.004
 """Events wait so long for others, besides what their link has gathered already."""
@@ -71,6 +77,12 @@ FARTHEST = 3_000
 """A page that is more events behind gets a snapshot."""
 
 MOST_PAGES = 64
+REPORT_POLICY = (
+    "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'; base-uri 'none'; "
+    "form-action 'none'; sandbox"
+)
+"""Of a report, a page of its own without any script."""
+
 LONGEST_COMMAND = 1_000_000
 """Bytes of a command."""
 
@@ -107,6 +119,7 @@ class Viewer:
         actions: On the network, for the page that sends goals; None shows none.
         runs: Lists runs for the home page; None lists those of `machines`.
         home: Pages begin with the list of runs, unless a machine is asked for.
+        simulations: Starts simulated runs; None offers none.
         value: Asks a machine for a value of its userdata, by name, container and key; blocks.
         picture: Asks a machine for the picture of a question, by name and path: media type and
             bytes; blocks.
@@ -126,12 +139,14 @@ class Viewer:
         picture: Callable[[str, str], tuple[str, bytes] | None] | None = None,
         runs: Runs | None = None,
         home: bool = False,
+        simulations: Simulations | None = None,
     ) -> None:
         self._picture_of = picture
         self._machines = machines
         self._value = value
         self._listed = Runs(machines) if runs is None else runs
         self._home = home
+        self._simulations = simulations
         self._actions = actions
         self._token = token
         self._send = send
@@ -161,6 +176,11 @@ class Viewer:
                 Route("/api/value", self._whole_value),
                 Route("/api/question", self._question_picture),
                 Route("/api/control", self._control, methods=["POST"]),
+                Route("/api/mission", self._command_mission, methods=["POST"]),
+                Route("/api/fleet", self._fleet),
+                Route("/api/simulations", self._list_simulations),
+                Route("/api/report", self._report),
+                Route("/api/simulate", self._simulate, methods=["POST"]),
                 Route("/api/action", self._action, methods=["GET"]),
                 Route("/api/action", self._command_action, methods=["POST"]),
                 Route("/{name:path}", self._file),
@@ -242,6 +262,9 @@ class Viewer:
 
     async def _run_list(self, _request: Request) -> Response:
         return Json(await run_in_threadpool(self._listed.rows))
+
+    async def _fleet(self, _request: Request) -> Response:
+        return Json(await run_in_threadpool(self._listed.fleet))
 
     async def _open(self, request: Request) -> Response:
         asked = request.query_params.get("run", "")
@@ -354,6 +377,54 @@ class Viewer:
             return Json(await run_in_threadpool(self._send, name, command))
         except SmachError as error:
             return Json({"ok": False, "text": str(error)}, status_code=409)
+
+    async def _list_simulations(self, _request: Request) -> Response:
+        if self._simulations is None:
+            return Json({"missions": {}, "batches": []})
+        batches = await run_in_threadpool(self._simulations.rows)
+        missions = await run_in_threadpool(self._simulations.missions)
+        return Json({"missions": missions, "batches": batches})
+
+    async def _report(self, request: Request) -> Response:
+        if self._simulations is None:
+            return _unknown(request)
+        try:
+            name = request.query_params.get("batch", "")
+            page_of = await run_in_threadpool(self._simulations.report, name)
+        except SmachError as error:
+            return PlainTextResponse(str(error), status_code=404)
+        headers = {"content-security-policy": REPORT_POLICY}
+        return Response(page_of, media_type=page.TYPES[".html"], headers=headers)
+
+    async def _simulate(self, request: Request) -> Response:
+        reason = refuse_command(request, self._token)
+        if reason is not None or self._simulations is None:
+            return _refused(reason)
+        command = await _read_command(request) or {}
+        try:
+            match command:
+                case {"command": "start"}:
+                    name = await run_in_threadpool(self._simulations.start, command)
+                    return Json({"ok": True, "batch": name})
+                case {"command": "stop", "batch": name}:
+                    await run_in_threadpool(self._simulations.stop, name)
+                    return Json({"ok": True})
+        except SmachError as error:
+            return Json({"ok": False, "text": str(error)}, status_code=409)
+        return _no_command()
+
+    async def _command_mission(self, request: Request) -> Response:
+        reason = refuse_command(request, self._token)
+        if reason is not None:
+            return _refused(reason)
+        command = await _read_command(request)
+        if command is None:
+            return _no_command()
+        try:
+            text = await run_in_threadpool(self._listed.command, command)
+        except SmachError as error:
+            return Json({"ok": False, "text": str(error)}, status_code=409)
+        return Json({"ok": True, "text": text})
 
     async def _action(self, request: Request) -> Response:
         if self._actions is None:

@@ -43,6 +43,8 @@ MODULES = {
     "htm": "vendor/htm.js",
     "@preact/signals-core": "vendor/signals-core.js",
     "@preact/signals": "vendor/signals.js",
+    "uplot": "vendor/uplot.js",
+    "gifenc": "vendor/gifenc.js",
     **{f"#{name.removeprefix('js/')}": name for name in SCRIPTS},
 }
 """What modules import each other by: the same names in the served page, in a file and in Node."""
@@ -79,7 +81,8 @@ def index() -> str:
     """Return the served page."""
     text = (WEB / "index.html").read_text(encoding="utf-8")
     head = (
-        '<link rel="stylesheet" href="/theme.css"><link rel="stylesheet" href="/app.css">'
+        '<link rel="stylesheet" href="/theme.css"><link rel="stylesheet" href="/vendor/uplot.css">'
+        '<link rel="stylesheet" href="/app.css">'
         f'<script type="importmap">{import_map()}</script>'
         '<script type="module" src="/js/app.js"></script>'
     )
@@ -161,7 +164,9 @@ def standalone(run: dict[str, Any], title: str) -> str:
         run: `model` of the machine, and a snapshot as the server sends it.
         title: Of the page.
     """
-    style = theme_css() + (WEB / "app.css").read_text(encoding="utf-8")
+    style = theme_css() + "".join(
+        (WEB / name).read_text(encoding="utf-8") for name in ("vendor/uplot.css", "app.css")
+    )
     for font in ("inter", "jetbrains-mono"):
         data = base64.b64encode((WEB / "vendor" / f"{font}.woff2").read_bytes()).decode()
         style = style.replace(f"/vendor/{font}.woff2", f"data:font/woff2;base64,{data}")

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from actionlib_core.clock import SerialExecutor
 from actionlib_core.ros2_options import add_ros2_options, ros2_of_options
 from smachpy.command import UsageError
+from smachpy.command.durable import JOURNAL
 
 if TYPE_CHECKING:
     import argparse
@@ -31,6 +32,7 @@ EXAMPLES = """examples:
   smachpy view --map office.yaml       with this floor, where no topic tells it
   smachpy view --host 0.0.0.0 --qr     for others on this network; a phone reads the address
   smachpy view --runs runs/            with the statistics of recorded runs on the graph
+  smachpy view --durable postgresql://db/missions    with the missions of this database
 """
 PORT = 8080
 HIGHEST_PORT = 65_535
@@ -68,10 +70,26 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "--runs", metavar="DIR", action="append", default=[], help="recorded runs for statistics"
     )
     parser.add_argument(
+        "--durable",
+        metavar="JOURNAL",
+        action="append",
+        default=[],
+        help="durable missions to list: a file, or postgresql://HOST/DATABASE; "
+        f"{JOURNAL} is listed when it is there",
+    )
+    parser.add_argument(
         "--map",
         type=Path,
         metavar="FILE",
         help="the floor, a map_server YAML file, where no topic tells it",
+    )
+    parser.add_argument(
+        "--mission",
+        metavar="MISSION",
+        action="append",
+        default=[],
+        help="what the page may simulate besides the installed missions: a .py file, "
+        "module:factory",
     )
     add_ros2_options(parser)
     parser.add_argument("--tui", action="store_true", help="show it in this terminal instead")
@@ -134,11 +152,16 @@ def _serve(
 ) -> int:
     from smachpy.command.runs_folder import runs_folder
     from viz.live.app import Viewer
+    from viz.live.journals import Journals
     from viz.live.runs import Runs
     from viz.live.security import make_token
     from viz.live.server import PageServer
+    from viz.live.simulations import Simulations
 
     token = make_token() if args.control else None
+    folder = runs_folder()
+    journals = Journals(args.durable, Path(JOURNAL), folder.parent / "resumed")
+    simulations = Simulations(folder.parent / "simulated", args.mission)
     viewer = Viewer(
         machines,
         token=token,
@@ -149,8 +172,9 @@ def _serve(
         actions=actions,
         value=network.value,
         picture=network.picture,
-        runs=Runs(machines, [runs_folder(), *(Path(place) for place in args.runs)]),
+        runs=Runs(machines, [folder, *(Path(place) for place in args.runs)], journals),
         home=not args.child and not args.files,
+        simulations=simulations,
     )
     server = PageServer(viewer, args.host, args.port)
     address = server.address + (f"#token={token}" if token else "")
@@ -159,7 +183,8 @@ def _serve(
         print_qr(address)
     if args.child:
         _end_with_parent(server)
-    server.serve_here()
+    with contextlib.closing(journals), contextlib.closing(simulations):
+        server.serve_here()
     return 0
 
 
@@ -218,6 +243,7 @@ def _load(machines: Machines, files: list[str]) -> None:
         recording = read_recording(path)
         machine = machines.obtain(path.name if names.count(path.name) == 1 else str(path))
         machine.recorded, machine.file = True, str(path)
+        machine.date_shift = recording.made_ns - recording.stamp_ns
         machine.reset(recording.history(), limit=len(recording.events) + 1)
 
 

@@ -52,6 +52,8 @@ class Machine:
         behind: How far its clock is behind this process's [ns]; None while nobody knows.
         before: Name of the machine that keeps what the program before this one did.
         after: The same the other way round, of one that is kept.
+        run: Names the run of a durable mission; "" for others.
+        date_shift: How far the real date of a recording is from its own, if time was virtual [ns].
 
     Threads: every method may be called from any thread.
     """
@@ -78,6 +80,10 @@ class Machine:
         self.node = ""
         self.behind: int | None = None
         self.epoch = uuid.uuid4().hex
+        self.run = ""
+        self.date_shift = 0
+        self._earlier: tuple[dict[str, Any], list[dict[str, Any]]] | None = None
+        self._shift = 0  # added to the numbers of events: what other processes did comes first
         self._on_change = on_change
         self._lock = threading.Lock()
         self._base = RunState()
@@ -103,20 +109,28 @@ class Machine:
     def reset(self, history: dict[str, Any], *, limit: int = KEPT_EVENTS) -> None:
         """Begin anew with what a server tells (`smachpy.network.feed`), or a file."""
         record = StateRecord.from_json(json.dumps(history["description"]))
-        if str(history["epoch"]) != self.epoch and self._now.data["started"] is not None:
-            self.before = self._keep(self._split_off()) or self.before
+        if str(history["epoch"]) != self.epoch:
+            goes_on = bool(self.run) and history.get("run") == self.run
+            self._earlier = self.history() if goes_on and _begins_in_the_middle(history) else None
+            if not goes_on and self._now.data["started"] is not None:
+                self.before = self._keep(self._split_off()) or self.before
         with self._lock:
+            self.run = str(history.get("run") or "")
             self.epoch = str(history["epoch"])
             self.problems = list(history.get("problems") or ())
             self.control = history.get("control")
             self.stale = None
             self._set_record(record)
-            base = history.get("base")
+            base, events = history.get("base"), history["events"]
+            self._shift = 0
+            if self._earlier is not None:
+                base, earlier = self._earlier
+                self._shift = earlier[-1]["seq"] if earlier else 0
+                events = [*earlier, *(self._shifted(event) for event in events)]
             self._base = RunState(json.loads(json.dumps(base)) if base else None)
             self._now = RunState(json.loads(json.dumps(base)) if base else None)
             self._events.clear()
             self._bytes = self._seq = self._folded = 0
-            events = history["events"]
             if events:
                 self._folded = events[0]["seq"] - events[0].get("dropped", 0) - 1
             for event in events:
@@ -127,12 +141,16 @@ class Machine:
             self._observe(history.get("observed") or ())
         self._on_change(self)
 
+    def _shifted(self, record: dict[str, Any]) -> dict[str, Any]:
+        return {**record, "seq": record["seq"] + self._shift} if self._shift else record
+
     def _split_off(self) -> Machine:
         """Return another machine that has what this one has; this one is to begin anew."""
         kept = Machine(self.name, self._on_change, floor=self._floor)
         with self._lock:
             kept.record, kept.revision, kept.problems = self.record, self.revision, self.problems
             kept.recorded, kept.node, kept.epoch = True, self.node, f"kept {self.epoch}"
+            kept.run = self.run
             kept.before, kept.after = self.before, self.name
             kept._base, kept._now, kept._bytes = self._base, self._now, self._bytes
             kept._seq, kept._folded = self._seq, self._folded
@@ -156,7 +174,7 @@ class Machine:
         Those that the machine itself has dropped (`smachpy.events.buffer`) are not missed.
         """
         with self._lock:
-            for record in records:
+            for record in map(self._shifted, records):
                 if record["seq"] <= self._seq:
                     continue
                 if record["seq"] - record.get("dropped", 0) > self._seq + 1:
@@ -310,6 +328,13 @@ class Machine:
             self._folded, old, text = self._events.popleft()
             self._bytes -= len(text)
             self._base.fold(old)
+
+
+def _begins_in_the_middle(history: dict[str, Any]) -> bool:
+    """Tell whether a server knows only what it did itself of a run that another one has begun."""
+    base, events = history.get("base"), history["events"]
+    is_first = not base or base["started"] is None
+    return is_first and bool(events) and bool(events[0]["kind"] == "Recovered")
 
 
 def with_progress(record: dict[str, Any], goals: dict[str, Any]) -> dict[str, Any]:

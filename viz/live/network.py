@@ -311,7 +311,7 @@ class Link:
             self._executor.submit(lambda: self._machine.set_control(json.loads(_text(sample))))
             return
         if sample.key.endswith(OBSERVED_TOPIC):
-            self._executor.submit(lambda: self._machine.observe([json.loads(_text(sample))]))
+            self._executor.submit(lambda: self._machine.observe([_record(_text(sample))]))
             return
         self._received.append(_text(sample))
         if len(self._received) == 1:  # the others go with the first
@@ -336,7 +336,9 @@ class Link:
         texts = list(self._received)
         for _ in texts:
             self._received.popleft()
-        if not self._machine.add([json.loads(text) for text in texts]):
+        events = [_record(text) for text in texts]
+        begins = any(event["kind"] in {"Started", "Recovered"} for event in events)
+        if not self._machine.add(events) or begins:  # of which mission the run is, is there
             self._read_history()
         if self._received:
             self._executor.submit(self._add)
@@ -359,6 +361,7 @@ class Link:
             if history.get("control") is not None:
                 machine.set_control(history["control"])
             machine.observe(history.get("observed") or ())
+            machine.run = str(history.get("run") or "")
             if machine.add(history["events"]):
                 return
         machine.reset(history)
@@ -381,7 +384,7 @@ class Link:
         query.close()
         answers = [Trigger._response_class.from_bytes(r.payload) for r in replies if not r.error]
         for answer in answers:
-            history: dict[str, Any] = json.loads(answer.message)
+            history = _record(answer.message)
             if history.get("session", self.session) == self.session:
                 if "now" in history:
                     self._machine.behind = middle - history["now"]
@@ -392,3 +395,9 @@ class Link:
 def _text(sample: Sample) -> str:
     text: str = String.from_bytes(sample.payload).data
     return text
+
+
+def _record(text: str) -> dict[str, Any]:
+    """What a mission tells; NaN and infinite numbers as texts, for browsers do not know them."""
+    record: dict[str, Any] = json.loads(text, parse_constant=str)
+    return record

@@ -13,7 +13,7 @@ from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
 from textual.widgets import DataTable, Footer, Input, RichLog, Static, Tree
 
-from smachpy.events import answered_text, asker_text
+from smachpy.events import answered_text, asker_text, recovered_text
 from smachpy.events.run_state import RunState
 from smachpy.exceptions import SmachError
 from smachpy.outcome_classes import outcome_class
@@ -43,7 +43,7 @@ STRIDE = 1000
 """Steps back fold so many events at most, but for one in so many."""
 
 LOGGED = {
-    *("Started", "Finished", "Left", "Failed", "GoalDone", "Retried"),
+    *("Started", "Recovered", "Finished", "Left", "Failed", "GoalDone", "Retried"),
     *("PreemptRequested", "PreemptServiced", "Abandoned"),
     *("QuestionAsked", "QuestionAnswered"),
 }
@@ -525,6 +525,8 @@ def _line(event: dict[str, Any], target: str) -> Text:
         words, style = f"asks {event['text']}", WAITING
     if event["kind"] == "QuestionAnswered":
         words, style = answered_text(event["answer"], event["by"]), WAITING
+    if event["kind"] == "Recovered":
+        words = recovered_text(event["outages"])
     words = {
         "PreemptServiced": "preempt serviced",
         "Abandoned": "abandoned",

@@ -10,7 +10,7 @@ import threading
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from smachpy.events import EVENT_TYPES, Event, Finished
+from smachpy.events import EVENT_TYPES, Event, Finished, Recovered, Started
 from smachpy.events.run_state import RunState
 from viz.model.machine import Marks
 
@@ -78,7 +78,9 @@ class History:
             return
         record: dict[str, Any] = dict(zip(event._fields, event, strict=True))
         # The machine's clock in place of the date: a date that is set changes no duration.
-        record["kind"], record["stamp_ns"] = type(event).__name__, round(event.t * 1e9)
+        # What went before the process that goes on is not on its clock, nor known here.
+        kind = Started if type(event) is Recovered else type(event)
+        record["kind"], record["stamp_ns"] = kind.__name__, round(event.t * 1e9)
         with self._lock:
             self._state.fold(record)
             if type(event) is Finished and self._state.data["started"] is not None:

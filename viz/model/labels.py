@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from smachpy.outcome_classes import outcome_class
+
 if TYPE_CHECKING:
     from smachpy.outcome_classes import OutcomeClass
 
@@ -23,6 +25,16 @@ ENDINGS: dict[OutcomeClass, str] = {
     "preempted": "\u25a0",
     "other": "",
 }
+
+WATCHING = frozenset({"monitor", "condition"})
+FINDINGS = frozenset({"invalid", "false", "no"})
+
+
+def end_class(kind: str, outcome: str) -> OutcomeClass:
+    """Return the class of a state's end: what a monitor finds, 'invalid' too, is no failure."""
+    if kind in WATCHING and outcome.lower() in FINDINGS:
+        return "other"
+    return outcome_class(outcome)
 
 
 def one_line(text: str) -> str:

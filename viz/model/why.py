@@ -107,18 +107,38 @@ def why(record: StateRecord, events: Sequence[dict[str, Any]]) -> Why:
         events: Its events in order, as `smachpy.events.to_record` has them; the oldest may be
             missing.
     """
-    begins = [i for i, event in enumerate(events) if _is(event, "Started", record.path)]
-    run = list(events[begins[-1] :] if begins else events)
+    run = newest_run(events, record.path)
     if not run:
         return Why(record.label, None, None, None)
     ends = [i for i, event in enumerate(run) if _is(event, "Finished", record.path)]
-    began = run[0]["stamp_ns"]
+    began = run[0].get("began_ns", run[0]["stamp_ns"])
     reader = _Reader({one.path: one for one in record.walk()}, run)
     if not ends:
         return Why(record.label, None, began, run[-1]["stamp_ns"], reader.running())
     end = run[ends[-1]]
     steps = reader.causes(record.path, ends[-1])
     return Why(record.label, end.get("outcome") or RAISED, began, end["stamp_ns"], steps)
+
+
+def newest_run(events: Sequence[dict[str, Any]], root: str) -> list[dict[str, Any]]:
+    """Return the events of the newest run of the machine at `root`.
+
+    One that another process goes on with is one run: ends that the end of the first process gave
+    states which go on are left out.
+    """
+    begins = [i for i, event in enumerate(events) if _is(event, "Started", root)]
+    run = list(events[begins[-1] :] if begins else events)
+    for at in [i for i, event in enumerate(run) if _is(event, "Recovered", root)]:
+        since = dict(run[at]["active"])
+        for i, event in enumerate(run[:at]):
+            ends = event["kind"] in ENDS
+            if ends and event["stamp_ns"] >= since.get(event["path"], _NEVER):
+                run[i] = _PASSED
+    return [event for event in run if event is not _PASSED]
+
+
+_PASSED: dict[str, Any] = {"kind": "", "path": "", "stamp_ns": 0}
+_NEVER = 2**64
 
 
 def _is(event: dict[str, Any], kind: str, path: str) -> bool:
@@ -154,6 +174,8 @@ class _Reader:
         for i, event in enumerate(self._run):
             if event["kind"] in {"Started", "Entered"}:
                 active[event["path"]] = i
+            elif event["kind"] == "Recovered":
+                active = {path: active.get(path, i) for path, _ in event["active"]}
             elif event["kind"] in ENDS:
                 active.pop(event["path"], None)
         leaves = [p for p in active if not any(other.startswith(f"{p}/") for other in active)]
@@ -301,7 +323,12 @@ class _Reader:
         for rule in parent.rules:
             if (state.label, outcome) in rule.conditions:
                 return f"rule for {shorten(rule.outcome, 80)}: {shorten(rule.text, 200)}"
-        return f"no rule of {parent.label} names it; its default is {parent.default_outcome}"
+        default = f"; its default is {parent.default_outcome}"
+        ended = next(
+            (e for e in self._run[end:] if e["kind"] in ENDS and e["path"] == parent.path), {}
+        )
+        is_other = ended.get("outcome") not in {None, parent.default_outcome}  # a callback decided
+        return f"no rule of {parent.label} names it{'' if is_other else default}"
 
 
 def _goal(event: dict[str, Any]) -> tuple[str, str, str] | None:

@@ -166,6 +166,7 @@ class _Interior:
             same_name = edge.to_outcome and outcomes == (edge.target,)
             attributes = style.transition(
                 outcomes,
+                self._nodes[edge.source].kind,
                 self._theme,
                 self._marks,
                 counts={o: self._marks.taken.get((path, o), 0) for o in outcomes},
@@ -231,6 +232,7 @@ class _Interior:
     def _deciding(self, node: Node, outcome: str, rule: Rule, *, named: bool) -> Mapping[str, str]:
         return style.transition(
             [outcome],
+            node.kind,
             self._theme,
             self._marks,
             counts={outcome: self._marks.taken.get((node.path, outcome), 0)},

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import graphviz
 
 from smachpy.outcome_classes import outcome_class
-from viz.model.labels import ENDINGS, GLYPHS, KIND_WORDS, shorten
+from viz.model.labels import ENDINGS, GLYPHS, KIND_WORDS, end_class, shorten
 from viz.model.machine import MISSING, PLACE, TRANSITION
 from viz.pictures.theme import FONT
 
@@ -241,6 +241,7 @@ def start(theme: Theme, *, fork: bool) -> Attributes:
 
 def transition(
     outcomes: Sequence[str],
+    kind: str,
     theme: Theme,
     marks: Marks,
     *,
@@ -254,6 +255,7 @@ def transition(
 
     Args:
         outcomes: Their names.
+        kind: Of the state.
         theme: The colours.
         marks: The run to show.
         counts: Times each outcome was taken here.
@@ -264,12 +266,12 @@ def transition(
     """
     if change is not None:
         return _compared_transition(outcomes, theme, change, remark, labelled=labelled)
-    kinds = {outcome_class(outcome) for outcome in outcomes}
-    kind: OutcomeClass = kinds.pop() if len(kinds) == 1 else "other"
-    swatch = theme.outcome(kind)
+    classes = {end_class(kind, outcome) for outcome in outcomes}
+    found: OutcomeClass = classes.pop() if len(classes) == 1 else "other"
+    swatch = theme.outcome(found)
     taken = sum(counts.get(outcome, 0) for outcome in outcomes)
     stands_back = marks.has_run and not taken
-    stroke = theme.edge if kind == "other" else swatch.stroke
+    stroke = theme.edge if found == "other" else swatch.stroke
     attributes = {
         "color": _see_through(stroke) if stands_back else stroke,
         "tooltip": plain(", ".join(outcomes)),
@@ -280,7 +282,7 @@ def transition(
         wide = min(4.0, 1.2 + 0.6 * log2(1 + taken)) if marks.runs else 2.6
         attributes |= {"penwidth": f"{wide:.2g}"}
     if labelled or taken > 1 or remark:
-        lines = [_outcome_line(o, theme, marks, counts, labelled=labelled) for o in outcomes]
+        lines = [_outcome_line(o, kind, theme, marks, counts, labelled=labelled) for o in outcomes]
         if remark:
             lines[-1] += f'<font color="{theme.muted}">&#160;{markup(remark)}</font>'
         attributes["label"] = _beside(lines)
@@ -401,13 +403,19 @@ def _beside(lines: Sequence[str]) -> str:
 
 
 def _outcome_line(
-    outcome: str, theme: Theme, marks: Marks, counts: Mapping[str, int], *, labelled: bool
+    outcome: str,
+    kind: str,
+    theme: Theme,
+    marks: Marks,
+    counts: Mapping[str, int],
+    *,
+    labelled: bool,
 ) -> str:
     """One line of an arrow's label: the outcome and how often it was taken."""
     count = counts.get(outcome, 0)
-    kind = outcome_class(outcome)
-    plain_ink = kind == "other" or (marks.has_run and not count)
-    ink = theme.muted if plain_ink else theme.outcome(kind).text
+    found = end_class(kind, outcome)
+    plain_ink = found == "other" or (marks.has_run and not count)
+    ink = theme.muted if plain_ink else theme.outcome(found).text
     name = markup(outcome) if labelled else ""
     return f'<font color="{ink}">{name}{_times(count)}</font>'
 
@@ -442,8 +450,8 @@ def _state_label(node: Node, marks: Marks, theme: Theme) -> str:
         return f"<{text}{_note(node, marks, theme, before='<br/>')}>"
     text += _count(marks.visits.get(node.path, 0), theme.muted)
     last = marks.last.get(node.path)
-    if last is not None and node.path not in marks.active and ENDINGS[outcome_class(last)]:
-        text += f"&#160;{ENDINGS[outcome_class(last)]}"
+    if last is not None and node.path not in marks.active and ENDINGS[end_class(node.kind, last)]:
+        text += f"&#160;{ENDINGS[end_class(node.kind, last)]}"
     return f"<{text}>"
 
 
@@ -465,7 +473,7 @@ def _status(node: Node, marks: Marks, theme: Theme) -> tuple[Swatch, Attributes]
     if marks.runs and node.path in marks.visits:
         return theme.inactive, {"penwidth": "1.6"}
     if last is not None:
-        return _ended(outcome_class(last), theme)
+        return _ended(end_class(node.kind, last), theme)
     if marks.has_run:
         return theme.inactive, {"color": theme.faint, "fontcolor": theme.muted, "penwidth": "1"}
     return theme.inactive, {}

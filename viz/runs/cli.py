@@ -108,7 +108,7 @@ def _list(args: argparse.Namespace) -> int:
             print(json.dumps(_facts(recording)))
         return 0
     table = Table(box=None, pad_edge=False)
-    for title in ("file", "machine", "began", "time", "outcome", "events"):
+    for title in ("file", "machine", "began", "time", "outcome", "outages", "events"):
         table.add_column(title, no_wrap=True, justify="right" if title == "events" else "left")
     for recording in each_recording(args.places):
         table.add_row(*(Text(printable(word)) for word in _line(recording)))
@@ -117,15 +117,20 @@ def _list(args: argparse.Namespace) -> int:
 
 
 def _facts(recording: Recording) -> dict[str, Any]:
-    """What a list says of a run; `outcome` is null when none is recorded."""
+    """What a list says of a run; `outcome` is null when none is recorded, `outages` are in ns."""
+    from smachpy.events.run_state import RunState
+
     events = recording.events
-    ends = [event.get("outcome") or "exception" for event in events if event["kind"] == "Finished"]
+    newest = RunState()
+    for event in events:
+        newest.fold(event)
     return {
         "file": str(recording.path),
         "machine": recording.record.label,
         "began_ns": recording.made_ns,
         "seconds": (events[-1]["stamp_ns"] - events[0]["stamp_ns"]) / 1e9 if events else 0.0,
-        "outcome": ends[-1] if ends else None,
+        "outcome": newest.data["outcome"],
+        "outages": newest.data.get("outages", []),
         "events": len(events),
         "missing": recording.dropped,
     }
@@ -133,6 +138,8 @@ def _facts(recording: Recording) -> dict[str, Any]:
 
 def _line(recording: Recording) -> tuple[str, ...]:
     from datetime import UTC, datetime
+
+    from smachpy.events import outages_text
 
     facts = _facts(recording)
     began = datetime.fromtimestamp(facts["began_ns"] / 1e9, UTC)
@@ -143,6 +150,7 @@ def _line(recording: Recording) -> tuple[str, ...]:
         began.strftime("%Y-%m-%d %H:%M:%S"),
         f"{facts['seconds']:.1f} s",
         facts["outcome"] or "not finished",
+        outages_text(facts["outages"]),
         f"{events} of {events + missing}" if missing else str(events),
     )
 

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 from smachpy.events.run_state import RAISED
 from smachpy.outcome_classes import outcome_class
-from viz.model.labels import shorten
-from viz.model.why import why
+from viz.model.labels import end_class, shorten
+from viz.model.why import newest_run, why
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from smachpy.introspection import StateRecord
 
@@ -34,7 +34,7 @@ def run_row(record: StateRecord, events: Sequence[dict[str, Any]]) -> dict[str, 
         [ns since the epoch], null where they are unknown; `outcome`, null when it has no end;
         `reason`, the first cause of an end that is no success, else where it is, or ""; `strip`:
         row, name of the state, seconds from the beginning at its begin and end (null: it runs),
-        class of its outcome.
+        class of its outcome; `outages`, pairs [s from the beginning] in which no process ran it.
     """
     found = why(record, events)
     kind = None if found.outcome is None else outcome_class(found.outcome)
@@ -44,7 +44,9 @@ def run_row(record: StateRecord, events: Sequence[dict[str, Any]]) -> dict[str, 
         reason = _cause(steps[0]) if steps else ""
     elif found.outcome is None and steps:
         reason = _name(steps[0].path, record)
-    run = [one for one in events if found.began is not None and one["stamp_ns"] >= found.began]
+    run = newest_run(events, record.path)
+    began = found.began or 0
+    last = next((one for one in reversed(run) if one["kind"] == "Recovered"), None)
     return {
         "machine": record.label,
         "robots": _robots(run),
@@ -54,7 +56,13 @@ def run_row(record: StateRecord, events: Sequence[dict[str, Any]]) -> dict[str, 
         "outcome": found.outcome,
         "reason": shorten(reason, LONGEST),
         "strip": [] if found.began is None else _strip(record, run, found.began),
+        "outages": [] if last is None else spans_after(began, last["outages"]),
     }
+
+
+def spans_after(began: int, spans: Iterable[Sequence[int]]) -> list[tuple[float, float]]:
+    """Return pairs of instants [ns] as seconds after `began`."""
+    return [(round((a - began) / 1e9, 3), round((b - began) / 1e9, 3)) for a, b in spans]
 
 
 def _cause(step: Any) -> str:
@@ -78,9 +86,7 @@ def _strip(
 ) -> list[tuple[int, str, float, float | None, str]]:
     """The visits of the root's children; a concurrence has a row for each of them."""
     children = {child.path: number for number, child in enumerate(record.children)}
-    watching = {
-        child.path for child in record.children if child.kind in {"monitor", "condition"}
-    }  # what they find is no failure
+    kinds = {child.path: child.kind for child in record.children}
     rows = record.kind == "concurrence"
     since: dict[str, float] = {}
     pieces: list[tuple[int, str, float, float | None, str]] = []
@@ -91,13 +97,15 @@ def _strip(
 
     for event in run:
         path, at = event["path"], round((event["stamp_ns"] - began) / 1e9, 3)
+        if event["kind"] == "Recovered":
+            known = [(one, start) for one, start in event["active"] if one in children]
+            since = {one: since.get(one, (start - began) / 1e9) for one, start in known}
         if path not in children:
             continue
         if event["kind"] == "Entered":
             since[path] = at
         elif event["kind"] in _ENDS and path in since:
-            kind = str(outcome_class(event.get("outcome") or RAISED))
-            add(path, at, "other" if kind == "failure" and path in watching else kind)
+            add(path, at, end_class(kinds[path], event.get("outcome") or RAISED))
     for path in list(since):
         add(path, None, "active")
     pieces.sort(key=lambda piece: piece[2])

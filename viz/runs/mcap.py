@@ -17,6 +17,7 @@ import heapq
 import json
 import zlib
 from collections import Counter
+from datetime import UTC, datetime
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
@@ -82,6 +83,9 @@ class _Export:
 
     def run(self) -> None:
         define_types(self._recording.definitions)
+        began = datetime.fromtimestamp(self._recording.made_ns / 1e9, UTC)  # stamps may be virtual
+        facts = {"machine": self._recording.record.label, "began": began.isoformat()}
+        self._writer.add_metadata("run", facts)
         for container in self._containers.values():
             message = _structure(container, self._recording.stamp_ns)
             topic = f"{self._server}/smach/container_structure"

@@ -89,6 +89,10 @@ class Scene:
                 yield f"{space}/map", _grid(record, header)
             case "value":
                 yield f"{space}/{record['name']}", Float64(data=float(record["value"]))
+            case "values":
+                for path, value in record["values"].items():
+                    name = f"/{record['topic']}/{path.replace('.', '/')}"
+                    yield name, Float64(data=float(value))
 
     def told(self, event: Mapping[str, Any], state: RunState) -> Iterator[Message]:
         """Yield what an event of the mission changes.

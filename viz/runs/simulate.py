@@ -8,35 +8,46 @@ import math
 import os
 import random
 import signal
+import tempfile
 import threading
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass, field
-from multiprocessing import get_context
+from dataclasses import dataclass, field, replace
+from multiprocessing import get_context, parent_process
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.clock import current_clock
 from smachpy.command.arguments import Text, parameters_of
 from smachpy.command.runner import NO_NAMES, build, needed_servers
 from smachpy.command.surroundings import Pace, RobotOptions, open_surroundings
 from smachpy.command.targets import load_target
+from smachpy.events import Entered, Failed, Left
 from smachpy.events.recording import Recorder
 from smachpy.exceptions import MissionError
 from smachpy.introspection import describe
 from smachpy.mission_info import mission_info
+from smachpy.run.grace import asking
 from smachpy.sim.config import load_config
 from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
     from concurrent.futures import Executor
-    from pathlib import Path
 
     from smachpy.command.targets import Target
+    from smachpy.events import Event
+    from smachpy.machines.container import Container
 
     Value = float | int | str
 
 SHORT = {"battery": "battery.charge"}
 """Short names of the simulated robot's parameters."""
 SERVER_TIMEOUT_S = 10.0
+LIMIT_S = 4 * 3600.0
+"""Virtual time that a run may take, unless something else is said [s]."""
+
+MOST_AT_ONCE = 100_000
+"""So many events at one instant of virtual time: a mission that goes round without waiting."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +122,7 @@ class Task:
         seed: Of the order in which things of the same instant happen.
         values: By key.
         file: Where it is recorded.
+        limit: Virtual time that it may take [s]; it is preempted then.
     """
 
     mission: str
@@ -118,6 +130,7 @@ class Task:
     seed: int
     values: Mapping[str, Value]
     file: Path
+    limit: float = LIMIT_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,13 +139,15 @@ class Result:
 
     Attributes:
         task: The run.
-        outcome: None when it raised or could not be done.
+        outcome: None when it raised, could not be done or did not end.
         error: Why not.
+        recording: What belongs into the file, when whoever did the run has no such folder.
     """
 
     task: Task
     outcome: str | None
     error: str = ""
+    recording: bytes = b""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +160,7 @@ class Plan:
         folder: Where recordings go; must exist.
         vary: What varies.
         seed: The same seed makes the same runs.
+        limit: Virtual time that a run may take [s].
     """
 
     mission: str
@@ -152,6 +168,7 @@ class Plan:
     folder: Path
     vary: Sequence[Vary] = field(default=())
     seed: int = 1
+    limit: float = LIMIT_S
 
     def tasks(self) -> list[Task]:
         """Return the runs.
@@ -168,6 +185,7 @@ class Plan:
                 self.seed * 1_000_003 + run,
                 {vary.key: vary.value(run, self.runs, self.seed) for vary in self.vary},
                 self.folder / f"{run + 1:04}.jsonl",
+                self.limit,
             )
             for run in range(self.runs)
         ]
@@ -219,8 +237,8 @@ def simulate(
 
     Args:
         plan: What to do.
-        executor: Where; a pool of one process per core when None. Its workers need this package,
-            the mission and the folder.
+        executor: Where; a pool of one process per core when None. Its workers need this package
+            and the mission; recordings are sent back from computers that do not have the folder.
         on_result: Called for each as it ends, in the caller's thread.
         jobs: Processes of that pool; None: one per core.
 
@@ -242,6 +260,9 @@ def simulate(
             task = futures[future]
             error = future.exception()
             result = future.result() if error is None else Result(task, None, _words(error))
+            if result.recording:
+                task.file.write_bytes(result.recording)
+                result = replace(result, task=task, recording=b"")
             results[task.number] = result
             on_result(result)
     return [results[task.number] for task in tasks]
@@ -255,10 +276,10 @@ def _pool(jobs: int | None, runs: int) -> Iterator[Executor]:
         jobs: How many; None: one per core.
         runs: No more are made than there are runs.
     """
-    executor = ProcessPoolExecutor(
+    executor = _Pool(
         min(jobs or os.cpu_count() or 1, runs),
         mp_context=get_context("spawn"),
-        initializer=_leave_signals,
+        initializer=_end_with_parent,
     )
     try:
         yield executor
@@ -266,9 +287,29 @@ def _pool(jobs: int | None, runs: int) -> Iterator[Executor]:
         executor.shutdown(cancel_futures=True)
 
 
-def _leave_signals() -> None:
-    """Ctrl-C is for the process that shares the work out."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+class _Pool(ProcessPoolExecutor):
+    """Its processes never see Ctrl-C, which is for the one that shares the work out."""
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Any:
+        """As `Executor.submit`."""
+        # A new process inherits what is blocked; an initializer comes after imports, too late.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            return super().submit(fn, *args, **kwargs)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _end_with_parent() -> None:
+    """End this process when the one that shares the work out is killed: nobody else would."""
+
+    def wait() -> None:
+        parent = parent_process()
+        assert parent is not None
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=wait, name="lifeline", daemon=True).start()
 
 
 def _words(error: BaseException) -> str:
@@ -284,13 +325,20 @@ def run_one(task: Task) -> Result:
     if threading.current_thread() is threading.main_thread():
         quiet = contextlib.redirect_stdout(io.StringIO())
     try:
-        with quiet:
-            return Result(task, _execute(task))
+        with quiet, contextlib.ExitStack() as stack:
+            here = task
+            if not task.file.parent.is_dir():  # another computer
+                folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="smachpy-run-"))
+                here = replace(task, file=Path(folder) / task.file.name)
+            outcome, error = _execute(here)
+            recording = b"" if here is task else here.file.read_bytes()
+            return Result(task, outcome, error, recording)
     except Exception as error:  # noqa: BLE001  whatever the mission's code does is a result
         return Result(task, None, _words(error))
 
 
-def _execute(task: Task) -> str:
+def _execute(task: Task) -> tuple[str | None, str]:
+    """Do a run; return its outcome, or None and why it was ended."""
     target = load_target(task.mission)
     robot_values = {
         SHORT.get(key, key): value
@@ -319,10 +367,67 @@ def _execute(task: Task) -> str:
         surroundings.start(machine, others)
         if not surroundings.wait(SERVER_TIMEOUT_S):
             raise MissionError("the program is to end")
-        with Recorder(task.file, machine):
+        with Recorder(task.file, machine), _limited(machine, task.limit) as limit:
             outcome = machine.execute()
         surroundings.over()
-    return outcome
+    return (outcome, "") if limit.reached is None else (None, limit.reached)
+
+
+class _Limit:
+    """Preempts a machine that does not end.
+
+    Args:
+        machine: The machine.
+        seconds: Virtual time that it may take [s].
+
+    Attributes:
+        reached: Why it was preempted, in words; None: it was not.
+    """
+
+    def __init__(self, machine: Container, seconds: float) -> None:
+        self.reached: str | None = None
+        self._machine = machine
+        self._seconds = seconds
+        self._instant, self._events = 0.0, 0
+        self._active: dict[str, None] = {}
+        self._newest = "no state"
+
+    def on_time(self) -> None:
+        """Take the end of its time."""
+        self._end(f"had not ended after {self._seconds:g} s of virtual time")
+
+    def on_event(self, event: Event) -> None:
+        """Count events of one instant, and note what runs."""
+        if isinstance(event, (Left, Failed)):
+            self._active.pop(event.path, None)
+            self._newest = event.path
+        elif isinstance(event, Entered):
+            self._active[event.path] = None
+        self._events = self._events + 1 if event.t == self._instant else 0
+        self._instant = event.t
+        if self._events > MOST_AT_ONCE:
+            self._end(f"went on for {MOST_AT_ONCE} events without waiting")
+
+    def _end(self, why: str) -> None:
+        if self.reached is None:
+            leaves = [
+                p for p in self._active if not any(q.startswith(f"{p}/") for q in self._active)
+            ]
+            self.reached = f"{why}; it was in {', '.join(leaves) or self._newest}"
+            with asking("program", "smachpy simulate", "its time is over"):
+                self._machine.request_preempt()
+
+
+@contextlib.contextmanager
+def _limited(machine: Container, seconds: float) -> Iterator[_Limit]:
+    limit = _Limit(machine, seconds)
+    unsubscribe = machine.subscribe(limit.on_event)
+    timer = current_clock().call_later(seconds, limit.on_time)
+    try:
+        yield limit
+    finally:
+        timer.cancel()
+        unsubscribe()
 
 
 def _write_config(file: Path, values: Mapping[str, Value]) -> None:

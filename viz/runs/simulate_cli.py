@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import importlib
+import json
 import sys
 import tempfile
 from pathlib import Path
@@ -10,8 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.output import printable
 from smachpy.command import UsageError
+from smachpy.command.run import time_span
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from concurrent.futures import Executor
+
     from viz.runs.report import Runs
     from viz.runs.simulate import Result, Vary
 
@@ -19,8 +26,10 @@ EXAMPLES = """examples:
   smachpy simulate patrol --runs 100 --vary battery=0.2..1.0
   smachpy simulate patrol --vary battery=0.2..1.0 --vary robot.max_speed=0.4..1.2 -o report.html
   smachpy simulate there_and_back --vary x=2,4,8 --record runs/ --compare last_week/
+  smachpy simulate patrol --runs 10000 --executor my_cluster:executor
 """
 MOST_RUNS = 100_000
+LIMIT_S = 4 * 3600.0
 MOST_FAILURES = 5
 
 
@@ -30,8 +39,8 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "simulate",
         help="do many runs of a mission in virtual time",
         description="Do many runs of a mission with the simulated robot, in virtual time and in "
-        "parallel, with values that vary. Exit codes: 0 all runs ended, 1 some raised, 2 bad "
-        "input.",
+        "parallel, with values that vary. Exit codes: 0 all runs ended, 1 some raised or did not "
+        "end, 2 bad input.",
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -54,6 +63,21 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--jobs", type=_count, metavar="N", help="runs at the same time (default: one a core)"
     )
+    parser.add_argument(
+        "--limit",
+        type=time_span,
+        default=LIMIT_S,
+        metavar="TIME",
+        help="virtual time that a run may take: 30s, 10m, 2h; it is preempted then, and named "
+        "(default: 4h)",
+    )
+    parser.add_argument(
+        "--executor",
+        metavar="MODULE:FUNCTION",
+        help="what returns the concurrent.futures.Executor that does the runs, of a cluster, say "
+        "(default: processes of this computer)",
+    )
+    parser.add_argument("--json", action="store_true", help="for programs: an object a run")
     parser.add_argument(
         "--record", type=Path, metavar="DIR", help="keep the recordings in this new folder"
     )
@@ -111,28 +135,30 @@ def _simulate(args: argparse.Namespace, folder: Path) -> int:
     from viz.runs.simulate import Plan, simulate
 
     before = None if args.compare is None else collect_one(args.compare, "simulate --compare")
-    plan = Plan(args.mission, args.runs, folder, args.vary, args.seed)
-    progress = _Progress(args.runs)
-    try:
-        results = simulate(plan, on_result=progress.on_result, jobs=args.jobs)
-    finally:
-        progress.end()
+    plan = Plan(args.mission, args.runs, folder, args.vary, args.seed, args.limit)
+    progress = _Progress(args.runs, as_json=args.json)
+    with _executor(args.executor) as executor:
+        try:
+            results = simulate(plan, executor, progress.on_result, jobs=args.jobs)
+        finally:
+            progress.end()
     failed = [result for result in results if result.outcome is None]
-    if len(failed) == len(results):
+    if not any(result.task.file.exists() for result in results):
         raise UsageError(f"smachpy simulate: no run has ended; run 1: {failed[0].error}")
     runs = collect_one(str(folder), "simulate")
     values = {str(result.task.file): result.task.values for result in results}
-    out = console()
-    print_statistics(out, runs.record, runs.statistics, 0)
-    _print_varied(runs, values)
-    for result in failed[:MOST_FAILURES]:
-        print(printable(f"run {result.task.number} raised: {_told(result)}"))
-    if len(failed) > MOST_FAILURES:
-        print(f"and {len(failed) - MOST_FAILURES} more")
-    if before is not None:
-        print_differences(before, runs)
+    if not args.json:
+        print_statistics(console(), runs.record, runs.statistics, 0)
+        _print_varied(runs, values)
+        for result in failed[:MOST_FAILURES]:
+            print(printable(f"run {result.task.number}: {_told(result)}"))
+        if len(failed) > MOST_FAILURES:
+            print(f"and {len(failed) - MOST_FAILURES} more")
+        if before is not None:
+            print_differences(before, runs)
     if args.output is not None:
-        print(_write(args.output, runs, before, values))
+        written = _write(args.output, runs, before, values)
+        print(written, file=sys.stderr if args.json else sys.stdout)
     return 1 if failed else 0
 
 
@@ -163,17 +189,49 @@ def _write(output: Path, runs: Runs, before: Runs | None, values: Any) -> Path:
     return write(page.encode("utf-8", "replace"), output)
 
 
-class _Progress:
-    """A line that counts the runs that have ended, in a terminal."""
+@contextlib.contextmanager
+def _executor(name: str | None) -> Iterator[Executor | None]:
+    """Make what does the runs; None: a pool of processes."""
+    if name is None:
+        yield None
+        return
+    module, colon, function = name.partition(":")
+    sys.path.insert(0, "")  # the current folder, as for missions
+    try:
+        made = getattr(importlib.import_module(module), function)() if colon else None
+    except Exception as error:
+        raise UsageError(
+            f"smachpy simulate: --executor {name!r}: {type(error).__name__}: {error}"
+        ) from error
+    finally:
+        sys.path.remove("")
+    if not callable(getattr(made, "submit", None)):
+        raise UsageError(
+            f"smachpy simulate: --executor {name!r}: got {type(made).__name__}; expected "
+            "MODULE:FUNCTION that returns a concurrent.futures.Executor."
+        )
+    assert made is not None
+    with made as executor:
+        yield executor
 
-    def __init__(self, runs: int) -> None:
+
+class _Progress:
+    """A line that counts the runs that have ended, in a terminal, or one for each as JSON."""
+
+    def __init__(self, runs: int, *, as_json: bool) -> None:
         self._runs = runs
         self._done = 0
-        self._shown = sys.stderr.isatty()
+        self._json = as_json
+        self._shown = sys.stderr.isatty() and not as_json
 
-    def on_result(self, _result: Result) -> None:
+    def on_result(self, result: Result) -> None:
         """Count one."""
         self._done += 1
+        if self._json:
+            task = result.task
+            facts = {"run": task.number, "outcome": result.outcome, "error": result.error}
+            told = {**facts, "values": dict(task.values), "seed": task.seed}
+            print(json.dumps(told), flush=True)
         if self._shown:
             sys.stderr.write(f"\r{self._done} of {self._runs} runs")
             sys.stderr.flush()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from smachpy.events.recording import each_recording, find_recordings
 from smachpy.events.run_state import RAISED
-from smachpy.outcome_classes import outcome_class
+from viz.model.labels import WATCHING, end_class
 from viz.model.machine import Marks
 
 if TYPE_CHECKING:
@@ -18,10 +18,6 @@ if TYPE_CHECKING:
 
     from smachpy.events.recording import Recording
     from smachpy.introspection import StateRecord
-
-
-WATCHING = frozenset({"monitor", "condition"})
-"""Kinds of states whose outcomes say what they have found, not how well they did."""
 
 
 @dataclass(slots=True)
@@ -33,23 +29,19 @@ class StateStatistics:
         outcomes: Times each outcome ended it.
         visits: Times it was entered.
         retries: Times it was tried again.
-        watches: It is a monitor or a condition: what it finds, 'invalid' too, is no failure.
+        kind: "monitor", ...: what a monitor finds, 'invalid' too, is no failure.
     """
 
     visits: int = 0
     durations: list[float] = field(default_factory=list)
     outcomes: dict[str, int] = field(default_factory=dict)
     retries: int = 0
-    watches: bool = False
+    kind: str = ""
 
     def failures(self) -> float:
         """Return the share of visits that failed or raised, 0 to 1."""
         ended = sum(self.outcomes.values())
-        bad = sum(
-            n
-            for out, n in self.outcomes.items()
-            if out == RAISED or (not self.watches and outcome_class(out) == "failure")
-        )
+        bad = sum(n for out, n in self.outcomes.items() if end_class(self.kind, out) == "failure")
         return bad / ended if ended else 0.0
 
     def to_json(self) -> dict[str, Any]:
@@ -95,30 +87,63 @@ class Statistics:
         """Count the events of one file; `record` is its machine, which says what only watches."""
         for one in () if record is None else record.walk():
             if one.kind in WATCHING:
-                self._state(one.path).watches = True
+                self._state(one.path).kind = one.kind
         since: dict[str, int] = {}
+        newest: dict[str, tuple[int, str]] = {}  # end and outcome of each state's newest visit
         for event in events:
             kind, path, stamp = event["kind"], event["path"], event["stamp_ns"]
             if kind in {"Started", "Entered"}:
                 since[path] = stamp
                 self._state(path).visits += 1
                 self.runs += kind == "Started"
+            elif kind == "Recovered":
+                self._recover(event, since, newest)
             elif kind == "Retried":
                 self._state(path).retries += 1
             elif kind in {"Left", "Failed", "Finished"}:
                 outcome = event.get("outcome") or RAISED
                 state = self._state(path)
                 state.outcomes[outcome] = state.outcomes.get(outcome, 0) + 1
+                newest[path] = stamp, outcome
                 if path in since:
                     state.durations.append((stamp - since.pop(path)) / 1e9)
                 if kind == "Finished":
                     self.outcomes[outcome] = self.outcomes.get(outcome, 0) + 1
                     self.durations += state.durations[-1:]
 
+    def _recover(
+        self, event: dict[str, Any], since: dict[str, int], newest: dict[str, tuple[int, str]]
+    ) -> None:
+        """Another process goes on with the run, and with what the end of the first one ended."""
+        root, active = event["path"], dict(event["active"])
+        self.runs += root not in since and root not in newest
+        for path in [path for path in since if path not in active]:
+            del since[path]
+        for path, began in active.items():
+            if path in since:
+                continue
+            since[path] = began
+            stamp, outcome = newest.pop(path, (-1, ""))
+            state = self._state(path)
+            if stamp < began:
+                state.visits += 1
+                continue
+            _take_back(state.outcomes, outcome)
+            del state.durations[-1:]
+            if path == root:
+                _take_back(self.outcomes, outcome)
+                del self.durations[-1:]
+
     def _state(self, path: str) -> StateStatistics:
         if path not in self.states:
             self.states[path] = StateStatistics()
         return self.states[path]
+
+
+def _take_back(outcomes: dict[str, int], outcome: str) -> None:
+    outcomes[outcome] -= 1
+    if not outcomes[outcome]:
+        del outcomes[outcome]
 
 
 ROUNDING = 1e-9  # 0.95 * 20 is a little more than 19

@@ -65,6 +65,7 @@ class EventLines:
         }
         self._by_type: dict[type, Callable[[Any], Text | None]] = {
             ev.Started: lambda event: self._line(event, Text("started")),
+            ev.Recovered: lambda event: self._line(event, Text(ev.recovered_text(event.outages))),
             ev.Left: self._left,
             ev.Failed: self._failed,
             ev.Finished: self._finished,

@@ -94,6 +94,7 @@ interface RunState {
   states: Record<string, StateRun>;
   goals: Record<string, GoalRun>;
   userdata: Record<string, UserdataEntry>;
+  outages?: [number, number][]; // in which no process ran it
   dropped?: number;
 }
 
@@ -409,4 +410,55 @@ interface RunRow {
   problem: string;
   file: string;
   strip: [number, string, number, number | null, string][]; // row, state, from and to [s], class
+  outages: [number, number][]; // [s]
+  run: string; // names the run of a durable mission
+  asks: boolean; // a person
+  stamp: number | null; // `began` by the mission's own time, which may have been virtual
+  mission: Mission | null;
+}
+
+// `viz.live.journals.Journals`: a durable mission.
+interface Mission {
+  id: string;
+  journal: string;
+  status: string; // queued, running, interrupted, ended or cancelled
+  active: string[];
+  problem: string;
+  can: string[]; // "resume", "cancel"
+}
+
+declare module "gifenc" {
+  type Palette = number[][];
+  interface Encoder {
+    writeFrame(index: Uint8Array, width: number, height: number, options?: object): void;
+    finish(): void;
+    bytes(): Uint8Array<ArrayBuffer>;
+  }
+  function GIFEncoder(): Encoder;
+  function quantize(rgba: Uint8ClampedArray, colours: number): Palette;
+  function applyPalette(rgba: Uint8ClampedArray, palette: Palette): Uint8Array;
+}
+
+// `viz.live.simulations.Batch`
+interface Batch {
+  id: string;
+  mission: string;
+  runs: number;
+  vary: string[];
+  seed: number;
+  limit: string;
+  compare: string;
+  began_ns: number;
+  outcomes: Record<string, number>;
+  failed: number;
+  first_failure: string;
+  running: boolean;
+  problem: string;
+  report: boolean;
+}
+
+// A live run, with what a map of all needs.
+interface FleetRow extends RunRow {
+  observed: Observed[];
+  events: RunEvent[];
 }

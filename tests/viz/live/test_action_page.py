@@ -18,7 +18,7 @@ def no_leaks():
     """Processes of this module's fixtures outlive single tests."""
 
 
-def wait_for(page, condition, timeout=10.0):
+def wait_for(page, condition, timeout=30.0):
     deadline = time.monotonic() + timeout
     while not page.evaluate(f"() => Boolean({condition})"):
         assert time.monotonic() < deadline, f"never true: {condition}"
@@ -136,7 +136,8 @@ def test_with_control_but_without_the_token_nothing_goes_either(action_page):
     assert "has no token" in page.text_content("#why")
     assert page.is_disabled("#send-goal")
     ask = """(headers) => fetch('/api/action', {method: 'POST', headers,
-        body: JSON.stringify({command: 'send', name: 'move_base', yaml: ''})}).then(async (a) => [a.status, await a.text()])"""
+        body: JSON.stringify({command: 'send', name: 'move_base', yaml: ''})}).then(async (a) => [a.status,
+          await a.text()])"""
     status, text = page.evaluate(ask, {"x-smachpy-token": "guess"})
     assert status == 403
     assert "token" in text

@@ -12,7 +12,7 @@ from smachpy.events.recording import Recorder
 pytestmark = [pytest.mark.browser, pytest.mark.zenoh]
 
 
-def wait_for(page, condition, timeout=10.0):
+def wait_for(page, condition, timeout=30.0):
     deadline = time.monotonic() + timeout
     while not page.evaluate(f"() => Boolean({condition})"):
         assert time.monotonic() < deadline, f"never true: {condition}"

@@ -24,7 +24,7 @@ def active(page):
     return page.evaluate("() => smachpy.store.activeLeaves.value")
 
 
-def wait_for(page, condition, timeout=10.0):
+def wait_for(page, condition, timeout=30.0):
     """Wait for a JavaScript condition; the page's policy forbids playwright's own way."""
     deadline = time.monotonic() + timeout
     while not page.evaluate(f"() => Boolean({condition})"):
@@ -118,7 +118,8 @@ def test_time_travel_shows_graph_goals_and_userdata_of_one_instant(delivery, sha
       const i = run.events.findIndex((e, n) => n > 20 && e.kind === "Left");
       store.seek(run.events[i].stamp_ns / 1e6);
       const path = run.events[i].path;
-      return { path, out: store.shown().states[path].outcome, wrote: Object.values(store.shown().userdata).map((u) => u.writer) };
+      return { path, out: store.shown().states[path].outcome,
+        wrote: Object.values(store.shown().userdata).map((u) => u.writer) };
     }""")
     assert found["out"] == "succeeded"
     assert found["wrote"]
@@ -209,7 +210,7 @@ def test_a_robot_that_dies_is_stale_and_one_that_comes_back_is_not(start, look):
     assert "Stale" in page.text_content(".banner")
     start.robot("--name", "mortal", "--rate", 4)
     wait_for(page, "smachpy.store.runStatus.value.word === 'running'")
-    assert active(page)
+    wait_for(page, "smachpy.store.activeLeaves.value.length")  # a state is entered soon
 
 
 def test_a_viewer_that_is_restarted_is_found_again_with_the_whole_history(start, look):
@@ -533,7 +534,8 @@ def test_every_key_does_what_the_help_says(delivery, look):
 def test_who_cannot_see_is_told(delivery, look):
     page = look(delivery.base + "?machine=delivery")
     page.wait_for_timeout(500)
-    unnamed = page.evaluate("""() => [...document.querySelectorAll('button, input, select, [role=button], [role=slider], svg[role]')]
+    unnamed = page.evaluate("""() => [
+      ...document.querySelectorAll('button, input, select, [role=button], [role=slider], svg[role]')]
         .filter((e) => e.getClientRects().length)
         .filter((e) => !(e.getAttribute('aria-label') || e.labels?.length || e.textContent.trim() || e.title))
         .map((e) => e.outerHTML.slice(0, 200))""")
@@ -549,7 +551,8 @@ def test_who_cannot_see_is_told(delivery, look):
     # What happens is spoken, at most once a second.
     wait_for(page, "document.getElementById('announced').textContent.startsWith('running: ')")
     changes = page.evaluate("""() => new Promise((done) => { let count = 0;
-        new MutationObserver(() => { count += 1; }).observe(document.getElementById('announced'), {childList: true, characterData: true, subtree: true});
+        new MutationObserver(() => { count += 1; }).observe(document.getElementById('announced'), {childList: true,
+          characterData: true, subtree: true});
         setTimeout(() => done(count), 2100); })""")
     assert changes <= 3
     tree = page.evaluate("""() => [...document.querySelectorAll('[role=treeitem]')].map((e) =>

@@ -10,7 +10,7 @@ import pytest
 from actionlib_core.exceptions import FieldError
 from actionlib_core.interfaces import define_action, get_message
 from smachpy import CBState, Concurrence, StateMachine
-from smachpy.events import SOURCES, asker_text
+from smachpy.events import SOURCES, asker_text, span_text
 from smachpy.events.run_state import RunState
 from smachpy.introspection import describe
 from smachpy.outcome_classes import FAILURE, PREEMPTED_PREFIXES, SUCCESS, outcome_class
@@ -123,6 +123,7 @@ def test_texts():
     for asker in fixture["askers"]:
         assert asker_text(asker["source"], asker["by"], asker["why"]) == asker["text"]
     assert {asker["source"] for asker in fixture["askers"]} > set(SOURCES)
+    assert all(span_text(seconds) == text for seconds, text in fixture["spans"])
 
 
 def test_the_fields_of_a_form():

@@ -139,3 +139,84 @@ def test_a_live_run_that_asks_its_operator_says_so(home, look):
     home.machines.get("one").add(home.events([("QuestionAsked", "/JOB/A", asked)], after=2))
     page.wait_for_selector(".runs .pill-text.waiting:has-text('asks you')")
     page.wait_for_function("() => document.title.startsWith('(1) ')")
+
+
+class Missions:
+    """A journal with one interrupted mission; it notes what it is told."""
+
+    def __init__(self, began):
+        self.told = []
+        self.began = began
+
+    def rows(self):
+        state = {"id": "<b>m</b>", "journal": "j.db", "status": "interrupted", "active": ["/JOB/B"]}
+        at = self.began
+        return [
+            {"id": "mission j.db m", "run": "m 1", "machine": "JOB", "robots": [], "began": at,
+             "ended": None, "last": at + 20_000_000_000, "outcome": None, "reason": "B",
+             "strip": [(0, "A", 0.0, 5.0, "success"), (0, "B", 15.0, None, "active")],
+             "outages": [(5.0, 15.0)],
+             "mission": {**state, "problem": "", "can": ["resume", "cancel"]}},
+        ]  # fmt: skip
+
+    def places(self):
+        return [{"name": "j.db", "problem": ""}, {"name": "b.db", "problem": "no such file"}]
+
+    def command(self, *words):
+        self.told.append(words)
+        return "it is resumed"
+
+
+def test_a_durable_mission_is_resumed_with_the_token_alone(served, look):
+    missions = Missions(served.began)
+    served.start(runs=Runs(served.machines, [], missions), home=True, token="right")
+    page = look(served.address, drawn=False)
+    page.wait_for_selector(".runs tr:has-text('interrupted')")
+    assert page.locator(".run-strip .outage").count() == 1
+    assert page.locator(".chip.bad").get_attribute("title") == "no such file"
+    assert page.locator(".runs button.small").count() == 0
+    page = look(served.address + "#token=right", drawn=False)
+    page.click("button[aria-label='resume <b>m</b>']")
+    page.wait_for_selector("text=it is resumed")
+    assert missions.told == [("j.db", "<b>m</b>", "resume", "")]
+    answer = page.evaluate(
+        """() => fetch('/api/mission', {method: 'POST', headers: {'x-smachpy-token': 'wrong',
+           'content-type': 'application/json'}, body: '{}'}).then((one) => one.status)"""
+    )
+    assert answer == 403
+
+
+def test_the_timeline_has_a_gap_where_no_process_ran_the_mission(served, look):
+    at = served.began
+    active = [["/JOB", at], ["/JOB/A", at]]
+    facts = {"mission": "m", "began_ns": at, "outages": [[at, at + 10**10]], "active": active}
+    served.add("one", events=[("Recovered", "/JOB", {**facts, "at": 10.0})])
+    page = look(served.start())
+    page.click(".time-tools button")
+    assert page.evaluate("() => smachpy.store.run.now.outages.length") == 1
+    assert page.evaluate("() => smachpy.page.timeline.gaps.length") == 1
+    assert page.locator(".log >> text=goes on after an outage of 10 s").count() == 1
+
+
+def test_live_runs_together_have_cards_lanes_and_one_map(served, look):
+    floor = {"kind": "Observed", "path": "", "what": "map", "robot": "", "resolution": 0.5, "width": 3,
+             "height": 2, "origin": [1.0, 2.0, 0.0], "cells": "eNpjYGRiYGIAAAAXAAY="}  # fmt: skip
+    pose = {"kind": "Observed", "path": "", "what": "pose", "robot": "", "at": [1.0, 1.0, 0.0]}
+    for name in ("one", "<b>two", "gone"):
+        machine = served.add(name, events=[("Started", "/JOB"), ("Entered", "/JOB/A")])
+        machine.observe(
+            {**one, "stamp_ns": served.began, "n": n} for n, one in enumerate((floor, pose), 1)
+        )
+    machine.set_stale(1)
+    page = look(served.start(home=True), drawn=False)
+    page.click("button:has-text('Fleet')")
+    page.wait_for_selector(".fleet-map canvas")
+    assert page.locator(".fleet .cards button").count() == 2
+    assert page.locator(".fleet .lanes rect.active").count() == 2
+    assert "<b>two" in page.locator(".fleet .cards").inner_text()
+    page.wait_for_function(
+        "() => document.querySelector('.fleet-map canvas').getAttribute('aria-label')"
+    )
+    page.click(".fleet .cards button:has-text('two')")
+    page.wait_for_function("() => smachpy.store.facts.value?.name === '<b>two'")
+    assert page.query_selector(".fleet") is None

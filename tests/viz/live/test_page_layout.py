@@ -147,3 +147,65 @@ def test_follow_frames_all_that_runs_and_never_below_nine_pixels(served, look):
           b.x * view.k + view.x > -1 && (b.x + b.w) * view.k + view.x < view.width + 1 &&
           b.y * view.k + view.y > -1 && (b.y + b.h) * view.k + view.y < view.height + 1); })()""",
     )
+
+
+def test_a_shape_at_which_the_layouter_fails_is_left_out(served, look):
+    served.add("one", labels="ABCD", events=[("Started", "/JOB"), ("Entered", "/JOB/A")])
+    page = look(served.start())
+    drawn = page.evaluate(
+        """async () => { const { page } = smachpy, { elk } = page.layout, real = elk.layout.bind(elk), seen = [];
+          elk.layout = async (graph) => {
+            const all = graph.children.map((one) => one.layoutOptions["elk.direction"]);
+            seen.push(...all);
+            if (all.includes("DOWN")) throw new Error("Index: -1, Size: 0");
+            return real(graph);
+          };
+          page.layout.clear();
+          await page.relayout({ frame: true });
+          return [seen.includes("DOWN"), [...page.layout.chosen.values()][0], smachpy.store.failure.value,
+            document.querySelectorAll('g.leaf').length]; }"""
+    )
+    assert drawn[0]
+    assert drawn[1].startswith("RIGHT")
+    assert drawn[2:] == [None, 4]
+
+
+def test_what_is_drawn_stays_when_nothing_can_be_laid_out(served, look):
+    served.add("one", labels="ABCD", events=[("Started", "/JOB"), ("Entered", "/JOB/A")])
+    page = look(served.start())
+    page.evaluate(
+        """async () => { const { page } = smachpy;
+          page.layout.elk.layout = async () => { throw new Error("Index: -1, Size: 0"); };
+          page.layout.clear(); await page.relayout({ frame: true }); }"""
+    )
+    assert page.locator("g.leaf").count() == 4
+    page.wait_for_selector(".notice.error:has-text('could not be laid out')")
+
+
+def test_while_the_page_opens_the_layout_follows_the_shape_that_is_left(served, look):
+    served.add("one", labels="ABCD", events=[("Started", "/JOB"), ("Entered", "/JOB/A")])
+    page = look(served.start())
+    page.set_viewport_size({"width": 1000, "height": 900})
+    wait_for_shape = """() => { const { layout, view, drawing } = smachpy.page;
+      return !drawing && layout.suits(view.width / view.height); }"""
+    page.wait_for_function(wait_for_shape)
+    page.set_viewport_size({"width": 1400, "height": 560})
+    page.wait_for_function(wait_for_shape)
+    page.evaluate("() => { smachpy.page.openedAt = -1e6; }")  # long ago: it stays as it is
+    aspect = page.evaluate("() => smachpy.page.layout.aspect")
+    page.set_viewport_size({"width": 800, "height": 900})
+    page.wait_for_function(
+        "() => { const { view, fitted } = smachpy.page; return view.height > 500 && view.is(fitted); }"
+    )
+    assert page.evaluate("() => smachpy.page.layout.aspect") == aspect
+
+
+def test_long_outcomes_are_cut_with_the_whole_in_a_tip(served, look):
+    long = "x" * 5000
+    sm = StateMachine(outcomes=[long], name="JOB")
+    with sm:
+        StateMachine.add("A", CBState(lambda _: "y", outcomes=["y" * 5000]), {"y" * 5000: long})
+    served.add("one", sm=sm)
+    page = look(served.start())
+    assert page.evaluate("() => smachpy.page.diagram.size.w") < 600
+    assert page.text_content(".pill title").startswith("x" * 300)

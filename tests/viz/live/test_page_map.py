@@ -74,7 +74,8 @@ def office(served):
     return served
 
 
-AT = "([x, y]) => { const b = document.querySelector('.map-view canvas').getBoundingClientRect(); const [px, py] = smachpy.page.map.at({ x, y }); return [b.left + px, b.top + py]; }"
+AT = """([x, y]) => { const b = document.querySelector('.map-view canvas').getBoundingClientRect();
+  const [px, py] = smachpy.page.map.at({ x, y }); return [b.left + px, b.top + py]; }"""
 
 
 def test_a_press_on_the_track_goes_to_its_instant(office, look):
@@ -89,6 +90,23 @@ def test_a_press_on_the_track_goes_to_its_instant(office, look):
     assert page.evaluate("() => smachpy.store.hovered.value") is None
 
 
+def test_two_fingers_zoom_the_map(office, look):
+    page = look(office.start())
+    page.wait_for_selector(".map-view canvas")
+    pinch = """() => { const canvas = document.querySelector('.map-view canvas'), { map } = smachpy.page;
+      const { left, top } = canvas.getBoundingClientRect(), before = map.at({ x: 2, y: 1 });
+      const on = (type, id, [x, y], target = window) => target.dispatchEvent(new PointerEvent(type,
+        { pointerId: id, clientX: left + x, clientY: top + y, bubbles: true, pointerType: 'touch' }));
+      const [x, y] = before, far = map.at({ x: 3, y: 1 })[0] - x;
+      on('pointerdown', 1, [x, y], canvas); on('pointerdown', 2, [x + 40, y], canvas);
+      on('pointermove', 2, [x + 120, y]); on('pointerup', 2, [x + 120, y]); on('pointerup', 1, [x, y]);
+      return [(map.at({ x: 3, y: 1 })[0] - map.at({ x: 2, y: 1 })[0]) / far, map.at({ x: 2, y: 1 })[0] - x]; }"""
+    factor, moved = page.evaluate(pinch)
+    assert factor == pytest.approx(3)
+    assert moved == pytest.approx(0, abs=1)  # what is under a finger stays there
+    assert page.evaluate("() => smachpy.store.cursor.value") is None  # and was not tapped
+
+
 def test_hovering_is_linked_both_ways(office, look):
     page = look(office.start())
     page.wait_for_selector(".map-view canvas")
@@ -98,12 +116,33 @@ def test_hovering_is_linked_both_ways(office, look):
     assert "00:05.0 \u2013 00:09.0, 4.0 s" in page.text_content(".map-view .tip")
     page.wait_for_selector("g[data-path='/JOB/B'].linked")
     bar = """() => { const t = smachpy.page.timeline, b = t.canvas.getBoundingClientRect(),
-      h = t.hits.find((one) => one.span.path === '/JOB/A'); return [b.left + h.left + 5, b.top + (h.top + h.bottom) / 2]; }"""
+      h = t.hits.find((one) => one.span.path === '/JOB/A'); return [b.left + h.left + 5,
+        b.top + (h.top + h.bottom) / 2]; }"""
     page.mouse.move(*page.evaluate(bar))
     page.wait_for_selector("g[data-path='/JOB/A'].linked")
     assert "ok 00:01.0 \u2013 00:05.0" in page.text_content(".map-view .tip")
     page.mouse.move(5, 5)
     page.wait_for_selector(".map-view .tip", state="detached")
+
+
+def test_hovering_the_diagram_a_goal_or_the_log_lights_up_the_visit_everywhere(office, look):
+    page = look(office.start())
+    page.wait_for_selector(".map-view canvas")
+    page.hover("g.leaf[data-path='/JOB/A']")
+    page.wait_for_selector(".map-view .tip")
+    assert "00:01.0 \u2013 00:05.0" in page.text_content(".map-view .tip")
+    page.wait_for_selector(".log li.lit:has-text('goal to move_base')")
+    page.wait_for_selector(".ended-goal.lit:has-text('arrived')")
+    page.mouse.move(5, 5)
+    page.wait_for_selector(".log li.lit", state="detached")
+    page.hover(".ended-goal:has-text('arrived')")
+    page.wait_for_selector("g[data-path='/JOB/A'].linked")
+    page.hover(".log li:has-text('goal to move_base')")
+    page.wait_for_selector("g[data-path='/JOB/B'].linked")
+    page.mouse.move(5, 5)
+    page.wait_for_selector("g.linked", state="detached")
+    page.focus(".ended-goal .link")
+    page.wait_for_selector("g[data-path='/JOB/A'].linked")
 
 
 def test_the_floor_is_drawn_in_the_colours_of_the_theme(office, look):
@@ -180,6 +219,8 @@ def test_the_one_file_has_the_map(office, look, tmp_path):
 def test_a_phone_shows_the_map(office, look):
     page = look(office.start())
     page.set_viewport_size({"width": 390, "height": 844})
+    page.click(".parts button:has-text('Map')")
+    page.wait_for_selector(".map-view canvas", state="visible")
     box = page.query_selector(".map-view canvas").bounding_box()
     assert box["width"] > 330
     assert box["height"] > 120

@@ -22,7 +22,7 @@ def told(*events):
     return [(kind, path, dict(*more)) for kind, path, *more in events]
 
 
-def wait_for(page, condition, timeout=10.0):
+def wait_for(page, condition, timeout=30.0):
     deadline = time.monotonic() + timeout
     while not page.evaluate(f"() => Boolean({condition})"):
         assert time.monotonic() < deadline, f"never true: {condition}"
@@ -74,8 +74,10 @@ def test_the_instant_stays_on_the_lanes(served, look):
     )
     # The line is drawn at the left end of the lanes, not over their names.
     column = """() => { const t = smachpy.page.timeline, c = t.canvas, r = devicePixelRatio;
-      const d = t.context.getImageData(0, 2 * r, c.width, 1).data; const want = getComputedStyle(document.documentElement)
-      .getPropertyValue('--active').trim(); const hex = (i) => '#' + [0, 1, 2].map((k) => d[4 * i + k].toString(16).padStart(2, '0')).join('');
+      const d = t.context.getImageData(0, 2 * r, c.width, 1).data;
+        const want = getComputedStyle(document.documentElement)
+      .getPropertyValue('--active').trim(); const hex = (i) => '#' + [0, 1,
+        2].map((k) => d[4 * i + k].toString(16).padStart(2, '0')).join('');
       const hits = []; for (let i = 0; i < c.width; i++) if (hex(i) === want.toLowerCase()) hits.push(i / r);
       return [Math.min(...hits), t.names]; }"""
     at, names = page.evaluate(column)
@@ -105,7 +107,8 @@ def test_selected_looks_like_nothing_else(served, look):
     served.add("one", events=told(*BEGUN))
     page = look(served.start())
     page.click('g[data-path="/JOB/B"] .frame')
-    colour = "(p) => { const s = getComputedStyle(document.querySelector(`g[data-path='${p}'] > .frame`)); return [s.outlineStyle, s.outlineColor, s.stroke]; }"
+    colour = """(p) => { const s = getComputedStyle(document.querySelector(`g[data-path='${p}'] > .frame`));
+      return [s.outlineStyle, s.outlineColor, s.stroke]; }"""
     (_, running_line, running), (style, line, stroke) = (
         page.evaluate(colour, path) for path in ("/JOB/A", "/JOB/B")
     )
@@ -121,10 +124,17 @@ def test_a_flight_never_mirrors_the_picture(served, look):
         """() => new Promise((done) => { const { view } = smachpy.page, scales = [], real = requestAnimationFrame;
         window.requestAnimationFrame = (f) => real((t) => { f(t - 900 + 400 * scales.length); scales.push(view.k); });
         view.set(0, 0, 1); view.animateTo(50, 50, 0.5);
-        const look = () => (scales.length > 4 ? done(scales) : real(look)); look(); })"""
+        const look = () => (view.k === 0.5 ? done(scales) : real(look)); look(); })"""
     )
     assert all(0.5 <= k <= 1 for k in scales)
     assert scales[-1] == 0.5
+
+
+def test_a_recording_without_an_end_stands_where_it_ends(served, look):
+    served.began = 978_307_200_000_000_000  # a run in virtual time
+    served.add("one", events=told(*BEGUN, *LATER)).recorded = True
+    page = look(served.start())
+    wait_for(page, "smachpy.store.instantText(smachpy.store.nowMs()) === '00:33.0'")
 
 
 def test_two_fingers_zoom(served, look):
@@ -215,7 +225,8 @@ def test_goals_that_have_ended_are_a_line_each(served, look):
     assert all(lines.nth(n).bounding_box()["height"] < 30 for n in range(3))
     assert "arrived" in lines.nth(0).text_content()
     assert page.evaluate(
-        "() => document.querySelector('.ended-goal .link').scrollWidth <= document.querySelector('.ended-goal .link').clientWidth"
+        """() => { const link = document.querySelector('.ended-goal .link');
+          return link.scrollWidth <= link.clientWidth; }"""
     )
     page.click("button:text-is('2 earlier')")
     wait_for(page, "document.querySelectorAll('.ended-goal').length === 5")
@@ -299,6 +310,22 @@ def test_why_it_ended_so_and_a_step_goes_there(served, look):
     )
     page.keyboard.press("w")
     wait_for(page, "!document.querySelector('.why')")
+    page.keyboard.press("l")
+    page.set_viewport_size({"width": 390, "height": 844})
+    page.click(".why-button")
+    page.wait_for_selector(".why li", state="visible")
+    tops = "() => ['.why', '.log'].map((name) => document.querySelector(name).getBoundingClientRect().top)"
+    why, log = page.evaluate(tops)
+    assert why < log
+    for kind in ("success", "failure", "preempted", "other"):  # its number can be read
+        number = page.evaluate(
+            """(kind) => { const step = document.querySelector('.why li');
+              step.className = `${kind} first`;
+              const { color, backgroundColor } = getComputedStyle(step, '::before');
+              return [color, backgroundColor]; }""",
+            kind,
+        )
+        assert number[0] != number[1]
 
 
 def test_the_way_to_the_end_is_opened_and_drawn_thick(served, look):
@@ -368,3 +395,25 @@ def test_an_old_tab_asks_for_the_token_of_a_new_viewer(served, look):
     page.click("#pause")
     wait_for(page, "document.querySelector('.notice')?.textContent === 'pause: done'")
     assert [one["command"] for one in served.commands] == ["pause"]
+
+
+def test_an_old_tab_takes_the_token_of_an_address_that_is_pasted_into_it(served, look):
+    served.add("one", events=told(*BEGUN), control=CONTROL)
+    page = look(f"{served.start(token='new')}#token=old")
+    page.evaluate("() => { location.hash = 'token=new'; }")
+    wait_for(page, "!location.hash.includes('token')")
+    page.click("#pause")
+    wait_for(page, "document.querySelector('.notice')?.textContent === 'pause: done'")
+
+
+def test_escape_closes_the_dialog_and_not_what_is_below(served, look):
+    served.add("one", events=told(*BEGUN))
+    page = look(served.start())
+    page.evaluate(
+        "() => { smachpy.store.homeOpen.value = true; smachpy.store.simulateOpen.value = true; }"
+    )
+    page.wait_for_selector(".simulate")
+    page.keyboard.press("h")  # keys are for the dialog
+    page.keyboard.press("Escape")
+    wait_for(page, "!document.querySelector('.simulate')")
+    assert page.evaluate("() => smachpy.store.homeOpen.value")

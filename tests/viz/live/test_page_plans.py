@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from itertools import pairwise
 
 import pytest
 
@@ -66,6 +67,11 @@ def test_tokens_move_and_guards_say_what_they_wait_for(plan, start, look):
     first, second, third = (f"/fetch/{t.id}" for t in plan.plan.net.transitions)
     init, there, near = (path_of(plan, name) for name in ("init", "there", "near"))
     wait_for(page, first, "begun is false")
+    boxes = [page.locator(f'g[data-path="{path}"]').bounding_box() for path in (init, first, there)]
+    assert any(
+        all(one[at] + one[size] <= other[at] for one, other in pairwise(boxes))
+        for at, size in (("x", "width"), ("y", "height"))
+    ), boxes
     assert "waiting" in text_of(page, first)[0]
     assert "marked" in text_of(page, init)[0]
     assert text_of(page, init)[1] == "\u25cf"

@@ -142,3 +142,154 @@ def test_the_bar_can_be_used_on_a_phone(served, look):
     assert box["y"] + box["height"] <= 844
     page.click("#play")
     page.wait_for_function("() => smachpy.store.playing.value !== null")
+
+
+def at(page, seconds, lane=10):
+    """Where an instant is in the timeline."""
+    return page.evaluate(
+        """([s, y]) => { const { canvas, scale } = smachpy.page.timeline, b = canvas.getBoundingClientRect();
+          return [b.left + scale.x(smachpy.store.run.first() + 1000 * s), b.top + y]; }""",
+        [seconds, lane],
+    )
+
+
+def drag(page, begin, end):
+    page.mouse.move(*begin)
+    page.mouse.down()
+    page.mouse.move(*[(a + b) / 2 for a, b in zip(begin, end, strict=True)])
+    page.mouse.move(*end)
+    page.mouse.up()
+
+
+STRETCH = """() => { const { stretch, run } = smachpy.store;
+  return stretch.value && [stretch.value.from, stretch.value.to].map((t) => Math.round((t - run.first()) / 1000)); }"""
+
+
+def test_a_drag_over_the_lanes_selects_what_is_looped(served, look):
+    served.add("one", events=run())
+    page = look(served.start())
+    page.evaluate("() => { smachpy.page.timeline.fitAll(); smachpy.page.timeline.draw(); }")
+    freeze(page)
+    drag(page, at(page, 12), at(page, 22))
+    assert page.evaluate(STRETCH) == [12, 22]
+    assert page.evaluate("() => smachpy.store.cursor.value") is None  # it moves nothing
+    page.evaluate(
+        "() => { const { from, to } = smachpy.store.stretch.value; smachpy.store.selectStretch(from - from % 1, to); }"
+    )
+    page.click("#loop")
+    page.wait_for_selector("#loop[aria-pressed=true]")
+    first = page.evaluate(SHOWN)
+    assert first.startswith("00:1")
+    length = page.evaluate(
+        "() => smachpy.store.stretch.value.to - smachpy.store.stretch.value.from"
+    )
+    page.evaluate("(ms) => pass(ms - 1000)", length)
+    assert page.evaluate(SHOWN) != first
+    page.evaluate("() => pass(1000)")
+    assert page.evaluate(SHOWN) == first  # begins anew
+    page.keyboard.press("r")
+    page.wait_for_selector("#loop[aria-pressed=false]")
+    page.evaluate("(ms) => pass(ms + 2000)", length)
+    assert page.evaluate(STRETCH) == [12, 22]
+    page.keyboard.press("Escape")
+    assert page.evaluate(STRETCH) is None
+
+
+def test_a_drag_on_the_axis_moves_the_instant(served, look):
+    served.add("one", events=run())
+    page = look(served.start())
+    page.evaluate("() => { smachpy.page.timeline.fitAll(); smachpy.page.timeline.draw(); }")
+    axis = page.evaluate("() => smachpy.page.timeline.canvas.clientHeight - 8")
+    drag(page, at(page, 12, axis), at(page, 22, axis))
+    assert page.evaluate(SHOWN).startswith("00:22")
+    assert page.evaluate(STRETCH) is None
+
+
+def test_only_the_first_button_moves_the_instant_and_the_wheel_zooms_at_once(served, look):
+    served.add("one", events=run())
+    page = look(served.start())
+    page.evaluate("() => { smachpy.page.timeline.fitAll(); smachpy.page.timeline.draw(); }")
+    axis = page.evaluate("() => smachpy.page.timeline.canvas.clientHeight - 8")
+    page.mouse.click(*at(page, 12, axis), button="right")
+    assert page.evaluate("() => smachpy.store.cursor.value") is None
+    shorter = """() => { const { timeline } = smachpy.page, { from, to } = timeline.scale;
+      timeline.canvas.dispatchEvent(new WheelEvent("wheel",
+        { deltaY: -100, clientX: timeline.canvas.getBoundingClientRect().left + 300, cancelable: true }));
+      return timeline.scale.to - timeline.scale.from < to - from; }"""
+    assert page.evaluate(shorter)
+
+
+def test_the_axis_tells_instants_as_the_clock_does(served, look):
+    served.add("one", events=run())
+    page = look(served.start())
+    texts = """() => { const { timeline } = smachpy.page, { prototype } = CanvasRenderingContext2D,
+      texts = [], before = prototype.fillText;
+      prototype.fillText = function (text, ...place) { texts.push(text); before.call(this, text, ...place); };
+      for (const end of [50, 1]) { timeline.length = 1000 * end; timeline.end = smachpy.store.run.first() + 1000 * end;
+        timeline.draw(); }
+      prototype.fillText = before; return texts.filter((text) => /[0-9]/.test(text)); }"""
+    told = page.evaluate(texts)
+    assert {"00:10", "00:40", "00:00.2", "00:00.8"} <= set(told)
+
+
+def test_the_stretch_is_chosen_by_keys_by_the_selected_state_and_by_a_link(served, look):
+    served.add("one", events=run())
+    page = look(served.start())
+    page.evaluate("() => smachpy.store.seek(smachpy.store.run.first() + 5000)")
+    page.keyboard.press("[")
+    page.evaluate("() => smachpy.store.seek(smachpy.store.run.first() + 15000)")
+    page.keyboard.press("]")
+    assert page.evaluate(STRETCH) == [5, 15]
+    page.evaluate("() => smachpy.store.seek(smachpy.store.run.first() + 2000)")
+    page.keyboard.press("]")  # it would end before it begins
+    assert page.evaluate(STRETCH) == [5, 15]
+    address = page.evaluate("() => smachpy.page.address()")
+    page.goto("about:blank")
+    page.goto(address)
+    page.wait_for_selector("html[data-drawn]")
+    assert page.evaluate(STRETCH) == [5, 15]
+    page.keyboard.press("Escape")
+    page.evaluate(
+        "() => { smachpy.page.select('/JOB/B'); smachpy.store.seek(smachpy.store.run.first() + 30000); }"
+    )
+    page.keyboard.press("r")
+    assert page.evaluate(STRETCH) == [20, 40]
+
+
+def test_the_last_seconds_are_saved_as_a_gif_without_moving_anything(served, look, tmp_path):
+    served.add("one", events=run())
+    page = look(served.start())
+    page.evaluate(
+        "() => { const { store } = smachpy; store.seek(store.run.first() + 30000);"
+        " store.selectStretch(store.run.first() + 19000, store.run.first() + 21000);"
+        " store.togglePlaying(); store.seek(store.run.first() + 30000); }"
+    )
+    with page.expect_download() as download:
+        page.click(".share button:has-text('GIF')")
+    assert page.evaluate("() => smachpy.store.playing.value") is None  # pictures are of one instant
+    assert download.value.suggested_filename.startswith("JOB-00-3")
+    download.value.save_as(tmp_path / "run.gif")
+    film = (tmp_path / "run.gif").read_bytes()
+    assert film[:6] == b"GIF89a"
+    width, height = (int.from_bytes(film[at : at + 2], "little") for at in (6, 8))
+    assert 300 < width <= 960
+    assert height > 100
+    assert 2 < film.count(b"\x21\xf9\x04") <= 11  # 5 pictures a second, fewer where nothing changes
+    page.wait_for_selector(".share button:has-text('GIF'):enabled")
+    assert page.evaluate(SHOWN).startswith("00:3")
+
+
+def test_what_is_typed_stays_while_a_run_goes_on(served, look):
+    served.add("one", events=run()[:1])
+    page = look(served.start())
+    page.click(".clock input")
+    page.keyboard.type("0:0")
+    shown = ".clock small"  # the length of the run, drawn together with the instant
+    before = page.text_content(shown)
+    page.wait_for_function(
+        "([shown, before]) => document.querySelector(shown).textContent !== before",
+        arg=[shown, before],
+    )
+    assert page.input_value(".clock input") == "0:0"
+    page.keyboard.press("Enter")
+    assert page.evaluate(SHOWN) == "00:00.0"

@@ -26,7 +26,7 @@ def told(*events):
     return [(kind, path, dict(*more)) for kind, path, *more in events]
 
 
-def wait_for(page, condition, timeout=10.0):
+def wait_for(page, condition, timeout=30.0):
     deadline = time.monotonic() + timeout
     while not page.evaluate(f"() => Boolean({condition})"):
         assert time.monotonic() < deadline, f"never true: {condition}"
@@ -87,7 +87,8 @@ def test_of_two_answers_at_once_one_counts(errand, look):
     page.wait_for_selector(OPEN)
     answers = page.evaluate(
         """async () => {
-          const [[path]] = Object.entries(smachpy.store.run.now.states).filter(([, s]) => s.question?.answered === null);
+          const [[path]] = Object.entries(smachpy.store.run.now.states).filter(([,
+            s]) => s.question?.answered === null);
           const give = (answer) => fetch("/api/control?machine=errand", {
             method: "POST", headers: { "x-smachpy-token": sessionStorage.getItem("smachpy.token") },
             body: JSON.stringify({ command: "answer", path, answer, by: answer }) }).then((r) => r.json());
@@ -165,3 +166,7 @@ def test_a_phone_shows_the_question_and_its_buttons_at_once(served, look):
         "() => [...document.querySelectorAll('.answer')].map((b) => b.getBoundingClientRect().height)"
     )
     assert min(sizes) >= 48
+    assert page.locator("[role=alertdialog]").evaluate(
+        "(card) => document.getElementById(card.getAttribute('aria-labelledby')).textContent"
+    )
+    assert " " not in page.get_attribute("[role=alertdialog]", "aria-labelledby")

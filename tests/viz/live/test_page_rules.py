@@ -11,7 +11,7 @@ from dataclasses import asdict
 
 import pytest
 
-from smachpy import CBState, Concurrence, StateMachine
+from smachpy import CBState, Concurrence, ConditionState, StateMachine
 from viz.live import app
 from viz.live.machines import KEPT_RUNS
 
@@ -33,7 +33,7 @@ def run(events=RUN):
     return [(kind, path, dict(*more)) for kind, path, *more in events]
 
 
-def wait_for(page, condition, timeout=10.0):
+def wait_for(page, condition, timeout=30.0):
     deadline = time.monotonic() + timeout
     while not page.evaluate(f"() => Boolean({condition})"):
         assert time.monotonic() < deadline, f"never true: {condition}"
@@ -119,8 +119,10 @@ def test_a_rule_over_several_children_is_a_bar_that_counts(served, look):
     # Both arrows end on the bar, and one leads from it.
     ends = page.evaluate(
         """() => { const bar = document.querySelector('rect.join').getBBox();
-        const near = (p) => p.x > bar.x - 2 && p.x < bar.x + bar.width + 2 && p.y > bar.y - 2 && p.y < bar.y + bar.height + 2;
-        const lines = [...document.querySelectorAll('path.edge')].map((e) => [e.getPointAtLength(0), e.getPointAtLength(e.getTotalLength())]);
+        const near = (p) => p.x > bar.x - 2 && p.x < bar.x + bar.width + 2 && p.y > bar.y - 2 &&
+          p.y < bar.y + bar.height + 2;
+        const lines = [...document.querySelectorAll('path.edge')].map((e) => [e.getPointAtLength(0),
+          e.getPointAtLength(e.getTotalLength())]);
         return [lines.filter(([, to]) => near(to)).length, lines.filter(([from]) => near(from)).length]; }"""
     )
     assert ends == [2, 1]
@@ -128,6 +130,36 @@ def test_a_rule_over_several_children_is_a_bar_that_counts(served, look):
     machine.add(served.events(left, after=4))
     wait_for(page, "document.querySelector('.label.joined').textContent === 'both: 1 of 2'")
     assert page.locator("path.edge.arrived").count() == 1
+
+
+def test_what_a_condition_finds_is_drawn_as_no_failure(served, look):
+    sm = StateMachine(outcomes=["done"], name="JOB")
+    with sm:
+        StateMachine.add(
+            "A", ConditionState(lambda _: True), {"true": "B", "false": "C", "preempted": "done"}
+        )
+        for name in "BC":
+            StateMachine.add(name, CBState(lambda _: "no", outcomes=["no"]), {"no": "done"})
+    served.add("one", sm=sm)
+    page = look(served.start())
+    kinds = page.evaluate(
+        "() => ['A', 'B'].map((name) => [...smachpy.page.diagram.arrows].filter(([key]) => /(false|no)$/.test(key)"
+        " && key.startsWith(`/JOB/${name}`)).map(([, [{ line }]]) => line.getAttribute('class')))"
+    )
+    assert kinds == [["edge other"], ["edge failure"]]
+
+
+def test_a_hidden_page_gathers_nothing_to_draw(served, look):
+    machine = served.add("one", events=run()[:1])
+    page = look(served.start())
+    page.evaluate("() => Object.defineProperty(document, 'hidden', { value: true })")
+    page.evaluate("() => { smachpy.page.frame = 1; }")  # asked for, and never drawn
+    machine.add(served.events([("Entered", "/JOB/A"), ("Left", "/JOB/A", {"outcome": "ok"})], 1))
+    wait_for(page, "smachpy.store.run.events.length === 3")
+    assert page.evaluate("() => [smachpy.page.flashes.length, smachpy.page.arrived.length]") == [
+        0,
+        0,
+    ]
 
 
 GOAL = ("GoalSent", "/JOB/A", {"action": "drive", "goal_id": "1", "goal": {"x": 1}})
@@ -498,7 +530,8 @@ def test_looking_back_stays_where_it_is_while_older_events_are_forgotten(served,
         wait_for(page, f"smachpy.store.run.events.at(-1).seq === {seq}")
         if turn == 5:
             shown = page.evaluate(
-                "() => { smachpy.store.seekTo(smachpy.store.run.events.length - 11); return smachpy.store.shown().states; }"
+                """() => { const { store } = smachpy; store.seekTo(store.run.events.length - 11);
+                  return store.shown().states; }"""
             )
     assert page.evaluate("() => smachpy.store.run.events.length") < 1400
     assert page.evaluate("() => smachpy.store.shown().states") == shown

@@ -8,7 +8,7 @@ from dataclasses import asdict
 import pytest
 
 from smachpy import CBState, Concurrence, StateMachine, describe
-from smachpy.events.recording import RecordingError, recording_lines
+from smachpy.events.recording import RecordingError, header_line, recording_lines
 from viz.live import runs as runs_module
 from viz.live.machines import Machines
 from viz.live.runs import Runs
@@ -70,7 +70,7 @@ def test_only_the_newest_run_counts_and_none_is_no_run():
     assert (row["began"], len(row["strip"])) == (BEGAN + 100 * S, 1)
     assert run_row(chain(), []) == {
         "machine": "JOB", "robots": [], "began": None, "ended": None, "last": None,
-        "outcome": None, "reason": "", "strip": [],
+        "outcome": None, "reason": "", "strip": [], "outages": [],
     }  # fmt: skip
 
 
@@ -185,3 +185,22 @@ def test_what_is_listed_can_be_opened_and_nothing_else(folder, tmp_path_factory,
                 f"file {folder / 'bad.jsonl'}"):  # fmt: skip
         with pytest.raises(RecordingError):
             runs.open(run)
+
+
+def test_a_run_in_virtual_time_has_its_real_date_and_is_one_row_with_its_file(tmp_path):
+    path = tmp_path / "virtual.jsonl"
+    lines = list(recording_lines(chain(), failed(began=S), None))
+    made = BEGAN + 5 * S
+    path.write_text(header_line(chain(), S, made_ns=made) + "".join(lines[1:]), encoding="utf-8")
+    runs = Runs(Machines(), [tmp_path])
+    [row] = runs.rows()["runs"]
+    assert (row["began"], row["stamp"]) == (made, S)
+    assert row["ended"] - row["began"] == row["last"] - made
+    machines = Machines()
+    machine = machines.obtain("one")
+    machine.reset(
+        {"epoch": "x", "description": asdict(chain()), "base": None, "events": failed(began=S)}
+    )
+    machine.behind = BEGAN
+    [row] = Runs(machines, [tmp_path]).rows()["runs"]
+    assert (row["began"], row["stamp"]) == (BEGAN + S, S)

@@ -9,6 +9,7 @@ import math
 import threading
 import weakref
 from dataclasses import asdict
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -413,6 +414,33 @@ def test_mcap_has_the_topics_of_smach_and_of_actions(record, tmp_path):
     assert (told.status.status, told.status.text, told.status.goal_id.id) == (3, "there", "id")
     statuses = [m.status_list for topic, _, m in messages if topic == "/robot/move_base/status"]
     assert [[one.status for one in several] for several in statuses] == [[1], [3]]
+
+
+def test_numbers_that_browsers_do_not_know_are_texts(record):
+    path = Path(record("run.jsonl"))
+    lines = path.read_text(encoding="utf-8").splitlines()
+    told = {
+        "kind": "UserdataWritten",
+        "path": "/JOB/FIRST",
+        "key": "x",
+        "value": [math.nan, -math.inf],
+    }
+    told |= {name: json.loads(lines[1])[name] for name in ("t", "stamp_ns", "seq")}
+    path.write_text(f"{lines[0]}\n{json.dumps(told)}\n", encoding="utf-8")
+    [event] = read_recording(str(path)).events
+    assert event["value"] == ["NaN", "-Infinity"]
+
+
+def test_mcap_has_the_real_date_of_a_run_in_virtual_time(record, tmp_path):
+    from mcap.reader import make_reader
+
+    recording = read_recording(record("run.jsonl"))
+    recording.made_ns = 1_795_411_316 * 10**9
+    exported(recording, tmp_path / "run.mcap")
+    with (tmp_path / "run.mcap").open("rb") as file:
+        [told] = make_reader(file).iter_metadata()
+    facts = {"machine": recording.record.label, "began": "2026-11-23T05:21:56+00:00"}
+    assert (told.name, told.metadata) == ("run", facts)
 
 
 def test_mcap_has_what_json_has_no_word_for_and_names_what_is_left_out(record, tmp_path, caplog):

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import json
+import os
 import re
+import select
+import signal
 import subprocess
 import sys
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from dataclasses import replace
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -198,3 +203,143 @@ def test_a_folder_is_exported_as_a_page_only(job, tmp_path, capsys, ending):
     simulate(plan(job, tmp_path, 1), Here())
     assert main(["runs", "export", str(tmp_path / "runs"), "-o", str(tmp_path / ending)]) == 2
     assert "expected .html" in capsys.readouterr().err
+
+
+ENDLESS = """
+import smachpy
+
+class Wait(smachpy.State):
+    def __init__(self, seconds):
+        super().__init__(outcomes=["again", "preempted"])
+        self.seconds = seconds
+
+    def execute(self, userdata):
+        self.sleep(self.seconds)
+        return "preempted" if self.preempt_requested() else "again"
+
+def mission(seconds: float = 1.0):
+    sm = smachpy.StateMachine(outcomes=["preempted"], name="ENDLESS")
+    with sm:
+        sm.add("WAIT", Wait(seconds), {"again": "WAIT"})
+    return sm
+"""
+
+
+@pytest.mark.parametrize("seconds", ["1.0", "0.0"])
+def test_a_mission_that_never_ends_is_named(tmp_path, seconds):
+    """One that waits, and one that only goes round: no time passes then."""
+    (tmp_path / "endless.py").write_text(ENDLESS)
+    (tmp_path / "runs").mkdir()
+    vary = [Vary.read(f"seconds={seconds}")]
+    endless = Plan(str(tmp_path / "endless.py"), 1, tmp_path / "runs", vary, limit=60.0)
+    [result] = simulate(endless, Here())
+    assert result.outcome is None
+    assert "WAIT" in result.error
+    [recording] = each_recording([tmp_path / "runs"])
+    assert recording.events[-1]["outcome"] == "preempted"
+
+
+@pytest.fixture
+def cluster(tmp_path, monkeypatch):
+    (tmp_path / "cluster.py").write_text(
+        "from concurrent.futures import ThreadPoolExecutor\n"
+        "def executor():\n    return ThreadPoolExecutor(1)\n"
+        "def nothing():\n    return 7\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    yield "cluster:executor"
+    sys.modules.pop("cluster", None)
+
+
+def test_the_limit_is_an_option_and_each_run_an_object(tmp_path, capsys, cluster):
+    (tmp_path / "endless.py").write_text(ENDLESS)
+    words = ["simulate", "endless.py", "--runs", "2", "--executor", cluster]
+    assert main([*words, "--limit", "30s", "--json"]) == 1
+    told = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [(one["run"], one["outcome"]) for one in told] == [(1, None), (2, None)]
+    with pytest.raises(SystemExit):
+        main([*words, "--limit", "soon"])
+
+
+def test_the_executor_of_a_cluster_is_an_option(job, cluster, capsys):
+    words = ["simulate", job, "--runs", "2", "--executor"]
+    assert main([*words, cluster]) == 0
+    assert "succeeded x2" in capsys.readouterr().out
+    for wrong in ("cluster", "cluster:gone", "cluster:nothing", "no_such_module_here:x"):
+        assert main([*words, wrong]) == 2
+
+
+def test_recordings_come_back_from_where_the_folder_is_not(job, tmp_path):
+    class Elsewhere(Here):
+        def submit(self, fn, task):
+            return super().submit(fn, replace(task, file=tmp_path / "gone" / task.file.name))
+
+    [result] = simulate(plan(job, tmp_path, 1), Elsewhere())
+    assert result.outcome == "succeeded"
+    assert result.task.file == tmp_path / "runs" / "0001.jsonl"
+    assert len(list(each_recording([tmp_path / "runs"]))) == 1
+
+
+INTERRUPT = """
+import os, signal, sys
+if "--multiprocessing-fork" in sys.orig_argv:
+    os.kill(os.getpid(), signal.SIGINT)
+"""
+
+
+def test_ctrl_c_is_not_for_the_processes_that_run_however_early_it_comes(job, tmp_path):
+    (tmp_path / "sitecustomize.py").write_text(INTERRUPT)  # as the terminal does to all processes
+    done = subprocess.run(
+        [sys.executable, "-m", "smachpy.command", "simulate", job, "--runs", "1", "--json"],
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert "Traceback" not in done.stderr
+    assert json.loads(done.stdout)["outcome"] == "succeeded"
+
+
+STAYS = """
+import os, smachpy
+
+@smachpy.state(outcomes=["done"])
+def stay(userdata):
+    with open(os.environ["PIPE"], "w") as pipe:
+        print(os.getpid(), file=pipe, flush=True)
+        os.read(os.pipe()[0], 1)  # for ever, in real time
+    return "done"
+
+def mission():
+    sm = smachpy.StateMachine(outcomes=["done"], name="STAYS")
+    with sm:
+        sm.add("STAY", stay)
+    return sm
+"""
+
+
+def test_a_killed_command_leaves_no_process_behind(tmp_path):
+    (tmp_path / "stays.py").write_text(STAYS)
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    command = subprocess.Popen(
+        [
+            sys.executable,
+            "-m",
+            "smachpy.command",
+            "simulate",
+            str(tmp_path / "stays.py"),
+            "--runs",
+            "1",
+        ],
+        env={**os.environ, "PIPE": str(pipe)},
+    )
+    with pipe.open() as ends:
+        worker = int(ends.readline())
+        command.kill()
+        command.wait()
+        ended, _, _ = select.select([ends], [], [], 30)  # its end closes the pipe
+        if not ended:
+            os.kill(worker, signal.SIGKILL)
+    assert ended, f"process {worker} runs on"

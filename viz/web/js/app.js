@@ -2,12 +2,15 @@
 import "@preact/signals";
 import { render } from "preact";
 import { useEffect, useLayoutEffect, useRef } from "preact/hooks";
+import { DOCKS } from "#core/arrangement.js";
 import { messageOf } from "#core/connection.js";
 import * as store from "#core/store.js";
 import { Page } from "#drawing/page.js";
 import { el } from "#drawing/svg.js";
 import { applyTheme } from "#drawing/theme.js";
 import { ActionsPage } from "#panels/actions.js";
+import { Dock, Parts } from "#panels/docks.js";
+import { FleetPage } from "#panels/fleet.js";
 import { HomePage } from "#panels/home.js";
 import { html } from "#panels/html.js";
 import { Inspector } from "#panels/inspector.js";
@@ -16,6 +19,8 @@ import { MapPanel } from "#panels/map.js";
 import { Help, Laying, Legend, Notice, Overlay, TokenDialog } from "#panels/messages.js";
 import { NoteDialog, ShareButtons } from "#panels/notes.js";
 import { PlayBar } from "#panels/play.js";
+import { AddLine, PlotsPanel } from "#panels/plots.js";
+import { SimulateDialog } from "#panels/simulate.js";
 import { TopBar } from "#panels/top_bar.js";
 import { Tree } from "#panels/tree.js";
 
@@ -43,7 +48,9 @@ function TimeTools() {
     timeline.fitAll();
     timeline.draw();
   };
-  return html`<div class="time-tools"><button title="show the whole run" onClick=${showAll}>All</button></div>`;
+  const addPlot = (/** @type {string} */ id) => store.setPlots([...store.plotsShown.value, [id]]);
+  return html`<div class="time-tools"><button title="show the whole run" onClick=${showAll}>All</button>
+    <${AddLine} label="plot a number of the run" text="Plot" onPick=${addPlot} /></div>`;
 }
 
 function ZoomButtons() {
@@ -52,6 +59,15 @@ function ZoomButtons() {
     <button title="larger (+)" aria-label="zoom in" onClick=${() => page.view.zoom(1.25)}>+</button>
     <button title="show everything (0)" onClick=${() => page.refit()}>Fit</button></span>`;
 }
+
+/** @type {Record<import("#core/arrangement.js").PanelName, () => any>} */
+const panels = {
+  tree: () => html`<${Tree} page=${page} />`,
+  map: () => html`<${MapPanel} page=${page}><${Mounted} element=${floor} /><//>`,
+  details: () => html`<${Inspector} page=${page} />`,
+  time: () => html`<div class="timeline"><${Mounted} element=${canvas} /><${TimeTools} /></div>`,
+  plots: () => html`<${PlotsPanel} page=${page} />`,
+};
 
 function App() {
   const paused = store.facts.value?.control?.paused && store.cursor.value === null;
@@ -66,11 +82,11 @@ function App() {
     store.cursor.value !== null && "past",
     store.treeOpen.value && "with-tree",
     store.asksNow.value && "asks",
-    store.hasMap.value && "with-map",
+    `part-${store.part.value}`,
   ];
   return html`<div class=${classes.filter(Boolean).join(" ")}>
     <${TopBar} page=${page} />
-    <${Tree} page=${page} />
+    ${DOCKS.map((name) => html`<${Dock} key=${name} name=${name} panels=${panels} />`)}
     <main class="stage">
       <${Mounted} element=${svg} />
       <${Overlay} page=${page} />
@@ -78,17 +94,17 @@ function App() {
       <${Mounted} element=${minimap} />
       <div class="strip"><${Legend} /><${ShareButtons} page=${page} /><${ZoomButtons} /></div>
     </main>
-    <footer class="timeline"><${Mounted} element=${canvas} /><${TimeTools} /></footer>
-    ${store.hasMap.value && html`<${MapPanel} page=${page}><${Mounted} element=${floor} /><//>`}
-    <${Inspector} page=${page} />
     <${PlayBar} page=${page} />
+    <${Parts} />
     <${HomePage} />
+    <${FleetPage} />
     <${ActionsPage} />
     <div id="announced" class="hidden" aria-live="polite"></div>
     <${Notice} />
     <${Help} />
     <${TokenDialog} />
     <${NoteDialog} />
+    <${SimulateDialog} />
   </div>`;
 }
 

@@ -73,8 +73,8 @@ export async function connect(handlers) {
   open();
 }
 
-/** The token stands in the fragment of the address, which no server is sent. */
-function readToken() {
+/** The token stands in the fragment of the address, which no server is sent; an old tab may be given a new one. */
+export function readToken() {
   const words = new URLSearchParams(location.hash.slice(1));
   const given = words.get("token") || null;
   words.delete("token");
@@ -321,7 +321,10 @@ export async function showWhy(open = store.why.value === null) {
   const shown = store.facts.value?.epoch;
   const answer = open ? (whyOfFile ?? (await ask(link("why")))) : null;
   if (answer && "ok" in answer) store.notify(`Why: ${answer.text}`, "error");
-  else if (shown === store.facts.value?.epoch) store.why.value = /** @type {Why | null} */ (answer);
+  else if (shown === store.facts.value?.epoch) {
+    store.why.value = /** @type {Why | null} */ (answer);
+    if (answer) store.part.value = "log"; // where a phone shows it
+  }
 }
 
 /** Give the machine shown a command. @param {string} name @param {Record<string, unknown>} [more] */
@@ -360,6 +363,33 @@ export function refreshRuns() {
     },
     Math.max(0, refreshed + REFRESH_MS - performance.now()),
   );
+}
+
+/** The live runs together. @returns {Promise<FleetRow[] | null>} */
+export async function askFleet() {
+  const answer = /** @type {any} */ (await ask("/api/fleet"));
+  return Array.isArray(answer) ? answer : null;
+}
+
+/** Start a batch of simulated runs, or stop one. @param {object} data */
+export async function askSimulation(data) {
+  const answer = await post("/api/simulate", data);
+  await refreshSimulations();
+  return answer;
+}
+
+/** Ask for the batches of simulated runs again. */
+export async function refreshSimulations() {
+  const answer = await ask("/api/simulations");
+  if (Array.isArray(answer.batches)) store.simulations.value = /** @type {any} */ (answer);
+}
+
+/** Resume or cancel a durable mission. @param {Mission} mission @param {string} what */
+export async function commandMission({ journal, id }, what) {
+  const answer = await post("/api/mission", { journal, id, command: what });
+  if (answer.ok) store.notify(`${id}: ${answer.text}`);
+  else if (!answer.wants_token) store.notify(answer.text ?? `${what}: refused`, "error");
+  refreshRuns();
 }
 
 /** Show a run of the list. @param {string} id */

@@ -3,6 +3,7 @@
 
 export const RAISED = "exception"; // stands for the outcome of a state that raised
 const CUT_SHORT = "a new run began before it ended"; // text of a LOST goal
+const NOT_RECORDED = "its end was not recorded"; // text of a LOST goal
 const ENDED_GOALS = 20; // so many goals that have ended are kept
 const NO_PREEMPT = { preempt: null, asked: null, serviced: null, abandoned: null };
 
@@ -68,6 +69,7 @@ const RULES = {
   Started(data, e) {
     data.run += 1;
     Object.assign(data, { started: e.stamp_ns, ended: null, outcome: null });
+    delete data.outages;
     // What an earlier run of this root left open was cut short: nothing will say that it ended.
     const below = `${e.path}/`;
     for (const [path, state] of Object.entries(data.states))
@@ -76,6 +78,28 @@ const RULES = {
       if (goal.ended == null && goal.path.startsWith(below))
         Object.assign(goal, { status: "LOST", text: CUT_SHORT, ended: e.stamp_ns });
     enter(data, e);
+  },
+  Recovered(data, e) {
+    if (data.started == null) Object.assign(data, { run: data.run + 1, started: e.began_ns });
+    Object.assign(data, {
+      ended: null,
+      outcome: null,
+      outages: e.outages.map((/** @type {[number, number]} */ pair) => [...pair]),
+    });
+    const active = new Map(e.active);
+    for (const [path, state] of Object.entries(data.states))
+      if (state.since != null && !active.has(path))
+        Object.assign(state, { since: null, left: e.stamp_ns, waits: null, ...NO_PREEMPT });
+    for (const [path, since] of active) {
+      const state = stateOf(data, path);
+      if (state.since == null && (state.left ?? -1) >= since)
+        reopen(state, since); // the process's own end
+      else if (state.since == null) Object.assign(state, { visits: state.visits + 1, attempt: 1 });
+      Object.assign(state, { since: state.since ?? since, waits: null, error: null, ...NO_PREEMPT });
+    }
+    for (const goal of Object.values(data.goals))
+      if (goal.ended == null && !active.has(goal.path))
+        Object.assign(goal, { status: "LOST", text: NOT_RECORDED, ended: e.stamp_ns });
   },
   Finished(data, e) {
     const outcome = e.outcome || RAISED;
@@ -200,6 +224,15 @@ function leave(data, e, outcome) {
   if (state.since != null) state.seconds += (e.stamp_ns - state.since) / 1e9;
   Object.assign(state, { since: null, left: e.stamp_ns, outcome, waits: null, ...NO_PREEMPT });
   put(state.outcomes, outcome, (own(state.outcomes, outcome) ?? 0) + 1);
+}
+
+/** Take the last end of a state back: it has not ended. @param {StateRun} state @param {number} since */
+function reopen(state, since) {
+  state.seconds = Math.max(0, state.seconds - ((state.left ?? since) - since) / 1e9);
+  const { outcome, outcomes } = state;
+  if (outcome !== null && outcomes[outcome] > 1) outcomes[outcome] -= 1;
+  else if (outcome !== null) delete outcomes[outcome];
+  state.outcome = Object.keys(outcomes).at(-1) ?? null;
 }
 
 /** @param {RunState} data @param {RunEvent} e @param {"serviced" | "abandoned"} fact */

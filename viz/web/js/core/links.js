@@ -1,5 +1,7 @@
-// What an address says of the view: instant, selected state, open containers, notes. All of it is in the fragment,
-// which no server is sent.
+// What an address says of the view: instant, selected state and stretch, open containers, panels, plots, notes. All of
+// it is in the fragment, which no server is sent.
+import { arrangementOf, wordOf } from "#core/arrangement.js";
+import { knownPlots } from "#core/series.js";
 
 const MOST_OPEN = 100; // containers
 const LONGEST_OPEN = 6000; // characters of all of them
@@ -8,7 +10,16 @@ const LONGEST_NOTE = 300; // characters
 const LATEST = 1e15; // [ms], later than any clock
 
 /** @typedef {{ at: number, text: string }} Note at an instant [ms] */
-/** @typedef {{ at: number | null, selected: string | null, opened: string[] | null, notes: Note[] }} LinkedView */
+/**
+ * @typedef {object} LinkedView
+ * @property {number | null} at instant [ms]; null: now
+ * @property {string | null} selected path
+ * @property {string[] | null} opened paths; null: as the page likes
+ * @property {Note[]} notes
+ * @property {[number, number] | null} stretch that is selected, from and to [ms]
+ * @property {import("#core/arrangement.js").Arrangement | null} panels null: as the reader likes
+ * @property {string[][] | null} plots ids of series; null: the usual ones
+ */
 
 /** An instant as seconds with microseconds, no earlier than it is. @param {number} at [ms] */
 const instant = (at) => (Math.ceil(at * 1000) / 1e6).toFixed(6);
@@ -21,7 +32,7 @@ function instantOf(text) {
 }
 
 /** The fragment of an address that shows this. @param {LinkedView} view */
-export function fragmentOf({ at, selected, opened, notes }) {
+export function fragmentOf({ at, selected, opened, notes, stretch, panels, plots }) {
   const words = new URLSearchParams();
   if (at !== null) words.append("at", instant(at));
   if (selected !== null) words.append("state", selected);
@@ -29,6 +40,10 @@ export function fragmentOf({ at, selected, opened, notes }) {
   const fits = paths.length <= MOST_OPEN && paths.join("").length <= LONGEST_OPEN;
   for (const path of fits ? paths : []) words.append("open", path);
   for (const note of notes.slice(-MOST_NOTES)) words.append("note", `${instant(note.at)} ${note.text}`);
+  if (stretch) words.append("stretch", stretch.map(instant).join(" "));
+  if (panels) words.append("panels", wordOf(panels));
+  for (const plot of plots ?? []) words.append("plot", plot.join(";"));
+  if (plots && !plots.length) words.append("plot", "");
   return words.toString();
 }
 
@@ -43,8 +58,19 @@ export function viewOf(text) {
   }
   const opened = words.getAll("open").slice(0, MOST_OPEN);
   /** @type {LinkedView} */
-  const view = { at: instantOf(words.get("at")), selected: words.get("state"), opened: null, notes };
+  const view = {
+    at: instantOf(words.get("at")),
+    selected: words.get("state"),
+    opened: null,
+    notes,
+    stretch: null,
+    panels: arrangementOf(words.get("panels")),
+    plots: null,
+  };
+  const [from, to] = (words.get("stretch") ?? "").split(" ").map(instantOf);
+  if (from && to && from < to) view.stretch = [from, to];
   if (opened.length) view.opened = opened;
+  if (words.has("plot")) view.plots = knownPlots(words.getAll("plot").map((plot) => plot.split(";")));
   return view;
 }
 

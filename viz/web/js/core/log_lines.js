@@ -1,12 +1,13 @@
 // An event as a line of the log.
 import { RAISED, requestOf } from "#core/fold.js";
-import { outcomeClass } from "#core/outcomes.js";
+import { endClass, outcomeClass } from "#core/outcomes.js";
 import { askerText, duration } from "#core/text.js";
 import { brief } from "#core/values.js";
 
 /** @type {Record<string, (e: RunEvent) => [string, string]>} */
 const LINES = {
   Started: () => ["started", "active"],
+  Recovered: (e) => [`goes on after an outage of ${outageText(e)}`, "waiting"],
   Finished: (e) => [`ended: ${e.outcome || RAISED}`, outcomeClass(e.outcome || RAISED)],
   Left: (e) => [e.outcome, outcomeClass(e.outcome)],
   Failed: (e) => [e.error, "failure"],
@@ -31,6 +32,12 @@ const LINES = {
 };
 
 /** @param {RunEvent} e */
+function outageText({ outages }) {
+  const [from, to] = outages?.at(-1) ?? [0, 0];
+  return duration((to - from) / 1e9);
+}
+
+/** @param {RunEvent} e */
 function heldText({ guards, truths }) {
   /** @type {(guard: string, i: number) => string} */
   const text = (guard, i) => `[${guard}] is false${truths?.[i] ? ` (${truths[i]})` : ""}`;
@@ -43,16 +50,20 @@ function requestText(e) {
   return `asked to stop${asker ? ` by ${asker}` : ""}${e.grace != null ? `, within ${duration(e.grace)}` : ""}`;
 }
 
-/** The text of an event's line, and the class of its colour. @param {RunEvent} e of one of `KINDS_OF` */
-export function lineOf(e) {
+/**
+ * The text of an event's line, and the class of its colour.
+ * @param {RunEvent} e of one of `KINDS_OF`
+ * @param {StateNode | null} [node] of its path
+ */
+export function lineOf(e, node) {
   const [text, kind] = LINES[e.kind](e);
-  return { text, kind };
+  return { text, kind: e.kind === "Left" ? endClass(node, e.outcome) : kind };
 }
 
 /** Kinds of events by the name of a filter. @type {Record<string, Set<string>>} */
 export const KINDS_OF = {
   all: new Set(Object.keys(LINES).filter((kind) => kind !== "UserdataWritten")),
-  transitions: new Set(["Started", "Finished", "Left", "Failed"]),
+  transitions: new Set(["Started", "Recovered", "Finished", "Left", "Failed"]),
   goals: new Set(["GoalSent", "GoalDone"]),
   userdata: new Set(["UserdataWritten"]),
   trouble: new Set([

@@ -12,24 +12,51 @@ export const FAILURE = words(
 );
 export const PREEMPTED_PREFIXES = words("preempt cancel recall interrupt");
 
+/** @type {Map<unknown, OutcomeClass>} */
+const known = new Map(); // it is asked for at every event
+const MOST_KNOWN = 2000;
+
 /**
  * @param {unknown} outcome
  * @returns {OutcomeClass}
  */
 export function outcomeClass(outcome) {
+  const before = known.get(outcome);
+  if (before) return before;
+  const found = classOf(outcome);
+  if (known.size < MOST_KNOWN) known.set(outcome, found);
+  return found;
+}
+
+/** @param {unknown} outcome @returns {OutcomeClass} */
+function classOf(outcome) {
   const word = String(outcome).toLowerCase().replace(/[- ]/g, "_");
   if (SUCCESS.includes(word)) return "success";
   if (FAILURE.includes(word)) return "failure";
   return PREEMPTED_PREFIXES.some((start) => word.startsWith(start)) ? "preempted" : "other";
 }
 
+const WATCHING = ["monitor", "condition"];
+const FINDINGS = ["invalid", "false", "no"];
+
 /**
- * The class that all of them share, else "other".
+ * The class of a state's end: what a monitor finds, "invalid" too, is no failure.
+ * @param {StateNode | null | undefined} node
+ * @param {string | null} outcome that it had; "exception" when it raised
+ */
+export function endClass(node, outcome) {
+  const isFinding = node && WATCHING.includes(node.kind) && FINDINGS.includes(String(outcome).toLowerCase());
+  return isFinding ? "other" : outcomeClass(outcome);
+}
+
+/**
+ * The class that all of some ends of a state share, else "other".
+ * @param {StateNode | null | undefined} node
  * @param {string[]} outcomes
  * @returns {OutcomeClass}
  */
-export function commonClass(outcomes) {
-  const classes = new Set(outcomes.map(outcomeClass));
+export function commonClass(node, outcomes) {
+  const classes = new Set(outcomes.map((outcome) => endClass(node, outcome)));
   const [first] = classes;
   return classes.size === 1 ? first : "other";
 }

@@ -1,12 +1,11 @@
 // Playing a run again: the instant at a moment, and the events that one may jump to.
-import { outcomeClass } from "#core/outcomes.js";
+import { endClass, outcomeClass } from "#core/outcomes.js";
 
 export const RATES = [0.25, 0.5, 1, 2, 4, 8, 16, 32, 64];
-const WATCHING = ["monitor", "condition"]; // what they find, "invalid" too, is no failure
 const MOST_KEYS = 200; // of userdata that are followed
 
 /** @typedef {"failure" | "preempt" | "goal"} Kind */
-/** @typedef {{ number: number, t: number, path: string, kind: string }} Mark an event, by its number in the run */
+/** @typedef {{ number: number, t: number, path: string, kind: string, outcome: string }} Mark by number of event */
 
 /**
  * The instant that is shown at a moment [ms].
@@ -14,6 +13,46 @@ const MOST_KEYS = 200; // of userdata that are followed
  * @param {number} moment
  */
 export const instantAt = ({ t, since, rate }, moment) => t + (moment - since) * rate;
+
+/** @typedef {{ from: number, to: number }} Stretch of a run [ms] */
+
+/**
+ * The instant of a loop over a stretch; before it, the way there is played.
+ * @param {number} t
+ * @param {Stretch} stretch
+ */
+export const loopedAt = (t, { from, to }) => (t < to ? t : from + ((t - from) % Math.max(1, to - from)));
+
+const FRAME_MS = 200; // between two pictures of a film, at least
+const MOST_FRAMES = 150;
+
+/**
+ * The instants of a film of a stretch; a long one is told faster than it went.
+ * @param {Stretch} stretch
+ */
+export function framesOf({ from, to }) {
+  const step = Math.max(FRAME_MS, (to - from) / MOST_FRAMES);
+  const count = Math.max(1, Math.ceil((to - from) / step));
+  const instants = Array.from({ length: count }, (_, i) => Math.min(to, from + i * step));
+  return [...instants, to];
+}
+export const FILM_FRAME_MS = FRAME_MS;
+
+/**
+ * Pixels that are as they were in the picture before become transparent: a film of a page that stands still is small.
+ * @param {Uint32Array} now
+ * @param {Uint32Array} before
+ * @param {Uint8Array} indexes of `now` in the palette
+ * @param {number} transparent index
+ * @returns {boolean} whether any pixel is another one
+ */
+export function keepUnchanged(now, before, indexes, transparent) {
+  let isOther = false;
+  for (let i = 0; i < now.length; i++)
+    if (now[i] === before[i]) indexes[i] = transparent;
+    else isOther = true;
+  return isOther;
+}
 
 /**
  * Seconds since the beginning of what was typed, such as 32.5, 01:02 or 1:02:03.25; null: it is none.
@@ -46,7 +85,7 @@ export class Marks {
   push(events) {
     for (const e of events) {
       this.#count += 1;
-      const mark = { number: this.#count, t: e.stamp_ns / 1e6, path: e.path, kind: e.kind };
+      const mark = { number: this.#count, t: e.stamp_ns / 1e6, path: e.path, kind: e.kind, outcome: e.outcome };
       const kind = kindOf(e);
       if (kind) this.#add(`kind ${kind}`, mark);
       if (e.kind !== "UserdataWritten" || (!this.keys.has(e.key) && this.keys.size >= MOST_KEYS)) continue;
@@ -101,7 +140,7 @@ export class Marks {
  * @param {Mark} mark
  * @param {import("#core/model.js").Model | null} model
  */
-function isOrigin({ kind, path }, model) {
+function isOrigin({ kind, path, outcome }, model) {
   const node = kind === "Left" ? model?.get(path) : undefined;
-  return !node || (!node.children.length && !WATCHING.includes(node.kind));
+  return !node || (!node.children.length && endClass(node, outcome) === "failure");
 }

@@ -17,6 +17,7 @@ export class Run {
   open = new Map();
   /** @type {number | null} */
   begun = null;
+  forgotten = 0; // so many of the oldest events
 
   /**
    * @param {RunState | null | undefined} base what happened before the events
@@ -51,6 +52,7 @@ export class Run {
     this.frames.splice(0, blocks);
     this.base = this.frames[0] ?? JSON.stringify(this.now);
     this.events.splice(0, gone);
+    this.forgotten += gone;
     const first = this.events.length ? timeOf(this.events[0]) : Infinity;
     const kept = (/** @type {Span} */ span) =>
       span.to === null ? this.open.get(span.path) === span : span.to >= first;
@@ -94,6 +96,7 @@ export class Run {
   /** @param {RunEvent} e */
   #follow(e) {
     const t = timeOf(e);
+    if (e.kind === "Recovered") this.#recover(e, t);
     if (e.kind === "Started" || e.kind === "Entered") {
       if (e.kind === "Started") {
         for (const span of this.open.values()) span.to = t; // the run before was cut off
@@ -114,6 +117,27 @@ export class Run {
       else this.preempts.push({ from: t, rows: [row] });
     } else if (e.kind === "PreemptServiced" && span.preempt !== null) span.serviced = t;
     else if (e.kind === "Abandoned" && span.preempt !== null) span.abandoned = t;
+  }
+
+  /**
+   * What was under way goes on, also what the end of the process had ended; how the rest ended is unknown.
+   * @param {RunEvent} e @param {number} t
+   */
+  #recover(e, t) {
+    const active = new Map(e.active);
+    for (const [path, span] of this.open) {
+      if (active.has(path)) continue;
+      span.to = t;
+      this.open.delete(path);
+    }
+    for (const [path, since] of active) {
+      if (this.open.has(path)) continue;
+      const last = this.spans.findLast((span) => span.path === path);
+      if (last?.to != null && last.to * 1e6 >= since) {
+        Object.assign(last, { to: null, outcome: null, preempt: null, asked: null, serviced: null, abandoned: null });
+        this.open.set(path, last);
+      } else this.#openSpan(path, since / 1e6);
+    }
   }
 
   /**
@@ -181,11 +205,11 @@ export class Run {
    * @param {number} count of events until then
    */
   lastTransition(count) {
-    const ends = ["Left", "Failed", "Finished", "Started"];
+    const ends = ["Left", "Failed", "Finished", "Started", "Recovered"];
     let end = count - 1; // of the transition: the newest event that ends a state
     while (end > 0 && !ends.includes(this.events[end]?.kind)) end--;
     let begin = end - 1;
-    while (begin > 0 && !["Left", "Failed", "Started"].includes(this.events[begin]?.kind)) begin--;
+    while (begin > 0 && !["Left", "Failed", "Started", "Recovered"].includes(this.events[begin]?.kind)) begin--;
     begin = Math.max(0, begin);
     const writes = this.events.slice(begin, count).filter((e) => e.kind === "UserdataWritten");
     return { before: this.after(begin), writes };

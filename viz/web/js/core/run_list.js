@@ -1,14 +1,32 @@
 // The list of runs: which of them are asked for, in which order, and how many there are of each sort.
 import { outcomeClass } from "#core/outcomes.js";
+import { duration } from "#core/text.js";
 
 /** @typedef {{ show: string, machine: string | null, robot: string | null, text: string }} Filter */
 
-export const SHOWN = ["all", "live", "pinned", "success", "failure", "preempted", "other", "cut"];
+export const SHOWN = [
+  "all",
+  "live",
+  "asking",
+  "pinned",
+  "durable",
+  "interrupted",
+  "queued",
+  "success",
+  "failure",
+  "preempted",
+  "other",
+  "cut",
+];
 /** @type {Record<string, string>} */
 export const SHOWN_NAMES = {
   all: "All runs",
   live: "Live",
+  asking: "Asking a person",
   pinned: "Pinned",
+  durable: "Durable",
+  interrupted: "interrupted",
+  queued: "queued",
   success: "succeeded",
   failure: "failed",
   preempted: "preempted",
@@ -16,14 +34,25 @@ export const SHOWN_NAMES = {
   cut: "without an end",
 };
 
-/** How a run stands: live, the class of its outcome, or cut. @param {RunRow} row */
+/** How a run stands: live, the class of its outcome, interrupted, queued, or cut. @param {RunRow} row */
 export function standing(row) {
-  if (row.live) return "live";
+  const status = row.mission?.status ?? "";
+  if (row.live || (status === "running" && row.outcome === null)) return "live";
+  if (status === "interrupted" || status === "queued") return status;
   return row.outcome === null ? "cut" : outcomeClass(row.outcome);
 }
 
+/** What names a run however it is found: a live one keeps its pin when it is a file. @param {RunRow} row */
+export const pinOf = (row) => row.run || (row.stamp === null ? row.id : `${row.machine} ${row.stamp}`);
+
 /** @param {RunRow} row @param {string} show @param {Set<string>} pins */
-const isShown = (row, show, pins) => show === "all" || (show === "pinned" ? pins.has(row.id) : standing(row) === show);
+function isShown(row, show, pins) {
+  if (show === "all") return true;
+  if (show === "pinned") return pins.has(pinOf(row));
+  if (show === "durable") return row.run !== "" || row.mission !== null;
+  if (show === "asking") return row.asks;
+  return standing(row) === show;
+}
 
 /** @param {RunRow} row @param {string} text */
 function hasText(row, text) {
@@ -47,7 +76,7 @@ export function chosen(rows, { show, machine, robot, text }, pins) {
       (robot === null || row.robots.includes(robot)) &&
       hasText(row, text),
   );
-  const rank = (/** @type {RunRow} */ row) => (row.live ? 0 : pins.has(row.id) ? 1 : 2);
+  const rank = (/** @type {RunRow} */ row) => (row.live ? 0 : pins.has(pinOf(row)) ? 1 : 2);
   return found
     .map((row, i) => ({ row, i }))
     .sort((a, b) => rank(a.row) - rank(b.row) || a.i - b.i)
@@ -85,7 +114,8 @@ export function filterText({ show, machine, robot, text }) {
 /** How long a run took, or has been running [s]; null: nobody knows. @param {RunRow} row @param {number} now [ms] */
 export function secondsOf(row, now) {
   if (row.began === null) return null;
-  const end = row.ended ?? (row.live ? now * 1e6 : row.last);
+  const runs = standing(row) === "live";
+  const end = row.ended ?? (runs ? now * 1e6 : row.last);
   return end === null ? null : Math.max(0, (end - row.began) / 1e9);
 }
 
@@ -95,4 +125,12 @@ export function beganText(ns, today) {
   if (date.toDateString() === today.toDateString())
     return date.toLocaleTimeString("en-GB", { hour: "2-digit", minute: "2-digit" });
   return date.toLocaleDateString("en-GB", { day: "numeric", month: "short", year: "numeric" });
+}
+
+/** How long no process ran it, in words; "" when there was always one. @param {RunRow} row */
+export function outageText({ outages }) {
+  if (outages.length === 0) return "";
+  const gone = outages.reduce((sum, [from, to]) => sum + to - from, 0);
+  const times = outages.length > 1 ? `${outages.length} outages, ` : "";
+  return `resumed after ${times}${duration(gone)}`;
 }

@@ -5,7 +5,8 @@ import { own } from "#core/fold.js";
 
 export const COLOURS = 8; // of tracks; from the ninth state on they repeat, dashed
 const MOST_POSES = 60_000; // of one robot
-const MOST_SEEN = 4_000; // scans, and plans, of one robot
+const MOST_SEEN = 4_000; // scans, and plans, of one robot; numbers of one topic
+const MOST_SERIES = 400; // numbers of topics
 const NEAR = 0.3; // [m] a goal this near to a named place has its name
 const ENDED = { Left: 1, Failed: 1, Finished: 1 };
 
@@ -319,6 +320,13 @@ function pushLimited(list, one) {
   if (list.length > MOST_SEEN) list.splice(0, MOST_SEEN / 4);
 }
 
+/** @param {Scene} scene @param {string} name @param {string} unit @param {{ t: number, value: number }} point */
+function pushSeries(scene, name, unit, point) {
+  const known = scene.series.get(name);
+  if (known) pushLimited(known.points, point);
+  else if (scene.series.size < MOST_SERIES) scene.series.set(name, { name, unit, points: [point] });
+}
+
 /** @type {Record<string, (scene: Scene, record: Observed, t: number, robot: Robot) => void>} */
 const OBSERVERS = {
   scan: (_scene, { at, first, step, ranges }, t, robot) => pushLimited(robot.scans, { t, at, first, step, ranges }),
@@ -328,11 +336,11 @@ const OBSERVERS = {
     scene.maps.sort((a, b) => a.t - b.t);
     if (scene.maps.length > 20) scene.maps.splice(1, 1);
   },
-  value(scene, { robot, name, value, unit }, t) {
-    const key = [robot, name].filter(Boolean).join("/");
-    const known = scene.series.get(key);
-    if (known) pushLimited(known.points, { t, value });
-    else scene.series.set(key, { name: key, unit, points: [{ t, value }] });
+  value: (scene, { robot, name, value, unit }, t) =>
+    pushSeries(scene, [robot, name].filter(Boolean).join("/"), unit, { t, value }),
+  values(scene, { topic, values }, t) {
+    for (const [path, value] of Object.entries(values))
+      pushSeries(scene, path === "data" ? topic : `${topic}.${path}`, "", { t, value });
   },
 };
 

@@ -1,7 +1,6 @@
 // Numbers on the graph: of the run shown, of recorded runs, or how they differ.
 // Counted as in viz/runs/statistics.py: tests/data/statistics.json holds for both.
 import { own } from "#core/fold.js";
-import { outcomeClass } from "#core/outcomes.js";
 import { duration } from "#core/text.js";
 
 /** @type {[string, string][]} */
@@ -19,13 +18,6 @@ export const OF_RECORDED_RUNS = ["runs", "failures", "compare"];
 
 /** @param {Outcomes} outcomes */
 const total = (outcomes) => Object.values(outcomes ?? {}).reduce((a, b) => a + b, 0);
-
-/** The share of ends that failed or raised, 0 to 1. @param {Outcomes} outcomes */
-export function failureShare(outcomes) {
-  const all = total(outcomes);
-  const failed = Object.entries(outcomes ?? {}).filter(([outcome]) => outcomeClass(outcome) === "failure");
-  return all ? failed.reduce((sum, [, count]) => sum + count, 0) / all : 0;
-}
 
 /**
  * @typedef {(path: string, outcome: string) => { count: number, share: number } | null} CountOf of a transition

@@ -1,11 +1,13 @@
 // What the page knows and what its user chose. Panels read signals; the diagram reads `shown()`.
 import { batch, computed, signal } from "@preact/signals";
-import { emptyState, ms } from "#core/fold.js";
+import { arrangementOf, moved, PANELS, placeOf, usual as usualArrangement, wordOf } from "#core/arrangement.js";
+import { emptyState, ms, own } from "#core/fold.js";
 import { withNotes } from "#core/links.js";
 import { Model } from "#core/model.js";
-import { instantAt, Marks } from "#core/playback.js";
+import { instantAt, loopedAt, Marks } from "#core/playback.js";
 import { Run } from "#core/run.js";
 import { Scene } from "#core/scene.js";
+import { knownPlots, MOST_LINES, MOST_PLOTS, usualPlots } from "#core/series.js";
 import { shorten } from "#core/text.js";
 import { wayOf } from "#core/why.js";
 
@@ -67,6 +69,8 @@ export const numbers = signal("none"); // a key of statistics.MODES
 export const theme = signal(saved("theme", "system"));
 /** @type {Signal<Visit | null>} */
 export const hovered = signal(null);
+/** @type {Signal<number | null>} */
+export const pointed = signal(null); // the instant at which the pointer is, in the timeline or a plot [ms]
 /** @type {Signal<Set<string>>} */
 export const opened = signal(new Set()); // paths of containers
 export const help = signal(false);
@@ -87,8 +91,12 @@ export const laidOut = signal(null); // so many states, while it takes a while
 export const dismissed = signal(null); // the run before whose notice was closed
 export const actionsOpen = signal(false);
 export const homeOpen = signal(false); // the list of runs
-/** @type {Signal<{ runs: RunRow[], folders: string[] }>} */
-export const runs = signal({ runs: [], folders: [] });
+/** @type {Signal<{ runs: RunRow[], folders: string[], journals: { name: string, problem: string }[] }>} */
+export const runs = signal({ runs: [], folders: [], journals: [] });
+export const fleetOpen = signal(false); // the live runs together
+export const simulateOpen = signal(false); // the dialog of simulated runs
+/** @type {Signal<{ missions: Record<string, string>, batches: Batch[] }>} */
+export const simulations = signal({ missions: {}, batches: [] });
 export const runsKnown = signal(false);
 export const runsProblem = signal(""); // why they cannot be listed
 /** @type {Signal<Set<string>>} */
@@ -120,6 +128,11 @@ let stateAtCursor = null;
 export const rate = signal(saved("rate", 1)); // of playing
 /** @type {Signal<{ t: number, since: number, rate: number } | null>} */
 export const playing = signal(null);
+/** @type {Signal<import("#core/playback.js").Stretch | null>} */
+export const stretch = signal(null); // of the run, that is selected [ms]
+/** @type {Signal<number | null>} */
+export const filmed = signal(null); // so much of a film is drawn [%]
+export const looping = signal(false); // whether playing stays in it
 /** @type {Signal<string | null>} */
 export const followedKey = signal(null); // whose changes one may jump to
 
@@ -137,6 +150,8 @@ export function startRun(base, events) {
     gap.value = null;
     hovered.value = null;
     playing.value = null;
+    stretch.value = null;
+    looping.value = false;
     followedKey.value = null;
   });
 }
@@ -158,6 +173,8 @@ export function addEvents(events) {
 
 /** Take in what the robot's topics told. @param {Observed[]} records */
 export const addObserved = (records) => scene.addObserved(records);
+
+const SHORTEST_MS = 20; // stretch of a run that can be selected
 
 /** @param {string} id of a run */
 export function togglePin(id) {
@@ -225,9 +242,50 @@ export function togglePlaying() {
 /** Show the instant that has come while playing; at the end that is now. @param {number} moment [ms] */
 export function playOn(moment) {
   if (!playing.value) return;
-  const t = instantAt(playing.value, moment);
+  let t = instantAt(playing.value, moment);
+  if (looping.value && stretch.value && t >= stretch.value.to) {
+    t = loopedAt(t, stretch.value);
+    playing.value = { t, since: moment, rate: rate.value };
+  }
   if (t >= (run.last() ?? t)) seek(null);
   else show(t, run.indexAt(t));
+}
+
+/** Select a stretch of the run, from one instant to another [ms]; null: none. @param {number} a @param {number} [b] */
+export function selectStretch(a, b = a) {
+  const inRun = (/** @type {number} */ t) => Math.max(run.first() ?? t, Math.min(t, run.last() ?? t));
+  const [from, to] = [inRun(Math.min(a, b)), inRun(Math.max(a, b))];
+  stretch.value = to - from >= SHORTEST_MS ? { from, to } : null;
+  if (!stretch.value) looping.value = false;
+}
+
+/** Play a stretch again and again: what is selected, else the visit of the selected state, else the whole run. */
+export function toggleLoop() {
+  looping.value = !looping.value;
+  if (!looping.value) return;
+  if (!stretch.value) {
+    const visit = selected.value === null ? null : visitAt(selected.value, nowMs());
+    if (visit) selectStretch(visit.from, visit.to ?? liveMs());
+    else selectStretch(run.first() ?? 0, run.last() ?? 0);
+  }
+  if (!stretch.value) {
+    looping.value = false;
+    notify("There is nothing to loop over yet");
+    return;
+  }
+  const { from, to } = stretch.value;
+  const t = nowMs();
+  playing.value = { t: t >= from && t < to ? t : from, since: performance.now(), rate: rate.value };
+  seek(playing.value.t);
+}
+
+/** Let the selected stretch begin, or end, at the instant shown. @param {"from" | "to"} end */
+export function moveStretch(end) {
+  const at = nowMs();
+  const other = end === "from" ? (stretch.value?.to ?? run.last()) : (stretch.value?.from ?? run.first());
+  const isTurned = other !== null && (end === "from" ? at >= other : at <= other);
+  if (other === null || isTurned) notify("The selected stretch would end before it begins", "error");
+  else selectStretch(at, other);
 }
 
 /** @param {number} factor */
@@ -254,6 +312,103 @@ export function jump(name, step) {
 
 /** So many of the kept events have happened by what is shown. */
 export const eventsShown = () => position.value ?? run.events.length;
+
+/** The newest visit of a state that had begun at an instant. @param {string} path @param {number} t [ms] */
+export const visitAt = (path, t) => run.spans.findLast((one) => one.path === path && one.from <= t) ?? null;
+
+/** The pointer is on something that a state did at an instant; null: on nothing. @param {string | null} path */
+export function hoverAt(path, t = nowMs()) {
+  const span = path === null ? null : visitAt(path, t);
+  hover(span && { path: span.path, from: span.from });
+}
+
+/** Whether what a state did at an instant [ms] belongs to the visit that the pointer is on. @param {string} path */
+export function isLit(path, /** @type {number} */ t) {
+  const span = hoveredSpan();
+  return span?.path === path && t >= span.from && t <= (span.to ?? Infinity);
+}
+
+/** Handlers for a row that tells of a state at an instant: hover and focus light its visit up. */
+export const hoverHandlers = (/** @type {string} */ path, /** @type {number} */ t) => ({
+  onPointerEnter: () => hoverAt(path, t),
+  onPointerLeave: () => hover(null),
+  onFocusIn: () => hoverAt(path, t),
+  onFocusOut: () => hover(null),
+});
+
+/** The visit that the pointer is on, with its end. */
+export function hoveredSpan() {
+  const visit = hovered.value;
+  return visit && run.spans.findLast((one) => one.path === visit.path && one.from === visit.from);
+}
+
+// -- plots ------------------------------------------------------------------------------------
+
+const PLOTTED_MACHINES = 30; // whose plots are kept in the browser
+
+/** @type {Signal<string[][] | null>} ids of series by plot; null: nobody has chosen any */
+export const plotsChosen = signal(null);
+/** @type {string[][]} */
+let usual = [];
+export const plotsShown = computed(() => {
+  slowTick.value;
+  if (plotsChosen.value) return plotsChosen.value;
+  const found = usualPlots(shown(), scene.series.keys());
+  const isMore = found.flat().length > usual.flat().length; // none goes while the run goes on
+  if (isMore) usual = found;
+  return usual;
+});
+
+/** Take up the plots of the machine shown. */
+export function loadPlots() {
+  const kept = saved("plots", {});
+  usual = [];
+  const mine = own(kept, model.value?.root.label ?? "");
+  plotsChosen.value = mine === undefined ? null : knownPlots(mine);
+}
+
+/** @param {string[][]} next */
+export function setPlots(next) {
+  plotsChosen.value = knownPlots(next);
+  const isCut = plotsChosen.value.flat().length < next.flat().length;
+  if (isCut) notify(`There are ${MOST_PLOTS} plots of ${MOST_LINES} lines at most: remove one first`, "error");
+  const name = model.value?.root.label;
+  if (name === undefined) return;
+  const others = Object.entries(saved("plots", {})).filter(([one]) => one !== name);
+  save("plots", Object.fromEntries([...others, [name, plotsChosen.value]].slice(-PLOTTED_MACHINES)));
+}
+
+/** @param {number} number of the plot @param {string} id */
+export const addLine = (number, id) => setPlots(plotsShown.value.map((ids, i) => (i === number ? [...ids, id] : ids)));
+
+/** @param {number} number of the plot @param {string} id */
+export const removeLine = (number, id) =>
+  setPlots(plotsShown.value.map((ids, i) => (i === number ? ids.filter((one) => one !== id) : ids)));
+
+// -- panels -----------------------------------------------------------------------------------
+
+/** @type {Signal<import("#core/arrangement.js").Arrangement | null>} null: the usual one */
+export const arrangement = signal(arrangementOf(saved("panels", null)));
+export const isPhone = signal(false); // whether there is room for one part of the page only
+export const part = signal("machine"); // the one that is shown on a phone: machine, map, time or log
+
+/** A phone has its own; and a question is never hidden. */
+export const arrangementShown = computed(() => {
+  const chosen = isPhone.value ? usualArrangement() : (arrangement.value ?? usualArrangement());
+  return asksNow.value && !placeOf(chosen, "details") ? moved(chosen, "details", "right") : chosen;
+});
+
+/** Names of the panels that have something to show. */
+export const panelsThere = computed(() => {
+  const isThere = { map: hasMap.value, plots: plotsShown.value.length > 0 };
+  return new Set(PANELS.filter((name) => /** @type {Record<string, boolean>} */ (isThere)[name] ?? true));
+});
+
+/** @param {import("#core/arrangement.js").Arrangement | null} next null: the usual one */
+export function arrange(next) {
+  arrangement.value = next;
+  save("panels", next && wordOf(next));
+}
 
 // -- notes ------------------------------------------------------------------------------------
 
@@ -331,7 +486,8 @@ export const nowMs = () => cursor.value ?? liveMs();
 
 /** The newest instant there is, on the robot's clock [ms since the epoch]. */
 export function liveMs() {
-  const ended = run.now.ended != null || facts.value?.stale != null || connection.value === "file";
+  const about = facts.value;
+  const ended = run.now.ended != null || about?.recorded || about?.stale != null || connection.value === "file";
   const lag = robotLag.value ?? (viewerLag.value ?? 0) + (ms(facts.value?.behind) ?? 0);
   const robot = Date.now() - lag;
   return ended ? (run.last() ?? robot) : Math.max(robot, run.last() ?? 0);
@@ -383,7 +539,8 @@ export const lastLeaves = computed(() => {
   const depth = (/** @type {string} */ path) => path.split("/").length;
   // Its containers were left at the same instant, or moments later.
   const [last] = left.reduce((a, b) => ((b[1].left ?? 0) > (a[1].left ?? 0) ? b : a));
-  const inside = left.filter(([path, state]) => path.startsWith(last) && (state.left ?? 0) >= entered(last));
+  const isWithin = (/** @type {string} */ path, /** @type {string} */ top) => `${path}/`.startsWith(`${top}/`);
+  const inside = left.filter(([path, state]) => isWithin(path, last) && (state.left ?? 0) >= entered(last));
   const end = inside.filter(([path]) => !inside.some(([other]) => other.startsWith(`${path}/`)));
   const newest = end.reduce((a, b) => {
     const later = (b[1].left ?? 0) - (a[1].left ?? 0);

@@ -1,8 +1,8 @@
 // The diagram: built once per layout, restyled by class when something happens.
 import { containerOf, ms, own } from "#core/fold.js";
 import { CHANGE_SIGNS, isPartOfNet, joinText, KIND_NAMES, signed } from "#core/model.js";
-import { commonClass, outcomeClass } from "#core/outcomes.js";
-import { duration } from "#core/text.js";
+import { commonClass, endClass, outcomeClass } from "#core/outcomes.js";
+import { duration, shorten } from "#core/text.js";
 import { measure } from "#drawing/measure.js";
 import { arrowHeads, el, icon, middleOfLongest, roundedLine } from "#drawing/svg.js";
 
@@ -53,6 +53,8 @@ export class Diagram {
   flashing = new Map(); // until when [ms]
   /** @type {Map<string, Problem[]>} */
   problems = new Map();
+  /** @type {import("#core/model.js").Model | null} */
+  model = null; // that is drawn
   /** @type {Box | null} */
   size = null;
   /** @type {SVGElement | null} */
@@ -74,6 +76,7 @@ export class Diagram {
   draw(layout, model, problems) {
     const { states, arrows, joins, boxes, pills, minimapRects, minimapDue } = this;
     for (const map of [states, arrows, joins, boxes, pills, minimapRects, minimapDue]) map.clear();
+    this.model = model;
     this.problems = groupByPath(problems);
     const isCompared = model.order.some((n) => n.change || n.note || n.edges.some((e) => e.change || e.note));
     this.svg.classList.toggle("compared", isCompared);
@@ -186,10 +189,10 @@ export class Diagram {
       group.append(el("text", { class: "inside", x: left + nameWidth + 7, y: middle + 3.4 }, inside));
     }
     for (const dot of place.dots) {
-      const kind = outcomeClass(dot.outcome);
+      const kind = endClass(node, dot.outcome);
       const end = { x: x + dot.x - 7, y: y + dot.y + 3.1, "text-anchor": "end" };
       group.append(el("circle", { class: `dot ${kind}`, cx: x + dot.x, cy: y + dot.y, r: 3.2 }));
-      group.append(el("text", { class: `outcome ${kind}`, ...end }, dot.outcome));
+      group.append(el("text", { class: `outcome ${kind}`, ...end }, shorten(dot.outcome)));
     }
     const room = place.dots.length ? place.nameWidth : w; // its outcomes are right of that
     this.#register(node, group, frame, bar, { x, y, w, h }, room);
@@ -233,7 +236,7 @@ export class Diagram {
   /** @param {PlacedEdge} edge @param {number} x @param {number} y */
   #edge(edge, x, y) {
     const points = edge.points.map((p) => ({ x: p.x + x, y: p.y + y }));
-    const kind = edge.kind === "link" ? commonClass(edge.outcomes) : edge.kind;
+    const kind = edge.kind === "link" ? commonClass(this.model?.get(edge.source), edge.outcomes) : edge.kind;
     const implicit = edge.link?.implicit ? " implicit" : "";
     const change = edge.link?.change ? ` cmp-${edge.link.change}` : "";
     const line = el("path", {
@@ -267,8 +270,9 @@ export class Diagram {
     }
     for (const label of edge.labels) {
       const place = { x: x + label.x, y: y + label.y + 9.2, "text-anchor": "middle" };
-      const name = signed(edge.link?.change, label.text);
-      into.append(el("text", { class: `label ${outcomeClass(label.text)}`, ...place }, name));
+      const name = signed(edge.link?.change, shorten(label.text));
+      const kind = endClass(this.model?.get(edge.source), label.text);
+      into.append(el("text", { class: `label ${kind}`, ...place }, name));
     }
     if (!edge.link) return;
     const { change, note } = edge.link;
@@ -348,7 +352,7 @@ export class Diagram {
     if (!view || isPartOfNet(view.node)) return;
     const active = state?.since != null;
     const asked = active && Boolean(state?.preempt);
-    const kind = state?.outcome != null ? outcomeClass(state.outcome) : null;
+    const kind = state?.outcome != null ? endClass(view.node, state.outcome) : null;
     const classes = view.group.classList;
     classes.toggle("active", active);
     classes.toggle("preempting", asked);
@@ -518,13 +522,15 @@ export class Diagram {
 /** @param {StateNode} node @param {Box & { outcome: string }} pill @param {number} x @param {number} y */
 function outcomePill(node, pill, x, y) {
   const byDefault = node.pills.find((one) => one.outcome === pill.outcome)?.by_default ? " default" : "";
+  const shown = shorten(pill.outcome);
   const place = { x: x + pill.x, y: y + pill.y, width: pill.w, height: pill.h, rx: pill.h / 2 };
   const centre = { x: place.x + pill.w / 2, y: place.y + pill.h / 2 + 3.1, "text-anchor": "middle" };
   return el(
     "g",
     { class: `pill ${outcomeClass(pill.outcome)}${byDefault}` },
     el("rect", place),
-    el("text", centre, pill.outcome),
+    el("text", centre, shown),
+    ...(shown === pill.outcome ? [] : [el("title", {}, shorten(pill.outcome, 400))]),
   );
 }
 

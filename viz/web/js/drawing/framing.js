@@ -6,7 +6,7 @@ import * as store from "#core/store.js";
 
 const SETTLED_MS = 450; // a container opens when it has run for so long
 const PAUSE_MS = 900; // between two rearrangements
-const READABLE = 0.82; // the scale at which the smallest text has 9 px
+const READABLE = 0.84; // a little above the scale at which names have 9 px
 let lastOpen = "";
 let rearrangedAt = -Infinity; // [ms]
 

@@ -1,6 +1,7 @@
 // Where things are: one ELK graph per open container, bottom-up, in a worker, and cached.
 // Opening or closing a container lays out itself and its ancestors only.
 import { joinText } from "#core/model.js";
+import { shorten } from "#core/text.js";
 import { measure } from "#drawing/measure.js";
 
 /**
@@ -42,6 +43,8 @@ const HEAD = 24; // height of the name of a tile
 const HEAD_GROWS = 1.7; // by every level around it
 const MOST_COLUMNS = 60;
 const ASPECTS = { least: 0.6, most: 2.4 };
+const SAME_ASPECT = 0.15; // difference of their logarithms
+const within = (/** @type {number} */ aspect) => Math.max(ASPECTS.least, Math.min(ASPECTS.most, aspect));
 /** @type {Direction[]} */
 const DIRECTIONS = ["DOWN", "RIGHT"];
 const FLOW = {
@@ -99,7 +102,7 @@ class Elk {
 }
 
 /** @param {string} outcome */
-export const pillWidth = (outcome) => measure(outcome, 9, true) + 15;
+export const pillWidth = (outcome) => measure(shorten(outcome), 9, true) + 15;
 
 /** @param {StateNode} node */
 export function leafWidth(node) {
@@ -129,9 +132,14 @@ export class Layout {
   /** Choose the shapes anew for a view of that aspect. @param {number} aspect */
   choose(aspect) {
     this.chosen.clear();
-    const next = Math.max(ASPECTS.least, Math.min(ASPECTS.most, aspect));
+    const next = within(aspect);
     if (Math.abs(next - this.aspect) > 0.1 * this.aspect) this.forget(); // grids and folds go by it
     this.aspect = next;
+  }
+
+  /** Whether the shapes were chosen for a view of about that aspect. @param {number} aspect */
+  suits(aspect) {
+    return Math.abs(Math.log(within(aspect) / this.aspect)) < SAME_ASPECT;
   }
 
   /** Forget the layouts, but keep the shapes. */
@@ -145,6 +153,7 @@ export class Layout {
    * @param {StateNode} root
    * @param {Set<string>} open
    * @param {(done: number, all: number) => void} [onProgress] told of the states that are laid out
+   * @throws {Error} ELK fails at the outermost container; one within at which it fails is shown closed
    */
   async run(root, open, onProgress) {
     const all = countOf(root, open);
@@ -169,7 +178,9 @@ export class Layout {
       done += level.reduce((sum, node) => sum + node.children.length, 0);
       onProgress?.(done, all);
     }
-    return this.#best(root, null, keys);
+    const best = this.#best(root, null, keys);
+    if (!best) throw new Error(`ELK fails at every layout of ${root.name}`);
+    return best;
   }
 
   /**
@@ -197,13 +208,39 @@ export class Layout {
       this.tried.set(known, [...names]);
     }
     if (!plans.length) return;
-    const result = await this.elk.layout({
-      id: "batch",
-      layoutOptions: { "elk.algorithm": "fixed" },
-      children: plans.map(({ plan }) => plan.graph),
-      edges: [],
-    });
-    for (const [i, { key, plan }] of plans.entries()) this.cache.set(key, placed(plan, result.children[i]));
+    const isComplete = await this.#place(plans);
+    if (isComplete) return;
+    // Where the shape that was chosen has failed, any other will do.
+    const laid = new Set(plans.filter(({ key }) => this.cache.has(key)).map(({ plan }) => plan.node));
+    const stuck = level.filter((node) => this.chosen.has(node.path) && !laid.has(node));
+    for (const node of stuck) this.chosen.delete(node.path);
+    if (stuck.length) await this.#layOut(stuck, root, open, keys);
+  }
+
+  /**
+   * Have ELK lay out some plans; it fails at some graphs, and those are left out. Returns whether none was.
+   * @param {{ key: string, plan: Plan }[]} plans
+   */
+  async #place(plans) {
+    const batch = (/** @type {typeof plans} */ some) =>
+      this.elk.layout({
+        id: "batch",
+        layoutOptions: { "elk.algorithm": "fixed" },
+        children: some.map(({ plan }) => plan.graph),
+        edges: [],
+      });
+    try {
+      const result = await batch(plans);
+      for (const [i, { key, plan }] of plans.entries()) this.cache.set(key, placed(plan, result.children[i]));
+      return true;
+    } catch (error) {
+      if (plans.length === 1) {
+        console.warn(`no layout of ${plans[0].plan.node.path}: ${error}`);
+        return false;
+      }
+      for (const one of plans) await this.#place([one]);
+      return false;
+    }
   }
 
   /**
@@ -433,7 +470,8 @@ class Plan {
         "elk.layered.nodePlacement.strategy": "NETWORK_SIMPLEX",
         "elk.layered.nodePlacement.favorStraightEdges": "true",
         "elk.layered.considerModelOrder.strategy": "NODES_AND_EDGES",
-        "elk.layered.cycleBreaking.strategy": "MODEL_ORDER",
+        // In a plan all places stand before all transitions: half its arcs would count as going back.
+        "elk.layered.cycleBreaking.strategy": node.kind === "plan" ? "DEPTH_FIRST" : "MODEL_ORDER",
         "elk.layered.edgeLabels.sideSelection": "SMART_DOWN",
         "elk.nodeLabels.placement": "[H_CENTER, V_TOP, INSIDE]",
         "elk.nodeSize.constraints": "[NODE_LABELS, PORTS, PORT_LABELS, MINIMUM_SIZE]",
@@ -505,7 +543,7 @@ class Plan {
       this.graph.children.push({ id, width, height: LEAF_H });
       return { entry: id, out: () => id, split: false };
     }
-    const text = Math.max(...child.wired.map((outcome) => measure(outcome, 9))) + 16;
+    const text = Math.max(...child.wired.map((outcome) => measure(shorten(outcome), 9))) + 16;
     const single = child.wired.length === 1;
     const h = single ? LEAF_H : Math.max(LEAF_H, 10 + child.wired.length * ROW_H);
     const w = width - 4 + text;
@@ -622,7 +660,7 @@ class Plan {
       id: this.#next(meaning),
       sources: [source],
       targets: [target],
-      labels: labels.map((text) => ({ text, width: measure(text, 9) + 6, height: 12 })),
+      labels: labels.map((text) => ({ text, width: measure(shorten(text), 9) + 6, height: 12 })),
     });
   }
 }

@@ -4,7 +4,8 @@ import { bytesOf } from "#core/connection.js";
 import { outcomeClass } from "#core/outcomes.js";
 import { COLOURS, cellAt, countUntil, scanPoints } from "#core/scene.js";
 import * as store from "#core/store.js";
-import { drag } from "#drawing/viewport.js";
+import { Colours, fitted } from "#drawing/theme.js";
+import { grab } from "#drawing/viewport.js";
 
 const MARGIN = 10; // around what is shown [px]
 const ROBOT_M = 8; // so much is shown around a robot
@@ -23,10 +24,11 @@ export class MapView {
   followed = null;
   /** @type {{ k: number, x: number, y: number } | null} px per metre, and the place in the middle [m]; null: all */
   view = null;
+  /** @type {{ scene: Scene, now: number } | null} shown in place of the page's own run; nothing is linked then */
+  given = null;
   /** @type {Map<string, HTMLCanvasElement>} pictures of maps, by their cells and colours */
   #pictures = new Map();
-  /** @type {Map<string, string>} */
-  #colours = new Map();
+  #colours = new Colours();
   /** @type {{ left: number, top: number, right: number, bottom: number }[]} where names are, and marks of places */
   #labels = [];
   #scale = { k: 1, left: 0, bottom: 0 };
@@ -37,7 +39,11 @@ export class MapView {
     this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
     canvas.addEventListener("pointermove", (e) => this.#hover(e));
     canvas.addEventListener("pointerleave", () => store.hover(null));
-    canvas.addEventListener("pointerdown", (e) => this.#down(e));
+    grab(canvas, {
+      onPan: (dx, dy) => this.#pan(dx, dy),
+      onZoom: (factor, px, py) => this.#zoom(factor, px, py),
+      onTap: (e) => this.#goTo(e),
+    });
     canvas.addEventListener("wheel", (e) => this.#wheel(e), { passive: false });
     canvas.addEventListener("dblclick", () => this.show(null));
     canvas.addEventListener("keydown", (e) => this.#key(e));
@@ -46,7 +52,7 @@ export class MapView {
 
   /** Read the colours again. */
   restyle() {
-    this.#colours.clear();
+    this.#colours.forget();
     this.#pictures.clear();
   }
 
@@ -62,15 +68,6 @@ export class MapView {
     this.followed = robot;
     this.view = null;
     this.draw();
-  }
-
-  /** @param {string} name */
-  #colour(name) {
-    const known = this.#colours.get(name);
-    if (known !== undefined) return known;
-    const colour = getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
-    this.#colours.set(name, colour);
-    return colour;
   }
 
   /** Where a place is drawn. @param {Point} place [m] @returns {[number, number]} [px] */
@@ -105,23 +102,20 @@ export class MapView {
 
   draw() {
     const { canvas, context: g } = this;
-    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-    if (!width || !height) return;
-    const ratio = devicePixelRatio || 1;
-    const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
-    if (canvas.width !== w || canvas.height !== h) Object.assign(canvas, { width: w, height: h });
-    g.setTransform(ratio, 0, 0, ratio, 0, 0);
-    const { scene } = store;
-    const now = store.nowMs();
+    const size = fitted(g);
+    if (!size) return;
+    const { width, height, ratio } = size;
+    const { scene, now } = this.given ?? { scene: store.scene, now: store.nowMs() };
     this.#frame(scene, now, width, height);
     const map = scene.mapAt(now);
-    g.fillStyle = this.#colour(map ? "unknown" : "floor");
+    g.fillStyle = this.#colours.of(map ? "unknown" : "floor");
     g.fillRect(0, 0, width, height);
     if (map) this.#floor(map, ratio);
     else this.#grid(width, height);
-    const until = store.cursor.value ?? Infinity;
-    for (const robot of scene.robots.values()) this.#seen(robot, now, until);
+    const until = (this.given ? null : store.cursor.value) ?? Infinity;
+    for (const robot of scene.robots.values()) this.#seen(scene, robot, now, until);
     for (const robot of scene.robots.values()) this.#tracks(scene, robot, until);
+    this.#labels = [this.#scaleBox(width, height)];
     this.#goals(scene, until);
     for (const [name, robot] of scene.robots) this.#robot(scene, name, robot, now);
     this.#scaleBar(width, height);
@@ -147,7 +141,7 @@ export class MapView {
 
   /** A map as a picture; null while it is being unpacked. @param {GridMap} map */
   #picture(map) {
-    const colours = ["floor", "wall", "unknown"].map((name) => this.#colour(name));
+    const colours = ["floor", "wall", "unknown"].map((name) => this.#colours.of(name));
     const key = `${colours.join()} ${map.width} ${map.cells}`;
     const known = this.#pictures.get(key);
     if (known) return known.width ? known : null;
@@ -180,7 +174,7 @@ export class MapView {
     const step = k > 6 ? 1 : 10;
     const from = this.#placeAt(0, height);
     const to = this.#placeAt(width, 0);
-    g.strokeStyle = this.#colour("hair-map");
+    g.strokeStyle = this.#colours.of("hair-map");
     g.lineWidth = 1;
     g.beginPath();
     for (let x = Math.ceil(from.x / step) * step; x < to.x; x += step) {
@@ -196,14 +190,17 @@ export class MapView {
     g.stroke();
   }
 
-  /** What a robot sees and plans. @param {Robot} robot @param {number} now @param {number} until */
-  #seen(robot, now, until) {
+  /**
+   * What a robot sees and plans.
+   * @param {Scene} scene @param {Robot} robot @param {number} now @param {number} until
+   */
+  #seen(scene, robot, now, until) {
     const g = this.context;
     const scan = robot.scans[countUntil(robot.scans, now) - 1];
-    const pose = store.scene.poseAt(robot, now);
+    const pose = scene.poseAt(robot, now);
     if (scan && pose && now - scan.t < SCAN_MS) {
       const points = scanPoints(scan).map((point) => this.at(point));
-      g.fillStyle = this.#colour("active");
+      g.fillStyle = this.#colours.of("active");
       g.globalAlpha = 0.1;
       g.beginPath();
       g.moveTo(...this.at({ x: scan.at[0], y: scan.at[1] }));
@@ -215,7 +212,7 @@ export class MapView {
     }
     const plan = robot.plans[countUntil(robot.plans, Math.min(now, until)) - 1];
     if (!plan?.points.length) return;
-    g.strokeStyle = this.#colour("active");
+    g.strokeStyle = this.#colours.of("active");
     g.lineWidth = 1.5;
     g.setLineDash([2, 4]);
     this.#line(plan.points.map(([x, y]) => ({ x, y })));
@@ -245,15 +242,15 @@ export class MapView {
       if (count < 1) break;
       const poses = count === piece.poses.length ? piece.poses : piece.poses.slice(0, count);
       if (isLit(piece)) {
-        g.strokeStyle = this.#colour("ink");
+        g.strokeStyle = this.#colours.of("ink");
         g.lineWidth = 12;
         this.#line(poses);
-        g.strokeStyle = this.#colour("halo");
+        g.strokeStyle = this.#colours.of("halo");
         g.lineWidth = 10;
         this.#line(poses);
       }
       const number = piece.path === null ? -1 : scene.colourOf(piece.path);
-      g.strokeStyle = this.#colour(number < 0 ? "muted" : `s${1 + (number % COLOURS)}`);
+      g.strokeStyle = this.#colours.of(number < 0 ? "muted" : `s${1 + (number % COLOURS)}`);
       g.lineWidth = number < 0 ? 1 : 2.5;
       if (number >= COLOURS) g.setLineDash([6, 4]);
       g.globalAlpha = anyLit && !isLit(piece) ? 0.4 : 0.9;
@@ -272,16 +269,16 @@ export class MapView {
       for (const goal of robot.goals)
         if (goal.t <= until) places.set(`${goal.x.toFixed(1)} ${goal.y.toFixed(1)}`, goal);
     g.textBaseline = "middle";
-    this.#labels = [...places.values()].map((goal) => {
+    for (const goal of places.values()) {
       const [x, y] = this.at(goal);
-      return { left: x - 8, top: y - 8, right: x + 8, bottom: y + 8 };
-    });
+      this.#labels.push({ left: x - 8, top: y - 8, right: x + 8, bottom: y + 8 });
+    }
     for (const goal of places.values()) {
       const [x, y] = this.at(goal);
       const runs = goal.to === null || goal.to > until;
       const kind = runs ? "active" : outcomeClass(goal.status);
-      g.fillStyle = this.#colour(runs ? "floor" : `${kind}-fill`);
-      g.strokeStyle = this.#colour(kind);
+      g.fillStyle = this.#colours.of(runs ? "floor" : `${kind}-fill`);
+      g.strokeStyle = this.#colours.of(kind);
       g.lineWidth = 1.75;
       if (kind === "preempted") g.setLineDash([3, 2]);
       g.beginPath();
@@ -291,7 +288,7 @@ export class MapView {
       g.setLineDash([]);
       g.beginPath();
       if (runs) {
-        g.fillStyle = this.#colour(kind);
+        g.fillStyle = this.#colours.of(kind);
         g.arc(x, y, 3, 0, 7);
         g.fill();
       } else if (kind === "success") {
@@ -334,11 +331,11 @@ export class MapView {
     const side = sides.find(isFree) ?? sides[0];
     this.#labels.push(side);
     g.textAlign = "left";
-    g.strokeStyle = this.#colour("floor");
+    g.strokeStyle = this.#colours.of("floor");
     g.lineWidth = 3;
     g.lineJoin = "round";
     g.strokeText(text, side.left, side.top + 7);
-    g.fillStyle = this.#colour("ink");
+    g.fillStyle = this.#colours.of("ink");
     g.fillText(text, side.left, side.top + 7);
   }
 
@@ -352,14 +349,14 @@ export class MapView {
     g.save();
     g.translate(x, y);
     g.rotate(-pose.yaw);
-    g.fillStyle = this.#colour("active");
-    g.strokeStyle = this.#colour("floor");
+    g.fillStyle = this.#colours.of("active");
+    g.strokeStyle = this.#colours.of("floor");
     g.lineWidth = 1.5;
     g.beginPath();
     g.arc(0, 0, r, 0, 7);
     g.fill();
     g.stroke();
-    g.fillStyle = this.#colour("floor");
+    g.fillStyle = this.#colours.of("floor");
     g.beginPath();
     g.moveTo(0.7 * r, 0);
     g.lineTo(-0.35 * r, 0.5 * r);
@@ -369,18 +366,24 @@ export class MapView {
     if (scene.robots.size > 1) this.#label(name, x, y - r - 7, true);
   }
 
+  /** Where the scale is, at the bottom right. @param {number} width @param {number} height */
+  #scaleBox(width, height) {
+    const metres = SCALES_M.find((m) => m * this.#scale.k >= 44) ?? 1000;
+    const long = metres * this.#scale.k;
+    const [left, top] = [width - long - 20, height - 27];
+    return { metres, long, left, top, right: left + long + 12, bottom: top + 22 };
+  }
+
   /** @param {number} width @param {number} height */
   #scaleBar(width, height) {
     const g = this.context;
-    const { k } = this.#scale;
-    const metres = SCALES_M.find((m) => m * k >= 44) ?? 1000;
-    const long = metres * k;
-    const [x, y] = [width - long - 14, height - 10];
+    const { metres, long, left, top } = this.#scaleBox(width, height);
+    const [x, y] = [left + 6, top + 17];
     g.globalAlpha = 0.85;
-    g.fillStyle = this.#colour("floor");
-    g.fillRect(x - 6, y - 17, long + 12, 22);
+    g.fillStyle = this.#colours.of("floor");
+    g.fillRect(left, top, long + 12, 22);
     g.globalAlpha = 1;
-    g.strokeStyle = g.fillStyle = this.#colour("ink");
+    g.strokeStyle = g.fillStyle = this.#colours.of("ink");
     g.lineWidth = 1.25;
     g.beginPath();
     g.moveTo(x, y - 3);
@@ -398,6 +401,7 @@ export class MapView {
 
   /** @param {PointerEvent | MouseEvent} e */
   #nearest(e) {
+    if (this.given) return null;
     const { x, y } = this.#placeAt(e.offsetX, e.offsetY);
     return store.scene.nearest(x, y, REACH / this.#scale.k, store.cursor.value ?? Infinity);
   }
@@ -410,27 +414,20 @@ export class MapView {
     store.hover(path === null || visit === null ? null : { path, from: visit });
   }
 
-  /** A press goes to an instant, a drag moves the map. @param {PointerEvent} e */
-  #down(e) {
+  /** Go to the instant at which a robot was here. @param {PointerEvent} e */
+  #goTo(e) {
     const found = this.#nearest(e);
-    const { k } = this.#scale;
-    const middle = this.#placeAt(this.canvas.clientWidth / 2, this.canvas.clientHeight / 2);
-    let dragged = false;
-    drag(
-      (m) => {
-        const [dx, dy] = [m.clientX - e.clientX, m.clientY - e.clientY];
-        if (!dragged && Math.hypot(dx, dy) < 4) return;
-        dragged = true;
-        this.followed = null;
-        this.view = { k, x: middle.x - dx / k, y: middle.y + dy / k };
-        this.draw();
-      },
-      () => {
-        if (dragged || !found) return;
-        store.seek(found.t);
-        if (found.piece.path) store.selected.value = found.piece.path;
-      },
-    );
+    if (!found) return;
+    store.seek(found.t);
+    if (found.piece.path) store.selected.value = found.piece.path;
+  }
+
+  /** @param {number} dx @param {number} dy */
+  #pan(dx, dy) {
+    this.followed = null;
+    const middle = this.#placeAt(this.canvas.clientWidth / 2 - dx, this.canvas.clientHeight / 2 - dy);
+    this.view = { k: this.#scale.k, ...middle };
+    this.draw();
   }
 
   /** @param {WheelEvent} e */

@@ -1,6 +1,6 @@
 // The drawing as a whole: what happens reaches the diagram and the timeline, and the panels at
 // their own pace. What the user does comes in by the methods below.
-import { connect, isFile, makeLayoutWorker, messageOf } from "#core/connection.js";
+import { connect, isFile, makeLayoutWorker, messageOf, readToken } from "#core/connection.js";
 import { containerOf } from "#core/fold.js";
 import { fragmentOf, viewOf } from "#core/links.js";
 import { numbersFor } from "#core/statistics.js";
@@ -14,10 +14,15 @@ import { Timeline } from "#drawing/timeline.js";
 import { drag, Viewport } from "#drawing/viewport.js";
 
 const PANELS_MS = 160; // the panels are drawn again at most so often
+const SLOWEST_PANELS_MS = 800;
+const IN_TIME_MS = 25; // a frame that comes so soon after it was asked for is in time
+const PANELS_PER_LATE = 8; // longer pause between panels for each ms that frames are late
+const LATE_PART = 0.1; // of the newest frame in the average
 const TEXT_MS = 400; // and those with much text
 const BEAT_MS = 200; // between two looks at what changes without events
 const BUSY = 15; // events in a second from which transitions do not fade one by one
 const ANNOUNCE_MS = 1000;
+const OPENING_MS = 15_000; // so long after a machine came its panels may still come
 const READABLE = 0.55; // the scale below which fewer levels are opened at first
 const SLOW_MS = 300; // a layout that takes longer shows how far it is
 const PLAY_MS = 45; // between two pictures of a run that is played
@@ -30,6 +35,8 @@ export class Page {
   /** @type {RunEvent[]} */
   flashes = []; // transitions to flash
   frame = 0; // of the browser, that is asked for
+  askedAt = 0; // for that frame [ms]
+  late = 0; // so much later it came, on average [ms]
   playFrame = 0; // the same while a run is played
   playedAt = 0; // [ms]
   /** @type {Promise<void> | null} */
@@ -41,6 +48,8 @@ export class Page {
   toggled = null; // path of the container that is opened or closed
   /** @type {import("#drawing/viewport.js").View | null} */
   fitted = null; // the view that showed everything
+  /** @type {string | null} */
+  hovered = null; // path of the state in the diagram that the pointer is on
   followIsSet = false;
   /** @type {import("#core/links.js").LinkedView | null} */
   linked = viewOf(location.hash); // what the address asked for, until it is shown
@@ -54,6 +63,7 @@ export class Page {
   panelsDue = 0;
   /** @type {ReturnType<typeof setTimeout> | 0} */
   mapsDue = 0;
+  openedAt = 0; // when the machine came [ms]
   layoutMs = 0; // the last layout took
   /** @type {number[]} */
   latencies = []; // from the event to the paint [ms], for benchmarks
@@ -62,6 +72,8 @@ export class Page {
   /** @type {number[]} */
   painting = []; // stamps of events in the frame that is being painted
   paintPort = new MessageChannel();
+  /** @type {Set<import("#drawing/plot.js").Plot>} */
+  plots = new Set();
   /** @type {Layout | null} */
   layout = null;
 
@@ -75,22 +87,41 @@ export class Page {
     this.map = new MapView(floor);
     this.diagram = new Diagram(svg, minimap);
     this.view = new Viewport(svg, this.diagram.world, () => this.diagram.showWindow(this.view));
-    this.timeline = new Timeline(canvas, { onPick: (path) => this.goTo(path) });
+    this.timeline = new Timeline(canvas, {
+      onPick: (path) => this.goTo(path),
+      onDraw: (range) => {
+        for (const plot of this.plots) plot.draw(range);
+      },
+    });
     this.paintPort.port1.onmessage = () => this.#measureLatency();
     svg.addEventListener("click", (e) => {
       if (!this.view.moved) this.select(pathOf(e));
     });
+    svg.addEventListener("pointermove", (e) => e.buttons || this.#hover(pathOf(e)));
+    svg.addEventListener("pointerleave", () => this.#hover(null));
     svg.addEventListener("dblclick", (e) => this.#toggle(store.model.value?.get(pathOf(e))));
     minimap.addEventListener("pointerdown", (e) => this.#jump(e));
     new ResizeObserver(() => {
-      if (this.fitted && this.view.is(this.fitted)) this.fit({ animate: false }); // who saw all sees all again
+      if (this.fitted && this.view.is(this.fitted)) {
+        // Who saw all sees all again; panels that come while the page opens leave another shape to lay out for.
+        if (this.#isOtherShape()) this.refit();
+        else this.fit({ animate: false });
+      }
       this.diagram.showWindow(this.view);
       this.timeline.draw();
     }).observe(svg);
-    for (const one of [store.selected, store.opened, store.instant, store.notes])
-      one.subscribe(() => this.#writeAddress());
+    const linked = [store.selected, store.opened, store.instant, store.notes, store.stretch];
+    const phone = matchMedia("(max-width: 720px)");
+    const look = () => {
+      store.isPhone.value = phone.matches;
+    };
+    phone.addEventListener("change", look);
+    look();
+    new ResizeObserver(() => this.timeline.draw()).observe(canvas);
+    for (const one of [...linked, store.arrangement, store.plotsChosen]) one.subscribe(() => this.#writeAddress());
     store.notes.subscribe(() => this.timeline.draw());
     addEventListener("hashchange", () => {
+      readToken();
       this.linked = viewOf(location.hash);
       this.#showLinked();
       this.relayout({ frame: true });
@@ -109,6 +140,8 @@ export class Page {
       this.timeline.draw();
       this.map.draw();
     });
+    store.pointed.subscribe(() => this.timeline.draw());
+    store.stretch.subscribe(() => this.timeline.draw());
     store.serversSeen.subscribe(() => this.paintAll());
     store.facts.subscribe(() => this.paintAll());
     store.wayShown.subscribe(() => this.#showWay());
@@ -130,11 +163,13 @@ export class Page {
 
   /** Show the machine that has come into the store. */
   showMachine() {
+    this.openedAt = performance.now();
     store.selected.value = null;
     framing.restart();
     this.layout?.clear();
     this.timeline.reset();
     store.loadNotes();
+    store.loadPlots();
     this.map.reset();
     if (isFile() || store.facts.value?.recorded) this.timeline.fitAll();
     if (store.settings.value.follow && !this.followIsSet) {
@@ -156,9 +191,27 @@ export class Page {
     return String(address);
   }
 
+  /** What is shown, for a picture's head. */
+  title() {
+    return store.facts.value?.label ?? "";
+  }
+
+  /** A name for a file of what is shown. */
+  fileName() {
+    return `${this.title()} ${store.instantText(store.nowMs())}`.replace(/[^\p{L}\p{N}._-]+/gu, "-");
+  }
+
   #fragment() {
-    const { cursor, selected, opened, notes } = store;
-    return fragmentOf({ at: cursor.value, selected: selected.value, opened: [...opened.value], notes: notes.value });
+    const { cursor, selected, opened, notes, stretch, arrangement, plotsChosen } = store;
+    return fragmentOf({
+      at: cursor.value,
+      selected: selected.value,
+      opened: [...opened.value],
+      notes: notes.value,
+      stretch: stretch.value && [stretch.value.from, stretch.value.to],
+      panels: arrangement.value,
+      plots: plotsChosen.value,
+    });
   }
 
   /** Let the address say what is shown, a moment after the last change. */
@@ -178,6 +231,9 @@ export class Page {
     const known = view.opened?.filter((path) => model.get(path)?.children.length);
     if (known?.length) store.keepOpened(new Set(known));
     if (view.notes.length) store.addNotes(view.notes);
+    if (view.panels) store.arrangement.value = view.panels;
+    if (view.stretch) store.selectStretch(...view.stretch);
+    if (view.plots) store.plotsChosen.value = view.plots;
     const first = store.run.first();
     const isKept = first !== null && view.at !== null && view.at >= first && view.at <= (store.run.last() ?? first) + 1;
     if (isKept) {
@@ -193,7 +249,7 @@ export class Page {
 
   /** @param {RunEvent[]} events */
   takeEvents(events) {
-    const live = store.cursor.value === null;
+    const live = store.cursor.value === null && !document.hidden; // a hidden page draws no frames
     for (const e of events) {
       this.changed.add(e.path);
       if (live && ["Left", "Failed", "Fired"].includes(e.kind)) this.flashes.push(e);
@@ -211,12 +267,20 @@ export class Page {
   }
 
   #schedule() {
-    if (!this.frame) this.frame = requestAnimationFrame(() => this.#draw());
+    if (this.frame) return;
+    this.askedAt = performance.now();
+    this.frame = requestAnimationFrame(() => this.#draw());
+  }
+
+  /** Time between two pictures of the panels [ms]: longer where the browser is behind, for the diagram comes first. */
+  get #panelsPause() {
+    return Math.min(SLOWEST_PANELS_MS, PANELS_MS + PANELS_PER_LATE * Math.max(0, this.late - IN_TIME_MS));
   }
 
   #draw() {
     this.frame = 0;
     const moment = performance.now();
+    this.late += LATE_PART * (moment - this.askedAt - this.late);
     if (store.cursor.value === null) {
       const now = store.nowMs();
       for (const path of this.changed) this.#paint(path, store.run.now, now);
@@ -230,8 +294,9 @@ export class Page {
       }
     }
     if (this.diagram.endFlashes(moment)) this.#schedule();
-    if (moment - this.panelsAt > PANELS_MS) this.#panels(moment);
-    else this.panelsDue ||= setTimeout(() => this.#panels(performance.now()), PANELS_MS);
+    const pause = this.#panelsPause;
+    if (moment - this.panelsAt > pause) this.#panels(moment);
+    else this.panelsDue ||= setTimeout(() => this.#panels(performance.now()), pause);
   }
 
   /** @param {number} moment */
@@ -363,6 +428,7 @@ export class Page {
       do {
         this.drawAgain = false;
         await this.#layoutOnce();
+        if (this.afterLayout.frame === true && this.#isOtherShape()) this.drawAgain = true;
       } while (this.drawAgain);
       const { frame, focus } = this.afterLayout;
       this.afterLayout = { frame: false, focus: null };
@@ -373,8 +439,12 @@ export class Page {
       else if (frame) this.fit({ animate: false });
       const { dataset } = document.documentElement;
       dataset.drawn = String(Number(dataset.drawn ?? 0) + 1);
+      store.failure.value = null;
     } catch (error) {
-      store.failure.value = `This machine could not be laid out: ${messageOf(error)}`;
+      const text = `This machine could not be laid out: ${messageOf(error)}`;
+      if (this.diagram.size)
+        store.notify(text, "error"); // what was drawn stays
+      else store.failure.value = text;
       console.error(error);
     } finally {
       this.drawing = null;
@@ -447,6 +517,12 @@ export class Page {
     this.relayout({ frame: "follow" });
   }
 
+  /** Whether the page is just opening, and its view has become much wider or higher than what was laid out for it. */
+  #isOtherShape() {
+    const isOpening = performance.now() - this.openedAt < OPENING_MS;
+    return isOpening && this.layout !== null && !this.layout.suits(this.view.width / this.view.height);
+  }
+
   /** Show everything, laid out for the view as it is now. */
   refit() {
     this.relayout({ frame: true });
@@ -458,6 +534,12 @@ export class Page {
 
   // -- what the user does -------------------------------------------------------------------------
 
+  /** The pointer is on a state of the diagram: its visit lights up elsewhere, too. @param {string | null} path */
+  #hover(path) {
+    if (path !== this.hovered) store.hoverAt(path);
+    this.hovered = path;
+  }
+
   /** @param {string | null} path */
   select(path) {
     store.selected.value = path;
@@ -468,6 +550,7 @@ export class Page {
   /** Select a state and bring it into view. @param {string} path */
   goTo(path) {
     this.select(path);
+    store.part.value = "machine";
     if (store.reveal(path)) this.relayout({ focus: path });
     else this.#focus(path);
   }
@@ -546,9 +629,22 @@ export class Page {
 
   #restyle() {
     this.timeline.restyle();
+    for (const plot of this.plots) plot.restyle();
     this.map.restyle();
     this.timeline.draw();
     this.map.draw();
+  }
+
+  /** @param {import("#drawing/plot.js").Plot} plot */
+  addPlot(plot) {
+    this.plots.add(plot);
+    this.timeline.draw();
+  }
+
+  /** @param {import("#drawing/plot.js").Plot} plot */
+  removePlot(plot) {
+    this.plots.delete(plot);
+    plot.destroy();
   }
 
   /** @param {string[]} paths */

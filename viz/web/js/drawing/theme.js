@@ -10,3 +10,38 @@ export function applyTheme() {
   else document.documentElement.dataset.theme = store.theme.value;
   store.save("theme", store.theme.value);
 }
+
+/** The colours that the page has now, by their names; read once. */
+export class Colours {
+  /** @type {Map<string, string>} */
+  #known = new Map();
+
+  /** @param {string} name */
+  of(name) {
+    const known = this.#known.get(name);
+    if (known !== undefined) return known;
+    const colour = getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+    this.#known.set(name, colour);
+    return colour;
+  }
+
+  /** Read them again. */
+  forget() {
+    this.#known.clear();
+  }
+}
+
+/**
+ * Let a canvas have as many pixels as its place, and one unit a CSS pixel; null where it is not shown.
+ * @param {CanvasRenderingContext2D} g
+ */
+export function fitted(g) {
+  const { canvas } = g;
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+  if (!width || !height) return null;
+  const ratio = devicePixelRatio || 1;
+  const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
+  if (canvas.width !== w || canvas.height !== h) Object.assign(canvas, { width: w, height: h });
+  g.setTransform(ratio, 0, 0, ratio, 0, 0);
+  return { width, height, ratio };
+}

@@ -1,9 +1,10 @@
 // The run over time: a lane per container, in it a row for each child of a concurrence; drag to seek.
 import { ms } from "#core/fold.js";
-import { outcomeClass } from "#core/outcomes.js";
+import { endClass } from "#core/outcomes.js";
 import { COLOURS } from "#core/scene.js";
 import * as store from "#core/store.js";
-import { askerText } from "#core/text.js";
+import { askerText, duration } from "#core/text.js";
+import { Colours, fitted } from "#drawing/theme.js";
 import { drag } from "#drawing/viewport.js";
 
 // Sizes in CSS pixels
@@ -13,7 +14,7 @@ const RIGHT = 14;
 const FOOT = 26; // the axis, with the buttons at its left
 const LANE = 19;
 const ROW = 13;
-const MOST_ROWS = 6; // of a concurrence that are given room
+const MOST_ROWS = 8; // of a concurrence that are given room
 const NOTE = 130; // the text of a note at most
 const THINNEST = 0.5;
 const LIVE_MS = 30_000; // shown at first
@@ -31,6 +32,9 @@ export class Timeline {
   end = null; // [ms]; null: follows now
   top = 0; // scrolled by [px]
   names = NAMES;
+  /** @type {Scale | null} */
+  scale = null; // that was drawn last
+  tallest = 0; // all lanes and the axis [px]
   /** @type {StateNode[]} */
   lanes = []; // in the order of the tree
   /** @type {Map<string, Span[]>} */
@@ -42,16 +46,19 @@ export class Timeline {
   sorted = 0; // so many spans have been put into lanes
   /** @type {Hit[]} */
   hits = [];
-  /** @type {Map<string, string>} */
-  #colours = new Map();
-  /** @type {number | null} */
-  #pointer = null; // where the pointer is [px]
+  /** @type {[number, number][]} */
+  gaps = []; // where no process ran the mission [px]
+  #colours = new Colours();
 
-  /** @param {HTMLCanvasElement} canvas @param {{ onPick: (path: string) => void }} handlers */
-  constructor(canvas, { onPick }) {
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {{ onPick: (path: string) => void, onDraw: (range: { from: number, to: number }) => void }} handlers
+   */
+  constructor(canvas, { onPick, onDraw }) {
     this.canvas = canvas;
     this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
     this.onPick = onPick;
+    this.onDraw = onDraw;
     canvas.addEventListener("pointerdown", (e) => this.#down(e));
     canvas.addEventListener("wheel", (e) => this.#wheel(e), { passive: false });
     canvas.addEventListener("pointermove", (e) => {
@@ -65,11 +72,15 @@ export class Timeline {
       store.hover(null);
     });
     canvas.addEventListener("keydown", (e) => this.#key(e));
+    canvas.addEventListener("dblclick", (e) => {
+      const span = this.#spanAt(e);
+      if (span) this.#show(span.from, span.to ?? store.nowMs());
+    });
   }
 
   /** Read the colours again. */
   restyle() {
-    this.#colours.clear();
+    this.#colours.forget();
   }
 
   reset() {
@@ -88,19 +99,18 @@ export class Timeline {
     this.end = last + this.length * 0.02;
   }
 
+  /** Show a visit, with a little around it. @param {number} from @param {number} to [ms] */
+  #show(from, to) {
+    const length = Math.max(SHORTEST_MS, (to - from) * 1.1);
+    this.end = (from + to) / 2 + length / 2;
+    this.length = length;
+    this.draw();
+  }
+
   /** Follow now. */
   live() {
     this.end = null;
     store.seek(null);
-  }
-
-  /** @param {string} name */
-  #colour(name) {
-    const known = this.#colours.get(name);
-    if (known !== undefined) return known;
-    const colour = getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
-    this.#colours.set(name, colour);
-    return colour;
   }
 
   /** What is shown [ms]. @returns {[number, number]} */
@@ -155,16 +165,12 @@ export class Timeline {
   }
 
   draw() {
-    const { canvas, context: g } = this;
+    const g = this.context;
     const model = store.model.value;
-    const width = canvas.clientWidth;
-    const height = canvas.clientHeight;
-    const ratio = devicePixelRatio || 1;
-    if (!width || !model) return;
+    const size = fitted(g);
+    if (!size || !model) return;
+    const { width, height } = size;
     this.names = width < 640 ? NAMES_NARROW : NAMES;
-    const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
-    if (canvas.width !== w || canvas.height !== h) Object.assign(canvas, { width: w, height: h });
-    g.setTransform(ratio, 0, 0, ratio, 0, 0);
     g.clearRect(0, 0, width, height);
     g.font = "11px Inter, Arial, sans-serif";
     g.textBaseline = "middle";
@@ -173,7 +179,13 @@ export class Timeline {
     const [from, to] = this.#range();
     const x = (/** @type {number} */ t) => this.names + ((t - from) / (to - from)) * (width - this.names - RIGHT);
     const scale = { from, to, x };
+    this.scale = scale;
     this.#grid(scale, width, height);
+    const tallest = this.lanes.reduce((sum, lane) => sum + laneHeight(lane), 3) + FOOT;
+    if (tallest !== this.tallest) {
+      this.tallest = tallest; // no higher than its lanes: plots need the room
+      document.documentElement.style.setProperty("--lanes", `${tallest}px`);
+    }
     const room = height - FOOT;
     const lanes = this.#lanesToShow(scale, room);
     const all = lanes.reduce((sum, lane) => sum + laneHeight(lane), 0);
@@ -187,8 +199,55 @@ export class Timeline {
         y += tall;
       }
     });
+    this.#outages(scale, width, room);
+    this.#stretch(x, height);
     this.#notes(x, width, height);
     this.#cursor(x, height);
+    this.onDraw({ from, to });
+  }
+
+  /** The selected stretch of the run. @param {(t: number) => number} x @param {number} height */
+  #stretch(x, height) {
+    const found = store.stretch.value;
+    if (!found) return;
+    const g = this.context;
+    const [left, right] = [found.from, found.to].map((t) => Math.max(this.names, x(t)));
+    g.fillStyle = this.#colours.of("ink");
+    g.globalAlpha = 0.1;
+    g.fillRect(left, 0, right - left, height - FOOT);
+    g.globalAlpha = 1;
+    for (const px of [left, right]) g.fillRect(px - 0.75, 0, 1.5, height - FOOT);
+    g.fillRect(left, height - FOOT, right - left, store.looping.value ? 4 : 2);
+  }
+
+  /** Gaps where no process ran the mission. @param {Scale} scale @param {number} width @param {number} height */
+  #outages({ from, to, x }, width, height) {
+    const g = this.context;
+    this.gaps = [];
+    for (const [begin, end] of store.run.now.outages ?? []) {
+      if (end / 1e6 < from || begin / 1e6 > to) continue;
+      const left = Math.max(this.names, x(begin / 1e6));
+      const right = Math.min(width - RIGHT, Math.max(x(end / 1e6), left + 3));
+      if (right <= left) continue;
+      this.gaps.push([left, right]);
+      g.fillStyle = this.#colours.of("background");
+      g.fillRect(left, 0, right - left, height);
+      g.strokeStyle = this.#colours.of("waiting");
+      g.lineWidth = 1.5;
+      g.setLineDash([2, 3]);
+      for (const px of [left, right]) {
+        g.beginPath();
+        g.moveTo(px, 0);
+        g.lineTo(px, height);
+        g.stroke();
+      }
+      g.setLineDash([]);
+      const text = duration((end - begin) / 1e9);
+      if (g.measureText(text).width + 8 > right - left) continue;
+      g.fillStyle = this.#colours.of("waiting-text");
+      g.textAlign = "center";
+      g.fillText(text, (left + right) / 2, 10);
+    }
   }
 
   /**
@@ -200,7 +259,7 @@ export class Timeline {
     for (const { at, text } of store.notes.value) {
       const px = x(at);
       if (px < this.names || px > width - RIGHT) continue;
-      g.fillStyle = this.#colour("ink");
+      g.fillStyle = this.#colours.of("ink");
       g.fillRect(px - 0.5, 0, 1, height - FOOT);
       const wide = Math.min(NOTE, g.measureText(text).width + 10);
       const left = px + wide > width - RIGHT ? px - wide : px;
@@ -208,7 +267,7 @@ export class Timeline {
       g.beginPath();
       g.roundRect(left, top, wide, 15, 3);
       g.fill();
-      g.fillStyle = this.#colour("background");
+      g.fillStyle = this.#colours.of("background");
       g.textAlign = "left";
       this.#clipped(left, top, wide - 4, 15, () => g.fillText(text, left + 5, top + 8));
     }
@@ -243,8 +302,8 @@ export class Timeline {
     const begun = ms(store.shown().started) ?? store.run.first() ?? from;
     const widthOf = (/** @type {number} */ s) => ((s * 1000) / (to - from)) * (width - this.names);
     const step = 1000 * (STEPS_S.find((s) => widthOf(s) > 74) ?? 86_400 * Math.ceil((to - from) / 86_400_000 / 8));
-    g.fillStyle = this.#colour("muted");
-    g.strokeStyle = this.#colour("hair");
+    g.fillStyle = this.#colours.of("muted");
+    g.strokeStyle = this.#colours.of("hair");
     g.textAlign = "left";
     g.lineWidth = 1;
     for (let t = begun + Math.ceil((from - begun) / step) * step; t < to; t += step) {
@@ -253,14 +312,16 @@ export class Timeline {
       g.moveTo(px, 0);
       g.lineTo(px, height - FOOT);
       g.stroke();
-      g.fillText(clock((t - begun) / 1000), px + 3, height - FOOT / 2);
+      const instant = store.instantText(t);
+      const text = step < 1000 ? instant : instant.slice(0, -2);
+      if (px + 3 + g.measureText(text).width < width) g.fillText(text, px + 3, height - FOOT / 2);
     }
   }
 
   /** @param {StateNode} lane @param {number} y @param {number} h @param {Scale} scale @param {number} width */
   #lane(lane, y, h, { from, to, x }, width) {
     const g = this.context;
-    g.fillStyle = this.#colour("muted");
+    g.fillStyle = this.#colours.of("muted");
     g.textAlign = "left";
     const indent = 10 + Math.min(lane.depth, 6) * 9;
     this.#clipped(0, y, this.names - 8, h, () => g.fillText(lane.name, indent, y + h / 2));
@@ -285,7 +346,7 @@ export class Timeline {
       const tall = (h - 3) / rows - (rows > 1 ? 1.5 : 0);
       const hit = { left, right: left + Math.max(2, right - left), top, bottom: top + tall, span };
       g.globalAlpha = later ? 0.35 : 1;
-      this.#bar(hit, node.name, ended, x, later ? Infinity : now);
+      this.#bar(hit, node, ended, x, later ? Infinity : now);
       g.globalAlpha = 1;
       this.hits.push(hit);
     }
@@ -293,18 +354,18 @@ export class Timeline {
 
   /**
    * @param {Hit} hit
-   * @param {string} name
+   * @param {StateNode} node
    * @param {boolean} ended
    * @param {(t: number) => number} x
    * @param {number} now what is later has not happened [ms]
    */
-  #bar({ left, right, top, bottom, span }, name, ended, x, now) {
+  #bar({ left, right, top, bottom, span }, node, ended, x, now) {
     const g = this.context;
     const [wide, tall] = [right - left, bottom - top];
     const asked = span.preempt !== null && span.preempt <= now ? span.preempt : null;
-    const kind = ended ? outcomeClass(span.outcome) : asked !== null ? "preempted" : "active";
-    g.fillStyle = this.#colour(`${kind}-fill`);
-    g.strokeStyle = this.#colour(kind);
+    const kind = ended ? endClass(node, span.outcome) : asked !== null ? "preempted" : "active";
+    g.fillStyle = this.#colours.of(`${kind}-fill`);
+    g.strokeStyle = this.#colours.of(kind);
     g.lineWidth = 1.1;
     g.beginPath();
     g.roundRect(left, top, wide, tall, Math.min(4, tall / 2, wide / 2));
@@ -313,31 +374,31 @@ export class Timeline {
       // hatch the time from the request to the end
       g.save();
       g.clip();
-      g.fillStyle = this.#colour("preempted");
+      g.fillStyle = this.#colours.of("preempted");
       g.globalAlpha *= 0.55;
       for (let px = Math.max(left, x(asked)); px < right; px += 5) g.fillRect(px, top, 2.5, tall);
       g.restore();
     }
     g.stroke();
     if (store.selected.value === span.path) {
-      g.strokeStyle = this.#colour("ink"); // as in the diagram: not what running looks like
+      g.strokeStyle = this.#colours.of("ink"); // as in the diagram: not what running looks like
       g.lineWidth = 2;
       g.strokeRect(left - 1, top - 1, wide + 2, tall + 2);
     }
     const driver = store.scene.colourOf(span.path);
     if (driver >= 0) {
-      g.fillStyle = this.#colour(`s${1 + (driver % COLOURS)}`); // of its track on the map
+      g.fillStyle = this.#colours.of(`s${1 + (driver % COLOURS)}`); // of its track on the map
       g.fillRect(left + 2, bottom - 4, Math.max(0, wide - 4), 2.5);
     }
     const lit = store.hovered.value;
     if (lit?.path === span.path && lit.from === span.from) this.#halo({ left, right, top, bottom });
     this.#mark(span.serviced, "preempted", x, now, { right, top, tall });
     this.#mark(span.abandoned, "failure", x, now, { right, top, tall });
-    if (wide <= 26 || tall <= 8) return;
-    g.fillStyle = this.#colour(`${kind}-text`);
+    if (wide <= 26 || tall <= 9) return;
+    g.fillStyle = this.#colours.of(`${kind}-text`);
     g.font = `${tall > 13 ? 11 : 9.5}px Inter, Arial, sans-serif`;
     g.textAlign = "left";
-    this.#clipped(left, top, wide - 3, tall, () => g.fillText(name, left + 4, top + tall / 2 + 0.5));
+    this.#clipped(left, top, wide - 3, tall, () => g.fillText(node.name, left + 4, top + tall / 2 + 0.5));
     g.font = "11px Inter, Arial, sans-serif";
   }
 
@@ -348,7 +409,7 @@ export class Timeline {
       ["ink", 4.5],
       ["halo", 2.5],
     ])) {
-      g.strokeStyle = this.#colour(name);
+      g.strokeStyle = this.#colours.of(name);
       g.lineWidth = wide;
       g.beginPath();
       g.roundRect(left - 1, top - 1, right - left + 2, bottom - top + 2, 4);
@@ -368,7 +429,7 @@ export class Timeline {
     if (t === null || t > now) return;
     const g = this.context;
     const px = Math.min(x(t), right);
-    g.fillStyle = this.#colour(colour);
+    g.fillStyle = this.#colours.of(colour);
     g.beginPath();
     g.moveTo(px - 3.5, top - 1);
     g.lineTo(px + 3.5, top - 1);
@@ -379,15 +440,14 @@ export class Timeline {
 
   /** @param {number | null} px */
   #hover(px) {
-    const before = this.#pointer;
-    this.#pointer = px !== null && px >= this.names ? px : null;
-    if (before !== this.#pointer) this.draw();
+    store.pointed.value = px !== null && px >= this.names ? this.#timeAt(px) : null;
   }
 
   /** The instant at the pointer, and the one that is shown. @param {(t: number) => number} x @param {number} height */
   #cursor(x, height) {
     const at = store.cursor.value;
-    if (this.#pointer !== null) this.#flag(this.#pointer, this.#timeAt(this.#pointer), height, "muted", 1);
+    const pointed = store.pointed.value;
+    if (pointed !== null && x(pointed) >= this.names) this.#flag(x(pointed), pointed, height, "muted", 1);
     if (at === null) return;
     const last = this.canvas.clientWidth - RIGHT;
     const px = Math.max(this.names, Math.min(last, x(at))); // beside what is shown it stays at the edge
@@ -404,18 +464,18 @@ export class Timeline {
     g.font = "600 11px 'JetBrains Mono', ui-monospace, monospace";
     const half = g.measureText(text).width / 2 + 5;
     const middle = Math.max(this.names + half, Math.min(this.canvas.clientWidth - half, px));
-    g.fillStyle = this.#colour(colour);
+    g.fillStyle = this.#colours.of(colour);
     g.fillRect(px - wide / 2, 0, wide, height - FOOT);
     g.beginPath();
     g.roundRect(middle - half, height - FOOT + 3, 2 * half, FOOT - 6, 4);
     g.fill();
-    g.fillStyle = this.#colour("background");
+    g.fillStyle = this.#colours.of("background");
     g.textAlign = "center";
     g.fillText(text, middle, height - FOOT / 2 + 0.5);
     g.font = "11px Inter, Arial, sans-serif";
   }
 
-  /** @param {PointerEvent} e */
+  /** @param {MouseEvent} e */
   #spanAt(e) {
     const box = this.canvas.getBoundingClientRect();
     const [px, py] = [e.clientX - box.left, e.clientY - box.top];
@@ -425,9 +485,11 @@ export class Timeline {
 
   /** @param {PointerEvent} e */
   #down(e) {
-    const { left } = this.canvas.getBoundingClientRect();
+    const { left, bottom } = this.canvas.getBoundingClientRect();
     const from = e.clientX - left;
-    if (from < this.names) return;
+    if (e.button !== 0 || from < this.names) return;
+    const selects = e.pointerType === "mouse" && e.clientY < bottom - FOOT; // else a drag moves the instant
+    const begin = this.#timeAt(from);
     const span = this.#spanAt(e);
     let dragged = false;
     const [, stop] = this.#range();
@@ -436,9 +498,11 @@ export class Timeline {
       store.seek(Math.min(this.#timeAt(m.clientX - left), store.run.last() ?? stop));
     const move = (/** @type {PointerEvent} */ m) => {
       if (Math.abs(m.clientX - left - from) > 3) dragged = true;
-      if (dragged || !span) seek(m);
+      if (dragged && selects) store.selectStretch(begin, this.#timeAt(m.clientX - left));
+      else if (dragged || (!span && !selects)) seek(m);
     };
     drag(move, (m) => {
+      if (dragged && selects) return;
       seek(m);
       if (!dragged && span) this.onPick(span.path);
     });
@@ -447,10 +511,13 @@ export class Timeline {
   /** @param {WheelEvent} e */
   #wheel(e) {
     e.preventDefault();
-    if (e.shiftKey || (!e.ctrlKey && e.deltaX === 0 && e.offsetX < this.names)) {
-      this.top += e.deltaY;
-      return;
-    }
+    if (e.shiftKey || (!e.ctrlKey && e.deltaX === 0 && e.offsetX < this.names)) this.top += e.deltaY || e.deltaX;
+    else this.#zoom(e);
+    this.draw();
+  }
+
+  /** @param {WheelEvent} e */
+  #zoom(e) {
     const [, to] = this.#range();
     if (Math.abs(e.deltaX) > Math.abs(e.deltaY)) {
       this.end = to + (e.deltaX / this.canvas.clientWidth) * this.length;
@@ -493,14 +560,6 @@ function firstAfter(spans, t) {
     else high = mid;
   }
   return Math.max(0, low - 16);
-}
-
-/** @param {number} s */
-function clock(s) {
-  const sign = s < -0.0005 ? "-" : "";
-  const v = Math.abs(s);
-  if (v < 60) return `${sign}${+v.toFixed(1)} s`;
-  return `${sign}${Math.floor(v / 60)}:${String(Math.floor(v % 60)).padStart(2, "0")}`;
 }
 
 /** @param {Span} span */

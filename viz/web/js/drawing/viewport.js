@@ -12,8 +12,6 @@ export class Viewport {
   k = 1;
   moved = false; // whether the last press of the pointer moved the view
   #animation = 0;
-  /** @type {Map<number, Point>} */
-  #pointers = new Map(); // that are down, by their number
 
   /** @param {SVGSVGElement} svg @param {SVGElement} world @param {() => void} onChange */
   constructor(svg, world, onChange) {
@@ -22,7 +20,16 @@ export class Viewport {
     this.onChange = onChange;
     this.reducedMotion = matchMedia("(prefers-reduced-motion: reduce)");
     svg.addEventListener("wheel", (e) => this.#wheel(e), { passive: false });
-    svg.addEventListener("pointerdown", (e) => this.#down(e));
+    grab(svg, {
+      onPress: () => {
+        this.moved = false;
+      },
+      onPan: (dx, dy) => {
+        this.moved = true;
+        this.pan(dx, dy);
+      },
+      onZoom: (factor, px, py) => this.zoom(factor, px, py),
+    });
   }
 
   get width() {
@@ -108,41 +115,6 @@ export class Viewport {
     const pixels = e.deltaMode ? e.deltaY * 16 : e.deltaY;
     this.zoom(Math.exp(-pixels * 0.0016), e.clientX - box.left, e.clientY - box.top);
   }
-
-  /** One pointer moves the view, two zoom it as well. @param {PointerEvent} e */
-  #down(e) {
-    if (e.button !== 0) return;
-    this.#pointers.set(e.pointerId, { x: e.clientX, y: e.clientY });
-    if (this.#pointers.size === 1) this.moved = false;
-    const begun = { x: e.clientX, y: e.clientY };
-    const isMine = (/** @type {PointerEvent} */ m) => m.pointerId === e.pointerId;
-    drag(
-      (m) => {
-        if (!isMine(m)) return;
-        if (!this.moved && Math.hypot(m.clientX - begun.x, m.clientY - begun.y) < 4) return;
-        this.moved = true;
-        this.svg.classList.add("grabbed");
-        const before = this.#grip();
-        this.#pointers.set(e.pointerId, { x: m.clientX, y: m.clientY });
-        const after = this.#grip();
-        this.pan(after.x - before.x, after.y - before.y);
-        const box = this.svg.getBoundingClientRect();
-        if (before.wide && after.wide) this.zoom(after.wide / before.wide, after.x - box.left, after.y - box.top);
-      },
-      () => {
-        this.#pointers.delete(e.pointerId);
-        if (!this.#pointers.size) this.svg.classList.remove("grabbed");
-      },
-      isMine,
-    );
-  }
-
-  /** The middle between the pointers, and how far they are from each other. */
-  #grip() {
-    const [a, b] = this.#pointers.values();
-    if (!b) return { ...a, wide: 0 };
-    return { x: (a.x + b.x) / 2, y: (a.y + b.y) / 2, wide: Math.hypot(a.x - b.x, a.y - b.y) };
-  }
 }
 
 /**
@@ -162,4 +134,55 @@ export function drag(onMove, onEnd, isMine = () => true) {
   addEventListener("pointermove", onMove);
   addEventListener("pointerup", end);
   addEventListener("pointercancel", end);
+}
+
+const STILL = 4; // a pointer that moves less than so far moves nothing [px]
+
+/**
+ * One pointer moves what an element shows, two zoom it as well.
+ * @param {Element} element
+ * @param {{ onPress?: () => void, onPan: (dx: number, dy: number) => void,
+ *   onZoom: (factor: number, px: number, py: number) => void, onTap?: (pressed: PointerEvent) => void }} handlers
+ *   `onTap`: it was pressed, and nothing moved
+ */
+export function grab(element, { onPress, onPan, onZoom, onTap }) {
+  /** @type {Map<number, Point>} */
+  const pointers = new Map(); // that are down, by their number
+  let moved = false;
+  const grip = () => {
+    const [a, b] = pointers.values();
+    if (!b) return { ...a, wide: 0 };
+    return { x: (a.x + b.x) / 2, y: (a.y + b.y) / 2, wide: Math.hypot(a.x - b.x, a.y - b.y) };
+  };
+  const down = (/** @type {PointerEvent} */ e) => {
+    if (e.button !== 0) return;
+    pointers.set(e.pointerId, { x: e.clientX, y: e.clientY });
+    if (pointers.size === 1) {
+      moved = false;
+      onPress?.();
+    }
+    const isMine = (/** @type {PointerEvent} */ m) => m.pointerId === e.pointerId;
+    drag(
+      (m) => {
+        if (!isMine(m)) return;
+        if (!moved && Math.hypot(m.clientX - e.clientX, m.clientY - e.clientY) < STILL) return;
+        moved = true;
+        element.classList.add("grabbed");
+        const before = grip();
+        pointers.set(e.pointerId, { x: m.clientX, y: m.clientY });
+        const after = grip();
+        onPan(after.x - before.x, after.y - before.y);
+        const box = element.getBoundingClientRect();
+        if (before.wide && after.wide) onZoom(after.wide / before.wide, after.x - box.left, after.y - box.top);
+      },
+      (m) => {
+        pointers.delete(e.pointerId);
+        if (pointers.size) return;
+        element.classList.remove("grabbed");
+        if (!moved && m.type === "pointerup") onTap?.(e);
+      },
+      isMine,
+    );
+  };
+  element.addEventListener("pointerdown", (e) => down(/** @type {PointerEvent} */ (e)));
 }

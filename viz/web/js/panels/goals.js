@@ -38,7 +38,7 @@ function EndedGoal({ id, goal, page }) {
   const status = goal.status.toLowerCase();
   const onToggle = (/** @type {Event} */ e) => setOpen(/** @type {HTMLDetailsElement} */ (e.target).open);
   const title = [`${status}: ${goal.action}`, goal.text, id].filter(Boolean).join("\n");
-  return html`<details class=${`ended-goal ${kind}`} open=${open} onToggle=${onToggle}>
+  return html`<details ...${linked(goal, `ended-goal ${kind}`)} open=${open} onToggle=${onToggle}>
     <summary title=${title}><span class=${`ended ${kind}`} aria-label=${status}>${MARKS[kind]}</span>
       <${StateLink} path=${goal.path} page=${page} /><span class="what">${goal.text || status}</span>
       <span class="times">${took}</span></summary>
@@ -55,7 +55,7 @@ function Goal({ id, goal, now, page }) {
   const kind = waits ? "waiting" : "active";
   const part = goal.progress?.fraction ?? null;
   const took = duration((now - goal.since / 1e6) / 1000);
-  return html`<div class=${`goal ${kind}`} title=${id}>
+  return html`<div ...${linked(goal, `goal ${kind}`)} title=${id}>
     <div class="head"><${StateLink} path=${goal.path} page=${page} /><span class="action">${goal.action}</span>
       <span class="times">${goal.attempt > 1 ? `attempt ${goal.attempt} \u00b7 ` : ""}${took}</span></div>
     <${ProgressBar} part=${part} ended=${false} />
@@ -64,6 +64,12 @@ function Goal({ id, goal, now, page }) {
       ${part !== null && html`<span class="times">${Math.round(part * 100)} %</span>`}</div>
     <${Foldable} label="goal" value=${goal.goal} /></div>`;
 }
+
+/** Attributes of a row that lights up with the visit that sent its goal. @param {GoalRun} goal @param {string} kind */
+const linked = (goal, kind) => ({
+  ...store.hoverHandlers(goal.path, goal.since / 1e6),
+  class: `${kind} ${store.isLit(goal.path, goal.since / 1e6) ? "lit" : ""}`,
+});
 
 /** @param {Progress | undefined} progress */
 const progressText = (progress) => {

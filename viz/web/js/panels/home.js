@@ -1,11 +1,13 @@
 // The home page: live and past runs of all machines that were found, with filters and pins.
 import { useEffect, useRef, useState } from "preact/hooks";
-import { openRun, refreshRuns, showHome } from "#core/connection.js";
+import { commandMission, hasToken, openRun, refreshRuns, showHome } from "#core/connection.js";
 import {
   beganText,
   chosen,
   countsOf,
   filterText,
+  outageText,
+  pinOf,
   SHOWN,
   SHOWN_NAMES,
   secondsOf,
@@ -26,11 +28,20 @@ const SIGNS = {
   preempted: "\u2298",
   other: "\u00b7",
   cut: "\u2026",
+  interrupted: "\u2016",
+  queued: "\u2026",
 };
 /** @type {Record<string, string>} */
-const KINDS = { live: "active", cut: "waiting" }; // others are called as their colours are
+const WORDS = { live: "running", interrupted: "interrupted", queued: "queued" };
+const REFRESH_MS = 5000; // journals say nothing by themselves
+/** Others are called as their colours are. @type {Record<string, string>} */
+const KINDS = { live: "active", cut: "waiting", interrupted: "waiting", queued: "waiting" };
 
 export const HomePage = () => (store.homeOpen.value ? html`<${OpenHome} />` : null);
+
+const openSimulations = () => {
+  store.simulateOpen.value = true;
+};
 
 const lastWord = (/** @type {string} */ path) => path.split("/").at(-1) || path;
 
@@ -46,8 +57,13 @@ function OpenHome() {
   useEffect(() => {
     refreshRuns();
   }, [machines.value]);
+  const { runs, folders, journals } = store.runs.value;
+  useEffect(() => {
+    if (!journals.length) return;
+    const timer = setInterval(refreshRuns, REFRESH_MS);
+    return () => clearInterval(timer);
+  }, [journals.length > 0]);
   store.slowTick.value;
-  const { runs, folders } = store.runs.value;
   const pins = store.pins.value;
   const rows = chosen(runs, filter, pins);
   const change = (/** @type {Partial<import("#core/run_list.js").Filter>} */ some) => {
@@ -60,10 +76,18 @@ function OpenHome() {
     <div class="run-list">
       <header><h2 id="home-title" tabindex="-1" ref=${heading}>Runs</h2>
         ${folders.map((one) => html`<span class="chip" title=${one}>folder ${shorten(lastWord(one), 24)}</span>`)}
+        ${journals.map((one) => html`<${JournalChip} ...${one} />`)}
         <span class="spread"></span>
         <span class="hint">${rows.length.toLocaleString("en")} runs${failed > 0 && `, ${failed} failed`}</span>
         <input placeholder="machine, robot, state, reason" aria-label="search runs" value=${filter.text}
           onInput=${(/** @type {Event} */ e) => change({ text: fieldValue(e) })} />
+        ${
+          runs.filter((row) => row.live).length > 1 &&
+          html`<button onClick=${() => {
+            store.fleetOpen.value = true;
+          }}>Fleet</button>`
+        }
+        <button onClick=${openSimulations}>Simulate</button>
         ${store.model.value && html`<button onClick=${() => showHome(false)}>Close</button>`}</header>
       ${store.runsProblem.value && html`<p class="error">${store.runsProblem.value}</p>`}
       ${!runs.length && store.runsKnown.value && html`<${NoRuns} />`}
@@ -78,6 +102,12 @@ function OpenHome() {
     </div>
   </section>`;
 }
+
+/** @param {{ name: string, problem: string }} props */
+const JournalChip = ({ name, problem }) =>
+  html`<span class=${problem ? "chip bad" : "chip"} title=${problem || name}>journal ${shorten(lastWord(name), 24)}${
+    problem && ": not readable"
+  }</span>`;
 
 function NoRuns() {
   const text = "smachpy run patrol --start-robot --view";
@@ -130,7 +160,7 @@ function Rows({ rows, pins }) {
   return html`<table class="runs"><thead><tr><th><span class="hidden">pinned</span></th><th>Outcome</th>
       <th>Machine and reason</th><th class="right">Duration</th><th>States</th><th class="right">Began</th></tr></thead>
     <tbody>${rows.map(
-      (row) => html`<${Row} key=${row.id} row=${row} pinned=${pins.has(row.id)} today=${today} />`,
+      (row) => html`<${Row} key=${row.id} row=${row} pinned=${pins.has(pinOf(row))} today=${today} />`,
     )}</tbody>
   </table>`;
 }
@@ -139,27 +169,45 @@ function Rows({ rows, pins }) {
 function Row({ row, pinned, today }) {
   const kind = standing(row);
   const known = row.problem ? "unreadable" : shorten(row.outcome ?? "no end", 20);
-  const asks = row.live && store.machines.value.some((one) => one.name === row.name && one.questions);
-  const colour = asks ? "waiting" : (KINDS[kind] ?? kind);
-  const word = asks ? "asks you" : kind === "live" ? "running" : known;
+  const colour = row.asks ? "waiting" : (KINDS[kind] ?? kind);
+  const word = row.asks ? "asks you" : (WORDS[kind] ?? known);
   const seconds = secondsOf(row, Date.now());
-  const open = () => openRun(row.id);
+  const opens = row.name !== null || row.file !== "";
+  const open = () => opens && openRun(row.id);
   const onKeyDown = (/** @type {KeyboardEvent} */ e) => {
     if (e.key === "Enter" && e.target === e.currentTarget) open();
   };
   const pin = (/** @type {Event} */ e) => {
     e.stopPropagation();
-    store.togglePin(row.id);
+    store.togglePin(pinOf(row));
   };
-  return html`<tr tabindex="0" class=${row.problem ? "bad" : ""} onClick=${open} onKeyDown=${onKeyDown}>
+  const outage = outageText(row);
+  const classes = `${row.problem ? "bad" : ""}${opens ? "" : " closed"}`;
+  return html`<tr tabindex="0" class=${classes} onClick=${open} onKeyDown=${onKeyDown}>
     <td><button class=${pinned ? "pin on" : "pin"} aria-pressed=${pinned} title=${pinned ? "pinned" : "pin"}
       aria-label=${`pin ${row.machine}`} onClick=${pin}>${pinned ? "\u2605" : "\u2606"}</button></td>
-    <td><span class=${`pill-text ${colour}`}>${asks ? "?" : SIGNS[kind]} ${word}</span></td>
+    <td><span class=${`pill-text ${colour}`}>${row.asks ? "?" : SIGNS[kind]} ${word}</span></td>
     <td class="what"><b>${shorten(row.machine, 40)}</b> <span class="hint">${row.robots.join(", ")}</span>
+      ${outage && html` <span class="pill-text waiting">${outage}</span>`}
+      <${MissionButtons} mission=${row.mission} />
       <small title=${row.problem || row.reason}>${shorten(row.problem || row.reason, 110)}</small></td>
     <td class="right">${seconds === null ? "" : duration(seconds)}</td>
     <td class="strip-cell"><${Strip} row=${row} seconds=${seconds} /></td>
     <td class="right">${row.began === null ? "" : beganText(row.began, today)}</td></tr>`;
+}
+
+/** @param {{ mission: Mission | null }} props */
+function MissionButtons({ mission }) {
+  if (!mission?.can.length || !hasToken()) return null;
+  return mission.can.map((what) => {
+    const onClick = (/** @type {Event} */ e) => {
+      e.stopPropagation();
+      commandMission(mission, what);
+    };
+    return html` <button class="small" aria-label=${`${what} ${mission.id}`} onClick=${onClick}>${
+      what === "resume" ? "Resume" : "Cancel"
+    }</button>`;
+  });
 }
 
 /** The states of a run in the colours of their outcomes. @param {{ row: RunRow, seconds: number | null }} props */
@@ -173,6 +221,12 @@ function Strip({ row, seconds }) {
     return html`<rect class=${kind} x=${`${x}%`} y=${at * tall + 1} width=${`${wide}%`} height=${Math.max(2, tall - 2)}
       rx=${rows > 2 ? 0 : 3}><title>${name}: ${duration((to ?? seconds) - from)}</title></rect>`;
   };
+  const gap = (/** @type {[number, number]} */ [from, to]) => {
+    const [x, wide] = [(100 * from) / seconds, Math.max(0.8, (100 * (to - from)) / seconds)];
+    return html`<rect class="outage" x=${`${x}%`} y="0" width=${`${wide}%`} height="24">
+      <title>no process ran it for ${duration(to - from)}</title></rect>`;
+  };
   const names = row.strip.slice(0, 12).map((piece) => piece[1]);
-  return html`<svg class="run-strip" height="24" role="img" aria-label=${names.join(", ")}>${row.strip.map(bar)}</svg>`;
+  return html`<svg class="run-strip" height="24" role="img" aria-label=${names.join(", ")}>
+    ${row.strip.map(bar)}${row.outages.map(gap)}</svg>`;
 }

@@ -33,7 +33,13 @@ export function listenToKeys(page) {
     K: () => jumpToChange(-1),
     Home: () => store.seek(store.run.first()),
     End: () => page.timeline.live(),
-    m: () => page.map.canvas.focus(),
+    m: () => {
+      store.part.value = "map";
+      page.map.canvas.focus();
+    },
+    r: () => store.toggleLoop(),
+    "[": () => store.moveStretch("from"),
+    "]": () => store.moveStretch("to"),
     w: () => showWhy(),
     n: () => store.askForNote(),
     t: () => {
@@ -56,9 +62,14 @@ export function listenToKeys(page) {
     Enter: () => page.toggleSelected(),
     Escape: () => {
       if (store.help.value) store.help.value = false;
+      else if (store.simulateOpen.value) store.simulateOpen.value = false;
+      else if (store.noteAt.value !== null) store.noteAt.value = null;
+      else if (store.tokenAsked.value) store.tokenAsked.value = false;
       else if (store.actionsOpen.value) showActions(false);
+      else if (store.fleetOpen.value) store.fleetOpen.value = false;
       else if (store.homeOpen.value) showHome(!store.model.value);
       else if (store.treeOpen.value) store.treeOpen.value = false;
+      else if (store.stretch.value) store.selectStretch(0);
       else page.select(null);
     },
     " ": () => {
@@ -81,6 +92,8 @@ export function listenToKeys(page) {
       return;
     }
     if ((e.key === "Enter" || e.key === " ") && target.closest(PRESSED)) return;
+    const asks = store.simulateOpen.value || store.noteAt.value !== null || store.tokenAsked.value;
+    if (asks && e.key !== "Escape") return;
     if ((store.actionsOpen.value || store.homeOpen.value) && !ON_ACTIONS.includes(e.key)) return;
     if (e.key in ARROWS) {
       const [dx, dy] = ARROWS[e.key];

@@ -30,13 +30,15 @@ export function Log({ page }) {
     const missing = i + 1 < end ? (store.run.events[i + 1].dropped ?? 0) : 0;
     if (missing) lines.push(html`<li key=${-e.seq} class="hint">${countOfEvents(missing)} missing here</li>`);
     if (!kinds.has(e.kind)) continue;
-    const line = lineOf(e);
+    const line = lineOf(e, store.model.value?.get(e.path));
     if (wanted && !`${e.path} ${line.text}`.toLowerCase().includes(wanted)) continue;
     const count = i + 1;
     const onClick = () => {
       if (store.cursor.value !== null) store.seekTo(count);
     };
-    lines.push(html`<li key=${e.seq} onClick=${onClick}>
+    const t = e.stamp_ns / 1e6;
+    lines.push(html`<li key=${e.seq} class=${store.isLit(e.path, t) ? "lit" : ""} onClick=${onClick}
+        ...${store.hoverHandlers(e.path, t)}>
       <time>${((e.stamp_ns / 1e6 - begun) / 1000).toFixed(2)}</time>
       <${StateLink} path=${e.path} page=${page} />${" "}
       <span class=${`word ${line.kind}`}>${shorten(line.text, LONGEST)}</span>${targetOf(e)}</li>`);

@@ -12,7 +12,10 @@ const MOST_ROBOTS = 5; // with a button of their own
 export function MapPanel({ page, children }) {
   store.tick.value;
   const { map } = page;
-  const names = [...store.scene.robots].filter(([, robot]) => robot.poses.length).map(([name]) => name);
+  const names = [...store.scene.robots]
+    .filter(([, robot]) => robot.poses.length)
+    .map(([name]) => name)
+    .sort();
   const noMap = !store.scene.maps.length;
   return html`<section class="map-panel" aria-label="map">
     <header><h2>Map</h2>

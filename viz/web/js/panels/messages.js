@@ -33,6 +33,7 @@ const KEYS = [
   [", .", "one event back or forward"],
   ["l", "back to now"],
   ["1 \u2026 9", "levels to open"],
+  ["r [ ]", "loop over the selected stretch of the run; let it begin or end at the instant shown"],
   ["w", "why it ended so"],
   ["n", "note at the instant shown"],
   ["t", "states, on a small screen"],
@@ -143,7 +144,7 @@ export function Legend() {
     scale && html`<span class="scale">${scale[0]}<b class="heat"></b>${scale[1]}</span>`
   }${LEGEND.map(
     ([kind, text]) => html`<span><b class=${kind}></b>${text}</span>`,
-  )}${store.overview.value && html`<span class="hint">double-click a state to open its diagram</span>`}</div>`;
+  )}${store.overview.value && html`<span class="hint">double-click opens one</span>`}</div>`;
 }
 
 export function Notice() {
@@ -179,7 +180,8 @@ export function TokenDialog() {
   return html`<div class="veil"><form class="card token" role="dialog" aria-label="token" onSubmit=${onSubmit}>
     <h2>The viewer has a new token</h2>
     <p>It was started anew. Paste the address that it printed, or the token at its end.</p>
-    <input aria-label="address or token" autocomplete="off" spellcheck=${false} value=${text} autofocus
+    <input aria-label="address or token" autocomplete="off" spellcheck=${false} value=${text}
+      ref=${(/** @type {HTMLInputElement | null} */ input) => input?.focus()}
       onInput=${(/** @type {Event} */ e) => setText(fieldValue(e))} />
     ${wrong && html`<p class="problem">no token; expected ADDRESS/#token=TOKEN, or TOKEN</p>`}
     <p><button class="primary" type="submit">Use it</button>${" "}

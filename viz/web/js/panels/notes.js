@@ -2,6 +2,7 @@
 import { useState } from "preact/hooks";
 import { isFile } from "#core/connection.js";
 import * as store from "#core/store.js";
+import { saveFilm } from "#drawing/film.js";
 import { fieldValue, html, Section } from "#panels/html.js";
 
 /** @typedef {import("#drawing/page.js").Page} Page */
@@ -17,7 +18,10 @@ export function ShareButtons({ page }) {
       store.notify("This browser lets no page copy here: the address bar shows the link", "error");
     }
   };
+  const done = store.filmed.value;
   return html`<span class="share">
+    <button title="GIF of the selected stretch, else of the 20 s before the instant shown" disabled=${done !== null}
+      onClick=${() => saveFilm(page)}>${done === null ? "GIF" : `GIF ${done} %`}</button>
     <button title="note at the instant shown (n)" onClick=${() => store.askForNote()}>Note</button>
     <button title="copy the address of what is shown: instant, selection, what is open, notes"
       onClick=${copy}>Link</button></span>`;

@@ -1,4 +1,5 @@
 // The play bar: where in the run one looks, how fast it is played, and what one may jump to.
+import { useState } from "preact/hooks";
 import { isFile } from "#core/connection.js";
 import { parseInstant, RATES } from "#core/playback.js";
 import * as store from "#core/store.js";
@@ -15,6 +16,7 @@ const ICONS = {
   pause: "M5 3v10M11 3v10",
   forward: "M5 3l6 5-6 5Z",
   end: "M12 3v10M3 3l7 5-7 5Z",
+  loop: "M12 7V5H3.5M5.5 3l-2 2 2 2M4 9v2h8.5M10.5 9l2 2-2 2",
 };
 /** @type {[string, string, string][]} kind, sign, key */
 const KINDS = [
@@ -49,6 +51,7 @@ export function PlayBar({ page }) {
       <select value=${store.rate.value} title="speed"
         onChange=${(/** @type {Event} */ e) => store.setRate(Number(fieldValue(e)))}>
         ${RATES.map((rate) => html`<option value=${rate}>${rate} \u00d7</option>`)}</select></label>
+    <${LoopButton} />
     <${Jumps} />
     <span class="spread"></span>
     <button title="back to now (l)" class=${`live-button ${live ? "on" : ""}`} aria-pressed=${live}
@@ -56,19 +59,35 @@ export function PlayBar({ page }) {
   </div>`;
 }
 
+function LoopButton() {
+  const [on, found] = [store.looping.value, store.stretch.value];
+  const what = found
+    ? `from ${store.instantText(found.from)} to ${store.instantText(found.to)}`
+    : "over the selected state's visit; drag in the timeline to select a stretch";
+  return html`<${IconButton} name="loop" class=${`icon-button ${on ? "on" : ""}`} aria-pressed=${on} id="loop"
+    title=${`loop ${what} (r)`} onClick=${() => store.toggleLoop()} />`;
+}
+
 /** The instant shown, to read and to type. */
 function Clock() {
   store.tick.value; // it has no properties, so it is drawn again only when this changes
   const last = store.run.last() ?? 0;
+  // What is being typed stays, whatever the run does meanwhile.
+  const [typed, setTyped] = useState(/** @type {string | null} */ (null));
   const onChange = (/** @type {Event} */ e) => {
     const seconds = parseInstant(fieldValue(e));
     if (seconds === null) store.notify(`Instant: got ${shorten(fieldValue(e), 30)}; expected such as 01:32.5`, "error");
     else store.seek((store.began() ?? 0) + seconds * 1000);
     /** @type {HTMLInputElement} */ (e.target).blur();
   };
-  return html`<span class="clock"><input value=${store.instantText(store.nowMs())} onChange=${onChange} size="9"
+  const onFocus = (/** @type {Event} */ e) => {
+    setTyped(fieldValue(e));
+    /** @type {HTMLInputElement} */ (e.target).select();
+  };
+  return html`<span class="clock"><input value=${typed ?? store.instantText(store.nowMs())} size="9"
       aria-label="instant shown; type another one" title="type an instant to go there" autocomplete="off"
-      onFocus=${(/** @type {Event} */ e) => /** @type {HTMLInputElement} */ (e.target).select()} />
+      onInput=${(/** @type {Event} */ e) => setTyped(fieldValue(e))} onChange=${onChange}
+      onFocus=${onFocus} onBlur=${() => setTyped(null)} />
     <small>/ ${store.instantText(Math.max(last, store.nowMs()))}</small></span>`;
 }
 

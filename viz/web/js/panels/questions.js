@@ -58,7 +58,7 @@ function Card({ one, page }) {
     const by = store.operator.value.trim() || undefined;
     if (!(await command("answer", { path: one.path, answer, by }))) setSent(false);
   };
-  const id = `question ${one.path}`;
+  const id = `question-${encoded(one.path)}`; // a list of ids has spaces in between
   return html`<article class=${`question ${one.isOpen ? "" : "over"}`} role="alertdialog" aria-labelledby=${id}>
     <header><div><h3 id=${id} ref=${text} tabindex="-1">${shorten(one.text, LONGEST)}</h3>
       <${StateLink} path=${one.path} page=${page} /></div>

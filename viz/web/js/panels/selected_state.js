@@ -1,7 +1,7 @@
 // The selected state: what it is, how it has run, where its outcomes lead, and commands for it.
 import { own } from "#core/fold.js";
 import { KIND_NAMES } from "#core/model.js";
-import { outcomeClass } from "#core/outcomes.js";
+import { endClass } from "#core/outcomes.js";
 import * as store from "#core/store.js";
 import { duration, shorten } from "#core/text.js";
 import { OutcomeBreakpoint, StateControls } from "#panels/controls.js";
@@ -75,7 +75,7 @@ function Outcome({ node, outcome, times, model }) {
   const link = model.linkOf(node, outcome);
   return html`<li>
     <${OutcomeBreakpoint} node=${node} outcome=${outcome} />
-    <${Pill} kind=${outcomeClass(outcome)}>${shorten(outcome, 60)}<//>
+    <${Pill} kind=${endClass(node, outcome)}>${shorten(outcome, 60)}<//>
     <span>${link ? ` \u2192 ${shorten(link.target)}` : ""}</span>
     <span class="times">${times ? `\u00d7${times}` : ""}</span></li>`;
 }

@@ -9,6 +9,7 @@ import { isDark } from "#drawing/theme.js";
 import { ActionsButton } from "#panels/actions.js";
 import { CompareChip, CompareLine } from "#panels/comparison.js";
 import { Controls } from "#panels/controls.js";
+import { PanelLines } from "#panels/docks.js";
 import { fieldValue, html } from "#panels/html.js";
 
 /** @typedef {import("#drawing/page.js").Page} Page */
@@ -190,6 +191,7 @@ function ViewMenu({ page }) {
             <option value="system">as the system</option>
             <option value="light">light</option>
             <option value="dark">dark</option></select></label>
+        ${!store.isPhone.value && html`<${PanelLines} />`}
         ${!isFile() && html`<${AboutQuestions} />`}
         ${!isFile() && html`<${Downloads} />`}
         <div class="line"><span>Keys</span><button onClick=${showKeys}>show (?)</button></div>

@@ -1,7 +1,7 @@
 // The states as a tree; it draws only the rows that are in view.
 import { useRef, useState } from "preact/hooks";
 import { own } from "#core/fold.js";
-import { outcomeClass } from "#core/outcomes.js";
+import { endClass } from "#core/outcomes.js";
 import * as store from "#core/store.js";
 import { html } from "#panels/html.js";
 
@@ -107,7 +107,7 @@ function Row({ node, state, open, place, isAt, onClick, onFold }) {
   const active = state?.since != null;
   const selected = store.selected.value === node.path;
   const isContainer = node.children.length > 0;
-  const kind = state?.outcome != null ? outcomeClass(state.outcome) : null;
+  const kind = state?.outcome != null ? endClass(node, state.outcome) : null;
   const visits = state?.visits ?? 0;
   const classes = ["row", isAt && "at", active && "active", active && state.preempt && "preempting"];
   const style = { top: `${place * ROW}px`, paddingLeft: `${8 + Math.min(node.depth, MOST_INDENT) * 14}px` };

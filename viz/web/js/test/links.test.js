@@ -1,13 +1,21 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
+import { arrangementOf } from "#core/arrangement.js";
 import { fragmentOf, viewOf, withNotes } from "#core/links.js";
 
-const EMPTY = { at: null, selected: null, opened: null, notes: [] };
+const EMPTY = { at: null, selected: null, opened: null, notes: [], stretch: null, panels: null, plots: null };
 
 test("an address says what is shown, whatever names and texts hold", () => {
   const at = 1795377854028.148;
   const notes = [{ at, text: "why here? #1 & 100 % \u65e5\u672c\nsecond line" }];
-  const view = { at, selected: "/JOB/A&state=#x", opened: ["/JOB", "/JOB/\u{1f916} B"], notes };
+  const view = {
+    ...EMPTY,
+    at,
+    selected: "/JOB/A&state=#x",
+    opened: ["/JOB", "/JOB/\u{1f916} B"],
+    notes,
+    plots: [["topic,battery"]],
+  };
   const found = viewOf(`#${fragmentOf(view)}`);
   assert.deepEqual([found.selected, found.opened], [view.selected, view.opened]);
   assert.equal(found.notes[0].text, notes[0].text);
@@ -32,6 +40,26 @@ test("what makes no sense in an address is left out", () => {
   const long = viewOf(`#note=1.5+${"x".repeat(9000)}${"&note=2+y".repeat(500)}`);
   assert.equal(long.notes[0].text.length, 300);
   assert.equal(long.notes.length, 20);
+});
+
+test("an address names plots by where their numbers come from", () => {
+  const plots = [["topic,a%3Bb%20c", "userdata,%2FJOB,count"], ["progress,move_base,distance"]];
+  assert.deepEqual(viewOf(fragmentOf({ ...EMPTY, plots })).plots, plots);
+  assert.deepEqual(viewOf(fragmentOf({ ...EMPTY, plots: [] })).plots, []); // chosen: none
+  assert.deepEqual(viewOf("#plot=topic,x;nonsense&plot=%25&plot=progress,a,constructor").plots, [["topic,x"]]);
+});
+
+test("an address names a stretch of the run", () => {
+  const stretch = /** @type {[number, number]} */ ([1795377854028.25, 1795377860000.5]);
+  assert.deepEqual(viewOf(fragmentOf({ ...EMPTY, stretch })).stretch, stretch);
+  for (const odd of ["5 1", "1", "1 x", "nan nan", "1 1", "0 -1"])
+    assert.equal(viewOf(`#stretch=${encodeURIComponent(odd)}`).stretch, null);
+});
+
+test("an address names the places of the panels", () => {
+  const panels = arrangementOf("|details,map|plots:90|300:500");
+  assert.deepEqual(viewOf(fragmentOf({ ...EMPTY, panels })).panels, panels);
+  assert.equal(viewOf("#panels=%3Cscript%3E|||1:2").panels, null);
 });
 
 test("very many open containers are not in the address", () => {

@@ -1,7 +1,31 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { instantAt, Marks, parseInstant } from "#core/playback.js";
+import { framesOf, instantAt, keepUnchanged, loopedAt, Marks, parseInstant } from "#core/playback.js";
 import { event } from "./fixtures.js";
+
+test("a film shows its stretch at 5 pictures a second, a long one faster", () => {
+  assert.deepEqual(framesOf({ from: 1000, to: 1500 }), [1000, 1200, 1400, 1500]);
+  assert.deepEqual(framesOf({ from: 7, to: 7 }), [7, 7]);
+  const long = framesOf({ from: 0, to: 3_600_000 });
+  assert.equal(long.length, 151);
+  assert.equal(long.at(-1), 3_600_000);
+});
+
+test("what is as it was costs nothing in a film", () => {
+  const indexes = new Uint8Array([1, 2, 3]);
+  assert.equal(keepUnchanged(new Uint32Array([5, 6, 7]), new Uint32Array([5, 9, 7]), indexes, 255), true);
+  assert.deepEqual([...indexes], [255, 2, 255]);
+  assert.equal(keepUnchanged(new Uint32Array([5]), new Uint32Array([5]), new Uint8Array(1), 255), false);
+});
+
+test("a loop begins anew where its stretch ends, and plays what is before it first", () => {
+  const stretch = { from: 100, to: 300 };
+  assert.deepEqual(
+    [50, 100, 299, 300, 350, 1100].map((t) => loopedAt(t, stretch)),
+    [50, 100, 299, 100, 150, 100],
+  );
+  assert.equal(loopedAt(5, { from: 5, to: 5 }), 5);
+});
 
 test("an instant is typed as it is shown, or in seconds", () => {
   const read = ["32.5", " 00:32.0 ", "01:02", "1:02:03.25", "90:00", "0"].map(parseInstant);

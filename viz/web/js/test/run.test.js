@@ -139,3 +139,20 @@ test("what the last transition wrote", () => {
   assert.deepEqual(run.lastTransition(0).writes, []);
   assert.deepEqual(new Run(null, []).lastTransition(0).writes, []);
 });
+
+test("a run that another process goes on with is one: what it took up again has one bar", () => {
+  const { events } = fixture("folds.json").at(-1);
+  const run = new Run(null, events);
+  const bars = (/** @type {string} */ path) =>
+    run.spans.filter((span) => span.path === path).map(({ to, outcome }) => [to === null, outcome]);
+  assert.deepEqual(bars("/JOB"), [[true, null]]);
+  assert.deepEqual(bars("/JOB/B/C"), [[false, "done"]]);
+  assert.deepEqual(bars("/JOB/B/D"), [[false, null]]); // its end was not recorded
+  assert.deepEqual(bars("/JOB/B/E"), [[true, null]]);
+  // One that only knows the second process has the same bars of what went on.
+  const late = new Run(null, events.slice(11));
+  assert.deepEqual(
+    late.spans.map(({ path, from }) => [path, from]),
+    run.spans.filter(({ path }) => !/[AD]$/.test(path)).map(({ path, from }) => [path, from]),
+  );
+});

@@ -1,6 +1,16 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { beganText, chosen, countsOf, filterText, secondsOf, standing, tally } from "#core/run_list.js";
+import {
+  beganText,
+  chosen,
+  countsOf,
+  filterText,
+  outageText,
+  pinOf,
+  secondsOf,
+  standing,
+  tally,
+} from "#core/run_list.js";
 
 /** @param {string} id @param {Partial<RunRow>} [facts] @returns {RunRow} */
 const row = (id, facts = {}) => ({
@@ -17,6 +27,11 @@ const row = (id, facts = {}) => ({
   problem: "",
   file: "",
   strip: [],
+  outages: [],
+  run: "",
+  asks: false,
+  stamp: 1e9,
+  mission: null,
   ...facts,
 });
 const ROWS = [
@@ -24,7 +39,7 @@ const ROWS = [
   row("b", { machine: "PATROL", strip: [[0, "DOCK", 0, 1, "success"]] }),
   row("c", { live: true, outcome: null, ended: null, robots: ["robot_0", "robot_1"] }),
   row("d", { outcome: null, ended: null }),
-  row("e", { outcome: "preempted" }),
+  row("e", { outcome: "preempted", began: 2e9, stamp: 2e9 }),
 ];
 const ALL = { show: "all", machine: null, robot: null, text: "" };
 const ids = (/** @type {object} */ filter, pins = new Set()) =>
@@ -38,12 +53,12 @@ test("a run stands as its outcome, live, or without an end", () => {
 
 test("live runs come first, then pinned ones, then as they came", () => {
   assert.equal(ids({}), "cabde");
-  assert.equal(ids({}, new Set(["e"])), "ceabd");
+  assert.equal(ids({}, new Set([pinOf(ROWS[4])])), "ceabd");
 });
 
 test("filters choose together", () => {
   assert.equal(ids({ show: "failure" }), "a");
-  assert.equal(ids({ show: "pinned" }, new Set(["b", "gone"])), "b");
+  assert.equal(ids({ show: "pinned" }, new Set([pinOf(ROWS[1]), "gone"])), "b");
   assert.equal(ids({ robot: "robot_0" }), "ca");
   assert.equal(ids({ machine: "PATROL", show: "failure" }), "");
   assert.equal(ids({ text: "GOAL drive" }), "a");
@@ -53,7 +68,7 @@ test("filters choose together", () => {
 });
 
 test("runs are counted by what they can be chosen by", () => {
-  const counts = countsOf(ROWS, new Set(["a"]));
+  const counts = countsOf(ROWS, new Set([pinOf(ROWS[1])]));
   assert.deepEqual([counts.get("all"), counts.get("live"), counts.get("pinned"), counts.get("other")], [5, 1, 1, 0]);
   assert.deepEqual(
     tally(ROWS, (one) => one.robots),
@@ -71,7 +86,7 @@ test("runs are counted by what they can be chosen by", () => {
 test("how long a run took, or runs", () => {
   assert.deepEqual(
     ROWS.map((one) => secondsOf(one, 11_000)),
-    [2, 2, 10, 2, 2],
+    [2, 2, 10, 2, 1],
   );
   assert.equal(secondsOf(row("x", { began: null }), 0), null);
 });
@@ -80,4 +95,30 @@ test("today has hours, other days are dates", () => {
   const today = new Date(2026, 4, 1, 12, 0);
   assert.equal(beganText(today.getTime() * 1e6, today), "12:00");
   assert.equal(beganText(new Date(2026, 3, 1).getTime() * 1e6, today), "1 Apr 2026");
+});
+
+/** @param {string} status @returns {Mission} */
+const mission = (status) => ({ id: "m", journal: "j.db", status, active: [], problem: "", can: [] });
+
+test("durable missions stand as their journals say, and are found", () => {
+  const open = { outcome: null, ended: null };
+  const rows = [
+    row("f", { ...open, mission: mission("interrupted"), run: "f 1", outages: [[1, 2]] }),
+    row("g", { ...open, mission: mission("queued"), run: "g 1" }),
+    row("h", { ...open, mission: mission("running"), run: "h 1" }),
+    row("i", { outcome: "done", mission: mission("ended"), run: "i 1" }),
+  ];
+  assert.deepEqual(rows.map(standing), ["interrupted", "queued", "live", "success"]);
+  const found = (/** @type {string} */ show) => chosen([...ROWS, ...rows], { ...ALL, show }, new Set()).length;
+  assert.deepEqual(["durable", "interrupted", "asking"].map(found), [4, 1, 0]);
+  assert.equal(pinOf(rows[0]), "f 1");
+  assert.equal(secondsOf(rows[2], 11_000), 10);
+});
+
+test("outages in words", () => {
+  const text = (/** @type {[number, number][]} */ ...outages) => outageText(row("x", { outages }));
+  assert.deepEqual(
+    [text(), text([1, 4]), text([1, 4], [5, 200])],
+    ["", "resumed after 3.0 s", "resumed after 2 outages, 3 min 18"],
+  );
 });

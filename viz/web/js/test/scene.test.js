@@ -160,3 +160,18 @@ test("a map's cells, its corners and a scan's points", () => {
     ],
   );
 });
+
+test("numbers of topics are series by their paths", () => {
+  const scene = new Scene();
+  const record = { kind: "Observed", path: "", robot: "", n: 1, stamp_ns: 1e9, what: "values" };
+  scene.addObserved([
+    { ...record, topic: "arm/current", values: { data: 1.5 } },
+    { ...record, topic: "joints", values: { "position.0": 2, "position.1": 3 } },
+    { ...record, stamp_ns: 2e9, topic: "joints", values: { "position.0": 4 } },
+  ]);
+  assert.deepEqual([...scene.series.keys()], ["arm/current", "joints.position.0", "joints.position.1"]);
+  assert.deepEqual(
+    scene.series.get("joints.position.0")?.points.map(({ value }) => value),
+    [2, 4],
+  );
+});

@@ -122,3 +122,12 @@ test("implicit transitions of the same machine", () => {
   store.setImplicit(false);
   assert.equal(links(), before);
 });
+
+test("where a run ended is in the state that was left last, not in one whose name begins so", () => {
+  const began = [event("Entered", "/JOB/A"), event("Entered", "/JOB/AB/X")];
+  const ends = [event("Left", "/JOB/A", { outcome: "ok" }), event("Left", "/JOB/AB/X", { outcome: "ok" })];
+  ends[1].stamp_ns = ends[0].stamp_ns;
+  store.startRun(null, [...began, ...ends]);
+  store.tick.value += 1;
+  assert.deepEqual(store.lastLeaves.value, ["/JOB/A"]);
+});

@@ -25,12 +25,18 @@ test("outcomes are classed as in Python", () => {
   assert.deepEqual([...FAILURE].sort(), table.failure);
   assert.deepEqual([...PREEMPTED_PREFIXES].sort(), [...table.preempted_prefixes].sort());
   for (const [outcome, expected] of Object.entries(table.classes)) assert.equal(outcomeClass(outcome), expected);
-  assert.equal(commonClass(["succeeded", "done"]), "success");
-  assert.equal(commonClass(["succeeded", "aborted"]), "other");
-  assert.equal(commonClass([]), "other");
+  const monitor = /** @type {any} */ ({ kind: "monitor" });
+  assert.equal(commonClass(null, ["succeeded", "done"]), "success");
+  assert.equal(commonClass(null, ["succeeded", "aborted"]), "other");
+  assert.equal(commonClass(null, ["invalid"]), "failure");
+  assert.equal(commonClass(monitor, ["invalid"]), "other");
+  assert.equal(commonClass(monitor, ["exception"]), "failure");
+  assert.equal(commonClass(monitor, ["aborted"]), "failure");
+  assert.equal(commonClass(null, []), "other");
 });
 
 test("spans of time", () => {
+  for (const [seconds, text] of texts.spans) assert.equal(duration(seconds), text);
   const cases = {
     0: "0.0 s",
     9.94: "9.9 s",

@@ -1,0 +1,155 @@
+// A plot beside the timeline, on its axis of instants: uPlot draws the lines and their scale.
+import uPlot from "uplot";
+import { aligned, Samples } from "#core/series.js";
+import * as store from "#core/store.js";
+import { Colours } from "#drawing/theme.js";
+import { drag } from "#drawing/viewport.js";
+
+const SCALE = 44; // room for the numbers of the scale [px]
+const FONT = "11px Inter, Arial, sans-serif";
+export const RIGHT = 14; // as the timeline has it
+
+/** @typedef {{ from: number, to: number }} Range what is shown [ms] */
+
+export class Plot {
+  /** @type {Range} */
+  range = { from: 0, to: 1 };
+  #colours = new Colours();
+
+  /** @param {HTMLElement} element @param {string[]} ids of series @param {string} unit */
+  constructor(element, ids, unit) {
+    this.element = element;
+    this.samples = ids.map((id) => new Samples(id));
+    const colour = (/** @type {string} */ name) => () => this.#colours.of(name);
+    const paths = { linear: uPlot.paths.linear?.(), stepped: uPlot.paths.stepped?.({ align: 1 }) };
+    const lines = this.samples.map(({ isStep }, i) => ({
+      stroke: colour(`s${i + 1}`),
+      width: 1.75,
+      paths: isStep ? paths.stepped : paths.linear,
+      points: { size: 4 },
+      gaps: breaksOf,
+    }));
+    const percent = unit === "%";
+    this.chart = new uPlot(
+      {
+        width: Math.max(1, element.clientWidth),
+        height: Math.max(1, element.clientHeight),
+        padding: [6, RIGHT, 6, 0],
+        cursor: { show: false },
+        legend: { show: false },
+        scales: { x: { time: false, auto: false }, y: percent ? { range: [0, 100] } : {} },
+        axes: [
+          { show: false },
+          {
+            size: SCALE,
+            gap: 4,
+            font: FONT,
+            space: 24,
+            stroke: colour("muted"),
+            grid: { stroke: colour("hair"), width: 1 },
+            ticks: { show: false },
+          },
+        ],
+        series: [{}, ...lines],
+        hooks: { draw: [() => this.#marks()] },
+      },
+      aligned([], 0, 1, 0),
+      element,
+    );
+    element.addEventListener("pointerdown", (e) => this.#down(e));
+    element.addEventListener("pointermove", (e) => {
+      store.pointed.value = this.#timeAt(e);
+    });
+    element.addEventListener("pointerleave", () => {
+      store.pointed.value = null;
+    });
+  }
+
+  destroy() {
+    this.chart.destroy();
+  }
+
+  restyle() {
+    this.#colours.forget();
+  }
+
+  /** @param {Range} range */
+  draw(range) {
+    const { chart, element } = this;
+    const [width, height] = [element.clientWidth, element.clientHeight];
+    if (!width || !height) return;
+    this.range = range;
+    for (const one of this.samples) one.update(store.run, store.scene.series);
+    if (chart.width !== width || chart.height !== height) chart.setSize({ width, height });
+    chart.batch(() => {
+      chart.setData(aligned(this.samples, range.from, range.to, store.nowMs()), false);
+      chart.setScale("x", { min: range.from, max: range.to });
+    });
+  }
+
+  /** The instant shown and the one at the pointer; what the hovered visit took; what is later is pale. */
+  #marks() {
+    const { ctx: g, bbox } = this.chart;
+    const at = (/** @type {number} */ t) =>
+      bbox.left + ((t - this.range.from) / (this.range.to - this.range.from)) * bbox.width;
+    const within = (/** @type {number} */ px) => Math.max(bbox.left, Math.min(px, bbox.left + bbox.width));
+    const band = (/** @type {number} */ from, /** @type {number} */ to, /** @type {string} */ name, part = 1) => {
+      g.globalAlpha = part;
+      g.fillStyle = this.#colours.of(name);
+      g.fillRect(within(from), bbox.top, Math.max(0, within(to) - within(from)), bbox.height);
+    };
+    const ratio = devicePixelRatio || 1;
+    g.save();
+    const span = store.hoveredSpan();
+    if (span) band(at(span.from), at(span.to ?? store.nowMs()), "halo", 0.22);
+    const stretch = store.stretch.value;
+    if (stretch) band(at(stretch.from), at(stretch.to), "ink", 0.1);
+    if (store.cursor.value !== null) {
+      band(at(store.cursor.value), bbox.left + bbox.width, "background", 0.55);
+      band(at(store.cursor.value) - ratio, at(store.cursor.value) + ratio, "active");
+    }
+    if (store.pointed.value !== null) band(at(store.pointed.value), at(store.pointed.value) + ratio, "muted");
+    g.restore();
+  }
+
+  /** @param {PointerEvent} e */
+  #timeAt(e) {
+    const { left, width } = this.chart.over.getBoundingClientRect();
+    const { from, to } = this.range;
+    return from + Math.max(0, Math.min(1, (e.clientX - left) / width)) * (to - from);
+  }
+
+  /** @param {PointerEvent} e */
+  #down(e) {
+    if (e.button !== 0) return;
+    const seek = (/** @type {PointerEvent} */ m) => store.seek(this.#timeAt(m));
+    seek(e);
+    drag(seek);
+  }
+}
+
+/**
+ * Where a line is broken, wide enough to be seen: uPlot draws over breaks that are narrower than a pixel.
+ * @param {uPlot} chart @param {number} number of the series @param {number} first @param {number} last index shown
+ * @returns {[number, number][]}
+ */
+function breaksOf(chart, number, first, last) {
+  const instants = chart.data[0];
+  const values = chart.data[number];
+  const ratio = devicePixelRatio || 1;
+  /** @type {[number, number][]} */
+  const breaks = [];
+  let before = -1; // index of the last value
+  let isBroken = false;
+  for (let i = first; i <= last; i++) {
+    if (values[i] === null) isBroken = true;
+    if (typeof values[i] !== "number") continue;
+    if (isBroken && before >= 0) {
+      const [from, to] = [before, i].map((at) => chart.valToPos(instants[at], "x", true));
+      breaks.push([from, Math.max(to, from + ratio)]);
+    }
+    isBroken = false;
+    before = i;
+  }
+  return breaks;
+}
