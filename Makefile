@@ -25,8 +25,9 @@ test: lint types  ## Check everything: ruff, mypy, import-linter, the page's Jav
 	@.ci/web test
 	$(BIN)/python -m pytest -q $(WORKERS) $(TESTS)
 
+# What the pages of docs show is executed once, by `make test`.
 test-pythons:  ## Run the default tests on every Python that is claimed and found (SKIP=3.11: but that one)
-	@.ci/test-pythons $(WORKERS) $(DEFAULT_TESTS)
+	@.ci/test-pythons $(WORKERS) $(DEFAULT_TESTS) --ignore=tests/docs
 
 contract-100:  ## Run the contract tests a hundred times in a row, with other faults each time
 	@.ci/venv dot,sim,test
@@ -36,9 +37,10 @@ soak:  ## Attack what is promised for some minutes and print the figures (GOALS=
 	@.ci/venv dot,sim,test
 	$(BIN)/python tests/soak/soak.py $(if $(GOALS),--goals $(GOALS)) $(if $(SECONDS),--seconds $(SECONDS)) $(if $(SEED),--seed $(SEED))
 
-soak-durable:  ## Kill a durable mission's processes a thousand times (KILLS=1000)
+soak-durable:  ## Kill a durable mission's processes, and the shipped missions in virtual time (KILLS=1000 RUNS=1000 SEED=1)
 	@.ci/venv dot,sim,test
 	KILLS=$(or $(KILLS),1000) $(BIN)/python -m pytest -q -s -m slow tests/smachpy/durable/test_killed_processes.py
+	RUNS=$(or $(RUNS),1000) $(BIN)/python -m pytest -q -m slow tests/missions/test_killed.py
 
 lint:
 	@.ci/venv dot,sim,test

@@ -48,12 +48,15 @@ class _Parser(argparse.ArgumentParser):
             found.all_words = tuple(args)
             return found, []
         if args is None or self.get_default("words") is None:
-            return super().parse_known_args(args, namespace)
-        end = args.index("--") if "--" in args else len(args)
-        names = parse_arguments(args[:end])
-        found, unknown = super().parse_known_args(list(names.rest), namespace)
-        found.words, found.names = tuple(args[end + 1 :]), names
-        return found, unknown
+            found, unknown = super().parse_known_args(args, namespace)
+        else:
+            end = args.index("--") if "--" in args else len(args)
+            names = parse_arguments(args[:end])
+            found, unknown = super().parse_known_args(list(names.rest), namespace)
+            found.words, found.names = tuple(args[end + 1 :]), names
+        if unknown:  # told here by the subcommand: argparse leaves it to the parser above
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return found, []
 
 
 def main(

@@ -103,11 +103,8 @@ def _show(questions: Sequence[Question], *, as_json: bool) -> int:
             for answer, words in zip(one.answers, one.words, strict=True)
         ]
         print(printable(f"{one.path}: {one.text}"))
-        print(
-            printable(
-                f"    {', '.join(answers)}; without an answer {one.default} in {one.left:.0f} s"
-            )
-        )
+        limit = f"; without an answer {one.default} in {one.left:.0f} s" if one.default else ""
+        print(printable(f"    {', '.join(answers)}{limit}"))
     return 0 if questions else EXIT_NOTHING
 
 

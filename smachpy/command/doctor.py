@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from actionlib_core.config import Ros2
     from actionlib_core.node import Node
-    from actionlib_core.transport import Reply
+    from actionlib_core.transport import Closable, Reply
     from actionlib_core.wire.ros2.diagnosis import Finding
     from actionlib_core.wire.ros2.names import Token
     from actionlib_core.wire.ros2.network import RosNetwork
@@ -74,7 +74,7 @@ def _print(findings: list[tuple[Ros2, Finding]]) -> None:
 def look_at(node: Node, settings: Ros2) -> list[Finding]:
     """Return what is found of one network, the worst thing last where nothing more can be seen.
 
-    Blocks: until the router has answered and a node too, `LIST_S` and `ASK_S` at most.
+    Blocks: until the router has answered and the nodes too, `LIST_S` and `ASK_S` at most.
     """
     from actionlib_core.wire.ros2 import diagnosis
     from actionlib_core.wire.ros2.diagnosis import Finding, Level
@@ -101,41 +101,61 @@ def look_at(node: Node, settings: Ros2) -> list[Finding]:
 
 
 def _ask(node: Node, network: RosNetwork, tokens: list[Token]) -> list[Finding]:
-    """Ask a node for none of its parameters: how fast it answers, and what time it has."""
+    """Ask each node for none of its parameters: how fast it answers, and what time it has."""
     from actionlib_core.interfaces import ros2
     from actionlib_core.wire.ros2 import diagnosis
-    from actionlib_core.wire.ros2.attachment import unpack_attachment
     from actionlib_core.wire.ros2.graph import RosType
     from actionlib_core.wire.ros2.names import Kind
 
-    asked = [t for t in tokens if t.kind is Kind.SERVICE and t.type == PARAMETERS]
+    asked = {t.full_node: t for t in tokens if t.kind is Kind.SERVICE and t.type == PARAMETERS}
     if not asked:
         return []
-    token = asked[0]
-    end = network.ros.end(Kind.CLIENT, token.name, RosType(token.type, token.type_hash))
     request: Any = ros2.get_service(PARAMETERS, network.settings.distro).Request()
-    replies: list[tuple[int, Reply]] = []
-    done = node.clock.event()
+    news = node.clock.event()
+    answers: dict[str, tuple[int, Reply]] = {}
+    over: list[str] = []
     started = node.clock.time_ns()
-    query = network.transport.query(
-        end.key,
-        request.to_cdr(),
-        attachment=end.attachment(),
-        best=True,
-        timeout=ASK_S,
-        on_reply=lambda reply: replies.append((node.clock.time_ns(), reply)),
-        on_done=done.set,
-    )
-    done.wait(ASK_S + 1.0)
-    query.close()
-    good = [(at, reply) for at, reply in replies if not reply.error]
-    if not good:
-        return [diagnosis.diagnose_answers(token.name, None)]
-    at, reply = good[0]
-    findings = [diagnosis.diagnose_answers(token.name, (at - started) / 1e9)]
+
+    def ask(name: str, token: Token) -> Closable:
+        def on_reply(reply: Reply) -> None:
+            if not reply.error:
+                answers.setdefault(name, (node.clock.time_ns(), reply))
+
+        def on_done() -> None:
+            over.append(name)
+            if len(over) == len(asked):
+                news.set()
+
+        end = network.ros.end(Kind.CLIENT, token.name, RosType(token.type, token.type_hash))
+        return network.transport.query(
+            end.key,
+            request.to_cdr(),
+            attachment=end.attachment(),
+            best=True,
+            timeout=ASK_S,
+            on_reply=on_reply,
+            on_done=on_done,
+        )
+
+    queries = [ask(name, token) for name, token in asked.items()]
+    news.wait(ASK_S + 1.0)
+    for query in queries:
+        query.close()
+    seconds = {name: (at - started) / 1e9 for name, (at, _) in answers.items()}
+    findings = [diagnosis.diagnose_answers({name: seconds.get(name) for name in asked})]
+    offsets = {
+        name: ((there - (started + at) / 2) / 1e9, (at - started) / 2e9)
+        for name, (at, reply) in answers.items()
+        if (there := _time_in(reply))
+    }
+    return [*findings, diagnosis.diagnose_clock(offsets)] if offsets else findings
+
+
+def _time_in(reply: Reply) -> int:
+    """Return when a node has sent a reply [ns since 1970], by its clock; 0 if it does not say."""
+    from actionlib_core.wire.ros2.attachment import unpack_attachment
+
     try:
-        there = unpack_attachment(reply.attachment).time_ns
+        return unpack_attachment(reply.attachment).time_ns
     except ValueError:
-        return findings
-    offset = (there - (started + at) / 2) / 1e9
-    return [*findings, diagnosis.diagnose_clock(offset, (at - started) / 2e9)]
+        return 0

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.output import tell
+from smachpy.command.targets import PLANS
 from smachpy.exceptions import MissionError
 from smachpy.mission_info import mission_info
 from smachpy.sim.geometry import finite
@@ -139,7 +140,7 @@ def durable_options(args: argparse.Namespace) -> DurableOptions | None:
 def whole_target(text: str) -> str:
     """Return what names a mission; a file by its whole path."""
     place, colon, attribute = text.partition(":")
-    is_file = place.endswith(".py") or "/" in place
+    is_file = place.endswith((".py", *PLANS)) or "/" in place
     return f"{Path(place).resolve()}{colon}{attribute}" if is_file else text
 
 
@@ -176,7 +177,7 @@ def kept(target: Target, machine: Container, options: DurableOptions | None) -> 
     patience = min(8.0, options.lease_s / 2)
     with contextlib.closing(open_store(options.journal, patience=patience)) as store:
         row = find_or_create(store, machine, options)
-        begun = "goes on" if row.changed > row.created else "begins"
+        verb = "begins" if row.status == "queued" else "goes on"
         migrate: Any = options.migrate or info.migrations
         with kept_mission(
             machine,
@@ -189,7 +190,7 @@ def kept(target: Target, machine: Container, options: DurableOptions | None) -> 
             on_fenced=_leave,
         ):
             where = store_name(options.journal)
-            print(f"mission {row.id} {begun}; journal: {where}", file=sys.stderr)
+            print(f"mission {row.id} {verb}; journal: {where}", file=sys.stderr)
             yield
 
 

@@ -15,7 +15,7 @@ from actionlib_core.clock import Event, RealClock
 from actionlib_core.names import check_name
 from actionlib_core.output import printable, tell
 from smachpy.command.durable import JOURNAL, LEASE_S, store_name, whole_target, words_of
-from smachpy.command.run import positive_seconds, read_input, read_inputs
+from smachpy.command.run import add_input, positive_seconds, read_inputs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,15 +43,7 @@ def register_submit(subparsers: Any) -> None:
         "target", metavar="MISSION", help="as of `smachpy run`; runners must have it, too"
     )
     _add_db(parser)
-    parser.add_argument(
-        "--input",
-        "-i",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        type=read_input,
-        help="an argument of the mission's function by name, or a userdata key",
-    )
+    add_input(parser)
     parser.add_argument("--mission", metavar="ID", help="its id (default: a new one)")
     parser.add_argument("--robot", default="", metavar="NAME", help="the robot that it moves")
     when = parser.add_mutually_exclusive_group()

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
+import sys
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.output import printable
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from smachpy.durable.position import Position
-    from smachpy.durable.store import MissionRow, Store
+    from smachpy.durable.store import MissionRow
 
 
 _PASSED_ON = (
@@ -57,6 +58,9 @@ def register(subparsers: Any) -> None:
         if name == "resume":
             for option, meaning in _PASSED_ON:
                 command.add_argument(f"--{option}", action="store_true", help=meaning)
+            command.add_argument(
+                "--record", type=Path, metavar="FILE", help="where the run is recorded"
+            )
         command.set_defaults(act=run)
     parser.set_defaults(run=_run)
 
@@ -77,51 +81,59 @@ def _list(args: argparse.Namespace) -> int:
     from rich.table import Table
     from rich.text import Text as Cell
 
+    from smachpy.durable.overview import overview
+    from smachpy.events import outages_text
+
     with _open(args) as store:
-        rows = store.missions()
-        stands = {row.id: _active(store, row.id) for row in rows}
+        found = [
+            {**overview(store, row), "due": row.due, "every": row.every} for row in store.missions()
+        ]
     if args.json:
-        print(json.dumps([{**_facts(row), "active": stands[row.id]} for row in rows]))
+        print(json.dumps(found))
         return 0
-    if not rows:
+    if not found:
         print(f"no missions in {store_name(args.durable)}")
         return 0
     table = Table(box=None, pad_edge=False)
-    for title in ("mission", "status", "outcome", "robot", "changed", "active"):
-        table.add_column(title)
-    for row in rows:
+    for title in ("mission", "status", "outcome", "robot", "changed", "outages", "active"):
+        table.add_column(title, overflow="fold")  # paths and ids are copied
+    for one in found:
+        stands = [f"({one['problem']})"] if one["problem"] else one["active"]
         cells = (
-            row.id,
-            _status(row),
-            row.outcome or "",
-            row.robot or "",
-            _time(row.changed),
-            ", ".join(stands[row.id]),
+            one["id"],
+            _status(one["status"], one["due"], one["every"]),
+            one["outcome"] or "",
+            one["robot"] or "",
+            _time(one["changed"]),
+            outages_text(one["outages"]),
+            ", ".join(stands),
         )
         table.add_row(*(Cell(printable(cell)) for cell in cells))
-    Console(highlight=False, soft_wrap=True).print(table)
+    wide = None if sys.stdout.isatty() else 160
+    Console(highlight=False, width=wide).print(table)
     return 0
 
 
-def _active(store: Store, mission: str) -> list[str]:
-    """Return the active states; of a journal that cannot be read, why."""
-    from smachpy.durable.journal import read_position
-    from smachpy.durable.store import StoreError
+def _status(status: str, due: float | None, every: str | None) -> str:
+    """Return a mission's status; of one that is queued also when it is due, and how often."""
+    from smachpy.durable.store import QUEUED
 
-    try:
-        return read_position(store, mission).leaves()
-    except StoreError as error:
-        return [f"({error.reason})"]
+    if status != QUEUED:
+        return status
+    often = f", every {every}" if every else ""
+    return status + often + (f", due {_time(due)}" if due is not None else "")
 
 
 def _show(args: argparse.Namespace) -> int:
     from smachpy.durable.journal import read_position
+    from smachpy.durable.overview import overview
 
     with _open(args) as store:
         row = store.mission(args.mission)
         position = read_position(store, row.id)
+        facts = overview(store, row)
     if args.json:
-        print(json.dumps({**_facts(row), "position": position.data}))
+        print(json.dumps({**facts, "position": position.data}))
         return 0
     for line in _lines(row, position):
         print(printable(line))
@@ -129,11 +141,13 @@ def _show(args: argparse.Namespace) -> int:
 
 
 def _lines(row: MissionRow, position: Position) -> list[str]:
+    from smachpy.events import span_text
+
     data = position.data
     lines = [
         f"mission   {row.id}",
         f"runs      {' '.join((row.target, *row.argv))}",
-        f"status    {_status(row)}{f', {row.outcome}' if row.outcome else ''}",
+        f"status    {row.status}{f', {row.outcome}' if row.outcome else ''}",
         f"began     {_time(row.created)}",
         f"changed   {_time(row.changed)}",
     ]
@@ -156,7 +170,7 @@ def _lines(row: MissionRow, position: Position) -> list[str]:
         ]
     lines += [f"asked     {one['path']}: {one['source']} {one['by']}" for one in data["preempts"]]
     lines += [
-        f"outage    {_time(begin / 1e9)}, {(end - begin) / 1e9:.1f} s"
+        f"outage    {_time(begin / 1e9)}, {span_text((end - begin) / 1e9)}"
         for begin, end in data["outages"]
     ]
     return lines
@@ -173,6 +187,7 @@ def _resume(args: argparse.Namespace) -> int:
     robot = ["--robot", row.robot] if row.robot else []
     own = ["--durable", args.durable, "--mission", row.id, "--max-outage", "1e12"]
     options = [f"--{option}" for option, _ in _PASSED_ON if getattr(args, option)]
+    options += [] if args.record is None else ["--record", str(args.record)]
     return main(["run", row.target, *own, *robot, *options, *row.argv])
 
 
@@ -180,8 +195,9 @@ def _cancel(args: argparse.Namespace) -> int:
     with _open(args) as store:
         store.request_cancel(args.mission)
         row = store.mission(args.mission)
-    how = "now" if row.status in {"running", "cancelled"} else "when it goes on"
-    print(f"mission {row.id}: will be preempted {how}; status: {_status(row)}")
+    how = "now" if row.status == "running" else "when it goes on"
+    told = "" if row.status == "cancelled" else f"will be preempted {how}; status: "
+    print(f"mission {row.id}: {told}{row.status}")
     return 0
 
 
@@ -190,36 +206,6 @@ def _forget(args: argparse.Namespace) -> int:
         store.forget(args.mission)
     print(f"mission {args.mission}: forgotten")
     return 0
-
-
-def _status(row: MissionRow) -> str:
-    """Return the status; one whose process was killed still says "running" in the store."""
-    from smachpy.durable.processes import this_runner
-    from smachpy.durable.store import host_and_pid
-
-    if row.status == "running" and row.owner:
-        host, pid = host_and_pid(row.owner)
-        if host == host_and_pid(this_runner())[0] and not _lives(pid):
-            return "interrupted"
-    return row.status
-
-
-def _lives(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    return True
-
-
-def _facts(row: MissionRow) -> dict[str, Any]:
-    facts = {name: getattr(row, name) for name in _SHOWN}
-    return {**facts, "status": _status(row)}
-
-
-_SHOWN = ("id", "name", "target", "argv", "outcome", "robot", "created", "changed", "owner")
 
 
 def _time(seconds: float) -> str:

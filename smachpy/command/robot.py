@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, get_args
 from actionlib_core import shutdown
 from actionlib_core.clock import current_clock
 from actionlib_core.config import Distro, Ros2
-from smachpy.exceptions import MissionError
 from smachpy.sim.config import SimConfig, load_config
 from smachpy.sim.exceptions import NavigationError
 from smachpy.sim.geometry import Pose2D, finite, wrap_angle
@@ -126,12 +125,7 @@ def serve(args: argparse.Namespace) -> int:
         config = dataclasses.replace(load_network(), ros2=())
         name, space = ("move_base", config.namespace) if served else ("simulation", "")
         if args.ros2:
-            if served is None:
-                raise MissionError(
-                    "--ros2: got --world or --robots beside it; expected one robot. Try starting "
-                    "one robot for each, with --namespace."
-                )
-            name = "simulated_robot"
+            name = "simulated_robot" if served else name
             network = Ros2(router=args.ros2, domain=args.domain, distro=args.distro)
             config = dataclasses.replace(config, ros2=(network,))
         if args.namespace is not None:
@@ -143,7 +137,8 @@ def serve(args: argparse.Namespace) -> int:
                 server = make(served, node=node)
             else:
                 assert spec is not None
-                server = Simulation(spec.build(current_clock().now()), node=node)
+                world = spec.build(current_clock().now())
+                server = Simulation(world, node=node, on_ros2=bool(args.ros2))
             try:
                 server.start()
                 print(_ready(server, node, args), flush=True)
@@ -179,16 +174,23 @@ def make_robot(floor: Path, config: Path, pose: Sequence[float]) -> Robot:
         raise NavigationError(f"{where}: {error}. Try --pose X Y YAW.") from error
 
 
-def _world(args: argparse.Namespace) -> WorldSpec:
+def team(floor: Path, config: Path, pose: Sequence[float], count: int) -> WorldSpec:
+    """Return a floor with robots robot_0, robot_1, ...; arguments and errors as `make_robot`."""
     from smachpy.sim.occupancy import load_map
-    from smachpy.sim.world_file import WorldSpec, load_world, place_robots
+    from smachpy.sim.world_file import WorldSpec, place_robots
+
+    parameters, grid = load_config(config), load_map(floor)
+    if pose:
+        parameters = dataclasses.replace(parameters, start=Pose2D(*pose))
+    return WorldSpec(floor.name, grid, place_robots(grid, parameters, count))
+
+
+def _world(args: argparse.Namespace) -> WorldSpec:
+    from smachpy.sim.world_file import load_world
 
     if args.world is not None:
         return load_world(args.world)
-    config, grid = load_config(args.config), load_map(args.map)
-    if args.pose:
-        config = dataclasses.replace(config, start=Pose2D(*args.pose))
-    return WorldSpec(args.map.name, grid, place_robots(grid, config, args.robots))
+    return team(args.map, args.config, args.pose or (), args.robots)
 
 
 def _ready(
@@ -197,18 +199,17 @@ def _ready(
     """Return the line that says what is served."""
     from smachpy.sim.simulation import Simulation
 
+    ros2 = f", ROS 2 {args.distro}, domain {args.domain}" if args.ros2 else ""
     if not isinstance(server, Simulation):
         x, y, _ = server.robot.body.pose
-        where = f"{args.map.name} at ({x:.2f}, {y:.2f})"
-        if args.ros2:
-            where = f"{where}, ROS 2 {args.distro}, domain {args.domain}"
+        where = f"{args.map.name} at ({x:.2f}, {y:.2f}){ros2}"
         served = "navigate_to_pose" if args.ros2 else "move_base"
         return f"{node.resolve(served)}: ready on {where}; Ctrl-C ends it"
     floor = args.world.name if args.world else args.map.name
     names = list(server.robots)
     robots = f"{names[0]} to {names[-1]}" if len(names) > 1 else names[0]
     doors = f", doors {', '.join(server.world.doors)}" if server.world.doors else ""
-    return f"{node.resolve('simulation')}: ready on {floor}: {robots}{doors}; Ctrl-C ends it"
+    return f"{node.resolve('simulation')}: ready on {floor}: {robots}{doors}{ros2}; Ctrl-C ends it"
 
 
 def parameters() -> str:

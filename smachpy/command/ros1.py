@@ -65,7 +65,7 @@ def run_ros1(
             clock: Any = current_clock()
             stack.enter_context(clock.patched())
         install(script, stub_missing=ros1.stub_missing)
-        argv = [*ros1.words, *(f"{rule.old}:={rule.new}" for rule in options.names.rules)]
+        argv = list(ros1.words)
         made = Session(
             [str(script), *argv],
             make_node=_node_maker(options, stack),
@@ -171,7 +171,7 @@ class _Runs:
 
     def observe(self) -> None:
         """Hear of every machine from now on."""
-        from smachpy.run.root import OBSERVERS
+        from smachpy.run.threads import OBSERVERS
 
         OBSERVERS.append(self._begin)
         self._stack.callback(OBSERVERS.remove, self._begin)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.names import NameArguments
 from actionlib_core.output import tell
 from smachpy.command.targets import Target, TargetError, load_target
 from smachpy.exceptions import MissionError
@@ -22,7 +23,7 @@ class Ros1Options:
         params: Files of parameters, each with the name space that it is for.
         stub_missing: Stand-ins for what nobody has.
         timeout: Longest time that a script may take to build its machine [s].
-        words: The script's own arguments.
+        words: The script's own arguments, with its remapping and parameters.
     """
 
     params: tuple[tuple[str, Path], ...] = ()
@@ -68,6 +69,7 @@ def add_options(parser: Any, *, loads: bool) -> None:
         help="stand-ins for modules, messages and parameters that nobody has",
     )
     if loads:
+        parser.set_defaults(words=(), names=NameArguments(), loads=True)
         group.add_argument(
             "--timeout",
             type=float,
@@ -83,7 +85,16 @@ def options_of(args: argparse.Namespace) -> Ros1Options | None:
     Raises:
         MissionError: an option needs `--ros1`.
     """
+    loads = getattr(args, "loads", False)
+    names = args.names
+    words = (
+        *args.words,
+        *(f"{rule.old}:={rule.new}" for rule in names.rules),
+        *names.parameters,
+    )
     if not args.ros1:
+        if loads and words:
+            raise MissionError(f"{words[0]}: got arguments of a script; expected --ros1 with them.")
         for name in ("params", "stub_missing"):
             if getattr(args, name):
                 flag = name.replace("_", "-")
@@ -93,7 +104,7 @@ def options_of(args: argparse.Namespace) -> Ros1Options | None:
         tuple(_params(text) for text in args.params),
         args.stub_missing,
         getattr(args, "timeout", 10.0),
-        tuple(getattr(args, "words", ())),
+        words,
     )
 
 

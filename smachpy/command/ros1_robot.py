@@ -20,7 +20,7 @@ def add_option(group: Any) -> None:
         "--ros1-robot",
         metavar="URL",
         help="a real robot that runs ROS 1, by its master: http://robot:11311. What the mission "
-        "uses is carried to and from it; see 'smachpy bridge ros1'",
+        "uses is carried to and from it, nothing else; see 'smachpy bridge ros1'",
     )
 
 
@@ -44,7 +44,8 @@ def ros1_robot(args: argparse.Namespace) -> Iterator[Ros1Bridge]:
             raise MissionError(f"--ros1-robot: got it beside {option}; expected one of them.")
     from actionlib_core import ros1
 
-    with ros1.bridge(args.ros1_robot, used=True, namespace=args.robot) as bridge:
+    options: dict[str, Any] = {"namespace": args.robot, "leave_out": _names_of_viewers()}
+    with ros1.bridge(args.ros1_robot, on_demand=True, **options) as bridge:
         if not bridge.wait_for_master(args.server_timeout):
             raise MissionError(
                 f"--ros1-robot {args.ros1_robot}: no answer of a master at {bridge.master} within "
@@ -52,3 +53,14 @@ def ros1_robot(args: argparse.Namespace) -> Iterator[Ros1Bridge]:
                 "address that ROS_MASTER_URI has on the robot."
             )
         yield bridge
+
+
+def _names_of_viewers() -> list[str]:
+    """Return patterns of what only our own viewers use; those of ROS 1 get SMACH's topics."""
+    from smachpy.network import feed, remote_control, values
+
+    names = (
+        *(feed.DESCRIPTION_TOPIC, feed.EVENTS_TOPIC, feed.OBSERVED_TOPIC, feed.HISTORY_SERVICE),
+        *(remote_control.STATE_TOPIC, remote_control.CONTROL_SERVICE, values.VALUE_SERVICE),
+    )
+    return [f"*{name}" for name in names]

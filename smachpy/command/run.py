@@ -69,15 +69,7 @@ def register(subparsers: Any) -> None:
         metavar="MISSION",
         help="a name of `smachpy list`, module:factory, a .py file, or a plan as .pnml",
     )
-    parser.add_argument(
-        "--input",
-        "-i",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        type=read_input,
-        help="an argument of the mission's function by name, or a userdata key",
-    )
+    add_input(parser)
     parser.add_argument(
         "--time",
         type=_pace,
@@ -146,7 +138,7 @@ def _add_watching(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--view-for",
-        type=_span,
+        type=time_span,
         metavar="TIME",
         help="how long the page stays when the run has ended: 30s, 10m, 2h, or 0 (default: until "
         "Ctrl-C)",
@@ -267,6 +259,7 @@ def _options(
             view_for=args.view_for,
             port=args.port,
             control=args.control,
+            journal=args.durable,
             alone=args.time.virtual,
         ),
     )
@@ -284,7 +277,8 @@ def _robot(args: argparse.Namespace, world: Path | None) -> RobotOptions:
         )
     pose = tuple(args.pose or ())
     world = args.world or (None if said else world)
-    return RobotOptions(args.start_robot, args.map, args.config, pose, world)
+    ros1 = args.ros1_robot or ""
+    return RobotOptions(args.start_robot, args.map, args.config, pose, world, ros1)
 
 
 class _Help(argparse.Action):
@@ -308,7 +302,8 @@ class _Help(argparse.Action):
         parser.exit()
 
 
-def _span(text: str) -> float:
+def time_span(text: str) -> float:
+    """Return the seconds of "30s", "10m", "2h" or "0", for argparse."""
     match = re.fullmatch(r"(\d{1,9}(?:\.\d{1,3})?)(s|m|h|)", text)
     if match is None:
         raise argparse.ArgumentTypeError(f"got {text!r}; expected a time such as 30s, 10m, 2h or 0")
@@ -332,6 +327,19 @@ def _pace(text: str) -> Pace:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 
+def add_input(parser: argparse.ArgumentParser) -> None:
+    """Add the option `--input`; `read_inputs` takes what it gives."""
+    parser.add_argument(
+        "--input",
+        "-i",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        type=_read_input,
+        help="an argument of the mission's function by name, or a userdata key",
+    )
+
+
 def read_inputs(pairs: Sequence[tuple[str, Text]]) -> dict[str, Text]:
     """Return the values of `--input` by key; one given twice is refused."""
     inputs = dict(pairs)
@@ -341,7 +349,7 @@ def read_inputs(pairs: Sequence[tuple[str, Text]]) -> dict[str, Text]:
     return inputs
 
 
-def read_input(text: str) -> tuple[str, Text]:
+def _read_input(text: str) -> tuple[str, Text]:
     """Read KEY=VALUE."""
     key, equals, value = text.partition("=")
     if not (key and equals):

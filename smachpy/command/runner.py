@@ -19,6 +19,7 @@ from smachpy.command.durable import DurableOptions, kept
 from smachpy.command.extras import load_view
 from smachpy.command.out_folder import OutFolder
 from smachpy.command.surroundings import REAL_TIME, Pace, RobotOptions, open_surroundings
+from smachpy.command.targets import raised_text
 from smachpy.command.watching import Watching, watched
 from smachpy.exceptions import MissionError
 from smachpy.mission_info import mission_info
@@ -119,11 +120,13 @@ def run_mission(target: Target, options: RunOptions) -> int:
             return signal_exit(ending)
         if out is not None:
             stack.enter_context(out.collecting())
+        keeping = stack.enter_context(contextlib.ExitStack())
+        keeping.enter_context(kept(target, machine, options.durable))
         watch = stack.enter_context(watched(target.name, machine, record.path, options.watching))
         show = show_run(record, options)
         stack.enter_context(show)
         stack.callback(machine.subscribe(show.on_event))
-        with kept(target, machine, options.durable):
+        with keeping:
             outcome = _execute(machine, show, options)
         surroundings.over()
         good = outcome in good_outcomes(record, options)
@@ -252,7 +255,7 @@ def _execute(machine: Container, show: Any, options: RunOptions) -> str | None:
         if options.debug:
             sys.stderr.write(printable("".join(traceback.format_exception(error))))
         else:
-            tell("smachpy", str(error))
+            tell("smachpy", raised_text(error.__cause__ or error, str(error)))
     show.print_summary(outcome)
     return outcome
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from smachpy import log
+from smachpy.events.recording import run_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -31,12 +32,14 @@ def runs_folder(environment: Mapping[str, str] = os.environ) -> Path:
     return Path(state).expanduser() / "smachpy" / "runs"
 
 
-def new_file(mission: str, stamp_ns: int) -> Path | None:
+def new_file(mission: str, stamp_ns: int, run: str = "") -> Path | None:
     """Return the name of a new file, and remove the oldest that are too many.
 
     Args:
         mission: Name of the mission.
         stamp_ns: When it begins [ns since the epoch].
+        run: Names a durable run (`smachpy.durable.store.MissionRow.run`): the file that holds what
+            an earlier process did of it, if there is one.
 
     Returns:
         None when nothing can be written there, which is logged.
@@ -45,6 +48,9 @@ def new_file(mission: str, stamp_ns: int) -> Path | None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         ours = [path for path in folder.iterdir() if _NAME.fullmatch(path.name)]
+        known = next((path for path in ours if run and run_of(path) == run), None)
+        if known is not None:
+            return known
         ours.sort(key=lambda path: path.stat().st_mtime)
         for path in ours[: max(0, len(ours) - KEPT + 1)]:
             path.unlink(missing_ok=True)

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from smachpy.machines.container import Container
     from smachpy.sim.geometry import Pose2D
     from smachpy.sim.occupancy import OccupancyMap
+    from smachpy.sim.world_file import WorldSpec
 
 ROBOT_ACTIONS: Final = frozenset({"move_base", "charge"})
 """What the simulated robot does; the last word of an action's name."""
@@ -35,6 +36,7 @@ ROBOT_ACTIONS: Final = frozenset({"move_base", "charge"})
 MOST_NAMED: Final = 3
 """Names of servers that may be meant, in an error."""
 
+_NUMBERED = re.compile(r"robot_(\d{1,2})")
 _TIMES = re.compile(r"(?P<number>\d+(\.\d+)?)x")
 _FASTEST: Final = 1000.0
 
@@ -89,6 +91,7 @@ class RobotOptions:
         config: Its parameters.
         pose: Where it starts [m, m, rad]; empty: where its parameters say.
         world: A world file in place of all that: robots, doors, what moves.
+        ros1: Address of the master of a real robot that runs ROS 1, in place of a simulated one.
     """
 
     start: bool
@@ -96,6 +99,7 @@ class RobotOptions:
     config: Path
     pose: tuple[float, ...] = ()
     world: Path | None = None
+    ros1: str = ""
 
     def arguments(self) -> tuple[str, ...]:
         """Return them as the robot's program takes them."""
@@ -256,10 +260,11 @@ class _Network:
             return
         arguments = self._options.arguments()
         if self._options.world is None:
-            prefix = _prefix_of(needed)
+            prefix, count = _robots_of(needed)
             space = get_node().namespace
             name = "/".join(word for word in (space, prefix) if word)
             arguments += ("--namespace", name or "/")
+            arguments += ("--robots", str(count)) if count > 1 else ()
         self._robot = RobotProcess(arguments, on_change=self._wait.wake)
         self._robot.on_refusal(machine.request_preempt)
         self._robot.__enter__()
@@ -285,6 +290,8 @@ class _Network:
             text = missing_text(missing, {end.name for end in there}, timeout)
             if get_node().config.ros2:
                 text = f"{missing_on_robot(missing, timeout)} Try: smachpy doctor --ros2"
+            elif self._options.ros1:
+                text = missing_on_ros1_robot(missing, timeout, self._options.ros1)
             raise MissionError(text)
         return not shutdown.requested()
 
@@ -304,23 +311,28 @@ class _Network:
             self._robot.stop()
 
 
-def _prefix_of(needed: Mapping[str, str]) -> str:
-    """Return the name of the robot whose actions a mission calls; "" for its own.
+def _robots_of(needed: Mapping[str, str]) -> tuple[str, int]:
+    """Return the robots whose actions a mission calls: a name, "" for its own, and how many.
+
+    Several are robot_0, robot_1, ... up to the highest that it names; then the name is "".
 
     Raises:
-        MissionError: they are several.
+        MissionError: they are several, and have other names.
     """
     prefixes = {
         name.strip("/").rpartition("/")[0]
         for name in needed
         if name.rpartition("/")[2] in ROBOT_ACTIONS
     }
-    if len(prefixes) > 1:
+    if len(prefixes) < 2:  # noqa: PLR2004  one, or none
+        return (prefixes.pop() if prefixes else ""), 1
+    matches = [_NUMBERED.fullmatch(prefix) for prefix in prefixes]
+    if not all(matches):
         raise MissionError(
-            f"--start-robot: the mission calls several robots: {sorted(prefixes)}; expected one. "
-            "Try starting each: smachpy robot --namespace NAME"
+            f"--start-robot: the mission calls several robots: {sorted(prefixes)}; expected one, "
+            "or robot_0, robot_1, ... Try starting each: smachpy robot --namespace NAME"
         )
-    return prefixes.pop() if prefixes else ""
+    return "", 1 + max(int(match[1]) for match in matches if match)
 
 
 class ServerWait:
@@ -399,6 +411,17 @@ def missing_on_robot(missing: Mapping[str, str], timeout: float) -> str:
     return (
         f"{what} {listed}: no server after {timeout:g} s, neither on the ROS 2 robot nor here; "
         "names there are told by 'map' in the configuration."
+    )
+
+
+def missing_on_ros1_robot(missing: Mapping[str, str], timeout: float, master: str) -> str:
+    """Return what to say about actions that have no server, where a ROS 1 robot is in use."""
+    what, be = ("action", "has") if len(missing) == 1 else ("actions", "have")
+    listed = ", ".join(f"'/{full}'" for full in sorted(missing))
+    return (
+        f"{what} {listed}: {be} no server after {timeout:g} s, neither on the ROS 1 robot at "
+        f"{master} nor here; expected one. Try 'smachpy bridge ros1 --master {master}' and, in "
+        "another terminal, 'actionlib list' for the actions that the robot has."
     )
 
 
@@ -485,7 +508,11 @@ class _VirtualNetwork:
         if self._options.world is not None:
             self._put_world(self._options.world)
         elif needed or self._options.start:
-            self._put_robot(_prefix_of(needed))
+            prefix, count = _robots_of(needed)
+            if count > 1:
+                self._put_robots(count)
+            else:
+                self._put_robot(prefix)
 
     def put_robot(self, prefix: str, timeout: float) -> None:
         del timeout
@@ -494,10 +521,18 @@ class _VirtualNetwork:
         else:
             self._put_robot(prefix)
 
-    def _put_world(self, world: Path) -> None:
+    def _put_robots(self, count: int) -> None:
+        from smachpy.command.robot import team
+
+        options = self._options
+        spec = team(options.map, options.config, options.pose, count)
+        self._put_world(spec, get_node().namespace)
+
+    def _put_world(self, world: Path | WorldSpec, space: str = "") -> None:
         from smachpy.sim.simulation import simulation
 
-        node = Node("simulation", transport=self._session(), clock=get_node().clock)
+        mine = get_node()
+        node = Node("simulation", transport=self._session(), clock=mine.clock, namespace=space)
         self._down.enter_context(node)
         self._down.enter_context(simulation(world, node=node))
 

@@ -17,6 +17,7 @@ from smachpy.command.extras import advice, clash, hidden_by
 from smachpy.exceptions import SmachError
 from smachpy.machines.container import Container
 from smachpy.mission_info import is_mission, mission
+from smachpy.run.step import trace_of
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -78,12 +79,12 @@ class Target:
         except Exception as error:
             raise TargetError(
                 self.name,
-                f"{self.source} raised {_text_of(error)}; expected a state machine. Try --debug, "
-                "which shows where.",
+                f"expected a state machine; {self.source} raised {raised_text(error)}",
             ) from error
         if not isinstance(machine, Container):
+            hint = " Try `return` with it at the end." if machine is None else ""
             raise TargetError(
-                self.name, f"{self.source} returned {machine!r}; expected a state machine."
+                self.name, f"{self.source} returned {machine!r}; expected a state machine.{hint}"
             )
         return machine
 
@@ -125,7 +126,7 @@ def list_missions() -> dict[str, str]:
                 else _load_mission(point.name).summary
             )
         except TargetError as error:
-            lines[point.name] = f"not available: {error.problem}"
+            lines[point.name] = f"not available: {error.problem.splitlines()[0]}"
     return lines
 
 
@@ -193,7 +194,7 @@ def _plan_target(text: str) -> Target:
 
     def plan() -> Container:
         """Run a Petri net plan."""
-        return load_plan(path)
+        return load_plan(path, to_run=False)
 
     return Target(path.name.partition(".")[0], text, "a Petri net plan", plan)
 
@@ -207,7 +208,7 @@ def _load_mission(name: str) -> Target:
     try:
         thing = point.load()
     except ImportError as error:
-        text = advice(error) or f"importing {point.value!r} raised {_text_of(error)}"
+        text = advice(error) or f"importing {point.value!r} raised {raised_text(error)}"
         raise TargetError(name, text) from error
     return _target(name, point.value, thing)
 
@@ -230,7 +231,7 @@ def _import_file(text: str, path: Path) -> ModuleType:
     except Exception as error:
         sys.modules.pop(name, None)  # half of it is there
         why = clash(error, [path.parent]) if isinstance(error, ImportError) else None
-        raise TargetError(text, why or f"running the file raised {_text_of(error)}") from error
+        raise TargetError(text, why or f"running the file raised {raised_text(error)}") from error
     finally:
         sys.path.remove(str(path.parent.resolve()))
     return module
@@ -257,7 +258,7 @@ def _import_module(text: str, name: str) -> ModuleType:
             why or f"no module {error.name!r}; expected one on the Python path or in {here!r}.",
         ) from error
     except Exception as error:
-        raise TargetError(text, f"importing {name!r} raised {_text_of(error)}") from error
+        raise TargetError(text, f"importing {name!r} raised {raised_text(error)}") from error
     finally:
         sys.path.remove(here)
 
@@ -276,10 +277,12 @@ def _from_module(text: str, module: ModuleType, attribute: str, name: str) -> Ta
     if not names:
         machines = [n for n, thing in vars(module).items() if isinstance(thing, Container)]
         if len(machines) != 1:
+            made = {n: thing for n, thing in vars(module).items() if _usable(n, thing)}
+            here = [n for n in made if n in machines or made[n].__module__ == module.__name__]
             raise TargetError(
                 text,
-                f"which machine is meant? got {machines}; expected one of "
-                f"{list(DEFAULT_NAMES)} or a single machine. Try {text}:NAME.",
+                f"which machine is meant? got {here or 'no machine and no function'}; expected one "
+                f"of {list(DEFAULT_NAMES)} or a single machine. Try {text}:NAME.",
             )
         names = machines
     thing: Any = module
@@ -308,5 +311,12 @@ def _suggest(word: str, names: list[str]) -> str:
     return f"expected one of {sorted(names)}.{did_you_mean(word, names)}"
 
 
-def _text_of(error: Exception) -> str:
-    return f"{type(error).__name__}: {error}"
+def raised_text(error: BaseException, said: str = "") -> str:
+    """Return what the user's code raised, with the innermost of its lines.
+
+    Args:
+        error: What was raised.
+        said: What to say of it, in place of its type and text.
+    """
+    lines = (said or f"{type(error).__name__}: {error}", *trace_of(error).splitlines())
+    return "\n    ".join(lines)

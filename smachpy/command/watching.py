@@ -35,6 +35,7 @@ class Watching:
         view_for: How long after its end [s]; None: until the program is to end.
         port: Of that page; 0 takes any.
         control: Obey pause, step, jump and the like from viewers.
+        journal: Where a durable mission is kept, for the page's list of runs.
         alone: The mission is on no network that others are on: it is shown to `view` only.
     """
 
@@ -43,6 +44,7 @@ class Watching:
     view_for: float | None = None
     port: int = 8080
     control: bool = False
+    journal: str | None = None
     alone: bool = False
 
 
@@ -116,6 +118,10 @@ def watched(name: str, machine: Container, path: str, watching: Watching) -> Ite
         node = None
         if watching.alone and watching.view:  # viewers are on another network, in real time
             node = stack.enter_context(Node("mission", clock=RealClock()))
+        file = _file(name, machine, watching)
+        if file is not None:
+            stack.enter_context(file)
+            stack.callback(robot.listen(file.observe))
         server = IntrospectionServer(
             word if word[:1].isalpha() else f"m_{word}",
             machine,
@@ -123,25 +129,30 @@ def watched(name: str, machine: Container, path: str, watching: Watching) -> Ite
             control=watching.control and not watching.alone,
             node=node,
             robot=robot,
+            earlier=() if file is None else file.earlier,
         )
-        path_of_file = watching.record
-        if path_of_file is None and watching.view:
-            path_of_file = runs_folder.new_file(name, RealClock().time_ns())
-        file = (
-            None if path_of_file is None else stack.enter_context(Recorder(path_of_file, machine))
-        )
-        if file is not None:
-            stack.callback(robot.listen(file.observe))
         if watching.view or not watching.alone:
             server.start()
             stack.callback(server.stop)
         viewer = None
         if watching.view:
             control = ("--control",) if watching.control and not watching.alone else ()
-            viewer = load_view("viewer")(("--auto-focus", "--port", str(watching.port), *control))
+            journal = () if watching.journal is None else ("--durable", watching.journal)
+            port = ("--port", str(watching.port))
+            viewer = load_view("viewer")(("--auto-focus", *port, *control, *journal))
         watch = Watch(file, viewer, watching.view_for)
         if viewer is not None:
             viewer.on_change = watch.viewer_ended
             stack.enter_context(viewer)
             print(f"watch it at {viewer.address}", flush=True)
         yield watch
+
+
+def _file(name: str, machine: Container, watching: Watching) -> Recorder | None:
+    """What writes the run down: a durable one that goes on, to the file that it began with."""
+    journal = machine._smachpy.journal
+    run = "" if journal is None else journal.run
+    path = watching.record
+    if path is None and watching.view:
+        path = runs_folder.new_file(name, RealClock().time_ns(), run)
+    return None if path is None else Recorder(path, machine, run=run)

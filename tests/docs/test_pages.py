@@ -134,6 +134,22 @@ def fresh_program(monkeypatch):
 
 
 @pytest.fixture
+def own_modules(tmp_path, monkeypatch):
+    """A page imports the files that it writes, also where another test had some of these names."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    forget_modules(tmp_path.parent)
+    yield
+    forget_modules(tmp_path)
+
+
+def forget_modules(folder):
+    for name, module in list(sys.modules.items()):
+        file = getattr(module, "__file__", None)
+        if file and folder in Path(file).parents:
+            del sys.modules[name]
+
+
+@pytest.fixture
 def groups():
     """The process groups of a page's commands; what still runs in them when it failed is ended."""
     started = []
@@ -144,12 +160,10 @@ def groups():
 
 
 @pytest.mark.zenoh
-@pytest.mark.timeout(120)
 @pytest.mark.parametrize("page", MARKED, ids=lambda page: str(page.relative_to(ROOT)))
-@pytest.mark.usefixtures("fresh_program")
+@pytest.mark.usefixtures("fresh_program", "own_modules")
 def test_page(page, tmp_path, monkeypatch, groups):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(str(tmp_path))
     namespace = {"__name__": "page"}
     for block in blocks_of(page):
         if block.directive == "shown":

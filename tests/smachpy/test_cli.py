@@ -68,6 +68,14 @@ def test_an_error_is_one_screen_on_stderr_and_exit_code_2(capsys):
     assert captured.err == "smachpy: /PATROL: broken: got 'x'; expected 'y'.\n"
 
 
+def test_an_unknown_option_is_told_by_the_subcommand(capsys):
+    with pytest.raises(SystemExit) as ended:
+        smachpy.command.main(["ok", "7", "--fast"])
+    assert ended.value.code == 2
+    said = "smachpy ok: unrecognized arguments: --fast\nTry 'smachpy ok --help'.\n"
+    assert capsys.readouterr().err == said
+
+
 def test_debug_shows_the_traceback(capsys):
     assert smachpy.command.main(["bad", "--debug"]) == 2
     assert "Traceback" in capsys.readouterr().err

@@ -120,7 +120,7 @@ def test_an_end_is_reported_before_it_is_counted(clock, monkeypatch):
             looker.join()
             super().append(branch)
 
-    monkeypatch.setattr("smachpy.run.branches.deque", Watched)
+    monkeypatch.setattr("smachpy.run.threads.deque", Watched)
     seen = []
     both = concurrence(lambda: None, lambda: None, child_termination_cb=seen.append)
     assert both.execute() == "ok"

@@ -167,6 +167,17 @@ def test_scopes_publish_from_any_thread(clock):
     )
 
 
+def test_the_scope_of_a_root_publishes_after_its_run():
+    heard, scopes = [], []
+    sm = smachpy.StateMachine(["ok"], name="P", on_enter=lambda _ud: scopes.append(sm.scope()))
+    sm.add("A", say("ok"))
+    sm.subscribe(heard.append)
+    sm.execute()
+    assert scopes[0].is_watched
+    scopes[0].emit(events.GoalSent, "move_base", "id-1", "there")
+    assert (heard[-1].path, heard[-1].goal_id) == ("/P", "id-1")
+
+
 texts = st.text(max_size=5)
 anything = st.none() | st.integers() | texts | st.lists(st.integers()) | st.builds(object)
 

@@ -10,7 +10,7 @@ import pytest
 
 from actionlib_core.clock import RealClock, VirtualClock, use_clock
 from smachpy import Concurrence, Iterator, State, StateMachine
-from smachpy.run import branches, callback, frame, grace, root, runner
+from smachpy.run import callback, frame, grace, step, threads
 
 
 class Value:
@@ -65,15 +65,14 @@ MACHINES = {
 
 # What is made for one run, and nobody needs after it.
 OF_A_RUN = (
-    branches.Branch,
-    branches.Group,
+    threads.Branch,
+    threads.Group,
     callback.CallbackFrame,
     frame.Frame,
     frame.Run,
     frame.Scope,
     grace.Visit,
-    root._Stop,
-    runner.Timeout,
+    step.Timeout,
 )
 
 
@@ -114,7 +113,7 @@ def test_the_objects_of_a_run_are_freed_as_it_ends(kind, kind_of_clock, watched,
         ended.wait(20.0)
         left = new(before)
         if watched:  # a machine keeps the frames of its newest run; five runs made dozens
-            assert set(left) <= {"Frame", "Root", "Run", "ChildBranch"}
+            assert set(left) <= {"Frame", "Root", "ChildBranch"}
             assert len(left) <= 5
         else:
             assert left == []

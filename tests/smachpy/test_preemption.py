@@ -178,6 +178,7 @@ def test_preempt_at_every_line_of_the_machinery(watched):
         outcome = cut.run()
         if cut.over:
             break
+        assert cut.done  # else no function ends the run any more as this test knows it
         cuts[outcome] += 1
         assert outcome in {"done", "preempted"}
         assert_clean(sm)
@@ -787,7 +788,6 @@ def test_shutdown_requested_by_the_program_preempts(own_shutdown, clock):
 def test_set_shutdown_check_is_obeyed():
     from smachpy import util
 
-    before = util._check[0]
     answers = iter([False, True, True])
     try:
         smachpy.set_shutdown_check(lambda: next(answers, True))
@@ -796,7 +796,7 @@ def test_set_shutdown_check_is_obeyed():
         assert last.runs == 0
         assert smachpy.is_shutdown()
     finally:
-        util._check[0] = before
+        util.reset_shutdown_check()
 
 
 def test_requests_are_events(clock):

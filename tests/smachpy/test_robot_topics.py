@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import math
+import threading
 import zlib
 from pathlib import Path
 
@@ -26,14 +27,15 @@ from actionlib_core.interfaces.geometry_msgs.msg import (
 )
 from actionlib_core.interfaces.nav_msgs.msg import MapMetaData, OccupancyGrid, Odometry
 from actionlib_core.interfaces.nav_msgs.msg import Path as PathMessage
-from actionlib_core.interfaces.sensor_msgs.msg import BatteryState, LaserScan
-from actionlib_core.interfaces.std_msgs.msg import Header
+from actionlib_core.interfaces.sensor_msgs.msg import BatteryState, Image, JointState, LaserScan
+from actionlib_core.interfaces.std_msgs.msg import Float64, Header, String
 from actionlib_core.interfaces.tf2_msgs.msg import TFMessage
 from actionlib_core.node import Node, use_node
+from actionlib_core.pubsub.topic import Publisher
 from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import CBState, StateMachine
 from smachpy.events.recording import Recorder, read_recording
-from smachpy.network.observations import Observer, role_of
+from smachpy.network.observations import Observer, is_small, role_of
 from smachpy.network.robot_topics import RobotTopics
 from smachpy.sim.geometry import Pose2D
 from smachpy.sim.simulation import simulation
@@ -212,7 +214,7 @@ def test_the_robots_of_a_floor_are_told_while_somebody_listens(office):
         cancel = topics.listen(told.append)
         clock.sleep(1.0)
         drive(node)
-        assert {"pose", "scan", "plan", "map", "value"} == {one["what"] for one in told}
+        assert {"pose", "scan", "plan", "map", "value", "values"} == {one["what"] for one in told}
         assert [one["n"] for one in told] == list(range(1, len(told) + 1))
         (floor_map,) = [one for one in told if one["what"] == "map"]
         assert (floor_map["width"], floor_map["height"]) == (540, 340)
@@ -241,8 +243,67 @@ def test_only_what_is_below_the_missions_name_space_is_told(office):
         topics.listen(told.append)
         clock.sleep(2.0)
     poses = {one["robot"] for one in told if one["what"] == "pose"}
-    assert poses == {""}  # its own robot
+    assert poses == {"robot_1"}  # named as in the goals that are sent to it
     assert [one["robot"] for one in told if one["what"] == "map"] == [""]
+
+
+@pytest.mark.parametrize(
+    ("message", "small"),
+    [
+        (Float64(), True),
+        (Twist(), True),
+        (JointState(), True),
+        (Odometry(), True),
+        (String(), False),  # no number
+        (Image(), False),
+        (PathMessage(), False),
+        (OccupancyGrid(), False),
+    ],
+    ids=lambda value: getattr(value, "_type", None),
+)
+def test_which_messages_are_small_and_have_numbers(message, small):
+    assert is_small(message) == small
+
+
+def test_numbers_of_a_message_by_path_twice_a_second():
+    observer = Observer()
+    state = JointState(name=["a"] * 9, position=[0.5, math.nan, 2] + [1.0] * 9)
+    (record,) = observer.take("numbers", "arm/joints", state, S)
+    assert record["topic"] == "arm/joints"
+    assert record["robot"] == ""
+    assert record["values"] == {
+        "position.0": 0.5, "position.2": 2.0, **{f"position.{i}": 1.0 for i in range(3, 8)},
+    }  # fmt: skip
+    assert observer.take("numbers", "arm/joints", state, S + S // 4) == []
+    assert observer.take("numbers", "other", Float64(data=math.inf), S) == []
+    (record,) = observer.take("numbers", "arm/joints", Odometry(), S + S // 2)
+    assert "twist.twist.linear.x" in record["values"]
+    assert not any("covariance" in path for path in record["values"])
+
+
+def test_any_topic_with_numbers_is_told_and_a_large_one_is_not_listened_to():
+    told = []
+    with (
+        VirtualClock() as clock,
+        use_clock(clock),
+        Node("one", transport=MemoryNetwork(clock).session(), clock=clock) as node,
+        RobotTopics(node) as topics,
+    ):
+        topics.listen(told.append)
+        wheel = Publisher("arm/current", Float64, queue_size=1, node=node)
+        image = Publisher("camera", Image, queue_size=1, node=node)
+        clock.sleep(1.0)
+        assert image.get_num_connections() == 0
+        wheel.publish(Float64(data=1.5))
+        wheel.publish(Float64(data=2.5))  # too soon after
+        clock.sleep(1.0)
+        wheel.publish(Float64(data=3.5))
+        clock.sleep(1.0)
+        wheel.unregister()
+        image.unregister()
+    assert [(one["topic"], one["values"]) for one in told] == [
+        ("arm/current", {"data": 1.5}), ("arm/current", {"data": 3.5}),
+    ]  # fmt: skip
 
 
 def test_of_many_records_the_newest_are_kept_and_the_map(office, monkeypatch):
@@ -275,3 +336,30 @@ def test_a_recording_holds_what_the_robot_told(office, tmp_path):
     assert all(one["kind"] != "Observed" for one in recording.events)
     assert [one["n"] for one in recording.observed] == list(range(1, len(recording.observed) + 1))
     assert {"pose", "map"} <= {one["what"] for one in recording.observed}
+
+
+def test_who_has_left_is_not_being_called():
+    """What the listener uses may be closed then: its publisher, its file."""
+    called = threading.Event()
+    waits, leavers = [], []
+
+    def listener(_record):
+        if not called.is_set():
+            leaver = threading.Thread(target=leave)
+            leaver.start()
+            leaver.join(0.1)
+            waits.append(leaver.is_alive())
+            leavers.append(leaver)
+            called.set()
+
+    with (
+        Node("n", transport=MemoryNetwork().session()) as node,
+        RobotTopics(node) as topics,
+        Publisher("odom", Odometry, latch=True, queue_size=1, node=node) as odom,
+    ):
+        leave = topics.listen(listener)
+        odom.publish(odometry(1.0, 1.0))
+        assert called.wait(10.0)
+        leavers[0].join(10.0)
+        assert not leavers[0].is_alive()
+    assert waits == [True]

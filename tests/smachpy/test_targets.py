@@ -134,15 +134,22 @@ def test_an_argument_the_factory_does_not_take_is_an_error(file):
 
 
 def test_a_file_that_raises_says_so_and_chains_the_cause(file):
-    file.write_text("1 / 0\n")
+    file.write_text("def half():\n    return 1 / 0\n\nhalf()\n")
     with pytest.raises(TargetError, match="raised ZeroDivisionError") as caught:
         load_target("drive_about.py")
     assert isinstance(caught.value.__cause__, ZeroDivisionError)
+    assert str(caught.value).endswith(":4 in <module>: half()\n    " + LINE.format(file))
+
+
+LINE = "{}:2 in half: return 1 / 0"
 
 
 def test_a_file_without_a_machine_says_what_it_looked_for(file):
     file.write_text("x = 1\n")
-    with pytest.raises(TargetError, match="which machine is meant"):
+    with pytest.raises(TargetError, match="no machine and no function"):
+        load_target("drive_about.py")
+    file.write_text("from re import match\ndef build(): ...\n")
+    with pytest.raises(TargetError, match=r"got \['build'\]"):
         load_target("drive_about.py")
 
 
@@ -200,6 +207,10 @@ def test_a_factory_that_raises_is_an_error_of_the_target(tmp_path):
     with pytest.raises(TargetError, match="raised ValueError: no map") as caught:
         load_target(str(path)).build()
     assert isinstance(caught.value.__cause__, ValueError)
+    assert f"{path}:2 in mission: raise ValueError" in str(caught.value)
+    path.write_text("def mission(): ...\n")
+    with pytest.raises(TargetError, match="at the end"):
+        load_target(str(path)).build()
 
 
 def test_no_control_character_of_an_exception_reaches_the_terminal(tmp_path):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import json
+import threading
 import time
 
 import pytest
@@ -696,3 +698,38 @@ def test_an_execute_that_cannot_be_called_is_found():
     bound.execute = lambda userdata: "done"
     found = [p.path for p in smachpy.check(sm) if p.rule == "wrong-signature"]
     assert found == ["/M/S1", "/M/S2", "/M/S3", "/M/S5"]
+
+
+def test_sources_are_parsed_by_one_thread_at_a_time(monkeypatch):
+    """CPython 3.11 raises SystemError else, if what collects garbage changes the thread."""
+    parse, inside, most = ast.parse, [], []
+    other = threading.Event()
+
+    def watched(text):
+        inside.append(None)
+        most.append(len(inside))
+        other.wait(0.05)  # time for the other thread to come in
+        inside.pop()
+        return parse(text)
+
+    monkeypatch.setattr(ast, "parse", watched)
+
+    def of(name):
+        class Own(smachpy.State):
+            def __init__(self):
+                super().__init__(outcomes=[name])
+
+            def execute(self, _userdata):
+                return name
+
+        machine = smachpy.StateMachine(outcomes=[name])
+        machine.add("A", Own())
+        return machine
+
+    threads = [threading.Thread(target=check, args=(of(name),)) for name in ("one", "two")]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert most
+    assert set(most) == {1}

@@ -12,6 +12,9 @@ from typing import Any
 import pytest
 
 from smachpy.command import main
+from smachpy.events.recording import read_recording
+from viz.runs.listing import run_row
+from viz.runs.statistics import Statistics
 
 MISSION = """
 from pathlib import Path
@@ -80,12 +83,15 @@ def test_it_goes_on_where_it_was(capsys: pytest.CaptureFixture[str]) -> None:
     assert run() == 130
     [row] = listed(capsys)
     assert (row["status"], row["active"]) == ("interrupted", ["/ERRAND/CARRY"])
+    mission = row["id"]
     Path("go").touch()
     assert run() == 0
+    assert f"mission {mission} goes on" in capsys.readouterr().err
     assert Path("loaded").read_text() == "x"
     [row] = listed(capsys)
     assert (row["status"], row["outcome"], row["active"]) == ("ended", "done", [])
     assert run() == 0  # another mission: that one has ended
+    assert "begins" in capsys.readouterr().err
     assert Path("loaded").read_text() == "xx"
 
 
@@ -114,6 +120,14 @@ def test_a_person_shows_resumes_and_forgets_it(
 def test_one_that_is_cancelled_is_preempted_when_it_goes_on(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
+    """What was active is entered, to be stopped; nothing comes after it."""
+    last = 'StateMachine.add("CARRY", carry'
+    text = (
+        Path("errand.py")
+        .read_text()
+        .replace(f"{last})", f'{last}, {{"done": "REST"}})\n        StateMachine.add("REST", load)')
+    )
+    Path("errand.py").write_text(text)
     assert run() == 130
     assert missions("cancel", listed(capsys)[0]["id"]) == 0
     Path("go").touch()
@@ -200,5 +214,69 @@ def test_a_journal_with_a_damaged_entry_is_refused_and_still_listed(
     connection.commit()
     connection.close()
     assert run() == 2
-    assert listed(capsys)[0]["active"] == ["(corrupt)"]
+    assert listed(capsys)[0]["problem"] == "corrupt"
     assert missions("show", listed(capsys)[0]["id"]) == 2
+
+
+def test_a_run_that_goes_on_is_one_run_in_its_recording(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert run("--record", "r.jsonl") == 130
+    with Path("r.jsonl").open("a", encoding="utf-8") as file:
+        file.write('{"kind": "Ent')  # as a power loss leaves it
+    Path("go").touch()
+    assert run("--record", "r.jsonl") == 0
+    [mission] = listed(capsys)
+    recording = read_recording("r.jsonl")
+    assert recording.run == mission["run"]
+    kinds = [event["kind"] for event in recording.events]
+    assert (kinds.count("Started"), kinds.count("Recovered")) == (1, 1)
+    statistics = Statistics()
+    statistics.add(recording.events, recording.record)
+    assert (statistics.runs, statistics.outcomes) == (1, {"done": 1})
+    assert {path: state.visits for path, state in statistics.states.items()} == {
+        "/ERRAND": 1, "/ERRAND/LOAD": 1, "/ERRAND/CARRY": 1,
+    }  # fmt: skip
+    row = run_row(recording.record, recording.events)
+    assert row["outcome"] == "done"
+    assert [piece[1] for piece in row["strip"]] == ["LOAD", "CARRY"]
+    assert len(row["outages"]) == len(mission["outages"]) == 1
+    assert main(["runs", "list", "r.jsonl", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["outages"] == mission["outages"]
+    assert run("--record", "r.jsonl") == 2  # another mission: no file is overwritten
+
+
+def test_what_was_recorded_of_one_run_in_several_files_is_one_run(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """As when another computer has taken it over."""
+    assert run("--record", "runs/b.jsonl") == 130
+    Path("go").touch()
+    assert run("--record", "runs/a.jsonl") == 0
+    capsys.readouterr()
+    assert main(["runs", "show", "runs", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["runs"], told["outcomes"]) == (1, {"done": 1})
+    assert main(["runs", "list", "runs", "--json"]) == 0
+    [line] = capsys.readouterr().out.splitlines()
+    assert (json.loads(line)["outcome"], len(json.loads(line)["outages"])) == ("done", 1)
+
+
+def test_a_mission_that_could_not_begin_is_none_that_was_interrupted(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    Path("taken.jsonl").touch()
+    assert run("--record", "taken.jsonl") == 2
+    assert listed(capsys)[0]["status"] == "queued"
+    assert run("--mission", "m", "--robot", "ghost", "--record", "taken.jsonl") == 2
+
+
+def test_what_is_queued_is_listed_with_when_it_is_due(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["submit", "errand.py", "--db", "j.db"]
+    assert main([*words, "--every", "0 8 * * 1-5"]) == 0
+    [row] = listed(capsys)
+    assert row["every"] == "0 8 * * 1-5"
+    assert row["due"] > row["created"]
+    assert missions("list") == 0
+    assert "due" in capsys.readouterr().out

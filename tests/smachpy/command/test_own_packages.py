@@ -38,10 +38,7 @@ def run(folder, *arguments, program=PLAIN, on_path=True):
     return subprocess.run(
         [sys.executable, "-P", "-c", program, *arguments],
         cwd=folder,
-        env={
-            **{name: value for name, value in os.environ.items() if name != "SMACHPY_DOMAIN"},
-            "PYTHONPATH": str(folder) if on_path else "",
-        },
+        env={**os.environ, "PYTHONPATH": str(folder) if on_path else ""},
         capture_output=True,
         text=True,
         timeout=280,

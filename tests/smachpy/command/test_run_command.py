@@ -18,7 +18,7 @@ from actionlib_core import node
 from smachpy.command import main
 from smachpy.sim.maps import OFFICE_MAP
 
-pytestmark = [pytest.mark.zenoh, pytest.mark.timeout(120)]
+pytestmark = pytest.mark.zenoh
 
 SMACHPY = [sys.executable, "-c", "import sys; from smachpy.command import main; sys.exit(main())"]
 WAYPOINTS = """\
@@ -211,6 +211,7 @@ def test_what_goes_wrong_at_the_start_leaves_nothing_running(arguments, text, tm
     done = run("run", "patrol", *arguments, cwd=tmp_path)
     assert done.returncode == 2, done.stdout + done.stderr
     check_one_screen(done.stderr, text)
+    assert done.stderr.count("smachpy: ") == 1
 
 
 def check_one_screen(message, text):
@@ -233,7 +234,8 @@ def test_a_mission_that_raises_ends_with_1(tmp_path):
     )
     done = run("run", "broken.py", "--plain", cwd=tmp_path)
     assert done.returncode == 1
-    assert "division by zero" in done.stderr
+    assert "division by zero\n    " in done.stderr
+    assert "broken.py:4 in look: return 1 / 0\n" in done.stderr
     assert "Traceback" not in done.stderr
     done = run("run", "broken.py", "--plain", "--debug", cwd=tmp_path)
     assert done.returncode == 1

@@ -16,7 +16,7 @@ import pytest
 from smachpy.command import runs_folder
 from smachpy.events.recording import read_recording
 
-pytestmark = [pytest.mark.zenoh, pytest.mark.timeout(120)]
+pytestmark = pytest.mark.zenoh
 
 MISSION = """
 import smachpy

@@ -43,6 +43,15 @@ def test_star_imports_leak_what_the_originals_leak(names):
     assert leaked <= set(scope)
 
 
+def test_submodules_by_from_are_those_by_import(names):
+    (names / "by_from.py").write_text(
+        "from actionlib import goal_id_generator, status_tracker\n"
+        "import actionlib.goal_id_generator as by_import\n"
+        "assert goal_id_generator is by_import\n"
+    )
+    importlib.import_module("by_from")
+
+
 def test_uninstall_gives_an_installed_smach_back(tmp_path):
     import smach as before
 
@@ -74,6 +83,12 @@ def test_a_missing_package_is_named_with_its_place(names):
     assert caught.value.name == "absent_msgs"
     assert caught.value.file == str(names / "uses.py")
     assert caught.value.line == 2
+    assert "message package 'absent_msgs'" in str(caught.value)
+    (names / "more.py").write_text("import dynamic_reconfigure.server\n")
+    with pytest.raises(
+        ModuleNotFoundError, match=r"module 'dynamic_reconfigure.server' is missing"
+    ):
+        importlib.import_module("more")
 
 
 def test_messages_of_the_packages_around(tmp_path):

@@ -148,6 +148,87 @@ sm.execute()
     assert {"parameter /unset", "module nobody_lib", "module nobody_msgs"} <= set(stubbed)
 
 
+def test_stand_ins_have_every_field_and_every_name_of_a_star_import(load):
+    machine = load(
+        """
+from nobody_msgs.msg import *
+from nobody_msgs.srv import Find
+import nobody_lib, sensor_msgs.nobody
+rospy.init_node('x')
+sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
+sm.userdata.tool = nobody_lib.Tool()
+smach_ros.IntrospectionServer('x', sm, '/SM').start()
+sm.userdata.pose = sm.userdata.thing = 1
+with sm:
+    smach.StateMachine.add(
+        'FIND',
+        smach_ros.ServiceState('find', Find, request_slots=['thing'], response_slots=['pose']),
+        {'succeeded': 'GRASP'})
+    smach.StateMachine.add(
+        'GRASP',
+        smach_ros.SimpleActionState('grasp', GraspAction, goal_slots=['pose'], result_slots=['ok']),
+        {'succeeded': 'PLACE'})
+    smach.StateMachine.add(
+        'PLACE', smach_ros.SimpleActionState('place', PlaceAction, goal=PlaceGoal(pose=3)))
+sm.execute()
+""",
+        stub_missing=True,
+    )
+    assert list(machine.get_children()) == ["FIND", "GRASP", "PLACE"]
+
+
+@pytest.fixture
+def robot(tmp_path):
+    """Return a script's path, in a package with an action that uses a type of nobody."""
+    package = tmp_path / "robot"
+    (package / "action").mkdir(parents=True)
+    (package / "package.xml").write_text("<name>robot</name>")
+    (package / "action" / "Grasp.action").write_text(
+        "int8 n\n---\nnobody_msgs/Code code\n---\nnobody_msgs/Code code\nother_msgs/Other other\n"
+    )
+    (package / "lib").mkdir()
+    (package / "lib" / "told.py").write_text("def tell():\n    print 'told'\n    return gone\n")
+    script = package / "script.py"
+    yield script
+    ros1.uninstall()
+
+
+ACTION = (
+    HEAD
+    + """
+from robot.msg import GraspAction, GraspGoal
+sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
+with sm:
+    sm.add('GRASP', smach_ros.SimpleActionState('grasp', GraspAction, goal=GraspGoal(n=3)))
+sm.execute()
+"""
+)
+
+
+def test_an_action_with_a_type_of_nobody(robot):
+    robot.write_text(ACTION)
+    with pytest.raises(ros1.LoadError, match=r"(?s)nobody_msgs/Code.*--stub-missing"):
+        ros1.load(robot)
+    ros1.uninstall()
+    assert list(ros1.load(robot, stub_missing=True).get_children()) == ["GRASP"]
+
+
+def test_modules_of_added_folders_may_be_python_2_and_errors_name_their_line(robot):
+    robot.write_text(
+        "import os, sys\n"
+        "sys.path.append(os.path.join(os.path.dirname(__file__), 'lib'))\n"
+        "import told\n"
+        "told.tell()\n"
+    )
+    with pytest.raises(ros1.LoadError, match=r"lib.told\.py:3: NameError: name 'gone'"):
+        ros1.load(robot)
+
+
+def test_a_name_that_a_bundled_package_lacks(load):
+    with pytest.raises(ros1.LoadError, match=r"(?s)QueryNothing.*FOLDER/std_srvs/srv"):
+        load("from std_srvs.srv import QueryNothing\n")
+
+
 def test_a_loaded_machine_runs_in_a_test(load):
     with MissionKit() as mission:
         machine = load("""

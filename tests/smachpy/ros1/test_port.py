@@ -144,6 +144,36 @@ def test_what_a_person_must_look_at():
     assert "rospy.get_param" in ported.notes[1][1]
 
 
+def test_names_of_ros_1_that_stay_are_told():
+    source = b"import message_filters, rospy, smach\nmessage_filters.Cache()\nsmach.State()\n"
+    ((line, text),) = port(source, "old.py").notes
+    assert (line, text.partition(" is still")[0]) == (1, "message_filters")
+
+
+def test_names_that_went_away_since(tmp_path):
+    source = """import sys, threading, types, yaml
+from types import FunctionType, ListType, StringType as Text
+from collections import Mapping
+assert isinstance([], ListType) and isinstance('', (Text, types.StringTypes))  # stays
+words = ['b', 'a']
+words.sort(lambda a, b: cmp(a, b))
+assert words == ['a', 'b'] and isinstance({}, Mapping) and isinstance(sys.maxint, int)
+assert {'k': yaml.load('1')}.keys()[0] == 'k' and not threading.Thread().isAlive()
+print >>sys.stdout, 'done', isinstance(lambda: 0, FunctionType)
+"""
+    ported = port(source.encode(), "old.py")
+    assert "  # stays\n" in ported.text
+    script = tmp_path / "new.py"
+    script.write_text(ported.text)
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True)
+    assert done.stdout == "done True\n"
+
+
+def test_what_is_python_3_is_not_touched():
+    source = "import yaml\nx = yaml.load(f,  Loader=L)\nnames.sort( key = f )\nprint( 'a' , 1 )\n"
+    assert port(source.encode(), "new.py").text == source
+
+
 @pytest.mark.parametrize("source", [b"def f(:\n", b"print 'a' +\n"])
 def test_what_is_no_python(source):
     with pytest.raises(SyntaxError):

@@ -3,6 +3,9 @@
 import pytest
 
 from actionlib_core.clock import VirtualClock, use_clock
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
+from actionlib_core.interfaces.std_msgs.msg import Empty
 from actionlib_core.node import Node, use_node
 from actionlib_core.shutdown import Shutdown, use_shutdown
 from actionlib_core.transport.memory import MemoryNetwork
@@ -46,6 +49,9 @@ WAITS = {
     "sleep": lambda rospy: rospy.sleep(60),
     "rate": lambda rospy: rospy.Rate(0.01).sleep(),
     "service": lambda rospy: rospy.wait_for_service("nobody"),
+    "service for some time": lambda rospy: rospy.wait_for_service("nobody", 60),
+    "message": lambda rospy: rospy.wait_for_message("nowhere", Empty, timeout=60),
+    "any message": lambda rospy: rospy.wait_for_message("nowhere", rospy.AnyMsg, timeout=60),
 }
 
 
@@ -53,6 +59,46 @@ WAITS = {
 def test_a_wait_that_the_end_interrupts_is_a_preempt(clock, name):
     assert machine_of(WAITS[name]).execute() == "preempted"
     assert clock.now() == ASKED_AT_S
+
+
+@pytest.fixture
+def client(clock):
+    """A client of a server whose goals end only when they are cancelled."""
+    import rospy
+
+    rospy.init_node("script")
+    from actionlib import SimpleActionClient, SimpleActionServer
+
+    def execute(_goal):
+        while not server.is_preempt_requested():
+            clock.sleep(0.1)
+        server.set_preempted()
+
+    server = SimpleActionServer("endless", MoveBaseAction, execute, auto_start=False)
+    server.start()
+    return SimpleActionClient("endless", MoveBaseAction)
+
+
+@pytest.mark.parametrize("limit", [0, 60])
+def test_the_end_ends_waits_for_actions(clock, client, limit):
+    import actionlib
+    import rospy
+
+    assert client.wait_for_server(rospy.Duration(limit))
+    client.send_goal(MoveBaseGoal())
+    assert not client.wait_for_result(rospy.Duration(limit))
+    assert clock.now() == ASKED_AT_S
+    for other in (actionlib.SimpleActionClient, actionlib.ActionClient):
+        assert not other("nobody", MoveBaseAction).wait_for_server(rospy.Duration(limit))
+    assert clock.now() == ASKED_AT_S
+    client.cancel_goal()
+
+
+def test_the_end_cancels_a_goal_that_is_waited_for(clock, client):
+    client.send_goal_and_wait(MoveBaseGoal())
+    assert clock.now() == ASKED_AT_S
+    clock.sleep(1.0)
+    assert client.get_state() == GoalStatus.PREEMPTED
 
 
 def test_children_of_a_concurrence_are_preempted_too(clock):

@@ -44,6 +44,71 @@ def test_there_are_enough():
     assert len(NAMES) >= 60
 
 
+def test_private_parameters_stand_where_rosrun_has_them(smachpy, tmp_path):
+    script = tmp_path / "rounds.py"
+    script.write_text(
+        "import rospy\n"
+        "rospy.init_node('rounds')\n"
+        "print(rospy.get_param('~rounds'), rospy.get_param('~place'), rospy.myargv()[1:])\n"
+    )
+    words = ("_rounds:=3", "--time", "virtual", "_place:=[1, 2]", "--", "mine", "a:=b")
+    code, output = smachpy("run", "--ros1", script, *words)
+    assert code == 0, output
+    assert "3 [1, 2] ['mine']" in output
+
+
+def test_scripts_are_drawn_and_checked_with_their_arguments(smachpy, tmp_path):
+    script = tmp_path / "to_place.py"
+    script.write_text(
+        "import rospy, smach, sys\n"
+        "if len(rospy.myargv()) < 2: sys.exit('where to?')\n"
+        "rospy.init_node('to_place')\n"
+        "label = f'{rospy.myargv()[1]}_{rospy.get_param(\"~n\")}'\n"
+        "sm = smach.StateMachine(['ok'])\n"
+        "with sm:\n"
+        "    sm.add(label, smach.CBState(lambda _ud: 'ok', outcomes=['ok']), {'ok': 'ok'})\n"
+        "sm.execute()\n"
+    )
+    picture = tmp_path / "machine.json"
+    code, output = smachpy("render", "--ros1", script, "-o", picture, "_n:=3", "--", "desk")
+    assert code == 0, output
+    assert "desk_3" in picture.read_text()
+    assert smachpy("check", "--ros1", script, "--", "desk", "_n:=3")[0] == 0
+    assert smachpy("check", "patrol", "--", "desk")[0] == 2
+
+
+@pytest.mark.parametrize("value", ["None", "object()"])
+def test_a_state_that_returns_no_text_is_told_and_shown(smachpy, tmp_path, value):
+    script = tmp_path / "forgets.py"
+    script.write_text(
+        "import rospy, smach, smach_ros\n"
+        "class Forgets(smach.State):\n"
+        "    def __init__(self):\n"
+        "        smach.State.__init__(self, outcomes=['ok'])\n"
+        "    def execute(self, userdata):\n"
+        f"        return {value}\n"
+        "rospy.init_node('forgets')\n"
+        "sm = smach.StateMachine(['ok'])\n"
+        "with sm:\n"
+        "    smach.StateMachine.add('A', Forgets())\n"
+        "server = smach_ros.IntrospectionServer('forgets', sm, '/SM')\n"
+        "server.start()\n"
+        "sm.execute()\n"
+    )
+    code, output = smachpy("run", "--ros1", script, "--time", "virtual", "--plain")
+    assert code == 1, output
+    assert "unknown outcome: got " in output, output
+    assert "Traceback" not in output, output
+
+
+def test_who_waits_for_what_nobody_offers(smachpy, tmp_path):
+    script = tmp_path / "waits.py"
+    script.write_text("import rospy\nrospy.init_node('waits')\nrospy.wait_for_service('/nobody')\n")
+    code, output = smachpy("run", "--ros1", script, "--time", "virtual", "--plain")
+    assert code == 2, output
+    assert "MainThread: waits for service '/nobody'" in output, output
+
+
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("name", NAMES)
 def test_runs_renders_and_checks(name, scripts, smachpy, tmp_path):

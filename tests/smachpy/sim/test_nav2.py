@@ -6,21 +6,28 @@ import math
 import os
 import subprocess
 import sys
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from actionlib_core import SimpleActionClient
 from actionlib_core.clock import RealClock
 from actionlib_core.config import Config, Ros2
 from actionlib_core.interfaces import ros2
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
+from actionlib_core.interfaces.nav2_msgs.action import NavigateToPose
+from actionlib_core.interfaces.std_srvs.srv import SetBool
 from actionlib_core.node import Node, use_node
+from actionlib_core.pubsub.service_proxy import ServiceProxy
 from actionlib_core.pubsub.topic import Publisher, Subscriber
 from actionlib_core.transport.memory import MemoryNetwork
-from smachpy import StateMachine
+from smachpy import SimpleActionState, StateMachine
 from smachpy.sim.geometry import Pose2D, quaternion_of, wrap_angle
+from smachpy.sim.maps import OFFICE_DOORS
 from smachpy.sim.nav2 import Nav2Server
+from smachpy.sim.simulation import Simulation
 from smachpy.sim.world import Robot, World
+from smachpy.sim.world_file import load_world
 from smachpy.states import drive_back, drive_to, locate
 from smachpy.states.nav2 import nav2_active
 from tests.free_port import free_port
@@ -80,9 +87,7 @@ def nav2(clock: VirtualClock, office: Any, office_robot: Any) -> Iterator[Callab
     made = []
 
     def make(distro: str = "kilted") -> Nav2:
-        battery = replace(office_robot.battery, capacity=100.0, charge=1.0)
-        config = replace(office_robot, battery=battery)
-        robot = Robot(World(office), config, config.start, clock.now())
+        robot = Robot(World(office), office_robot, office_robot.start, clock.now())
         made.append(Nav2(clock, robot, distro))
         return made[-1]
 
@@ -390,3 +395,54 @@ def test_bad_input_is_one_clear_end(arguments: list[str]) -> None:
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
     assert any(word in done.stderr for word in ("expected", "choose from", "nothing answers"))
+
+
+def test_it_drives_after_days_as_nothing_can_charge_it(nav2, clock):
+    robot = nav2().robot
+    assert robot.battery.charge(clock.now() + 1e6) == 1.0
+    robot.battery.drive(clock.now(), 1.0)
+    assert robot.battery.charge(clock.now() + 1e6) == 1.0
+
+
+def test_robots_of_a_world_are_in_their_namespaces_and_the_doors_on_our_own_wire(clock):
+    network = MemoryNetwork(clock)
+    config = Config(ros2=(Ros2(domain=DOMAIN, distro="kilted"),))
+    session, mine = network.session(), network.session()
+    node = Node("simulation", transport=session, clock=clock, config=config)
+    mission = Node("mission", transport=mine, clock=clock, namespace="robot_0", config=config)
+    world = load_world(OFFICE_DOORS).build(clock.now())
+    simulation = Simulation(world, node=node, on_ros2=True)
+    simulation.start()
+    with use_node(mission):
+        opened = ServiceProxy("/doors/lab/set", SetBool)(True)
+        assert opened.success
+        sm = StateMachine(["succeeded", "aborted", "preempted"])
+        go = navigate(17.9, 5.4)  # behind the door
+        sm.add("GO", SimpleActionState("navigate_to_pose", NavigateToPose, goal=go))
+        clock.sleep(4.0)
+        assert sm.execute() == "succeeded"
+    simulation.close()
+    for each in (mission, node, mine, session):
+        each.close()
+
+
+def navigate(x: float, y: float) -> Any:
+    goal = NavigateToPose.Goal()
+    goal.pose.header.frame_id = "map"
+    goal.pose.pose.position.x, goal.pose.pose.position.y = x, y
+    goal.pose.pose.orientation.w = 1.0
+    return goal
+
+
+def test_the_reason_of_a_failure_is_the_text_of_the_status(nav2, clock):
+    robot = nav2("jazzy")
+    config = Config(ros2=(Ros2(domain=DOMAIN),))
+    session = robot.network.session()
+    with Node("mission", transport=session, clock=clock, config=config) as node:
+        client = SimpleActionClient("navigate_to_pose", NavigateToPose, node=node)
+        assert client.wait_for_server(10.0)
+        assert client.send_goal_and_wait(navigate(-50.0, 0.0)) == GoalStatus.ABORTED
+        assert "error code 9000" in client.get_goal_status_text()
+        assert client.send_goal_and_wait(navigate(10.6, 7.1)) == GoalStatus.SUCCEEDED
+        assert client.get_goal_status_text() == ""
+    session.close()

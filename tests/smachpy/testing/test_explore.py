@@ -348,6 +348,8 @@ def test_an_unknown_fault():
 def test_an_unknown_option(mission):
     with pytest.raises(TypeError, match="Did you mean 'preempts'"):
         explore(sound(), prempts=0)
+    with pytest.raises(TypeError, match="Did you mean 'max_runs'"):
+        explore(sound(), max_run=3)
     with pytest.raises(TypeError, match=r"replay: unknown arguments \['max_run'\]"):
         mission.replay(sound(), [], max_run=3)
 
@@ -498,7 +500,7 @@ def test_a_loop_of_long_leaves_is_no_run_that_never_ends(monkeypatch):
         sm.add("AGAIN", Leaf("done", "again"), {"again": "ROUND"})
     rounds = []
 
-    def choose(self, where, options, situation=None):
+    def choose(self, where, options, *_):
         if "again" in options:
             rounds.append(self._clock.now())
             return options.index("again" if len(rounds) < 25 else "done")

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+import smachpy
 from smachpy.command import main
 from smachpy.testing import MissionTestCase, mission_kit, session
 from smachpy.testing import cli as testing_cli
@@ -52,6 +55,19 @@ ALIAS = "import sys; from smachpy.command import main; sys.exit(main(sys.argv[1:
 def test_the_fixtures_need_no_conftest(pytester):
     pytester.makepyfile(TESTS)
     pytester.runpytest_inprocess(*OPTIONS).assert_outcomes(passed=3)
+
+
+def test_pytest_does_not_parse_the_packages_of_the_plugin(pytester, monkeypatch):
+    """What it parses for its asserts while a thread of ours parses fails in Python 3.11."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(smachpy.__file__).parents[1]))  # as installed
+    pytester.makepyfile(
+        """
+        def test_loader():
+            import smachpy.checks.source as module
+            assert type(module.__loader__).__name__ == "SourceFileLoader"
+        """
+    )
+    pytester.runpytest_subprocess(*OPTIONS).assert_outcomes(passed=1)
 
 
 def test_a_failing_assertion_shows_the_diff_and_not_our_code(pytester):
@@ -322,6 +338,27 @@ def test_the_command_line_alias(pytester):
         check=False,
     )
     assert "1 passed" in done.stdout, done.stderr
+
+
+def test_the_alias_warns_of_nothing_where_the_package_is_installed(tmp_path):
+    facts = tmp_path / "plugged-1.0.dist-info"  # names its modules, as a wheel's files do
+    facts.mkdir()
+    (facts / "METADATA").write_text("Metadata-Version: 2.1\nName: plugged\nVersion: 1.0\n")
+    (facts / "RECORD").write_text("smachpy/__init__.py,,\n")
+    (facts / "entry_points.txt").write_text("[pytest11]\nplugged = smachpy.log\n")
+    (tmp_path / "test_m.py").write_text("def test_it(): pass\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "smachpy.command", "test", "test_m.py"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert "plugged-1.0" in done.stdout
+    assert "1 passed in" in done.stdout
+    assert "Warning" not in done.stdout
 
 
 @pytest.mark.parametrize(
