@@ -150,7 +150,7 @@ class Simulations:
         return batch.id
 
     def stop(self, name: object) -> None:
-        """End a batch that runs; what it has done is left.
+        """End a batch that runs, as Ctrl-C does; it is killed after `STOP_S`. What is done is left.
 
         Raises:
             SimulationError: there is none of that name that runs.
@@ -160,6 +160,7 @@ class Simulations:
         if process is None:
             raise SimulationError(f"batch: got {name!r}; expected one that runs.")
         _signal(process, signal.SIGINT)
+        self._clock.call_later(STOP_S, lambda: self._kill(name, process))
 
     def report(self, name: str) -> bytes:
         """Return the report of a batch, a page.
@@ -190,6 +191,12 @@ class Simulations:
             task.join(STOP_S)
 
     # -- parts -----------------------------------------------------------------------------------
+
+    def _kill(self, name: object, process: subprocess.Popen[str]) -> None:
+        """Kill a process that goes on: Python loses an interrupt in a destructor or callback."""
+        with self._lock:
+            if self._processes.get(str(name)) is process:
+                _signal(process, signal.SIGKILL)
 
     def _checked(self, asked: dict[str, Any]) -> Batch:
         problems = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import threading
 import urllib.error
 import urllib.request
 
@@ -97,6 +98,20 @@ def test_a_batch_that_cannot_run_says_why(simulations, job):
         simulations.report(found["id"])
     with pytest.raises(SimulationError):
         simulations.stop(found["id"])
+
+
+def test_a_batch_that_loses_the_interrupt_is_killed(simulations, tmp_path, job, monkeypatch):
+    """An interrupt in a destructor, or in a callback of the import system, is printed and lost."""
+    monkeypatch.setattr("viz.live.simulations.STOP_S", 0.2)
+    deaf = tmp_path / "deaf.py"
+    deaf.write_text("import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n" + MISSION)
+    simulations._own.append(str(deaf))
+    began, count = threading.Event(), simulations._count
+    monkeypatch.setattr(simulations, "_count", lambda *told: (count(*told), began.set()))
+    name = simulations.start({"mission": str(deaf), "runs": 1000})
+    assert began.wait(60.0)
+    simulations.stop(name)
+    assert ended(simulations, name)["problem"] == "it was stopped"
 
 
 def test_a_batch_is_stopped_and_no_more_than_two_run(simulations, job):
