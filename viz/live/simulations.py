@@ -92,6 +92,7 @@ class Simulations:
         self._lock = threading.Lock()
         self._batches: dict[str, Batch] = {}
         self._processes: dict[str, subprocess.Popen[str]] = {}
+        self._stopped: set[str] = set()
         self._tasks: list[Any] = []
 
     def missions(self) -> dict[str, str]:
@@ -157,8 +158,9 @@ class Simulations:
         """
         with self._lock:
             process = self._processes.get(name) if isinstance(name, str) else None
-        if process is None:
-            raise SimulationError(f"batch: got {name!r}; expected one that runs.")
+            if process is None:
+                raise SimulationError(f"batch: got {name!r}; expected one that runs.")
+            self._stopped.add(str(name))
         _signal(process, signal.SIGINT)
         self._clock.call_later(STOP_S, lambda: self._kill(name, process))
 
@@ -250,10 +252,10 @@ class Simulations:
         with self._lock:
             self._processes.pop(batch.id, None)
             batch.running = False
-            if code == EXIT_BAD_INPUT:
-                batch.problem = _last_line(folder / "said.txt")
-            elif code not in {0, 1}:
-                batch.problem = "it was stopped"
+            if not (folder / "report.html").is_file():
+                # The code alone does not tell: it is 1 where the interrupt comes while Python starts.
+                stopped = batch.id in self._stopped or code not in {0, 1, EXIT_BAD_INPUT}
+                batch.problem = "it was stopped" if stopped else _last_line(folder / "said.txt")
             with contextlib.suppress(OSError):
                 _write(folder, batch)
 

@@ -276,7 +276,7 @@ def test_a_message_that_comes_slowly_is_waited_for(served, look, monkeypatch):
     served.add("one", events=run())
     page = look(served.start())
     assert len(opened) > 1  # it was cut at first
-    page.wait_for_function("smachpy.store.connection.value === 'live'")
+    wait_for(page, "smachpy.store.connection.value === 'live'")
 
 
 def test_a_page_that_was_cut_off_goes_on_where_it_was(served, look):
