@@ -253,7 +253,7 @@ class Simulations:
             self._processes.pop(batch.id, None)
             batch.running = False
             if not (folder / "report.html").is_file():
-                # The code alone does not tell: it is 1 where the interrupt comes while Python starts.
+                # The code alone does not tell: 1 where the interrupt comes while Python starts.
                 stopped = batch.id in self._stopped or code not in {0, 1, EXIT_BAD_INPUT}
                 batch.problem = "it was stopped" if stopped else _last_line(folder / "said.txt")
             with contextlib.suppress(OSError):
