@@ -39,6 +39,7 @@ def test_key_is_the_documented_one():
     )
 
 
+@pytest.mark.slow
 @given(
     st.builds(
         Endpoint, st.sampled_from(Kind), NAME, st.just("") | NAME, st.just("") | NAME, NAME.map(lambda n: n.replace("/", "")),

@@ -225,6 +225,7 @@ def test_kill_of_the_client(stage, on_lost):
     assert second.wait(LONG_S)
 
 
+@pytest.mark.slow
 def test_server_stopped_for_longer_than_the_lease(stage):
     server = stage.server()
     client = stage.client(server_lost_timeout=LONG_S)
@@ -239,6 +240,7 @@ def test_server_stopped_for_longer_than_the_lease(stage):
     assert handle.get_result() == msg.TestResult(10)
 
 
+@pytest.mark.slow
 def test_server_stopped_without_patience_is_lost_within_the_lease(stage):
     server = stage.server()
     client = stage.client()
@@ -250,6 +252,7 @@ def test_server_stopped_without_patience_is_lost_within_the_lease(stage):
     server.signal(signal.SIGCONT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("on_lost", ["continue", "cancel"])
 def test_client_stopped_for_longer_than_the_lease(stage, on_lost):
     """To the server it is dead meanwhile; it has not noticed, and asks for what it missed."""
@@ -265,6 +268,7 @@ def test_client_stopped_for_longer_than_the_lease(stage, on_lost):
     client.expect("PREEMPTED" if on_lost == "cancel" else "SUCCEEDED")
 
 
+@pytest.mark.slow
 def test_restarted_server_takes_the_next_goal_and_not_the_old_one(stage):
     server = stage.server()
     client = stage.client()
@@ -280,6 +284,7 @@ def test_restarted_server_takes_the_next_goal_and_not_the_old_one(stage):
     again.expect("run 1")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cut_s", [1.5, pytest.param(5.0, marks=pytest.mark.slow)])
 def test_link_cut_during_a_goal(stage, cut_s):
     server = stage.server()

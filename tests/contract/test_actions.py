@@ -354,6 +354,7 @@ def test_copy_of_a_goal_that_outlives_its_server_does_not_run_at_the_next(world)
     assert first.runs == [1]
 
 
+@pytest.mark.slow
 def test_goal_runs_although_a_dead_server_still_shows_a_token(world):
     """A token may outlast its server, until the lease of a lost link is over.
 

@@ -107,6 +107,7 @@ def test_preempt_reaches_the_robot_while_feedback_cb_blocks(robot, mission, feed
     assert running.join(LONG_S)
 
 
+@pytest.mark.slow
 @pytest.mark.zenoh
 def test_cancel_reaches_the_robot_while_a_client_callback_blocks_and_the_goal_ends(robot, mission):
     clock = mission.clock

@@ -295,6 +295,7 @@ def test_whatever_happens_it_comes_home_or_says_so(mission, machine):
     found.assert_ok()
 
 
+@pytest.mark.slow
 def test_whatever_servers_do_it_ends(mission, machine):
     found = mission.explore(
         machine, real_actions=True, interleavings=False, max_runs=60, max_time=40

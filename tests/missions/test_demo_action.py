@@ -200,6 +200,7 @@ def test_a_count_that_takes_too_long_is_called_off(mission, action_server):
     run.assert_duration(at_least=8, at_most=9)
 
 
+@pytest.mark.slow
 def test_whatever_happens_it_ends(mission):
     found = mission.explore(demo_action, max_time=40)
     found.assert_ok()

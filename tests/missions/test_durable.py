@@ -17,6 +17,7 @@ from tests.missions.test_twice import (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(listed()))
 def test_a_shipped_mission_runs_with_a_journal(mission, name, tmp_path, monkeypatch, request):
     monkeypatch.chdir(tmp_path)  # maps, photos

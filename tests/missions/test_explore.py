@@ -248,6 +248,7 @@ def comes_back_whenever_it_set_out(run):
     return run.outcome == "preempted" or bool(run.visits("SEARCH")) == bool(run.visits("COME_BACK"))
 
 
+@pytest.mark.slow
 def test_whatever_happens_it_comes_back(mission, path):
     found = mission.explore(
         lambda: explore(path), invariants=[comes_back_whenever_it_set_out], max_runs=150
@@ -255,6 +256,7 @@ def test_whatever_happens_it_comes_back(mission, path):
     found.assert_ok()
 
 
+@pytest.mark.slow
 def test_the_simulated_robot_sees_the_rooms_around_it(simulation, path):
     machine = explore(path, most=3)
     events = []

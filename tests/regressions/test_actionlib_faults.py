@@ -78,6 +78,7 @@ def test_goal_that_arrives_while_another_ends_starts_at_once(pair):
     assert started[1] == sent  # not a moment of virtual time later
 
 
+@pytest.mark.slow
 def test_no_early_transition_is_missed_with_busy_threads(real_pair):
     """actionlib: the handle was stored after sending; 10 of 65 goals never finished."""
     stop = threading.Event()

@@ -53,6 +53,7 @@ def test_a_yaml_text_is_refused_with_one_line(text, kind):
     assert caught.value.reason
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", sorted(TEXTS))
 def test_every_reader_of_yaml_refuses_it(text, tmp_path):
     path = tmp_path / "file.yaml"
@@ -149,6 +150,7 @@ def damaged(value, rng):
     return rng.choice(others)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(150))
 def test_a_damaged_recording_is_shown_or_refused(lines, seed, tmp_path, capsys):
     rng = random.Random(seed)

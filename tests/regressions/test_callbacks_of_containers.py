@@ -125,6 +125,7 @@ def execute(request):
         yield in_thread if request.param == "another thread" else lambda machine: machine.execute()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("place", "around"),
     [
@@ -243,6 +244,7 @@ def test_a_callback_that_returns_in_time_is_not_interrupted(place, clock):
     assert not any(isinstance(e, Abandoned) for e in heard)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", PLACES)
 def test_a_callback_that_swallows_the_interruption(place, execute):
     """`except BaseException` as some programs have it, in a loop that ends late."""

@@ -89,6 +89,7 @@ def test_dropped_client_that_has_sent_goals_leaves(world, kind):
     assert not world.cancelled
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["simple client", "client"])
 def test_goal_of_a_dropped_client_runs_to_its_end_and_calls_back(world, kind):
     world.serve(seconds=5.0)
@@ -118,6 +119,7 @@ def test_handle_of_a_dropped_client_works(world):
     assert world.cancelled
 
 
+@pytest.mark.slow
 def test_dropped_subscriber_goes_on_and_latched_message_stays(world):
     seen = []
     Subscriber("counter", Int32, lambda message: seen.append(message.data), node=world.mission)
@@ -129,6 +131,7 @@ def test_dropped_subscriber_goes_on_and_latched_message_stays(world):
     assert seen == [1, 1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "make",
     [

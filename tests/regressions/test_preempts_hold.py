@@ -277,6 +277,7 @@ def test_what_a_late_request_does_meets_no_later_visit(clock):
     assert order == ["run", "told", "run"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["raises", "blocks"])
 def test_ctrl_c_requests_the_shutdown_whatever_the_root_makes_of_it(what):
     blocked = threading.Event()

@@ -468,6 +468,7 @@ def test_a_buffer_of_events_gives_what_a_listener_gets():
     buffer.close()
 
 
+@pytest.mark.slow
 def test_a_buffer_of_events_keeps_all_of_them_with_the_values_themselves():
     value = object()
 

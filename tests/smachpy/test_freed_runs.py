@@ -95,6 +95,7 @@ def new(before):
     return [type(one).__name__ for one in of_a_run() if id(one) not in known]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("watched", [False, True])
 @pytest.mark.parametrize("kind_of_clock", ["real", "virtual"])
 @pytest.mark.parametrize("kind", MACHINES)

@@ -599,6 +599,7 @@ def test_blocked_leaf_in_the_main_thread_is_broken(body, depth, quiet):
     assert_clean(sm)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", ["branch", "branch machine", "root"])
 def test_thread_blocked_in_c_is_left_behind_and_cannot_come_back(place, quiet):
     release = threading.Lock()

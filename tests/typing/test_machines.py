@@ -10,6 +10,7 @@ import pytest
 HERE = Path(__file__).parent / "machines"
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(180)
 def test_good_programs_pass_and_each_mistake_is_found():
     from mypy import api

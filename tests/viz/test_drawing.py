@@ -213,6 +213,7 @@ def records(draw, depth=2):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @settings(max_examples=20, deadline=None, suppress_health_check=list(HealthCheck))
 @given(record=records(), show_implicit=st.booleans(), depth=st.integers(1, 3) | st.none())
 def test_whatever_the_machine_it_is_drawn(build, record, show_implicit, depth):
@@ -256,6 +257,7 @@ def test_the_atlas_of_a_plain_state_is_its_one_page(build, tmp_path):
     assert [page.name for page in tmp_path.iterdir()] == ["index.svg"]
 
 
+@pytest.mark.slow
 def test_times_to_hold(large, tmp_path):
     def took(work):
         """Return the seconds that this process and those it started computed."""
@@ -334,6 +336,7 @@ def test_a_container_that_dot_cannot_lay_out_in_time_is_refused_at_once(build, t
         assert (caught.value.path, caught.value.states) == ("/M", 1000)
 
 
+@pytest.mark.slow
 def test_a_thousand_nested_states_are_one_picture_of_a_size_that_opens(build):
     def nested(label, levels):
         children = [

@@ -100,6 +100,7 @@ def test_without_any_program_both_remedies_are_named(monkeypatch, tmp_path):
         graphviz_process.find_dot()
 
 
+@pytest.mark.slow
 def test_a_layout_that_never_ends_is_tried_cheaper_and_given_up(monkeypatch, tmp_path):
     program, log = tmp_path / "dot", tmp_path / "log"
     program.write_text(f'#!/bin/sh\necho "$@" >> {log}\nexec sleep 60\n')

@@ -310,6 +310,7 @@ def interleaving(seed: int) -> list[str]:
         return order
 
 
+@pytest.mark.slow
 def test_a_hundred_seeds_give_the_same_run_twice():
     first = [interleaving(seed) for seed in range(100)]
     assert first == [interleaving(seed) for seed in range(100)]

@@ -7,6 +7,7 @@ import math
 from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -55,6 +56,7 @@ def message_of(registry: Registry, cls: Any) -> st.SearchStrategy[Any]:
     return st.fixed_dictionaries(fields).map(lambda values: cls(**values))
 
 
+@pytest.mark.slow
 @settings(max_examples=80, deadline=None)
 @given(definitions, st.data())
 def test_codecs_agree_with_rosbags(fields: list[tuple[str, str]], data: st.DataObject) -> None:

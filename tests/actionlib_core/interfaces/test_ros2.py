@@ -111,6 +111,7 @@ def test_distributions_differ() -> None:
         ros2.get_message("nav_msgs/msg/Path", "jazy")
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)  # hundreds of classes are made
 def test_every_definition_that_comes_with_us_is_a_class_with_a_hash_and_bytes() -> None:
     for distro in ros2.DISTROS:

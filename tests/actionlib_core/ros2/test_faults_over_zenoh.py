@@ -133,6 +133,7 @@ def reach(phase: str, process: Process, client: Client) -> ClientGoalHandle:
 PHASES = ["sent", "active", "canceling"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("phase", PHASES)
 def test_goal_of_a_killed_server_is_lost(robot: Ros2Robot, phase: str) -> None:
     process = Process(robot)
@@ -148,6 +149,7 @@ def test_goal_of_a_killed_server_is_lost(robot: Ros2Robot, phase: str) -> None:
     assert again.lines_left() == [str(ENDS)]  # and not the goal that was lost
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("phase", PHASES)
 def test_goal_of_a_suspended_server_is_lost_and_the_server_found_again(
     robot: Ros2Robot, phase: str
@@ -166,6 +168,7 @@ def test_goal_of_a_suspended_server_is_lost_and_the_server_found_again(
     assert process.lines_left() == [str(ENDS)]
 
 
+@pytest.mark.slow
 def test_goal_outlives_its_router(robot: Ros2Robot) -> None:
     process = Process(robot)
     client = Client(robot, lost_after=LONG_S)
@@ -180,6 +183,7 @@ def test_goal_outlives_its_router(robot: Ros2Robot) -> None:
     assert [process.line() for _ in range(3)] == [str(HELD), str(ENDS), "cancel"]
 
 
+@pytest.mark.slow
 def test_goal_on_its_way_outlives_its_router(robot: Ros2Robot) -> None:
     """Zenoh ends open questions while it holds a lock that the next question needs."""
     process = Process(robot)
@@ -245,6 +249,7 @@ class Cable:
             thread.join()
 
 
+@pytest.mark.slow
 def test_goal_behind_a_cut_cable_is_lost_and_the_server_found_again(robot: Ros2Robot) -> None:
     process = Process(robot)
     cable = Cable(robot.endpoint)

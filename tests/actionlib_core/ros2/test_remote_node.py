@@ -175,6 +175,7 @@ def test_a_node_that_is_not_there(robot: Robot) -> None:
         RemoteNode("nobody", timeout=-1.0, node=robot.nodes[1])
 
 
+@pytest.mark.slow
 @given(values)
 def test_every_value_survives(value: Any) -> None:
     assert value_of(parameter_value(value, make_value)) == value

@@ -161,6 +161,7 @@ def test_a_thousand_goals_at_once(robot: Ros2Robot) -> None:
         assert client.end_of(pending) == (4, Fibonacci.Result(sequence=[number]))
 
 
+@pytest.mark.slow
 def test_a_router_that_is_started_again(robot: Ros2Robot) -> None:
     ActionServer("fib", Fibonacci, lambda goal: goal.set_accepted(), node=robot.node())
     client = client_of(robot)

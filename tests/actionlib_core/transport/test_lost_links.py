@@ -231,6 +231,7 @@ def test_peer_that_was_suspended_longer_than_the_lease_is_whole_again(later):
         suspend(processes[0], echo, rounds=2)
 
 
+@pytest.mark.slow
 @pytest.mark.zenoh
 def test_client_of_a_router_that_was_suspended_longer_than_the_lease_is_whole_again():
     with socket.socket() as probe:

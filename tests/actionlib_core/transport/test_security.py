@@ -61,6 +61,7 @@ def join(endpoint):
         transport.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("user", "password", "shown"),
     [

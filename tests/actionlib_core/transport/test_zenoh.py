@@ -100,6 +100,7 @@ ENDINGS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_program_ends_within_a_second_on_every_path(ending):
     transport = ZenohTransport()
@@ -170,6 +171,7 @@ def test_killed_process_is_seen_at_once():
         transport.close()
 
 
+@pytest.mark.slow
 def test_stopped_process_is_lost_after_its_lease_and_found_again(tmp_path):
     file = tmp_path / "config.yaml"
     file.write_text(f"domain: {load_config().domain}\nlease: 1.0\n")
@@ -190,6 +192,7 @@ def test_stopped_process_is_lost_after_its_lease_and_found_again(tmp_path):
         transport.close()
 
 
+@pytest.mark.slow
 def test_close_does_not_wait_for_a_process_that_does_not_read():
     transport = ZenohTransport()
     watch = Watch(transport)
@@ -314,6 +317,7 @@ class Cable:
             task.join(WAIT_S)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("longer_than_lease", [False, True])
 def test_cut_cable(longer_than_lease):
     lease = 1.0 if longer_than_lease else 10.0

@@ -36,6 +36,7 @@ def question(path):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.zenoh
 @pytest.mark.timeout(300)  # six processes, one after another
 def test_a_mission_in_another_process_is_answered_by_name(tmp_path):

@@ -53,6 +53,7 @@ def test_a_robot_that_is_well_but_for_its_clock(clock, behind_s, clock_is):
         entry.close()
 
 
+@pytest.mark.slow
 def test_a_router_that_is_not_there(capsys, monkeypatch):
     monkeypatch.delenv("SMACHPY_CONFIG", raising=False)
     monkeypatch.setenv("SMACHPY_ROS2", f"tcp/127.0.0.1:{free_port()}")

@@ -73,6 +73,7 @@ def test_a_users_package_called_missions_works(folder, arguments, on_path):
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.slow
 @pytest.mark.zenoh
 def test_a_users_package_called_missions_works_with_the_robot_and_the_viewer(folder):
     arguments = ("--start-robot", "--view", "--view-for", "0", "--port", "0")

@@ -139,6 +139,7 @@ def test_a_patrol_of_two_processes_succeeds_and_leaves_its_pictures(files):
     assert done.stderr == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_stops_the_robot_and_everything_ends_soon(far, number, code):
     with started(*far) as process:
@@ -162,6 +163,7 @@ def test_a_mission_that_is_killed_takes_its_robot_along(far):
         wait_gone(robot, 30.0)
 
 
+@pytest.mark.slow
 def test_a_robot_that_is_killed_ends_the_mission(far):
     with started(*far) as process:
         wait_for_line(process, "move_base")
@@ -242,6 +244,7 @@ def test_a_mission_that_raises_ends_with_1(tmp_path):
     assert "Traceback" in done.stderr
 
 
+@pytest.mark.slow
 def test_two_robots_of_one_name():
     robot = [sys.executable, "-m", "smachpy.sim"]
     with running(robot) as first:
@@ -257,6 +260,7 @@ def test_two_robots_of_one_name():
         assert first.wait(30) == 0
 
 
+@pytest.mark.slow
 def test_two_runs_that_bring_their_robots_do_not_meet(monkeypatch):
     """As of a class on one server, or two jobs of a CI: nothing says which network to join."""
     monkeypatch.delenv("SMACHPY_DOMAIN")

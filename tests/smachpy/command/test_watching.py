@@ -71,6 +71,7 @@ def viewer_of(process):
     raise AssertionError("no viewer")
 
 
+@pytest.mark.slow
 def test_a_page_and_a_file_of_a_run(run, tmp_path):
     file = tmp_path / "runs" / "nap.jsonl"
     process = run("--view", "--view-for", "0", "--port", "0", "--record", str(file))
@@ -85,6 +86,7 @@ def test_a_page_and_a_file_of_a_run(run, tmp_path):
     assert recording.events[-1]["kind"] == "Finished"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_viewer_that_is_killed_or_hangs_does_not_stop_the_mission(run, what):
     process = run("--view", "--view-for", "0", "--port", "0", "--control")
@@ -110,6 +112,7 @@ def summary_at(address):
     return one
 
 
+@pytest.mark.slow
 def test_the_page_stays_after_the_end_until_ctrl_c(run, tmp_path):
     process = run("--view", "--port", "0")
     address = process.stdout.readline().split()[-1]
@@ -127,6 +130,7 @@ def test_the_page_stays_after_the_end_until_ctrl_c(run, tmp_path):
     assert process.wait(20) == 0  # as the mission ended
 
 
+@pytest.mark.slow
 def test_a_run_in_faster_time_is_seen_and_keeps_the_real_date(run, tmp_path):
     process = run("--time", "2x", "--view", "--port", "0")
     address = read_until(process, "watch it at")[-1].split()[-1]
@@ -143,12 +147,14 @@ def test_a_run_in_faster_time_is_seen_and_keeps_the_real_date(run, tmp_path):
     assert process.wait(20) == 0
 
 
+@pytest.mark.slow
 def test_the_page_stays_for_the_time_that_was_said(run):
     process = run("--view", "--view-for", "0.3s", "--port", "0")
     assert "for 0.3 s" in read_until(process, "still at")[-1]
     assert process.wait(20) == 0
 
 
+@pytest.mark.slow
 def test_a_viewer_that_ends_ends_the_wait(run):
     process = run("--view", "--port", "0")
     read_until(process, "still at")
@@ -156,6 +162,7 @@ def test_a_viewer_that_ends_ends_the_wait(run):
     assert process.wait(20) == 0
 
 
+@pytest.mark.slow
 def test_ctrl_c_while_it_runs_ends_all(run):
     process = run("--view", "--port", "0")
     process.stdout.readline()
@@ -172,6 +179,7 @@ def test_a_time_for_the_page_that_is_none_is_refused(run, wrong):
     assert process.wait(20) == 2
 
 
+@pytest.mark.slow
 def test_a_folder_of_runs_that_cannot_be_written_stops_nothing(run, tmp_path):
     (tmp_path / "kept").write_text("a file")
     process = run("--view", "--view-for", "0", "--port", "0")

@@ -74,6 +74,7 @@ def left_behind(place, folder, *names):
     return folder / place.name
 
 
+@pytest.mark.slow
 def test_a_file_without_its_log_is_refused(place, tmp_path):
     store, lease, _ = fill(place, 3)
     for number in range(3):  # the last one after SQLite has taken the log into the file

@@ -117,6 +117,7 @@ def statuses(place):
         store.close()
 
 
+@pytest.mark.slow
 def test_a_runner_takes_what_was_submitted(errand, tmp_path, capsys):
     place = str(tmp_path / "queue.db")
     for name in ("a", "b"):
@@ -137,6 +138,7 @@ def test_a_runner_takes_what_was_submitted(errand, tmp_path, capsys):
     ]
 
 
+@pytest.mark.slow
 def test_what_a_dead_computer_ran_goes_on_at_another(errand, tmp_path, store_place):
     submit(errand, store_place, "a")
     dead = runner(store_place)
@@ -188,6 +190,7 @@ def test_a_computer_that_comes_back_is_refused(errand, tmp_path, postgres_url):
     assert int(ends[0]) != child
 
 
+@pytest.mark.slow
 def test_a_robot_has_one_mission_at_a_time(errand, tmp_path):
     place = str(tmp_path / "queue.db")
     for name, robot in (("a", "r1"), ("b", "r1"), ("c", "r2"), ("d", "r3")):

@@ -143,6 +143,7 @@ def live(tree: Tree, world: World, store: KillingStore) -> tuple[str, dict[str, 
     return outcome, dict(values(machine))
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)  # hundreds of runs; on a busy machine they take minutes
 @settings(max_examples=60)
 @given(TREES)

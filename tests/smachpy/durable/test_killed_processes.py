@@ -124,6 +124,7 @@ def calm(world: World, machine: int) -> Done:
     return world.done()
 
 
+@pytest.mark.slow
 @pytest.mark.zenoh
 def test_a_mission_killed_with_its_goal_under_way_follows_it(world: World) -> None:
     expected = calm(world, 0)

@@ -105,6 +105,7 @@ def kill(process: subprocess.Popen[str]) -> None:
     process.stdout.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ends", ["later", "meanwhile"])
 def test_a_killed_mission_follows_its_goal(
     robot: Ros2Robot, programs: contextlib.ExitStack, tmp_path: Path, ends: str

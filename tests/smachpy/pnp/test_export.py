@@ -198,6 +198,7 @@ LEAVES = st.lists(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=30)
 @given(
     st.lists(

@@ -100,6 +100,7 @@ rospy.spin()
     assert len(machine.get_children()) == 100
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "what"),
     [
@@ -115,6 +116,7 @@ def test_what_has_no_machine_says_why(load, text, what):
     assert what in caught.value.problem
 
 
+@pytest.mark.slow
 def test_a_script_that_never_gets_there_is_ended(load):
     with pytest.raises(ros1.LoadError) as caught:
         load("while True: pass", timeout=0.5)
@@ -205,6 +207,7 @@ sm.execute()
 )
 
 
+@pytest.mark.slow
 def test_an_action_with_a_type_of_nobody(robot):
     robot.write_text(ACTION)
     with pytest.raises(ros1.LoadError, match=r"(?s)nobody_msgs/Code.*--stub-missing"):

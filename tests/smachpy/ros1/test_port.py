@@ -180,6 +180,7 @@ def test_what_is_no_python(source):
         port(source, "bad.py")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", sorted(SCRIPTS.glob("*.py*")), ids=lambda path: path.name)
 def test_all_scripts_give_python(path):
     ported = port(path.read_bytes(), str(path))

@@ -61,6 +61,7 @@ def test_all_parameters_are_listed(capsys):
         assert name in text
 
 
+@pytest.mark.slow
 @pytest.mark.zenoh
 @pytest.mark.parametrize(
     ("words", "name"),

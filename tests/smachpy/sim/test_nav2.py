@@ -328,6 +328,7 @@ def test_ready_made_states_with_ros_1_types_drive_it(nav2: Any) -> None:
         session.close()
 
 
+@pytest.mark.slow
 @pytest.mark.zenoh
 def test_the_command_serves_it_behind_a_router() -> None:
     from actionlib_core.transport.zenoh import ZenohTransport
@@ -364,6 +365,7 @@ def test_the_command_serves_it_behind_a_router() -> None:
     assert process.returncode == 0
 
 
+@pytest.mark.slow
 @pytest.mark.zenoh
 def test_without_the_option_it_joins_no_robot_that_missions_drive() -> None:
     process = subprocess.Popen(
@@ -379,6 +381,7 @@ def test_without_the_option_it_joins_no_robot_that_missions_drive() -> None:
     assert process.returncode == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", [
     ["--ros2", "nonsense"], ["--ros2", "tcp/127.0.0.1:1", "--domain", "-1"],
     ["--ros2", "tcp/127.0.0.1:1", "--robots", "2"], ["--ros2", "tcp/127.0.0.1:1", "--distro", "foxy"],

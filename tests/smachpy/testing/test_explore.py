@@ -794,6 +794,7 @@ def test_a_value_that_no_double_has_written_is_told_with_the_way_out():
     assert explore(machine, preempts=0, writes={"FIND": {"found": [1, 2]}}).ok
 
 
+@pytest.mark.slow
 def test_machines_of_a_function_are_let_go():
     made, alive = [], []
 
@@ -879,6 +880,7 @@ def drive_with_a_client():
     return sm
 
 
+@pytest.mark.slow
 def test_servers_and_topics_of_the_test_are_in_each_run(mission, action_server, topic):
     server = action_server("move_base", MoveBaseAction)
     server.reply(text="first", duration=1)

@@ -122,6 +122,7 @@ def drives():
     return root
 
 
+@pytest.mark.slow
 def test_goals_are_followed_whatever_a_server_does_to_them():
     found = explore(drives, faults=["kill"], real_actions=True, max_runs=120)
     found.assert_ok()

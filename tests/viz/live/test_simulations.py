@@ -88,6 +88,7 @@ def test_what_makes_no_sense_is_refused_and_nothing_begins(simulations, job, wro
     assert simulations.rows() == []
 
 
+@pytest.mark.slow
 def test_a_batch_that_cannot_run_says_why(simulations, job):
     found = ended(
         simulations, simulations.start({"mission": job, "runs": 1, "vary": ["nobody=1..2"]})
@@ -114,6 +115,7 @@ def test_a_batch_that_loses_the_interrupt_is_killed(simulations, tmp_path, job, 
     assert ended(simulations, name)["problem"] == "it was stopped"
 
 
+@pytest.mark.slow
 def test_a_batch_is_stopped_and_no_more_than_two_run(simulations, job):
     names = [simulations.start({"mission": job, "runs": 900}) for _ in range(2)]
     with pytest.raises(SimulationError):

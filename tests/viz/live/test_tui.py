@@ -35,6 +35,7 @@ def recorded(tmp_path):
     return read_recording(tmp_path / "run.jsonl")
 
 
+@pytest.mark.slow
 def test_tree_log_status_search_and_refused_commands(tmp_path, clock):
     machines = Machines()
     machines.obtain("job").reset(recorded(tmp_path).history())
@@ -204,6 +205,7 @@ def test_values_that_are_left_out_are_counted(tmp_path, clock):
     assert seen(watched(tmp_path, wrote))["values"][-1][0] == "and 10 more"
 
 
+@pytest.mark.slow
 def test_one_event_back_one_on_and_back_to_now(tmp_path, clock):
     machine = watched(tmp_path)
     last = machine.seq
@@ -233,6 +235,7 @@ def test_events_that_are_missing_are_counted(tmp_path, clock):
     assert "7 events missing" in seen(machine)["status"]
 
 
+@pytest.mark.slow
 def test_looking_back_folds_what_is_near_and_shows_what_was(tmp_path, clock, monkeypatch):
     monkeypatch.setattr(tui, "STRIDE", 10)
     monkeypatch.setattr(tui, "LOGGED_BACK", 10)
@@ -302,6 +305,7 @@ ASKED = {
 WAITS = [("Started", "/JOB"), ("Entered", "/JOB/A"), ("QuestionAsked", "/JOB/A", ASKED)]
 
 
+@pytest.mark.slow
 def test_the_terminal_view_shows_a_question_and_takes_the_number_of_an_answer(served, clock):
     served.add("one", events=[(kind, path, dict(*more)) for kind, path, *more in WAITS])
     sent = []

@@ -611,6 +611,7 @@ def test_statistics_of_a_machine_that_is_shown_under_another_name(record, tmp_pa
         StatisticsOfFiles([tmp_path / "none"])
 
 
+@pytest.mark.slow
 def test_counted_runs_are_not_kept(record, tmp_path, monkeypatch):
     from viz.runs import statistics
 

@@ -160,6 +160,7 @@ def test_the_report_shows_all_and_runs_nothing(job, tmp_path):
         ET.fromstring(chart)
 
 
+@pytest.mark.slow
 def test_the_command_prints_a_table_and_writes_a_report(job, tmp_path, capsys):
     folder, page = tmp_path / "kept", tmp_path / "report.html"
     words = ["simulate", job, "--runs", "4", "--vary", "seconds=1..119", "--jobs", "2"]
@@ -225,6 +226,7 @@ def mission(seconds: float = 1.0):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seconds", ["1.0", "0.0"])
 def test_a_mission_that_never_ends_is_named(tmp_path, seconds):
     """One that waits, and one that only goes round: no time passes then."""
@@ -287,6 +289,7 @@ if "--multiprocessing-fork" in sys.orig_argv:
 """
 
 
+@pytest.mark.slow
 def test_ctrl_c_is_not_for_the_processes_that_run_however_early_it_comes(job, tmp_path):
     (tmp_path / "sitecustomize.py").write_text(INTERRUPT)  # as the terminal does to all processes
     done = subprocess.run(
@@ -319,6 +322,7 @@ def mission():
 """
 
 
+@pytest.mark.slow
 def test_a_killed_command_leaves_no_process_behind(tmp_path):
     (tmp_path / "stays.py").write_text(STAYS)
     pipe = tmp_path / "pipe"
