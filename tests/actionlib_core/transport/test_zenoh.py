@@ -255,7 +255,7 @@ def test_sessions_meet_through_a_router(router, mode):
         # Tokens overtake samples: the live "old" may still have been on its way.
         assert [s[1:4] for s in heard if s.payload != b"old"] == [(b"new", "enc", a.session_id)]
         assert [r.payload for r in answers] == [b"sum of 1"]
-        for _ in range(40):  # each one: a router leaves some liveliness queries unanswered
+        for _ in range(400):  # an answer lacks at times what the session was told meanwhile
             assert b.list_alive("@test/*", WAIT_S) == ["@test/a"]
         a.close()
         watch.wait(lambda alive: not alive)
