@@ -38,6 +38,9 @@ if TYPE_CHECKING:
 logger = logging.getLogger("viz.live")
 
 HISTORY_S = 3.0
+VALUE_S = 10.0
+"""A whole value may have megabytes; of a server that has gone one hears at once."""
+
 RETRY_S = 0.5
 GATHER_S = 0.014
 """Events are worked off together that come so close to each other."""
@@ -228,7 +231,7 @@ class Link:
         self._received: deque[str] = deque()
         self._client = ControlClient(f"/{server}", node) if control else None
         self._values = ServiceProxy(
-            f"/{server}{VALUE_SERVICE}", ReadValue, timeout=HISTORY_S, node=node
+            f"/{server}{VALUE_SERVICE}", ReadValue, timeout=VALUE_S, node=node
         )
 
     @property

@@ -56,6 +56,17 @@ def test_the_past_says_which_instant_and_disarms_what_commands(served, look):
     assert [one["command"] for one in served.commands] == ["pause"]
 
 
+def test_a_run_that_has_ended_is_shown_whole_and_commands_nothing(served, look):
+    late = ("Finished", "/JOB", {"outcome": "ok", "at": 300.0})
+    machine = served.add("one", events=told(*BEGUN, *LATER, late), control=CONTROL)
+    page = look(f"{served.start(token='t')}#token=t")
+    wait_for(page, "smachpy.store.run.now.ended")
+    assert page.query_selector("#pause") is None
+    assert page.evaluate("() => smachpy.page.timeline.length") > 300_000
+    machine.add(served.events(told(*BEGUN), after=5))
+    page.wait_for_selector("#pause")
+
+
 def test_instants_are_clocks(served, look):
     served.add("one", events=told(*BEGUN, *LATER))
     page = look(served.start())

@@ -171,7 +171,7 @@ export class Page {
     store.loadNotes();
     store.loadPlots();
     this.map.reset();
-    if (isFile() || store.facts.value?.recorded) this.timeline.fitAll();
+    if (isFile() || store.facts.value?.recorded || store.run.now.ended != null) this.timeline.fitAll();
     if (store.settings.value.follow && !this.followIsSet) {
       store.follow.value = true;
       this.followIsSet = true;

@@ -37,7 +37,9 @@ function Confirm({ text, question, onConfirm, className = "", id, title }) {
 
 export function Controls() {
   const paused = control()?.paused;
-  if (paused === undefined) return null;
+  store.tick.value;
+  const isOver = store.run.now.ended != null;
+  if (paused === undefined || (isOver && !paused)) return null;
   const title = paused ? "continue (Space)" : "pause before the next state (Space)";
   return html`<span class="controls">
     <${Command} id="pause" title=${title} onClick=${() => command(paused ? "resume" : "pause")}>
