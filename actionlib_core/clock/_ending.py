@@ -5,6 +5,9 @@ from __future__ import annotations
 import sys
 import time
 
+# A wait until a time of the clock ends at once for a process that was stopped for longer, before
+# the threads that it waits for could run: so parts of it are counted.
+PART_S = 0.1
 SWITCH_S = 1e-4  # threads take turns so often then; Python's 5 ms each would add up
 REFUSAL_S = 0.01  # a call that is refused then takes so long
 

@@ -51,15 +51,17 @@ class Inside:
     def wait_idle(self, timeout: float) -> None:
         """Wait until no other thread is in a call.
 
-        Blocks: `timeout` [s] at most after the last of them that came out of one.
+        Blocks: about `timeout` [s] at most after the last of them that came out of one; a time in
+        which the process was stopped does not count.
         """
-        me, deadline = get_ident(), RealClock.now() + timeout
-        others = self.depths.keys() - {me}
-        while others and RealClock.now() < deadline:
+        left = timeout
+        others = self.depths.keys() - {get_ident()}
+        while others and left > 0.0:
             RealClock().sleep(POLL_S)
-            left = self.depths.keys() & others
-            if len(left) < len(others):
-                others, deadline = left, RealClock.now() + timeout
+            left -= POLL_S
+            still = self.depths.keys() & others
+            if len(still) < len(others):
+                others, left = still, timeout
 
 
 inside = Inside()

@@ -241,13 +241,13 @@ def test_server_stopped_for_longer_than_the_lease(stage):
 
 
 @pytest.mark.slow
-def test_server_stopped_without_patience_is_lost_within_the_lease(stage):
+def test_server_stopped_without_patience_is_lost(stage):
     server = stage.server()
     client = stage.client()
     handle = client.send_goal(msg.TestGoal(600))
     server.expect("run 600")
     server.signal(signal.SIGSTOP)
-    assert handle.wait(4 * LEASE_S)
+    assert handle.wait(LONG_S)
     assert handle.get_terminal_state().name == "LOST"
     server.signal(signal.SIGCONT)
 
@@ -270,14 +270,14 @@ def test_client_stopped_for_longer_than_the_lease(stage, on_lost):
 
 @pytest.mark.slow
 def test_restarted_server_takes_the_next_goal_and_not_the_old_one(stage):
-    server = stage.server()
-    client = stage.client()
+    server = stage.server(lease=3 * LONG_S)
+    client = stage.client(lease=3 * LONG_S)
     handle = client.send_goal(msg.TestGoal(600))
     server.expect("run 600")
     server.signal(signal.SIGKILL)
     assert handle.wait(LONG_S)
     server.close()
-    again = stage.server()
+    again = stage.server(lease=3 * LONG_S)
     following = client.send_goal(msg.TestGoal(1))
     assert following.wait(LONG_S)
     assert following.get_terminal_state().name == "SUCCEEDED"

@@ -609,7 +609,7 @@ def test_cancel_all_and_cancel_before_a_time(world):
     ActionServer(
         "demo",
         msg.TestAction,
-        lambda handle: (handle.set_accepted(), accepted.append(handle)),
+        lambda handle: (accepted.append(handle), handle.set_accepted()),
         lambda handle: handle.set_canceled(),
         node=world.node("server"),
     )

@@ -26,7 +26,7 @@ import zenoh
 from zenoh import handlers
 
 from actionlib_core.clock import RealClock, SerialExecutor, current_clock
-from actionlib_core.clock._ending import ending
+from actionlib_core.clock._ending import PART_S, ending
 from actionlib_core.config import Config, load_config
 from actionlib_core.exceptions import AccessDeniedError, TransportError
 from actionlib_core.transport import Presence, Quality, Reply, Sample
@@ -70,6 +70,7 @@ D = TypeVar("D", bound=Declared)
 
 CLOSE_S = 0.5  # zenoh may take so long to leave the network; it is left behind after that
 LET_GO_S = 2.0  # the interpreter waits so long for what had begun, on a busy computer
+LET_GO_PARTS = round(LET_GO_S / PART_S)
 IDLE_S = 0.3  # `close` waits so long for callbacks that are running
 ACCESS_S = 1.0  # longest wait for the other side's access rules
 ASK_S = 5.0  # longest wait for a latched publisher's answer
@@ -312,6 +313,8 @@ class ZenohTransport:
                 self._check_open(key)
                 entry = make()
         except zenoh.ZError as error:
+            if ending.begun:  # its frames hold what was declared before it was raised
+                _kept.append(error)
             raise TransportError(f"{key}: cannot be declared: {error}") from error
         with self._lock:
             self._declared[entry] = None
@@ -366,7 +369,7 @@ _loopbacks: weakref.WeakSet[SerialExecutor] = weakref.WeakSet()
 
 # What is closed as the interpreter ends. A thread that drops the last reference to an object of
 # zenoh's leaves the interpreter for a moment, and must not come back after its end.
-_kept: list[Declared] = []
+_kept: list[Declared | zenoh.ZError] = []
 
 
 def _close_all() -> None:
@@ -384,7 +387,7 @@ def _close_all() -> None:
         transport.close()
     held.wait(LET_GO_S)
     for executor in list(_loopbacks):
-        executor.join(LET_GO_S)
+        any(executor.join(PART_S) for _ in range(LET_GO_PARTS))
     inside.wait_idle(LET_GO_S)
 
 

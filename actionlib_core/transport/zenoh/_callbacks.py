@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from zenoh import handlers
 
-from actionlib_core.clock import RealClock
+from actionlib_core.clock._ending import PART_S
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -47,14 +47,16 @@ class Held:
     def wait(self, timeout: float) -> bool:
         """Wait until zenoh has let go of everything there is now; return whether it has.
 
-        Blocks: `timeout` [s] at most.
+        Blocks: `timeout` [s] at most, not counting a time in which the process was stopped.
         """
-        deadline = RealClock.now() + timeout
+        left = timeout
         with self._lock:
             locks = [lock for lock, _ in self._held if lock.locked()]
         for lock in locks:
-            if not lock.acquire(timeout=max(0.0, deadline - RealClock.now())):
-                return False
+            while not lock.acquire(timeout=min(left, PART_S)):
+                left -= PART_S
+                if left <= 0.0:
+                    return False
             lock.release()
         return True
 

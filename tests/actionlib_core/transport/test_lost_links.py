@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -22,6 +21,7 @@ from actionlib_core.transport._keys import is_for_another_key, key_mark
 from actionlib_core.transport._zenoh_config import new_session_id
 from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.transport.zenoh import ZenohTransport
+from tests.free_port import free_port
 
 CLOCK = RealClock()
 DOMAIN = int(os.environ["SMACHPY_DOMAIN"])
@@ -234,9 +234,7 @@ def test_peer_that_was_suspended_longer_than_the_lease_is_whole_again(later):
 @pytest.mark.slow
 @pytest.mark.zenoh
 def test_client_of_a_router_that_was_suspended_longer_than_the_lease_is_whole_again():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        router = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    router = f"tcp/127.0.0.1:{free_port()}"
     common = {"discovery": "off", "lease": LEASE_S}
     client = {"mode": "client", "connect": (router,), **common}
     with sessions(Config(mode="router", listen=(router,), **common), Config(**client)) as opened:

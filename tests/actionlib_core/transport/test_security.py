@@ -22,7 +22,7 @@ from tests.free_port import free_port
 pytestmark = pytest.mark.zenoh
 
 CLOCK = RealClock()
-WAIT_S = 15.0
+WAIT_S = 40.0
 RULES = (
     AccessRule(("robot_1/**",), users=("alice",)),
     AccessRule(("robot_1/secret",), users=("alice",), permission="deny"),
