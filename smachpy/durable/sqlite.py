@@ -84,7 +84,11 @@ class SQLiteStore(SqlStore):
         if create:
             self._make_folder(file.parent)
         elif not file.exists():
-            raise StoreError(self.where, "got no such file; expected a journal.", reason="missing")
+            problem = (
+                "got no such file; expected a journal. Try `smachpy run MISSION --durable`, which "
+                "makes one, or name another with `--durable FILE`."
+            )
+            raise StoreError(self.where, problem, reason="missing")
         mode = "rwc" if create else "rw"
         try:
             self._check_log()

@@ -12,7 +12,7 @@ import tempfile
 import threading
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field, replace
-from multiprocessing import get_context, parent_process
+from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -272,10 +272,13 @@ def simulate(
 def _pool(jobs: int | None, runs: int) -> Iterator[Executor]:
     """Make processes for runs; those that have not begun when the context ends never do.
 
+    An exception, Ctrl-C among them, ends the processes at once: what they run may never end.
+
     Args:
         jobs: How many; None: one per core.
         runs: No more are made than there are runs.
     """
+    others = active_children()
     executor = _Pool(
         min(jobs or os.cpu_count() or 1, runs),
         mp_context=get_context("spawn"),
@@ -283,6 +286,12 @@ def _pool(jobs: int | None, runs: int) -> Iterator[Executor]:
     )
     try:
         yield executor
+    except BaseException:
+        executor.shutdown(wait=False, cancel_futures=True)
+        for process in active_children():
+            if process not in others:
+                process.kill()
+        raise
     finally:
         executor.shutdown(cancel_futures=True)
 

@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import importlib
 import json
+import signal
 import sys
 import tempfile
 from pathlib import Path
@@ -110,6 +111,7 @@ def _vary(text: str) -> Vary:
 
 
 def _run(args: argparse.Namespace) -> int:
+    signal.signal(signal.SIGTERM, _end)
     keys = [vary.key for vary in args.vary]
     if len(set(keys)) < len(keys):
         raise UsageError(f"smachpy simulate: --vary: got {keys}; expected each key once.")
@@ -128,6 +130,11 @@ def _run(args: argparse.Namespace) -> int:
             f"smachpy simulate: --record {str(args.record)!r}: {error.strerror or error}."
         ) from error
     return _simulate(args, args.record)
+
+
+def _end(number: int, _frame: object) -> None:
+    """End as Ctrl-C does: processes are ended, and files that nobody asked for are removed."""
+    raise SystemExit(128 + number)
 
 
 def _simulate(args: argparse.Namespace, folder: Path) -> int:

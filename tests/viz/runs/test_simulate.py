@@ -323,27 +323,26 @@ def mission():
 
 
 @pytest.mark.slow
-def test_a_killed_command_leaves_no_process_behind(tmp_path):
+@pytest.mark.parametrize(
+    ("number", "code"),
+    [(signal.SIGKILL, -9), (signal.SIGTERM, 143), (signal.SIGINT, 130)],
+)
+def test_a_command_that_is_ended_leaves_no_process_and_no_file_behind(tmp_path, number, code):
     (tmp_path / "stays.py").write_text(STAYS)
-    pipe = tmp_path / "pipe"
+    pipe, files = tmp_path / "pipe", tmp_path / "files"
     os.mkfifo(pipe)
+    files.mkdir()
+    mission = str(tmp_path / "stays.py")
     command = subprocess.Popen(
-        [
-            sys.executable,
-            "-m",
-            "smachpy.command",
-            "simulate",
-            str(tmp_path / "stays.py"),
-            "--runs",
-            "1",
-        ],
-        env={**os.environ, "PIPE": str(pipe)},
+        [sys.executable, "-m", "smachpy.command", "simulate", mission, "--runs", "2"],
+        env={**os.environ, "PIPE": str(pipe), "TMPDIR": str(files)},
     )
     with pipe.open() as ends:
         worker = int(ends.readline())
-        command.kill()
-        command.wait()
+        command.send_signal(number)
+        assert command.wait(30) == code
         ended, _, _ = select.select([ends], [], [], 30)  # its end closes the pipe
         if not ended:
             os.kill(worker, signal.SIGKILL)
     assert ended, f"process {worker} runs on"
+    assert number == signal.SIGKILL or not [*files.glob("smachpy-*")]
