@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,6 +45,7 @@ ENDS = {  # what a real server ended the goals of these conversations with
 }
 SERVER = """
 import sys
+import threading
 from actionlib_core.action.server import ActionServer
 from actionlib_core.config import Config, Ros2
 from actionlib_core.interfaces.ros2.test_msgs.action import Fibonacci
@@ -202,12 +204,19 @@ def test_a_suspended_server_goes_on(robot: Ros2Robot) -> None:
 
 def test_a_server_ends_with_its_node(robot: Ros2Robot) -> None:
     node = Node("robot", clock=robot.clock, config=robot.config)
-    server = ActionServer("fib", Fibonacci, lambda goal: goal.set_accepted(), node=node)
+    called = threading.Event()
+
+    def accept(goal: ServerGoalHandle) -> None:
+        goal.set_accepted()
+        called.set()
+
+    server = ActionServer("fib", Fibonacci, accept, node=node)
     client = client_of(robot)
     uuid = bytes([1] * 16)
     assert client.accepted(uuid, Fibonacci.Goal()) is not None
     result = client.result(uuid)
     assert client.end_of(client.result(bytes(16)))[0] == 0  # so the one before has arrived too
+    assert called.wait(60.0)  # the client hears of it before the callback has returned
     node.close()
     assert client.end_of(result)[0] == 6
     assert server.stopped
