@@ -98,7 +98,7 @@ def test_a_folder_that_is_gone_is_told_and_the_next_attempt_may_succeed(simulati
     assert said[1].startswith("1 b:")
 
 
-def read_until(process, text, timeout=20.0):
+def read_until(process, text, timeout=60.0):
     """Read standard output until `text` comes; the pipe itself is waited for."""
     said = ""
     while text not in said:
@@ -128,10 +128,10 @@ def test_as_a_program_enter_saves_a_waypoint(tmp_path):
         saver.stdin.flush()
         read_until(saver, "1 home: x 9.80 m")
         saver.send_signal(signal.SIGINT)
-        assert saver.wait(10) == 0
+        assert saver.wait(60) == 0
     finally:
         for process in (saver, robot):
             process.stdin.close()
-            process.wait(10)
+            process.wait(60)
             process.stdout.close()
     assert path.read_text() == "name,x,y,yaw\nhome,9.800,7.100,1.571\n"

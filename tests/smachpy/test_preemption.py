@@ -634,7 +634,7 @@ def test_thread_blocked_in_c_is_left_behind_and_cannot_come_back(place, quiet):
     if place == "root":
         runner = threading.Thread(target=lambda: outcomes.append(top.execute()))
         runner.start()
-        runner.join(5)
+        runner.join(30)
     else:
         outcomes.append(top.execute())
     assert outcomes == ["preempted"]
@@ -644,13 +644,13 @@ def test_thread_blocked_in_c_is_left_behind_and_cannot_come_back(place, quiet):
     # The same machine runs again while the old thread still hangs.
     again = threading.Thread(target=lambda: outcomes.append(top.execute()))
     again.start()
-    again.join(5)
+    again.join(30)
     assert outcomes[1] in {"done", "preempted"}
     runs = after.runs
     release.release()
     for thread in threading.enumerate():
         if thread is not threading.main_thread() and thread.name.startswith("/SM_ROOT"):
-            thread.join(2)
+            thread.join(30)
     assert after.runs == runs
     assert "x" not in machine.userdata or machine.userdata.x != "late" or place == "root"
 

@@ -82,7 +82,7 @@ def test_the_robot_is_called_as_configuration_and_command_line_say(tmp_path, wor
         assert robot.stdout is not None
         assert robot.stdout.readline().startswith(f"{name}: ready")
         robot.send_signal(signal.SIGINT)
-        assert robot.wait(20) == 0
+        assert robot.wait(60) == 0
     finally:
         robot.kill()
         robot.wait()
@@ -112,7 +112,7 @@ def test_a_world_as_a_process():
             client.send_goal_and_wait(goal_at(Pose2D(0.5, 0, 0), "base_link"))
             assert client.get_goal_status_text() == "arrived"
         world.send_signal(signal.SIGINT)
-        assert world.wait(20) == 0
+        assert world.wait(60) == 0
     finally:
         world.kill()
         world.wait()
