@@ -25,15 +25,16 @@ import smachpy
 
 class Wait(smachpy.State):
     def __init__(self):
-        super().__init__(outcomes=["done"])
+        super().__init__(outcomes=["done", "preempted"])
 
     def execute(self, userdata):
         while not Path(__file__).with_name("over").exists():
-            self.sleep(0.05)
+            if self.sleep(0.05):
+                return "preempted"
         return "done"
 
 def mission():
-    sm = smachpy.StateMachine(outcomes=["succeeded"], name="NAP")
+    sm = smachpy.StateMachine(outcomes=["succeeded", "preempted"], name="NAP")
     with sm:
         sm.add("WAIT", Wait(), {"done": "succeeded"})
     return sm
@@ -175,8 +176,7 @@ def test_a_viewer_that_ends_ends_the_wait(run):
 @pytest.mark.slow
 def test_ctrl_c_while_it_runs_ends_all(run):
     process = run("--view", "--port", "0")
-    process.stdout.readline()
-    read_until(process, "WAIT")
+    read_until(process, "NAP  started")
     process.send_signal(signal.SIGINT)
     process.stdout.read()
     assert process.wait(60) == 128 + signal.SIGINT
