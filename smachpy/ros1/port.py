@@ -279,7 +279,7 @@ def _add_imports(code: str, transformer: Any) -> str:
     wanted = [line for line in wanted if line not in there]
     body = [n for n in tree.body if not (isinstance(n, ast.Expr) and n is tree.body[0])]
     future = [n for n in body if isinstance(n, ast.ImportFrom) and n.module == "__future__"]
-    first = (future[-1].end_lineno or 0) if future else (body[0].lineno - 1 if body else 0)
+    first = (future[-1].end_lineno or 0) if future else (_first_line(body[0]) - 1 if body else 0)
     added = [f"{line}\n" for line in wanted]
     lines[first:first] = added
     if transformer.logs:
@@ -288,6 +288,12 @@ def _add_imports(code: str, transformer: Any) -> str:
         last = max(last, first) + len(added)
         lines[last:last] = ["\nlogger = logging.getLogger(__name__)\n"]
     return "".join(lines)
+
+
+def _first_line(statement: ast.stmt) -> int:
+    """Return the line where a statement begins, with its decorators."""
+    marks = getattr(statement, "decorator_list", [])
+    return min(node.lineno for node in (statement, *marks))
 
 
 def _forget(cst: Any, name: str) -> Any:

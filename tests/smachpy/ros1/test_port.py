@@ -99,6 +99,14 @@ GUARDED = """try:
         pass"""
 
 
+def test_a_script_that_imports_nothing_else_before_its_function():
+    source = "import rospy\nimport smach\n\ndef main():\n    rospy.init_node('x')\n"
+    source += "    sm = smach.StateMachine([])\n    sm.execute()\n\nmain()\n"
+    text = port(source.encode(), "old.py").text
+    ast.parse(text)
+    assert text.index("import smachpy") < text.index("@smachpy.mission")
+
+
 @pytest.mark.parametrize("call", ["main()", GUARDED], ids=["plain", "guarded"])
 @pytest.mark.parametrize(
     "run",
