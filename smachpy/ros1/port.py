@@ -292,7 +292,7 @@ def _add_imports(code: str, transformer: Any) -> str:
 
 def _first_line(statement: ast.stmt) -> int:
     """Return the line where a statement begins, with its decorators."""
-    marks = getattr(statement, "decorator_list", [])
+    marks: list[ast.expr] = getattr(statement, "decorator_list", [])
     return min(node.lineno for node in (statement, *marks))
 
 

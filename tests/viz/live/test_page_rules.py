@@ -537,7 +537,21 @@ def test_looking_back_stays_where_it_is_while_older_events_are_forgotten(served,
     assert page.evaluate("() => smachpy.store.shown().states") == shown
     page.evaluate("() => { smachpy.store.seekEvent(-1); smachpy.store.seekEvent(1); }")
     assert page.evaluate("() => smachpy.store.shown().states") == shown
-    assert page.evaluate("() => smachpy.page.flashes.length") == 0
+    wait_for(page, "smachpy.page.flashes.length === 0")
+
+
+def test_what_comes_just_before_one_looks_back_does_not_flash_later(served, look):
+    served.add("one", events=run()[:2])
+    page = look(served.start())
+    page.evaluate(
+        """() => { const { page, store } = smachpy;
+          const newest = store.run.events.at(-1);
+          page.takeEvents([{ ...newest, kind: "Left", outcome: "ok", seq: newest.seq + 1 }]);
+          window.waiting = page.flashes.length;
+          store.seekTo(1); }"""  # before the next frame
+    )
+    assert page.evaluate("() => window.waiting") == 1
+    wait_for(page, "smachpy.page.flashes.length === 0")
 
 
 class Network:

@@ -281,15 +281,18 @@ export class Page {
     this.frame = 0;
     const moment = performance.now();
     this.late += LATE_PART * (moment - this.askedAt - this.late);
+    // What came just before one looked back is not shown late, when one is back.
+    const flashes = this.flashes.splice(0);
+    const arrived = this.arrived.splice(0);
     if (store.cursor.value === null) {
       const now = store.nowMs();
       for (const path of this.changed) this.#paint(path, store.run.now, now);
       this.changed.clear();
-      for (const e of this.flashes.splice(0))
+      for (const e of flashes)
         if (e.kind === "Fired") this.diagram.flashFired(e.path, e.transition, moment);
         else this.diagram.flash(e.path, e.outcome ?? "exception", moment);
-      if (this.arrived.length) {
-        this.painting.push(...this.arrived.splice(0));
+      if (arrived.length) {
+        this.painting.push(...arrived);
         this.paintPort.port2.postMessage(0);
       }
     }
