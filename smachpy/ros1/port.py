@@ -293,7 +293,7 @@ def _add_imports(code: str, transformer: Any) -> str:
 def _first_line(statement: ast.stmt) -> int:
     """Return the line where a statement begins, with its decorators."""
     marks: list[ast.expr] = getattr(statement, "decorator_list", [])
-    return min(node.lineno for node in (statement, *marks))
+    return min([statement.lineno, *(mark.lineno for mark in marks)])
 
 
 def _forget(cst: Any, name: str) -> Any:
