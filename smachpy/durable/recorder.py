@@ -186,7 +186,7 @@ class Recorder:
         A value that `step` may have changed in place is compared by what is kept of it; without a
         `step`, each one is.
         """
-        userdata = frame.container.userdata  # type: ignore[attr-defined]
+        userdata = frame.container.userdata
         path = self._homes.get(id(userdata))
         if path is None:
             return {}
@@ -598,7 +598,7 @@ class Recorder:
         Raises:
             NotDurableError: it cannot be kept.
         """
-        home = self._homes.get(id(frame.container.userdata))  # type: ignore[attr-defined]
+        home = self._homes.get(id(frame.container.userdata))
         if type(value) not in ATOMS and home is not None and self._is_kept(home, key):
             encode(value, key=key, path=path)
 

@@ -26,6 +26,7 @@ from smachpy.run.callback import call_bounded
 from smachpy.run.child import ContainerData
 from smachpy.run.grace import asking
 from smachpy.run.interrupt import Interruption
+from smachpy.run.step import make_step
 from smachpy.run.threads import Group
 from smachpy.run.visit import End
 from smachpy.slips import accepting, accepts
@@ -284,7 +285,7 @@ class Concurrence(Container):
     # -- running -------------------------------------------------------------------------------
 
     def _smachpy_compile(self) -> _Plan:
-        return _Plan(self, [self._smachpy_make_step(label) for label in self._smachpy.children])
+        return _Plan(self, [make_step(self, label) for label in self._smachpy.children])
 
     def _smachpy_run_children(self, frame: Frame, plan: _Plan) -> str:
         each = bool(self._smachpy.child_termination_cb or self._smachpy.transition_cbs)

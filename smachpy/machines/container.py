@@ -25,13 +25,12 @@ from smachpy.log import MESSAGES
 from smachpy.machines.callbacks import Callbacks
 from smachpy.machines.construction import Openable
 from smachpy.machines.problems import Problems, takes
-from smachpy.machines.state import CBState, DataOf, Shown, State
+from smachpy.machines.state import DataOf, Shown, State
 from smachpy.run.child import EPOCH, ContainerData
 from smachpy.run.frame import Frame, clock_of_run
 from smachpy.run.grace import REQUESTING, asking, leave, on_preempt, request, request_soon
 from smachpy.run.interrupt import Interruption
 from smachpy.run.options import retry_problems
-from smachpy.run.step import Step, get_options, runner_of
 from smachpy.run.threads import already_runs, execute_root
 from smachpy.run.visit import Origin
 from smachpy.slips import accepts
@@ -372,23 +371,6 @@ class Container(Openable, Callbacks, State):
     def _smachpy_run_children(self, frame: Frame, plan: Any) -> str:
         """Run the children and return the outcome."""
         raise NotImplementedError
-
-    def _smachpy_make_step(self, label: str) -> Step:
-        """Return a child ready to run: its `execute`, with its options around it."""
-        state, names = self._smachpy.children[label], self._smachpy.remappings[label]
-        data = state._smachpy
-        execute: Any = state.execute
-        callback = data.code[0] if isinstance(state, CBState) else None
-        is_async = inspect.iscoroutinefunction(execute) or inspect.iscoroutinefunction(callback)
-        kind: Any = type(state)
-        is_own = (
-            kind._smachpy_is_container
-            and getattr(execute, "__func__", None) is not kind._smachpy_execute
-        )
-        window = Remapper(self.userdata, data.input_keys, data.output_keys, names)
-        options = get_options(state)
-        run = runner_of(state, options, execute, is_async=is_async, is_callback=is_own)
-        return Step(label, state, window, run)
 
     def request_preempt(self, *, by: str = "") -> None:
         """Ask the container and all active states below it to stop.

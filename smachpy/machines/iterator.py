@@ -23,7 +23,7 @@ from smachpy.run.callback import call_bounded
 from smachpy.run.child import ContainerData
 from smachpy.run.grace import end_visit, unknown_outcome
 from smachpy.run.interrupt import Interruption
-from smachpy.run.step import run_watched, user_error
+from smachpy.run.step import make_step, run_watched, user_error
 from smachpy.run.visit import End, Why
 from smachpy.slips import accepting
 
@@ -292,7 +292,7 @@ class Iterator(Container):
     def _smachpy_compile(self) -> _Plan:
         label = self.__label
         assert label is not None
-        return _Plan(self, self._smachpy_make_step(label), self.__breaks())
+        return _Plan(self, make_step(self, label), self.__breaks())
 
     def _smachpy_run_children(self, frame: Frame, plan: _Plan) -> str:
         journal = frame.run.journal

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from threading import TIMEOUT_MAX
 from typing import (
     TYPE_CHECKING,
@@ -23,7 +24,14 @@ from smachpy.machines.names import name_of, unique_names
 from smachpy.machines.problems import Problems, as_number, unknown_arguments
 from smachpy.run.child import StateData
 from smachpy.run.frame import clock_of_run, current_scope
-from smachpy.run.grace import REQUESTING, PreemptNotice, mark_preempt, note_serviced, on_preempt
+from smachpy.run.grace import (
+    REQUESTING,
+    PreemptNotice,
+    mark_preempt,
+    note_serviced,
+    on_preempt,
+    wait_for_preempt,
+)
 from smachpy.run.options import NAMES, NO_OPTIONS, Options, Retry, changed
 from smachpy.run.step import get_options
 from smachpy.slips import accepts
@@ -402,13 +410,8 @@ def _wait_preempt(state: State, argument: str, seconds: float | None) -> bool:
     if state._preempt_requested:
         return True
     first: Frame | None = THREAD.get()
-    wake = (current_clock() if first is None else first.run.clock).event()
-    forget = on_preempt(state, wake.set)
-    try:
-        wake.wait(seconds)
-    finally:
-        forget()
-    return state._preempt_requested
+    clock = current_clock() if first is None else first.run.clock
+    return wait_for_preempt(state, clock, seconds)
 
 
 class CBState(State):
@@ -444,6 +447,7 @@ class CBState(State):
         self.__args = problems.values("cb_args", cb_args)
         self.__kwargs = problems.mapping("cb_kwargs", cb_kwargs, "name -> value")
         self._smachpy.code = (cb,)
+        self._smachpy.is_async = inspect.iscoroutinefunction(cb)
         call = "cb(userdata, *cb_args, **cb_kwargs)"
         count = 1 + len(self.__args)
         problems.function("cb", cb, call, count, self.__kwargs, optional=False, plain=False)

@@ -26,6 +26,7 @@ from smachpy.run.frame import SUBSCRIPTIONS, Frame
 from smachpy.run.grace import asking, end_visit, forget_visit, leave, request_soon, unknown_outcome
 from smachpy.run.interrupt import Interruption
 from smachpy.run.step import (
+    make_step,
     only_buffer,
     publish_left,
     publish_raised,
@@ -348,7 +349,7 @@ class StateMachine(Container):
     # -- running -------------------------------------------------------------------------------
 
     def _smachpy_compile(self) -> _Plan:
-        steps = {label: self._smachpy_make_step(label) for label in self._smachpy.children}
+        steps = {label: make_step(self, label) for label in self._smachpy.children}
         return _Plan(self.userdata, steps, self._smachpy.outcomes, self._smachpy.transitions)
 
     def _smachpy_run_children(self, frame: Frame, plan: _Plan) -> str:

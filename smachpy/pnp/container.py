@@ -21,6 +21,7 @@ from smachpy.pnp.plan import Plan, problem_of, understand
 from smachpy.pnp.problems import PlanError, PlanProblem, raise_errors
 from smachpy.pnp.reading import find_plan, read_net
 from smachpy.run.child import ContainerData
+from smachpy.run.step import make_step
 from smachpy.run.visit import End
 from smachpy.userdata.typed import CheckedDict
 from smachpy.userdata.user_data import data_of
@@ -80,7 +81,7 @@ class _Compiled:
         data = machine._smachpy
         self.epoch = 0
         self.userdata = machine.userdata
-        self.steps = {label: machine._smachpy_make_step(label) for label in data.children}
+        self.steps = {label: make_step(machine, label) for label in data.children}
         for step in self.steps.values():
             step.next = {outcome: End(outcome) for outcome in step.state._smachpy.outcomes}
         self.table = Table(

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from smachpy.run.frame import Frame, Gate, RunJournal
     from smachpy.run.options import Options
     from smachpy.run.visit import Origin
+    from smachpy.userdata.user_data import UserData
 
     Callback: TypeAlias = tuple[Callable[..., object], tuple[Any, ...]]
 
@@ -48,12 +49,14 @@ class StateData:
         version: Changes with each of these.
         with_hooks: Its options and what they are with the hooks of its class; None when not known.
         preempt_callbacks: Called on each request to stop.
+        is_async: Its callback is a coroutine function.
         code: What it runs of the user's: functions that get the userdata, and messages made of it.
     """
 
     __slots__ = (
         "code",
         "input_keys",
+        "is_async",
         "options",
         "outcomes",
         "output_keys",
@@ -69,6 +72,7 @@ class StateData:
         self.options = NO_OPTIONS
         self.version = 0
         self.with_hooks: tuple[Options, Options] | None = None
+        self.is_async = False
         self.code: tuple[Any, ...] = ()
         self.preempt_callbacks: list[Callable[[], object]] = []
 
@@ -211,6 +215,11 @@ class Parent(Child, Protocol):
     @property
     def name(self) -> str | None:
         """Name of the machine when it is the root."""
+        ...
+
+    @property
+    def userdata(self) -> UserData:
+        """Its userdata."""
         ...
 
     def get_initial_states(self) -> list[str]:

@@ -34,7 +34,7 @@ from smachpy.run.visit import IS_ASKED, STEPS, Decision, Effect, Event, Origin, 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
-    from actionlib_core.clock import Task, Timer
+    from actionlib_core.clock import Clock, Task, Timer
     from actionlib_core.shutdown import Shutdown
     from smachpy.run.child import Child, Parent
     from smachpy.run.frame import Frame, Run
@@ -381,6 +381,22 @@ def on_preempt(state: Child, callback: Callable[[], object]) -> Callable[[], Non
             callbacks.remove(callback)
 
     return forget
+
+
+def wait_for_preempt(state: Child, clock: Clock, seconds: float | None) -> bool:
+    """Wait at most `seconds` for a request to `state`; tell whether there is one.
+
+    Blocks: that long; None waits for ever.
+    """
+    wake = clock.event()
+    callbacks = state._smachpy.preempt_callbacks
+    callbacks.append(wake.set)
+    try:
+        if not state._preempt_requested:
+            wake.wait(seconds)
+    finally:
+        callbacks.remove(wake.set)
+    return state._preempt_requested
 
 
 def mark_preempt(state: Child) -> None:

@@ -15,7 +15,14 @@ from smachpy.exceptions import InvalidUserCodeError
 from smachpy.machines.names import name_of
 from smachpy.run.callback import call_bounded
 from smachpy.run.frame import SUBSCRIPTIONS, clock_of_run
-from smachpy.run.grace import ask, asking, on_preempt, request_soon, shutdown_asking
+from smachpy.run.grace import (
+    ask,
+    asking,
+    on_preempt,
+    request_soon,
+    shutdown_asking,
+    wait_for_preempt,
+)
 from smachpy.run.interrupt import Interruption, ProgramEnds
 from smachpy.run.options import NO_OPTIONS
 from smachpy.run.visit import Again, End, Event, after_attempt
@@ -28,7 +35,7 @@ if TYPE_CHECKING:
 
     from actionlib_core.clock import Timer
     from smachpy.events.buffer import EventBuffer
-    from smachpy.run.child import Child
+    from smachpy.run.child import Child, Parent
     from smachpy.run.frame import Frame
     from smachpy.run.options import Options
 
@@ -73,15 +80,13 @@ class Step:
     )
     final: Literal[False]
 
-    def __init__(
-        self, label: str, state: Child, userdata: Any, execute: Callable[[Any], Any]
-    ) -> None:
+    def __init__(self, label: str, state: Child, execute: Callable[[Any], Any]) -> None:
         data = state._smachpy
         self.label = label
         self.final = False  # on the instance, where Python finds it faster; see `End`
         self.state = state
         self.execute = execute
-        self.userdata = userdata
+        self.userdata: Any = None
         self.next: dict[str, Any] = {}
         self.nested: Any = None
         self.interface = data.version
@@ -116,6 +121,24 @@ class Step:
                 self.userdata, frame, self.path_in(frame)
             )
         return window
+
+
+def make_step(container: Parent, label: str) -> Step:
+    """Return a child of `container` ready to run: its `execute`, with its options around it."""
+    data = container._smachpy
+    state: Any = data.children[label]
+    execute, kind, of_child = state.execute, type(state), state._smachpy
+    is_async = of_child.is_async or inspect.iscoroutinefunction(execute)
+    is_own = (
+        kind._smachpy_is_container
+        and getattr(execute, "__func__", None) is not kind._smachpy_execute
+    )
+    run = runner_of(state, get_options(state), execute, is_async=is_async, is_callback=is_own)
+    step = Step(label, state, run)
+    step.userdata = Remapper(
+        container.userdata, of_child.input_keys, of_child.output_keys, data.remappings[label]
+    )
+    return step
 
 
 class _Nowhere(dict[str, Any]):
@@ -338,7 +361,7 @@ class _WithOptions:
         state, attempt = self._state, 1
         if frame.run.journal is not None:
             attempt, wait = frame.run.journal.attempt(frame)
-            if wait and _waits_in_vain(state, wait):
+            if wait and wait_for_preempt(state, clock_of_run(), wait):
                 return "preempted"
         return self._try(frame, userdata, attempt)
 
@@ -367,7 +390,7 @@ class _WithOptions:
             if isinstance(decision, Again):
                 wait, result = decision
                 _tell_retried(frame, attempt, wait, _reason(result))
-                if not (wait and _waits_in_vain(state, wait)):
+                if not (wait and wait_for_preempt(state, clock_of_run(), wait)):
                     attempt += 1
                     continue
                 decision = after_attempt(
@@ -396,17 +419,6 @@ def _call_hook(frame: Frame, state: Any, hook: Callable[..., object], *arguments
         raise InvalidUserCodeError(
             f"{where}: hook {name} raised {type(error).__name__}: {error}", path=where
         ) from error
-
-
-def _waits_in_vain(state: Child, seconds: float) -> bool:
-    """Wait between two attempts; tell whether somebody asked `state` to stop meanwhile."""
-    wake = clock_of_run().event()
-    forget = on_preempt(state, wake.set)
-    try:
-        wake.wait(seconds)
-    finally:
-        forget()
-    return state._preempt_requested
 
 
 class Timeout:

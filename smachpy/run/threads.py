@@ -447,7 +447,8 @@ class Root(Branch, Run):
         self.watched = self.careful = self.logged or self.has_shutdown_check
         self.pending = deque()
         options = get_options(root)
-        self.step = Step(root.name or "SM_ROOT", root, parent_ud, runner_of(root, options, execute))
+        self.step = Step(root.name or "SM_ROOT", root, runner_of(root, options, execute))
+        self.step.userdata = parent_ud
         self.waits_for_ever = options.preempt_timeout is None
         self.ending = shutdown.current_shutdown()
 
