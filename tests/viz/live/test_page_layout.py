@@ -72,6 +72,20 @@ def test_a_long_chain_is_folded(served, look):
     assert shown["k"] > 0.5
 
 
+def test_a_chain_in_a_machine_is_folded_though_nothing_leads_to_one_of_its_outcomes(served, look):
+    work = chain([f"STEP_{n}" for n in range(24)])
+    work.register_outcomes(["preempted"])
+    top = StateMachine(outcomes=["done", "preempted"], name="TOP")
+    with top:
+        StateMachine.add("WORK", work, {"done": "done", "preempted": "preempted"})
+    served.add("work", sm=top)
+    page = look(served.start())
+    said = []
+    page.on("console", lambda message: said.append(message.text))
+    all_levels(page)
+    assert said == []
+
+
 def test_heat_has_a_scale_that_is_seen(served, look):
     served.add("chain", sm=chain(["A", "B"], name="CHAIN"))
     page = look(served.start())

@@ -647,6 +647,15 @@ class Plan {
       // As wide as what stands there while it waits
       if (target) this.#edge(meaning, this.bars[i], target, [joinText(join, join.need - 1)]);
     }
+    if (this.shape.folded && this.outer !== null) this.#reachOutcomes();
+  }
+
+  /** ELK cannot fold a container with a port that no line leads to: lead one there that is not drawn. */
+  #reachOutcomes() {
+    const reached = new Set(this.graph.edges.map((/** @type {ElkElement} */ edge) => edge.targets[0]));
+    const last = this.graph.children[this.graph.children.length - 1];
+    for (const target of this.targets.values())
+      if (!reached.has(target)) this.#edge({ kind: "hidden" }, last.id, target);
   }
 
   /**
@@ -717,7 +726,8 @@ function placed(plan, found) {
         dots: meaning.hasRows ? dotsOf(child, plan) : [],
       });
   }
-  for (const edge of found.edges)
+  const drawn = found.edges.filter((/** @type {ElkElement} */ edge) => plan.meanings.get(edge.id).kind !== "hidden");
+  for (const edge of drawn)
     for (const section of edge.sections ?? [])
       result.edges.push({
         ...plan.meanings.get(edge.id),
