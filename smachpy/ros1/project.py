@@ -20,6 +20,11 @@ MOST_FOLDERS: Final = 5000
 KINDS: Final = ("msg", "srv", "action")
 _MANIFESTS: Final = ("package.xml", "manifest.xml")
 _SKIPPED: Final = frozenset({"__pycache__", "node_modules", "build", "devel", "install", "logs"})
+_COMMENT: Final = re.compile(r"<!--.*?-->", re.DOTALL)
+_DEPENDS: Final = re.compile(
+    r"<(?:(?:build|build_export|exec|run)_)?depend\b[^>]*>\s*([\w-]+)\s*<"
+    r"|<depend\s[^>]*?package=[\"']([\w-]+)[\"']"
+)
 _NAME: Final = re.compile(r"<name>\s*([A-Za-z]\w*)\s*</name>")
 
 
@@ -47,6 +52,12 @@ class Project:
                 if _is_package(folder):
                     self._packages.setdefault(_name_of(folder), folder)
         return self._packages
+
+    def depends(self, package: str) -> list[str]:
+        """Return what the manifest of a package of the project says that it depends on, sorted."""
+        texts = (_read(self.packages()[package] / name) for name in _MANIFESTS)
+        found = (_DEPENDS.findall(_COMMENT.sub("", text)) for text in texts)
+        return sorted({a or b for names in found for a, b in names})
 
     def interfaces_of(self, package: str) -> dict[str, list[Path]]:
         """Return kind -> files of the definitions of a package of the project; empty for none."""
@@ -118,8 +129,13 @@ def _is_package(folder: Path) -> bool:
 
 def _name_of(folder: Path) -> str:
     """Return the name in package.xml, else the folder's."""
-    try:
-        match = _NAME.search((folder / "package.xml").read_text(encoding="utf-8", errors="replace"))
-    except OSError:
-        match = None
+    match = _NAME.search(_read(folder / "package.xml"))
     return match[1] if match else folder.name
+
+
+def _read(file: Path) -> str:
+    """Return the text of a file; "" if there is none."""
+    try:
+        return file.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""

@@ -91,6 +91,30 @@ def test_a_missing_package_is_named_with_its_place(names):
         importlib.import_module("more")
 
 
+def test_what_packages_depend_on(tmp_path):
+    manifests = {
+        "arm/package.xml": "<name>arm</name><build_depend>rospy</build_depend>"
+        "<exec_depend version_gte='1'> arm_msgs </exec_depend><test_depend>tests</test_depend>"
+        "<!-- <depend>commented_out</depend> --><buildtool_depend>catkin</buildtool_depend>",
+        "arm_msgs/package.xml": "<name>arm_msgs</name><depend>std_msgs</depend><depend>arm</depend>",
+        "old/manifest.xml": '<package><depend package="arm"/></package>',
+    }
+    for name, text in manifests.items():
+        file = tmp_path / name
+        file.parent.mkdir()
+        file.write_text(text)
+    (tmp_path / ".git").mkdir()
+    with ros1.installed(tmp_path / "arm" / "script.py"):
+        rospkg = importlib.import_module("rospkg")
+        pack = rospkg.RosPack()
+        assert sorted(pack.get_depends("arm", implicit=False)) == ["arm_msgs", "rospy"]
+        assert sorted(pack.get_depends("arm")) == ["arm_msgs", "rospy", "std_msgs"]
+        assert pack.get_depends_on("arm", implicit=False) == ["arm_msgs", "old"]
+        assert pack.get_depends_on("std_msgs") == ["arm", "arm_msgs", "old"]
+        with pytest.raises(rospkg.ResourceNotFound):
+            pack.get_depends("nobody")
+
+
 def test_messages_of_the_packages_around(tmp_path):
     scripts = tmp_path / "my_stack" / "my_robot" / "scripts"
     scripts.mkdir(parents=True)

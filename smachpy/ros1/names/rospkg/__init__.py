@@ -8,6 +8,7 @@ from smachpy.ros1.install import current_project
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
 
 class ResourceNotFound(Exception):  # noqa: N818  rospkg's name
@@ -26,22 +27,47 @@ class RosPack:
         Raises:
             ResourceNotFound: there is none of that name.
         """
-        packages = current_project().packages()
-        if name not in packages:
-            raise ResourceNotFound(
-                f"package {name!r}: got none around {current_project().folder}; expected one of "
-                f"{sorted(packages)}."
-            )
-        return str(packages[name])
+        return str(_folder_of(name))
 
     def list(self) -> list[str]:
         """Return the names of all packages."""
         return sorted(current_project().packages())
 
     def get_depends(self, name: str, implicit: bool = True) -> Sequence[str]:
-        """Return nothing: dependencies are not read."""
-        del name, implicit
-        return []
+        """Return what a package's manifest says that it depends on.
+
+        Args:
+            name: The package's.
+            implicit: With what those of the same repository depend on.
+
+        Raises:
+            ResourceNotFound: there is no package of that name.
+        """
+        _folder_of(name)
+        project = current_project()
+        found: dict[str, None] = {}
+        left = project.depends(name)
+        while left:
+            one = left.pop(0)
+            if one not in found and one != name:
+                found[one] = None
+                if implicit and one in project.packages():
+                    left += project.depends(one)
+        return [*found]
+
+    def get_depends_on(self, name: str, implicit: bool = True) -> Sequence[str]:
+        """Return the packages that depend on one; `implicit`: by way of others too."""
+        return [one for one in self.list() if name in self.get_depends(one, implicit)]
+
+
+def _folder_of(name: str) -> Path:
+    packages = current_project().packages()
+    if name not in packages:
+        raise ResourceNotFound(
+            f"package {name!r}: got none around {current_project().folder}; expected one of "
+            f"{sorted(packages)}."
+        )
+    return packages[name]
 
 
 def get_ros_package_path() -> str:
