@@ -343,25 +343,12 @@ class Viewer:
     async def _export(self, request: Request) -> Response:
         machine = self._asked(request)
         form = request.query_params.get("format", "html")
-        if machine is None or machine.record is None or form not in {"html", "jsonl"}:
+        if machine is None or machine.record is None or form not in _EXPORTS:
             return _unknown(request)
-        from smachpy.events.recording import recording_lines
-        from viz.model.why import why
-
-        if form == "jsonl":
-            base, events = machine.history()
-            lines = recording_lines(machine.record, events, base, machine.observed())
-            return _download("".join(lines).encode(), "application/jsonl", "run.jsonl")
-        run = {
-            "model": page.model(machine.record),
-            "snap": json.loads(machine.snapshot()[1]),
-            "observed": machine.observed(),
-            "why": why(machine.record, machine.events()).to_json(),
-        }
-        text = await run_in_threadpool(page.standalone, run, machine.record.label)
-        return _download(
-            text.encode("utf-8", "replace"), page.TYPES[".html"], f"{_file_name(machine)}.html"
-        )
+        make, media = _EXPORTS[form]
+        data = await run_in_threadpool(make, machine, machine.record)
+        name = "run" if form == "jsonl" else _file_name(machine)
+        return _download(data, media, f"{name}.{form}")
 
     async def _control(self, request: Request) -> Response:
         reason = refuse_command(request, self._token)
@@ -611,6 +598,33 @@ async def _read_command(request: Request) -> dict[str, Any] | None:
 def _no_command() -> Response:
     text = f"command: got no JSON object of at most {LONGEST_COMMAND} bytes; expected one."
     return Json({"ok": False, "text": text}, status_code=400)
+
+
+def _export_page(machine: Machine, record: StateRecord) -> bytes:
+    """The run as one file that opens without a server."""
+    from viz.model.why import why
+
+    run = {
+        "model": page.model(record),
+        "snap": json.loads(machine.snapshot()[1]),
+        "observed": machine.observed(),
+        "why": why(record, machine.events()).to_json(),
+    }
+    return page.standalone(run, record.label).encode("utf-8", "replace")
+
+
+def _export_recording(machine: Machine, record: StateRecord) -> bytes:
+    """The run as `Recorder` writes it."""
+    from smachpy.events.recording import recording_lines
+
+    base, events = machine.history()
+    return "".join(recording_lines(record, events, base, machine.observed())).encode()
+
+
+_EXPORTS = {
+    "html": (_export_page, page.TYPES[".html"]),
+    "jsonl": (_export_recording, "application/jsonl"),
+}
 
 
 def _compared(old: tuple[str, Any, Any], new: tuple[str, Any, Any]) -> dict[str, Any]:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import io
 import ipaddress
 import socket
+import threading
 import urllib.error
 import urllib.parse
 import urllib.request
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 import segno
@@ -17,6 +19,7 @@ from viz.live.app import Viewer
 from viz.live.cli import print_qr
 from viz.live.machines import Machines
 from viz.live.server import EVERYWHERE, AddressError, PageServer, outward_address
+from viz.model import why
 
 
 @pytest.mark.parametrize("last", ["x:²", "x:٣", "x:-1", "x", "x:", f"x:{'9' * 5000}", "x:1.0"])
@@ -75,3 +78,35 @@ def test_the_qr_code_has_the_address(capsys):
     assert printed == again.getvalue()
     assert len(printed.splitlines()) > 10
     assert "\u2580" in printed
+
+
+@pytest.mark.parametrize("form", ["html", "jsonl"])
+def test_the_server_answers_while_a_run_is_exported(served, monkeypatch, form):
+    began, go_on = threading.Event(), threading.Event()
+    machine = served.add("one", events=[("Started", "/JOB"), ("Entered", "/JOB/A")])
+
+    def held(real):
+        def made(*arguments):
+            began.set()
+            assert go_on.wait(30), "nothing else was answered meanwhile"
+            return real(*arguments)
+
+        return made
+
+    monkeypatch.setattr(why, "why", held(why.why))
+    monkeypatch.setattr(machine, "history", held(machine.history))
+    address = served.start()
+
+    def get(path):
+        with urllib.request.urlopen(address + path, timeout=10) as answer:
+            return answer.read()
+
+    with ThreadPoolExecutor(1) as pool:
+        export = pool.submit(get, f"api/export?machine=one&format={form}")
+        try:
+            assert began.wait(10)
+            assert b'"one"' in get("api/machines")
+            assert not export.done()
+        finally:
+            go_on.set()
+        assert export.result()
