@@ -117,7 +117,7 @@ class Served:
         """Events as a machine sends them; `at` [s] moves one away from its place."""
         made = []
         for seq, (kind, path, *more) in enumerate(events, after + 1):
-            facts = more[0] if more else {}
+            facts = dict(*more)
             stamp = self.began + int(facts.pop("at", seq / 1000) * 1e9)
             made.append({"kind": kind, "path": path, "stamp_ns": stamp, "t": 0.0, **facts})
             made[-1]["seq"] = seq

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-import time
 
 import pytest
+
+from tests.browser import wait_for
 
 pytestmark = [pytest.mark.browser, pytest.mark.zenoh]
 
@@ -16,13 +17,6 @@ X, Y = ('[id="$.target_pose.pose.position.x"]', '[id="$.target_pose.pose.positio
 @pytest.fixture
 def no_leaks():
     """Processes of this module's fixtures outlive single tests."""
-
-
-def wait_for(page, condition, timeout=30.0):
-    deadline = time.monotonic() + timeout
-    while not page.evaluate(f"() => Boolean({condition})"):
-        assert time.monotonic() < deadline, f"never true: {condition}"
-        page.wait_for_timeout(50)
 
 
 @pytest.fixture

@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-import time
-
 import pytest
 
 from smachpy import CBState, StateMachine
 from smachpy.events.recording import Recorder
+from tests.browser import wait_for
 
 pytestmark = [pytest.mark.browser, pytest.mark.zenoh]
-
-
-def wait_for(page, condition, timeout=30.0):
-    deadline = time.monotonic() + timeout
-    while not page.evaluate(f"() => Boolean({condition})"):
-        assert time.monotonic() < deadline, f"never true: {condition}"
-        page.wait_for_timeout(50)
 
 
 def group(path):

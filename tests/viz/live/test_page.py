@@ -12,6 +12,8 @@ import urllib.request
 
 import pytest
 
+from tests.browser import wait_for
+
 pytestmark = [pytest.mark.browser, pytest.mark.zenoh]
 
 
@@ -22,14 +24,6 @@ def no_leaks():
 
 def active(page):
     return page.evaluate("() => smachpy.store.activeLeaves.value")
-
-
-def wait_for(page, condition, timeout=30.0):
-    """Wait for a JavaScript condition; the page's policy forbids playwright's own way."""
-    deadline = time.monotonic() + timeout
-    while not page.evaluate(f"() => Boolean({condition})"):
-        assert time.monotonic() < deadline, f"never true: {condition}"
-        page.wait_for_timeout(50)
 
 
 def group(path):

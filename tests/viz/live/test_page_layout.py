@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-import time
-
 import pytest
 
 from smachpy import CBState, Concurrence, StateMachine
+from tests.browser import wait_for
 
 pytestmark = pytest.mark.browser
 
 MOST_LAYOUT_MS = 3000  # of 300 states
-
-
-def wait_for(page, condition, timeout=20.0):
-    deadline = time.monotonic() + timeout
-    while not page.evaluate(f"() => Boolean({condition})"):
-        assert time.monotonic() < deadline, f"never true: {condition}"
-        page.wait_for_timeout(50)
 
 
 def chain(names, of=None, name=None):

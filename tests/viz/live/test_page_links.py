@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
 
 from smachpy import CBState, StateMachine
+from tests.browser import wait_for
 
 pytestmark = pytest.mark.browser
 
@@ -31,13 +31,6 @@ def address(served):
         StateMachine.add("IN", inner)
     served.add("one", sm=sm, events=[(kind, path, dict(facts)) for kind, path, facts in EVENTS])
     return served.start(token="t")
-
-
-def wait_for(page, condition, timeout=30.0):
-    deadline = time.monotonic() + timeout
-    while not page.evaluate(f"() => Boolean({condition})"):
-        assert time.monotonic() < deadline, f"never true: {condition}"
-        page.wait_for_timeout(50)
 
 
 def pin(page, text):

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import time
-
 import pytest
 
 from smachpy import CBState, StateMachine
+from tests.browser import wait_for
 
 pytestmark = pytest.mark.browser
 
@@ -18,23 +17,12 @@ LATER = [
 CONTROL = {"paused": False, "breakpoints": []}
 
 
-def told(*events):
-    return [(kind, path, dict(*more)) for kind, path, *more in events]
-
-
-def wait_for(page, condition, timeout=30.0):
-    deadline = time.monotonic() + timeout
-    while not page.evaluate(f"() => Boolean({condition})"):
-        assert time.monotonic() < deadline, f"never true: {condition}"
-        page.wait_for_timeout(50)
-
-
 def seek(page, seconds):
     page.evaluate(f"() => smachpy.store.seek(smachpy.store.run.first() + {seconds} * 1000)")
 
 
 def test_the_past_says_which_instant_and_disarms_what_commands(served, look):
-    served.add("one", events=told(*BEGUN, *LATER), control=CONTROL)
+    served.add("one", events=[*BEGUN, *LATER], control=CONTROL)
     page = look(f"{served.start(token='t')}#token=t")
     wait_for(page, "document.querySelector('#pause')")
     seek(page, 32)
@@ -58,17 +46,17 @@ def test_the_past_says_which_instant_and_disarms_what_commands(served, look):
 
 def test_a_run_that_has_ended_is_shown_whole_and_commands_nothing(served, look):
     late = ("Finished", "/JOB", {"outcome": "ok", "at": 300.0})
-    machine = served.add("one", events=told(*BEGUN, *LATER, late), control=CONTROL)
+    machine = served.add("one", events=[*BEGUN, *LATER, late], control=CONTROL)
     page = look(f"{served.start(token='t')}#token=t")
     wait_for(page, "smachpy.store.run.now.ended")
     assert page.query_selector("#pause") is None
     assert page.evaluate("() => smachpy.page.timeline.length") > 300_000
-    machine.add(served.events(told(*BEGUN), after=5))
+    machine.add(served.events(BEGUN, after=5))
     page.wait_for_selector("#pause")
 
 
 def test_instants_are_clocks(served, look):
-    served.add("one", events=told(*BEGUN, *LATER))
+    served.add("one", events=[*BEGUN, *LATER])
     page = look(served.start())
     text = "(s) => smachpy.store.instantText(smachpy.store.run.first() + s * 1000)"
     asked = [0, 32.04, 59.96, 3599.99, 3723.5, -1]
@@ -77,7 +65,7 @@ def test_instants_are_clocks(served, look):
 
 
 def test_the_instant_stays_on_the_lanes(served, look):
-    served.add("one", events=told(*BEGUN, *LATER))
+    served.add("one", events=[*BEGUN, *LATER])
     page = look(served.start())
     seek(page, 1)
     page.evaluate(
@@ -96,7 +84,7 @@ def test_the_instant_stays_on_the_lanes(served, look):
 
 
 def test_space_after_a_click_on_a_button_pauses(served, look):
-    served.add("one", events=told(*BEGUN), control=CONTROL)
+    served.add("one", events=BEGUN, control=CONTROL)
     page = look(f"{served.start(token='t')}#token=t")
     wait_for(page, "document.querySelector('#pause')")
     page.evaluate("() => smachpy.page.select('/JOB/B')")
@@ -109,13 +97,13 @@ def test_space_after_a_click_on_a_button_pauses(served, look):
 def test_what_is_held_back_and_why_is_said(served, look):
     held = ("Paused", "/JOB/B", {"reason": "breakpoint", "at": 33.1})
     paused = {"paused": True, "breakpoints": [["/JOB/B", None]]}
-    served.add("one", events=told(*BEGUN, LATER[0], held), control=paused)
+    served.add("one", events=[*BEGUN, LATER[0], held], control=paused)
     page = look(served.start())
     wait_for(page, "smachpy.store.runStatus.value.word === 'paused before B (breakpoint)'")
 
 
 def test_selected_looks_like_nothing_else(served, look):
-    served.add("one", events=told(*BEGUN))
+    served.add("one", events=BEGUN)
     page = look(served.start())
     page.click('g[data-path="/JOB/B"] .frame')
     colour = """(p) => { const s = getComputedStyle(document.querySelector(`g[data-path='${p}'] > .frame`));
@@ -129,7 +117,7 @@ def test_selected_looks_like_nothing_else(served, look):
 
 
 def test_a_flight_never_mirrors_the_picture(served, look):
-    served.add("one", events=told(*BEGUN))
+    served.add("one", events=BEGUN)
     page = look(served.start())
     scales = page.evaluate(
         """() => new Promise((done) => { const { view } = smachpy.page, scales = [], real = requestAnimationFrame;
@@ -143,13 +131,13 @@ def test_a_flight_never_mirrors_the_picture(served, look):
 
 def test_a_recording_without_an_end_stands_where_it_ends(served, look):
     served.began = 978_307_200_000_000_000  # a run in virtual time
-    served.add("one", events=told(*BEGUN, *LATER)).recorded = True
+    served.add("one", events=[*BEGUN, *LATER]).recorded = True
     page = look(served.start())
     wait_for(page, "smachpy.store.instantText(smachpy.store.nowMs()) === '00:33.0'")
 
 
 def test_two_fingers_zoom(served, look):
-    served.add("one", events=told(*BEGUN))
+    served.add("one", events=BEGUN)
     page = look(served.start())
     pinch = """() => { const svg = document.querySelector('.diagram'), { view } = smachpy.page; view.set(0, 0, 1);
       const on = (type, id, x, target = window) => target.dispatchEvent(new PointerEvent(type,
@@ -169,7 +157,7 @@ def test_two_fingers_zoom(served, look):
 
 
 def test_buttons_zoom_and_cover_nothing(served, look):
-    served.add("one", events=told(*BEGUN))
+    served.add("one", events=BEGUN)
     page = look(served.start())
     before = page.evaluate("() => smachpy.page.view.k")
     page.click("[aria-label='zoom out']")
@@ -182,7 +170,7 @@ def test_buttons_zoom_and_cover_nothing(served, look):
 
 
 def test_the_tree_opens_on_a_small_screen(served, look):
-    served.add("one", events=told(*BEGUN))
+    served.add("one", events=BEGUN)
     page = look(served.start())
     page.set_viewport_size({"width": 390, "height": 844})
     assert not page.is_visible(".tree")
@@ -204,10 +192,10 @@ def test_following_a_run_that_has_ended_shows_where(served, look):
     with sm:
         StateMachine.add("A", inner, {"done": "B"})
         StateMachine.add("B", CBState(lambda _: "ok", outcomes=["ok"]), {"ok": "done"})
-    ended = told(
+    ended = [
         *BEGUN, ("Entered", "/JOB/A/DEEP", {"at": 2.0}), ("Left", "/JOB/A/DEEP", {"outcome": "ok", "at": 3.0}),
         ("Left", "/JOB/A", {"outcome": "done", "at": 3.0}), ("Finished", "/JOB", {"outcome": "done", "at": 3.0}),
-    )  # fmt: skip
+    ]  # fmt: skip
     served.add("one", sm=sm, events=ended)
     page = look(served.start())
     page.keyboard.press("1")
@@ -229,7 +217,7 @@ def goal(n, path, at, **more):
 
 def test_goals_that_have_ended_are_a_line_each(served, look):
     ended = [event for n in range(5) for event in goal(n, "/JOB/A", 2 + n)]
-    served.add("one", events=told(*BEGUN, *ended))
+    served.add("one", events=[*BEGUN, *ended])
     page = look(served.start())
     lines = page.locator(".ended-goal")
     assert lines.count() == 3
@@ -252,7 +240,7 @@ def test_goals_that_have_ended_are_a_line_each(served, look):
 def test_only_a_preempt_worth_reading_has_a_section(served, look, source, until, shown):
     asked = ("PreemptRequested", "/JOB/A", {"source": source, "by": "/JOB/B", "why": "", "at": 3.0})
     left = ("Left", "/JOB/A", {"outcome": "preempted", "at": until})
-    served.add("one", events=told(*BEGUN, asked, left))
+    served.add("one", events=[*BEGUN, asked, left])
     page = look(served.start())
     page.wait_for_selector(".log li")
     assert page.locator(".preempt").count() == shown
@@ -270,7 +258,7 @@ def test_names_carry_their_parent_where_they_repeat(served, look):
         ("Entered", "/JOB/A/DRIVE", {"at": 2.0}),
         ("Left", "/JOB/A/DRIVE", {"outcome": "ok", "at": 3.0}),
     ]
-    served.add("one", sm=sm, events=told(*BEGUN, *drove))
+    served.add("one", sm=sm, events=[*BEGUN, *drove])
     page = look(served.start())
     wait_for(page, "document.querySelector('.log')?.textContent.includes('A \u203a DRIVE')")
 
@@ -278,7 +266,7 @@ def test_names_carry_their_parent_where_they_repeat(served, look):
 def test_values_are_trees_and_rounded(served, look):
     value = "Waypoint(name='dock 2', pose=Pose2D(x=9.8, yaw=1.5708000000000002))"
     wrote = ("UserdataWritten", "/JOB/A", {"key": "task", "value": value, "at": 2.0})
-    served.add("one", events=told(*BEGUN, wrote))
+    served.add("one", events=[*BEGUN, wrote])
     page = look(served.start())
     assert "yaw=1.5708)" in page.text_content(".userdata code")
     page.click(".userdata tr")
@@ -290,7 +278,7 @@ def test_the_log_is_always_in_sight(served, look):
     wrote = [
         ("UserdataWritten", "/JOB/A", {"key": f"key_{n}", "value": n, "at": 2.0}) for n in range(50)
     ]
-    served.add("one", events=told(*BEGUN, *wrote))
+    served.add("one", events=[*BEGUN, *wrote])
     page = look(served.start())
     box = page.locator(".log").bounding_box()
     assert box["y"] + box["height"] <= 900
@@ -302,10 +290,10 @@ def test_why_it_ended_so_and_a_step_goes_there(served, look):
         ("Failed", "/JOB/A", {"error": "KeyError: 'x'", "trace": "job.py:7 in go: x", "at": 33.0}),
         ("Finished", "/JOB", {"outcome": None, "at": 33.0}),
     ]
-    machine = served.add("one", events=told(*BEGUN))
+    machine = served.add("one", events=BEGUN)
     page = look(served.start())
     assert page.locator(".why-button").count() == 0  # it runs
-    machine.add(served.events(told(*ended), after=2))
+    machine.add(served.events([*ended], after=2))
     page.click(".why-button")
     page.wait_for_selector(".why li")
     said = [text.split() for text in page.locator(".why .step").all_text_contents()]
@@ -359,7 +347,7 @@ def test_the_way_to_the_end_is_opened_and_drawn_thick(served, look):
         ("Left", "/JOB/IN", {"outcome": "aborted"}),
         ("Finished", "/JOB", {"outcome": "aborted"}),
     ]
-    served.add("one", sm=sm, events=told(*events))
+    served.add("one", sm=sm, events=events)
     page = look(served.start())
     page.evaluate("async () => { smachpy.page.setDepth(1); await smachpy.page.drawing; }")
     assert page.locator('g[data-path="/JOB/IN/GO"]').count() == 0
@@ -379,7 +367,7 @@ def test_a_run_in_one_file_says_why_too(served, look, tmp_path):
         ("Left", "/JOB/A", {"outcome": "aborted", "at": 2.0}),
         ("Finished", "/JOB", {"outcome": "aborted", "at": 2.0}),
     ]
-    served.add("one", events=told(*BEGUN, *ended))
+    served.add("one", events=[*BEGUN, *ended])
     page = look(served.start())
     saved = page.request.get(f"{served.address}api/export?machine=one&format=html")
     file = tmp_path / "run.html"
@@ -391,7 +379,7 @@ def test_a_run_in_one_file_says_why_too(served, look, tmp_path):
 
 
 def test_an_old_tab_asks_for_the_token_of_a_new_viewer(served, look):
-    served.add("one", events=told(*BEGUN), control=CONTROL)
+    served.add("one", events=BEGUN, control=CONTROL)
     page = look(f"{served.start(token='new')}#token=old")
     wait_for(page, "document.querySelector('#pause')")
     page.click("#pause")
@@ -409,7 +397,7 @@ def test_an_old_tab_asks_for_the_token_of_a_new_viewer(served, look):
 
 
 def test_an_old_tab_takes_the_token_of_an_address_that_is_pasted_into_it(served, look):
-    served.add("one", events=told(*BEGUN), control=CONTROL)
+    served.add("one", events=BEGUN, control=CONTROL)
     page = look(f"{served.start(token='new')}#token=old")
     page.evaluate("() => { location.hash = 'token=new'; }")
     wait_for(page, "!location.hash.includes('token')")
@@ -418,7 +406,7 @@ def test_an_old_tab_takes_the_token_of_an_address_that_is_pasted_into_it(served,
 
 
 def test_escape_closes_the_dialog_and_not_what_is_below(served, look):
-    served.add("one", events=told(*BEGUN))
+    served.add("one", events=BEGUN)
     page = look(served.start())
     page.evaluate(
         "() => { smachpy.store.homeOpen.value = true; smachpy.store.simulateOpen.value = true; }"

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-import time
 import urllib.error
 import urllib.request
 
 import pytest
+
+from tests.browser import wait_for
 
 ASKED = {
     "text": "Delivery to lab: may I hand it over?",
@@ -20,17 +21,6 @@ ASKED = {
 }
 WAITS = [("Started", "/JOB"), ("Entered", "/JOB/A"), ("QuestionAsked", "/JOB/A", ASKED)]
 OPEN = ".question:not(.over)"
-
-
-def told(*events):
-    return [(kind, path, dict(*more)) for kind, path, *more in events]
-
-
-def wait_for(page, condition, timeout=30.0):
-    deadline = time.monotonic() + timeout
-    while not page.evaluate(f"() => Boolean({condition})"):
-        assert time.monotonic() < deadline, f"never true: {condition}"
-        page.wait_for_timeout(50)
 
 
 def post(view, command, token):
@@ -115,7 +105,7 @@ def test_nobody_answers_without_the_token(errand):
 
 @pytest.mark.browser
 def test_the_buttons_do_nothing_without_a_token_or_in_the_past(served, look):
-    served.add("one", events=told(*WAITS))
+    served.add("one", events=WAITS)
     page = look(served.start(token="t"))
     page.wait_for_selector(OPEN)
     assert page.locator(f"{OPEN} .answer:disabled").count() == 2
@@ -134,7 +124,7 @@ def test_the_buttons_do_nothing_without_a_token_or_in_the_past(served, look):
 
 @pytest.mark.browser
 def test_a_breakpoint_lets_the_operator_decide(served, look):
-    events = told(*WAITS[:2], ("Paused", "/JOB/B", {"reason": "breakpoint"}))
+    events = [*WAITS[:2], ("Paused", "/JOB/B", {"reason": "breakpoint"})]
     served.add("one", events=events, control={"paused": True, "breakpoints": [["/JOB/B", None]]})
     page = look(f"{served.start(token='t')}#token=t")
     page.click(".question.held .answer:text('Resume')")
@@ -146,7 +136,7 @@ def test_a_breakpoint_lets_the_operator_decide(served, look):
 @pytest.mark.parametrize("text", ["<img src=x onerror=alert(1)>", "x" * 5000, "\u202e\u65e5\u672c"])
 def test_words_of_questions_are_only_text(served, look, text):
     asked = {**ASKED, "text": text, "words": [text, text], "answers": ["yes", text]}
-    served.add("one", events=told(*WAITS[:2], ("QuestionAsked", "/JOB/A", asked)))
+    served.add("one", events=[*WAITS[:2], ("QuestionAsked", "/JOB/A", asked)])
     page = look(f"{served.start(token='t')}#token=t")
     page.wait_for_selector(OPEN)
     assert page.locator(f"{OPEN} img").count() == 0
@@ -155,7 +145,7 @@ def test_words_of_questions_are_only_text(served, look, text):
 
 @pytest.mark.browser
 def test_a_phone_shows_the_question_and_its_buttons_at_once(served, look):
-    served.add("one", events=told(*WAITS))
+    served.add("one", events=WAITS)
     page = look(f"{served.start(token='t')}#token=t")
     page.set_viewport_size({"width": 390, "height": 844})
     page.wait_for_selector(OPEN)

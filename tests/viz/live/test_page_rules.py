@@ -12,6 +12,7 @@ from dataclasses import asdict
 import pytest
 
 from smachpy import CBState, Concurrence, ConditionState, StateMachine
+from tests.browser import wait_for
 from viz.live import app
 from viz.live.machines import KEPT_RUNS
 
@@ -31,13 +32,6 @@ RUN = [
 def run(events=RUN):
     """The events, for one use."""
     return [(kind, path, dict(*more)) for kind, path, *more in events]
-
-
-def wait_for(page, condition, timeout=30.0):
-    deadline = time.monotonic() + timeout
-    while not page.evaluate(f"() => Boolean({condition})"):
-        assert time.monotonic() < deadline, f"never true: {condition}"
-        page.wait_for_timeout(50)
 
 
 def lit(page):
