@@ -34,6 +34,18 @@ def post(view, command, token):
         return error.code, json.loads(error.read())
 
 
+def note_answers(page):
+    """Keep in `seen` what is shown for three seconds only."""
+    page.evaluate(
+        """() => {
+            window.seen = "";
+            new MutationObserver(() => {
+                window.seen += document.querySelector(".question.over .hint")?.textContent ?? "";
+            }).observe(document.body, { childList: true, subtree: true, characterData: true });
+        }"""
+    )
+
+
 @pytest.fixture
 def no_leaks():
     """Processes of this module's fixtures outlive single tests."""
@@ -54,15 +66,8 @@ def test_a_question_is_answered_on_one_page_and_closes_on_all(errand, look):
         assert buttons.all_text_contents() == ["No, come back", "Yes, hand over"]
         wait_for(page, "document.querySelector('.question-picture').naturalWidth === 1")
     assert one.evaluate("() => document.activeElement.tagName") == "H3"
-    for page in (one, two):  # what is shown for three seconds only
-        page.evaluate(
-            """() => {
-                window.seen = "";
-                new MutationObserver(() => {
-                    window.seen += document.querySelector(".question.over .hint")?.textContent ?? "";
-                }).observe(document.body, { childList: true, subtree: true, characterData: true });
-            }"""
-        )
+    for page in (one, two):
+        note_answers(page)
     one.click(f"{OPEN} .answer.primary")
     for page in (one, two):
         wait_for(page, "window.seen.includes('answered yes by ann')")
@@ -75,6 +80,7 @@ def test_a_question_is_answered_on_one_page_and_closes_on_all(errand, look):
 def test_of_two_answers_at_once_one_counts(errand, look):
     page = look(f"{errand.base}?machine=errand#token={errand.token}")
     page.wait_for_selector(OPEN)
+    note_answers(page)
     answers = page.evaluate(
         """async () => {
           const [[path]] = Object.entries(smachpy.store.run.now.states).filter(([,
@@ -87,8 +93,7 @@ def test_of_two_answers_at_once_one_counts(errand, look):
     )
     assert [one["ok"] for one in answers].count(True) == 1
     (winner,) = (i for i, one in enumerate(answers) if one["ok"])
-    page.wait_for_selector(".question.over")
-    assert ("yes", "no")[winner % 2] in page.text_content(".question.over .hint")
+    wait_for(page, f"window.seen.includes('answered {('yes', 'no')[winner % 2]} by')")
 
 
 @pytest.mark.zenoh
@@ -120,6 +125,35 @@ def test_the_buttons_do_nothing_without_a_token_or_in_the_past(served, look):
     (sent,) = served.commands
     assert (sent["command"], sent["path"], sent["answer"]) == ("answer", "/JOB/A", "yes")
     assert sent["by"].startswith("page at ")
+
+
+@pytest.mark.browser
+def test_each_question_sounds_once(served, look):
+    """Not again when a newer one is answered and it is the newest that waits."""
+    machine = served.add("one", events=told(*WAITS[:2]))
+    page = look(f"{served.start(token='t')}#token=t")
+    page.evaluate(
+        """() => {
+            window.sounds = 0;
+            window.AudioContext = class extends AudioContext {
+                constructor() { super(); window.sounds += 1; }
+            };
+        }"""
+    )
+    later = {**ASKED, "service": "operator/questions/q2"}
+    answered = {"service": later["service"], "answer": "yes", "by": "ann"}
+    steps = [
+        (WAITS[2], 1, 1),
+        (("Entered", "/JOB/B"), 1, 1),
+        (("QuestionAsked", "/JOB/B", later), 2, 2),
+        (("QuestionAnswered", "/JOB/B", answered), 1, 2),
+    ]
+    for seq, (event, waiting, sounds) in enumerate(steps, 2):
+        machine.add(served.events(told(event), after=seq))
+        wait_for(page, f"document.querySelectorAll('{OPEN}').length === {waiting}")
+        wait_for(page, f"window.sounds >= {sounds}")
+    wait_for(page, "!document.querySelector('.question.over')")  # drawn again and again till then
+    assert page.evaluate("() => window.sounds") == 2
 
 
 @pytest.mark.browser

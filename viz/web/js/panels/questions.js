@@ -15,6 +15,9 @@ const LONGEST = 600; // characters of a question
 const TONES = [880, 1175]; // [Hz]
 const TONE_S = 0.16;
 
+/** When the questions that have sounded were asked: an older one that still waits is not new. */
+const heard = new Set();
+
 /** The questions of a live machine are those of now, whatever instant is looked at. */
 function questionsShown() {
   const isOver = isFile() || store.facts.value?.recorded;
@@ -31,13 +34,15 @@ export function Questions({ page }) {
   const others = store.machines.value.filter((one) => one.name !== facts?.name && one.stale == null);
   const elsewhere = others.reduce((sum, one) => sum + (one.questions ?? 0), 0);
   const title = titleOf(facts ? `${facts.label} \u2013 smachpy` : "smachpy", shown, elsewhere);
-  const newest = shown.findLast((one) => one.isOpen);
   useEffect(() => {
     if (!isFile()) document.title = title;
   }, [title]);
   useEffect(() => {
-    if (newest && store.sound.value && !isFile() && !facts?.recorded) chime();
-  }, [newest?.service]);
+    if (isFile() || facts?.recorded) return;
+    const unheard = shown.filter((one) => one.isOpen && !heard.has(one.asked));
+    for (const one of unheard) heard.add(one.asked);
+    if (unheard.length && store.sound.value) chime();
+  });
   if (!shown.length && !held.length) return null;
   return html`<section class="questions" aria-label="questions">
     ${shown.map((one) => html`<${Card} key=${`${one.path} ${one.asked}`} one=${one} page=${page} />`)}
