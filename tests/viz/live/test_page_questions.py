@@ -130,7 +130,7 @@ def test_the_buttons_do_nothing_without_a_token_or_in_the_past(served, look):
 @pytest.mark.browser
 def test_each_question_sounds_once(served, look):
     """Not again when a newer one is answered and it is the newest that waits."""
-    machine = served.add("one", events=told(*WAITS[:2]))
+    machine = served.add("one", events=WAITS[:2])
     page = look(f"{served.start(token='t')}#token=t")
     page.evaluate(
         """() => {
@@ -149,7 +149,7 @@ def test_each_question_sounds_once(served, look):
         (("QuestionAnswered", "/JOB/B", answered), 1, 2),
     ]
     for seq, (event, waiting, sounds) in enumerate(steps, 2):
-        machine.add(served.events(told(event), after=seq))
+        machine.add(served.events([event], after=seq))
         wait_for(page, f"document.querySelectorAll('{OPEN}').length === {waiting}")
         wait_for(page, f"window.sounds >= {sounds}")
     wait_for(page, "!document.querySelector('.question.over')")  # drawn again and again till then
