@@ -215,3 +215,9 @@ def test_long_outcomes_are_cut_with_the_whole_in_a_tip(served, look):
     page = look(served.start())
     assert page.evaluate("() => smachpy.page.diagram.size.w") < 600
     assert page.text_content(".pill title").startswith("x" * 300)
+
+
+def test_there_is_no_minimap_of_no_machine(served, look):
+    page = look(served.start(), drawn=False)
+    page.wait_for_selector("text=No machine on the network yet")
+    wait_for(page, "getComputedStyle(document.querySelector('.minimap')).opacity === '0'")
