@@ -28,7 +28,7 @@ from actionlib_core.interfaces import (
 from smachpy.compat import MODULES as SMACH_MODULES
 from smachpy.ros1 import python2
 from smachpy.ros1.session import session
-from smachpy.ros1.stubs import StubModule, StubSection
+from smachpy.ros1.stubs import OldSection, StubModule, StubSection
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -119,10 +119,11 @@ class _Alias(Loader):
 
 
 class _Stub(Loader):
-    """Makes a stand-in."""
+    """Makes a stand-in, or the interfaces of a package that is there."""
 
-    def __init__(self, *, known: bool = False) -> None:
+    def __init__(self, *, known: bool = False, complete: bool = False) -> None:
         self._known = known  # there is something of that name, which may lack a part
+        self._complete = complete  # what it lacks is an error
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         """Make a section of interfaces or a module."""
@@ -130,7 +131,7 @@ class _Stub(Loader):
         if section not in _SECTIONS:
             return StubModule(spec.name)
         known = import_module(f"{INTERFACES}.{spec.name}") if self._known else None
-        return StubSection(spec.name, known)
+        return (OldSection if self._complete else StubSection)(spec.name, known)
 
     def exec_module(self, module: ModuleType) -> None:
         """Nothing to run."""
@@ -196,8 +197,9 @@ class OldNames(MetaPathFinder):
         if not (has_interfaces and below in _SECTIONS):
             found = self._in_project(fullname, path)
         if found is None and has_interfaces and below in {"", *_SECTIONS}:
-            if below and self._stub_missing:
-                return ModuleSpec(fullname, _Stub(known=True), is_package=True)
+            if below:
+                loader = _Stub(known=True, complete=not self._stub_missing)
+                return ModuleSpec(fullname, loader, is_package=True)
             found = _alias(fullname, f"{INTERFACES}.{fullname}")
         return found or self._missing(fullname, path)
 
@@ -208,7 +210,7 @@ class OldNames(MetaPathFinder):
 
     def made(self, name: str, module: ModuleType) -> bool:
         """Tell whether a module was found by this finder."""
-        if self.claims(name) or isinstance(module, (StubModule, StubSection)):
+        if self.claims(name) or isinstance(module, (StubModule, OldSection)):
             return True
         return isinstance(getattr(module, "__loader__", None), OldSourceLoader)
 

@@ -28,6 +28,7 @@ from smachpy.ros1.hook import INTERFACES, MissingPackageError
 from smachpy.ros1.install import install
 from smachpy.ros1.project import Project
 from smachpy.ros1.session import Session, Stop
+from smachpy.ros1.stubs import Anything
 from smachpy.run.threads import OBSERVERS
 
 if TYPE_CHECKING:
@@ -236,6 +237,13 @@ def _node_in_force(_name: str) -> Node:
     return get_node()
 
 
+class _DryNode(Node):
+    """A node of a program that is only built: a stand-in, say a missing parameter, names itself."""
+
+    def resolve(self, name: str, kind: str = "name") -> str:
+        return super().resolve(str(name) if isinstance(name, Anything) else name, kind)
+
+
 def _go_virtual(stack: contextlib.ExitStack) -> None:
     """Enter a clock and a network in memory, unless the caller has such a clock in force."""
     clock = current_clock()
@@ -246,7 +254,9 @@ def _go_virtual(stack: contextlib.ExitStack) -> None:
     stack.enter_context(use_clock(made))
     stack.enter_context(use_shutdown(Shutdown()))
     stack.enter_context(made.patched())
-    node = stack.enter_context(Node("script", transport=MemoryNetwork(made).session(), clock=made))
+    node = stack.enter_context(
+        _DryNode("script", transport=MemoryNetwork(made).session(), clock=made)
+    )
     stack.enter_context(use_node(node))
 
 

@@ -12,6 +12,7 @@ import re
 import sys
 import types
 from dis import opname
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -118,16 +119,46 @@ class Anything:
         return (Anything,)
 
 
-def unbound_names(frame: FrameType | None) -> list[str]:
-    """Return the names that the importing file reads and nothing in it binds."""
-    while frame is not None and "importlib" in frame.f_code.co_filename:
+def _importing(frame: FrameType | None) -> tuple[ast.AST | None, dict[str, Any]]:
+    """Return the tree of the file that imports, and its globals; no tree if it cannot be read."""
+    while frame is not None and ("importlib" in frame.f_code.co_filename or _is_here(frame)):
         frame = frame.f_back
     if frame is None:
-        return []
+        return None, {}
+    file = frame.f_code.co_filename
     try:
-        tree = to_tree(Path(frame.f_code.co_filename).read_bytes(), frame.f_code.co_filename)
+        return to_tree(Path(file).read_bytes(), file), frame.f_globals
     except (OSError, SyntaxError):
-        return []
+        return None, {}
+
+
+def _is_here(frame: FrameType) -> bool:
+    return frame.f_code.co_filename == __file__
+
+
+def service_names(frame: FrameType | None) -> set[str]:
+    """Return the names in the importing file that are used as the class of a service."""
+    tree, _ = _importing(frame)
+    calls = [] if tree is None else [n for n in ast.walk(tree) if isinstance(n, ast.Call)]
+    names = set()
+    for call in calls:
+        called = call.func.attr if isinstance(call.func, ast.Attribute) else ""
+        called = call.func.id if isinstance(call.func, ast.Name) else called
+        if called in _SERVICE_CALLS and len(call.args) > 1 and isinstance(call.args[1], ast.Name):
+            names.add(call.args[1].id)
+    return names & set(_unbound(tree)) if tree is not None else set()
+
+
+_SERVICE_CALLS = frozenset({"Service", "ServiceProxy", "ServiceState"})
+
+
+def unbound_names(frame: FrameType | None) -> list[str]:
+    """Return the names that the importing file reads, nothing in it binds and it has not yet."""
+    tree, there = _importing(frame)
+    return [] if tree is None else [name for name in _unbound(tree) if name not in there]
+
+
+def _unbound(tree: ast.AST) -> list[str]:
     read = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)}
     for node in ast.walk(tree):
         if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
@@ -138,7 +169,7 @@ def unbound_names(frame: FrameType | None) -> list[str]:
             read.discard(node.arg)
         elif isinstance(node, ast.Import | ast.ImportFrom):
             read -= {(name.asname or name.name).partition(".")[0] for name in node.names}
-    return sorted(read - set(frame.f_globals) - set(dir(builtins)))
+    return sorted(read - set(dir(builtins)))
 
 
 def _wanted_items(frame: FrameType) -> int:
@@ -196,7 +227,52 @@ def stand_in_class(name: str) -> type:
     )
 
 
-class StubSection(types.ModuleType):
+class OldSection(types.ModuleType):
+    """`pkg.msg` or `pkg.srv` of a package that is there, as ROS 1's generator wrote it.
+
+    A star import gives what its modules import themselves, too: scripts use `std_msgs.msg.Bool` or
+    `sys` and import neither.
+
+    Args:
+        name: Its full name.
+        known: The module here.
+    """
+
+    def __init__(self, name: str, known: Any) -> None:
+        super().__init__(name, known.__doc__)
+        self._package = name.partition(".")[0]
+        self._known = known
+        self._leaked: tuple[str, ...] = ()
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "__all__":
+            names = list(self._known.__all__)
+            self._leaked = (*_GENERATED, *sorted(_packages_of(self._known, names)))
+            return [*names, *self._leaked]
+        if name in self._leaked:
+            return import_module(name)
+        return getattr(self._known, name)
+
+    def __dir__(self) -> list[str]:
+        return dir(self._known)
+
+
+_GENERATED = ("codecs", "genpy", "struct", "sys")
+
+
+def _packages_of(section: Any, names: list[str]) -> set[str]:
+    """Return the packages whose messages are fields of those in a section."""
+    found = set()
+    for name in names:
+        try:
+            fields = getattr(getattr(section, name), "_slot_types", ())
+        except InterfaceError:  # the definition of a field's type is missing
+            continue
+        found |= {field.partition("/")[0] for field in fields if "/" in field}
+    return found
+
+
+class StubSection(OldSection):
     """`pkg.msg` or `pkg.srv` of a package that is missing, or lacks some: made when named.
 
     Args:
@@ -205,17 +281,19 @@ class StubSection(types.ModuleType):
     """
 
     def __init__(self, name: str, known: Any = None) -> None:
-        super().__init__(name, "Stand-ins for the interfaces of a package that is missing.")
+        super().__init__(name, known)
+        self.__doc__ = "Stand-ins for the interfaces of a package that is missing."
         self.__file__ = None
         self.__path__: list[str] = []
-        self._package, _, self._kind = name.partition(".")
-        self._known = known
+        self._kind = name.partition(".")[2]
         self._names: list[str] = list(known.__all__) if known is not None else []
 
     def __getattr__(self, name: str) -> Any:
         if name == "__all__":
-            used = [each for each in unbound_names(sys._getframe(1)) if each[0].isupper()]
-            return [*self._names, *(each for each in used if each not in self._names)]
+            there = super().__getattr__(name) if self._known is not None else []
+            return [*there, *self._stand_ins(sys._getframe(1), there)]
+        if name in self._leaked:
+            return import_module(name)
         if name.startswith("_"):
             raise AttributeError(name)
         if name in self._names:
@@ -225,6 +303,18 @@ class StubSection(types.ModuleType):
         value = make(self._package, name)
         setattr(self, name, value)
         return value
+
+    def _stand_ins(self, frame: FrameType | None, there: list[str]) -> list[str]:
+        """Return the names that a star import gives beyond those that are there.
+
+        What a script calls a service with is none of a `msg`, and of a `srv` whatever its case.
+        """
+        unbound, services = unbound_names(frame), service_names(frame)
+        if self._kind == "srv":
+            used = sorted({each for each in unbound if each[0].isupper()} | services)
+        else:
+            used = [each for each in unbound if each[0].isupper() and each not in services]
+        return [each for each in used if each not in there]
 
     def _resolved(self, name: str) -> Any:
         """Return a class that is there; types that it uses and nobody has are empty."""

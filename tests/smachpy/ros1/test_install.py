@@ -115,6 +115,30 @@ def test_what_packages_depend_on(tmp_path):
             pack.get_depends("nobody")
 
 
+@pytest.mark.parametrize("stub_missing", [False, True])
+def test_a_star_import_gives_what_generated_modules_import(tmp_path, stub_missing):
+    (tmp_path / "uses.py").write_text(
+        "from actionlib_msgs.msg import *\n"
+        "from geometry_msgs.msg import *\n"
+        "made = std_msgs.msg.Bool(True), geometry_msgs.msg.Pose(), GoalID, sys.argv, genpy.Time\n"
+    )
+    with ros1.installed(tmp_path / "script.py", stub_missing=stub_missing):
+        assert importlib.import_module("uses").made[0].data is True
+
+
+def test_services_of_a_missing_package_are_services_though_its_messages_come_first(tmp_path):
+    (tmp_path / "uses.py").write_text(
+        "import rospy\nfrom jaw_msgs.msg import *\nfrom jaw_msgs.srv import *\n"
+        "def proxies():\n"
+        "    return rospy.ServiceProxy('home', HomeJaw), rospy.ServiceProxy('open', open_jaw)\n"
+        "def message():\n    return JawState()\n"
+    )
+    with ros1.installed(tmp_path / "script.py", stub_missing=True):
+        uses = importlib.import_module("uses")
+        assert uses.HomeJaw._request_class is not uses.open_jaw._request_class
+        assert uses.message().anything is not None
+
+
 def test_messages_of_the_packages_around(tmp_path):
     scripts = tmp_path / "my_stack" / "my_robot" / "scripts"
     scripts.mkdir(parents=True)

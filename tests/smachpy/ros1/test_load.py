@@ -207,6 +207,25 @@ sm.execute()
 )
 
 
+def test_missing_parameters_name_topics_services_and_the_node(robot):
+    robot.write_text(
+        """
+import rospy, smach
+from std_msgs.msg import Bool
+from std_srvs.srv import Empty
+rospy.init_node(rospy.get_param('~name'))
+rospy.Publisher(rospy.get_param('~out'), Bool, queue_size=1)
+rospy.Subscriber(rospy.get_param('~in') + '/raw', Bool)
+rospy.ServiceProxy(rospy.get_param('~service'), Empty)
+sm = smach.StateMachine(outcomes=['done'])
+with sm:
+    smach.StateMachine.add('A', smach.CBState(lambda _: 'done', outcomes=['done']))
+sm.execute()
+"""
+    )
+    assert list(ros1.load(robot, stub_missing=True).get_children()) == ["A"]
+
+
 @pytest.mark.slow
 def test_an_action_with_a_type_of_nobody(robot):
     robot.write_text(ACTION)

@@ -24,6 +24,7 @@ from actionlib_core.time import Time
 from actionlib_core.yaml_text import load_yaml
 from smachpy.ros1.names.rospy.exceptions import ROSException, ROSInitException
 from smachpy.ros1.session import session
+from smachpy.ros1.stubs import Anything
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -83,6 +84,8 @@ def init_node(
         ROSException: called again with another name.
     """
     del disable_rostime, xmlrpc_port, tcpros_port
+    if isinstance(name, Anything):
+        name = str(name)
     if not name or not isinstance(name, str):
         raise ValueError(f"init_node: name: got {name!r}; expected a word.")
     if log_level is not None:
