@@ -349,15 +349,19 @@ def run_one(task: Task) -> Result:
 def _execute(task: Task) -> tuple[str | None, str]:
     """Do a run; return its outcome, or None and why it was ended."""
     target = load_target(task.mission)
+    own = {*parameters_of(target.thing)}
+    if not own and task.values.keys() & SHORT.keys():  # the mission's key comes before the robot's
+        own = {*describe(target.build()).input_keys}
+    robot = _robot_parameters()
     robot_values = {
         SHORT.get(key, key): value
         for key, value in task.values.items()
-        if key not in parameters_of(target.thing) and SHORT.get(key, key) in _robot_parameters()
+        if key not in own and SHORT.get(key, key) in robot
     }
     inputs = {
         key: Text(value) if isinstance(value, str) else value
         for key, value in task.values.items()
-        if SHORT.get(key, key) not in robot_values
+        if key in own or SHORT.get(key, key) not in robot_values
     }
     info = mission_info(target.thing)
     with contextlib.ExitStack() as stack:
@@ -366,9 +370,9 @@ def _execute(task: Task) -> tuple[str | None, str]:
             config = task.file.with_suffix(".yaml")
             _write_config(config, robot_values)
             stack.callback(config.unlink)
-        robot = RobotOptions(start=True, map=OFFICE_MAP, config=config, world=info.world)
+        options = RobotOptions(start=True, map=OFFICE_MAP, config=config, world=info.world)
         surroundings = stack.enter_context(
-            open_surroundings(Pace(virtual=True, seed=task.seed), robot, NO_NAMES, "")
+            open_surroundings(Pace(virtual=True, seed=task.seed), options, NO_NAMES, "")
         )
         machine = build(target, inputs)
         needed = needed_servers(describe(machine))

@@ -111,6 +111,27 @@ def test_other_executors_do_it_too(job, tmp_path):
     assert [result.outcome for result in results] == ["succeeded"] * 2
 
 
+CHARGED = """
+import smachpy
+
+@smachpy.cb_interface(input_keys=["battery"], outcomes=["done", "failed"])
+def go(userdata):
+    return "done" if userdata.battery > 0.5 else "failed"
+
+def mission():
+    sm = smachpy.StateMachine(outcomes=["done", "failed"], input_keys=["battery"])
+    with sm:
+        smachpy.StateMachine.add("GO", smachpy.CBState(go))
+    return sm
+"""
+
+
+def test_a_key_of_the_mission_comes_before_a_short_name_of_the_robots_parameters(tmp_path):
+    (tmp_path / "charged.py").write_text(CHARGED)
+    plan = Plan(str(tmp_path / "charged.py"), 2, tmp_path, [Vary.read("battery=0.2,0.8")])
+    assert [one.outcome for one in simulate(plan, Here())] == ["failed", "done"]
+
+
 def test_parameters_of_the_robot_can_vary(tmp_path):
     results = simulate(
         Plan("there_and_back", 2, tmp_path, [Vary.read("robot.max_speed=0.5..0.9")]), Here()
