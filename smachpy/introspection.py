@@ -20,6 +20,9 @@ from typing import (
     get_type_hints,
 )
 
+from smachpy.exceptions import InvalidStateError
+from smachpy.machines.names import missing_init
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -253,7 +256,15 @@ def describe(machine: Described, *, name: str | None = None) -> StateRecord:
 def _describe(
     state: Described, path: str, label: str, remapping: tuple[tuple[str, str], ...]
 ) -> StateRecord:
-    kind, details = state.describe_details()
+    try:
+        kind, details = state.describe_details()
+    except AttributeError as error:
+        hint = missing_init(state, error)
+        if not hint:
+            raise
+        raise InvalidStateError(
+            f"{path}: state: got a {type(state).__name__} that is not initialised.{hint}"
+        ) from error
     structure = state.describe_structure()
     children = tuple(
         _describe(child, f"{path}/{child_label}", child_label, child_remapping)

@@ -24,6 +24,20 @@ def name_of(function: object) -> str:
     return str(name or type(function).__name__).rpartition("<locals>.")[2]
 
 
+def missing_init(state: object, error: BaseException) -> str:
+    """Return what to try when a state lacks an attribute as its own `__init__` called no other."""
+    lacks = getattr(error, "name", None) or ""
+    for kind in type(state).__mro__:
+        ours = kind.__module__.startswith("smachpy.")
+        if ours and lacks.startswith(f"_{kind.__name__.lstrip('_')}__"):
+            name = type(state).__name__
+            return (
+                f" {name}.__init__ did not call {kind.__name__}.__init__. Try as its first line "
+                f"`super().__init__(...)` with the arguments of {kind.__name__}."
+            )
+    return ""
+
+
 def unique_names(names: Iterable[str], what: str = "names") -> tuple[str, ...]:
     """Return `names` without repeats, in their order.
 

@@ -6,6 +6,7 @@ import contextlib
 import gc
 import linecache
 import os
+import re
 import signal
 import sys
 import threading
@@ -241,7 +242,9 @@ class _DryNode(Node):
     """A node of a program that is only built: a stand-in, say a missing parameter, names itself."""
 
     def resolve(self, name: str, kind: str = "name") -> str:
-        return super().resolve(str(name) if isinstance(name, Anything) else name, kind)
+        if isinstance(name, Anything):
+            name = re.sub(r"\W+", "_", str(name))
+        return super().resolve(name, kind)
 
 
 def _go_virtual(stack: contextlib.ExitStack) -> None:

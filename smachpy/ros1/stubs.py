@@ -218,9 +218,18 @@ class StubModule(types.ModuleType):
         return value
 
 
+class _AnyClass(type):
+    """A class that has every name: what looked like a class may be a module."""
+
+    def __getattr__(cls, name: str) -> Any:
+        if name.startswith("_") or name in _MARKS:
+            raise AttributeError(name)
+        return stand_in_class(name) if name[:1].isupper() else Anything(name)
+
+
 def stand_in_class(name: str) -> type:
     """Return a class of stand-ins."""
-    return type(
+    return _AnyClass(
         name,
         (Anything,),
         {"__init__": lambda self, *_args, **_kwargs: Anything.__init__(self, name)},

@@ -12,7 +12,7 @@ from actionlib_core import shutdown
 from smachpy.context import current_frame
 from smachpy.events import Entered, Failed, Left, Retried, UserdataWritten
 from smachpy.exceptions import InvalidUserCodeError
-from smachpy.machines.names import name_of
+from smachpy.machines.names import missing_init, name_of
 from smachpy.run.callback import call_bounded
 from smachpy.run.frame import SUBSCRIPTIONS, clock_of_run
 from smachpy.run.grace import (
@@ -594,6 +594,7 @@ class ChildErrors(ExceptionGroup[Exception]):
 
 def user_error(path: str, state: Child, error: BaseException) -> InvalidUserCodeError:
     """Return the error for code of a state that raised; raise it `from error`."""
+    hint = missing_init(state, error) if isinstance(error, AttributeError) else ""
     return InvalidUserCodeError(
-        f"{path}: {type(state).__name__} raised {type(error).__name__}: {error}", path=path
+        f"{path}: {type(state).__name__} raised {type(error).__name__}: {error}{hint}", path=path
     )

@@ -8,8 +8,10 @@ import pytest
 
 from actionlib_core.interfaces.std_msgs.msg import Int32
 from actionlib_core.pubsub.topic import Publisher
-from smachpy import StateMachine, UserData, cb_interface, events
+from smachpy import State, StateMachine, UserData, cb_interface, events
 from smachpy.actions.monitor_state import MonitorState
+from smachpy.exceptions import InvalidStateError, InvalidUserCodeError
+from smachpy.introspection import describe
 from tests.two_nodes import TwoNodes
 
 
@@ -179,3 +181,28 @@ def test_it_describes_itself(world):
         "checks": "3",
         "timeout": "4 s -> aborted",
     }
+
+
+class Uninitialised(MonitorState):
+    def __init__(self):
+        State.__init__(self, outcomes=["valid", "invalid", "preempted"])
+
+
+def test_a_class_that_skips_its_init_is_named_where_it_is_described_and_where_it_runs():
+    sm = StateMachine(outcomes=["valid", "invalid", "preempted"])
+    sm.add("WATCH", Uninitialised())
+    with pytest.raises(InvalidStateError, match=r"/WATCH.*MonitorState\.__init__"):
+        describe(sm)
+    with pytest.raises(InvalidUserCodeError, match=r"/WATCH.*MonitorState\.__init__"):
+        sm.execute()
+
+
+def test_other_missing_attributes_are_the_states_own():
+    class Broken(MonitorState):
+        def describe_details(self):
+            return self.nothing
+
+    sm = StateMachine(outcomes=["valid", "invalid", "preempted"])
+    sm.add("WATCH", Broken("level", Int32, lambda _userdata, _message: True))
+    with pytest.raises(AttributeError):
+        describe(sm)

@@ -213,7 +213,11 @@ def test_missing_parameters_name_topics_services_and_the_node(robot):
 import rospy, smach
 from std_msgs.msg import Bool
 from std_srvs.srv import Empty
+import nobody_lib
+from nobody_heads import Tilt
 rospy.init_node(rospy.get_param('~name'))
+rospy.Publisher(nobody_lib.join('a', 'b'), Bool, queue_size=1)
+Tilt.Tilt(3).go()
 rospy.Publisher(rospy.get_param('~out'), Bool, queue_size=1)
 rospy.Subscriber(rospy.get_param('~in') + '/raw', Bool)
 rospy.ServiceProxy(rospy.get_param('~service'), Empty)

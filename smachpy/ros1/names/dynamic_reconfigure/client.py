@@ -13,6 +13,7 @@ from smachpy.ros1.names.rospy.exceptions import ROSException
 from smachpy.ros1.names.rospy.service import ServiceProxy
 from smachpy.ros1.names.rospy.topics import Subscriber
 from smachpy.ros1.session import session
+from smachpy.ros1.stubs import Anything
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -100,8 +101,8 @@ def _write(changes: dict[str, Any]) -> Any:
             config.ints = [*config.ints, {"name": name, "value": value}]
         elif isinstance(value, float):
             config.doubles = [*config.doubles, {"name": name, "value": value}]
-        elif isinstance(value, str):
-            config.strs = [*config.strs, {"name": name, "value": value}]
+        elif isinstance(value, (str, Anything)):
+            config.strs = [*config.strs, {"name": name, "value": str(value)}]
         else:
             raise DynamicReconfigureParameterException(
                 f"{name}: got {value!r}; expected a bool, a number or a text."
