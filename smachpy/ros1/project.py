@@ -10,6 +10,7 @@ import os
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
+from xml.etree import ElementTree as ET
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -58,6 +59,23 @@ class Project:
         texts = (_read(self.packages()[package] / name) for name in _MANIFESTS)
         found = (_DEPENDS.findall(_COMMENT.sub("", text)) for text in texts)
         return sorted({a or b for names in found for a, b in names})
+
+    def exports(self, package: str, tag: str, attribute: str) -> list[str]:
+        """Return the values of an attribute of the tags in <export> of a package's manifest.
+
+        Raises:
+            ValueError: a manifest is no XML.
+        """
+        found = []
+        for file in (self.packages()[package] / name for name in _MANIFESTS):
+            text = _read(file)
+            try:
+                root = ET.fromstring(text or "<package/>")  # noqa: S314  beside code that is run
+            except ET.ParseError as error:
+                raise ValueError(f"{file}: {error}") from error
+            values = (one.get(attribute) for one in root.iterfind(f"export/{tag}"))
+            found += [value for value in values if value is not None]
+        return found
 
     def interfaces_of(self, package: str) -> dict[str, list[Path]]:
         """Return kind -> files of the definitions of a package of the project; empty for none."""

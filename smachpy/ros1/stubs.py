@@ -184,7 +184,7 @@ def _number(name: str) -> Callable[..., Any]:
     def operate(self: Anything, *others: Any) -> Any:
         if others and isinstance(others[0], str | list | tuple):
             return others[0] if name != "mod" else str(self)
-        return 0.0
+        return 0  # whole, as `range` takes it too
 
     operate.__name__ = name
     return operate

@@ -97,7 +97,8 @@ def test_what_packages_depend_on(tmp_path):
         "<exec_depend version_gte='1'> arm_msgs </exec_depend><test_depend>tests</test_depend>"
         "<!-- <depend>commented_out</depend> --><buildtool_depend>catkin</buildtool_depend>",
         "arm_msgs/package.xml": "<name>arm_msgs</name><depend>std_msgs</depend><depend>arm</depend>",
-        "old/manifest.xml": '<package><depend package="arm"/></package>',
+        "old/manifest.xml": '<package><depend package="arm"/>'
+        '<export><cpp cflags="-I"/><cpp libs="-l"/></export></package>',
     }
     for name, text in manifests.items():
         file = tmp_path / name
@@ -113,6 +114,9 @@ def test_what_packages_depend_on(tmp_path):
         assert pack.get_depends_on("std_msgs") == ["arm", "arm_msgs", "old"]
         with pytest.raises(rospkg.ResourceNotFound):
             pack.get_depends("nobody")
+        assert pack.get_manifest("old").get_export("cpp", "libs") == ["-l"]
+        with pytest.raises(rospkg.InvalidManifest):  # two roots
+            pack.get_manifest("arm").get_export("cpp", "libs")
 
 
 @pytest.mark.parametrize("stub_missing", [False, True])

@@ -15,6 +15,35 @@ class ResourceNotFound(Exception):  # noqa: N818  rospkg's name
     """There is no such package around the program."""
 
 
+class InvalidManifest(Exception):  # noqa: N818  rospkg's name
+    """A manifest is no XML."""
+
+
+class Manifest:
+    """What package.xml or manifest.xml says.
+
+    Args:
+        name: The package's name.
+        filename: Its folder.
+    """
+
+    def __init__(self, name: str, filename: str) -> None:
+        self.name = name
+        self.filename = filename
+        self.depends = current_project().depends(name)
+
+    def get_export(self, tag: str, attr: str) -> Sequence[str]:
+        """Return the values of an attribute of the tags in <export>.
+
+        Raises:
+            InvalidManifest: it is no XML.
+        """
+        try:
+            return current_project().exports(self.name, tag, attr)
+        except ValueError as error:
+            raise InvalidManifest(str(error)) from error
+
+
 class RosPack:
     """Finds packages in the repository of the program."""
 
@@ -54,6 +83,14 @@ class RosPack:
                 if implicit and one in project.packages():
                     left += project.depends(one)
         return [*found]
+
+    def get_manifest(self, name: str) -> Manifest:
+        """Return a package's manifest.
+
+        Raises:
+            ResourceNotFound: there is no package of that name.
+        """
+        return Manifest(name, str(_folder_of(name)))
 
     def get_depends_on(self, name: str, implicit: bool = True) -> Sequence[str]:
         """Return the packages that depend on one; `implicit`: by way of others too."""
