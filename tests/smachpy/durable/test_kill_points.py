@@ -156,10 +156,16 @@ def test_a_run_killed_at_any_write_ends_as_one_that_is_not(tree: Tree) -> None:
         for written in (False, True):
             world, store = World(), KillingStore()
             store.arm(kill_at, written=written)
-            assert live(tree, world, store) is None
-            store.arm(0, written=False)
-            assert live(tree, world, store) == expected, (kill_at, written)
-            check_deeds(calm, world, exact=written)
+            ended = live(tree, world, store)
+            has_ended = store.rows["m"].status == "ended"
+            # Branches may share more writes than in the calm run: this one may be the last, or none.
+            assert is_parallel(tree) or (ended is None and not has_ended)
+            if not has_ended:
+                store.arm(0, written=False)
+                ended = live(tree, world, store)
+            if ended is not None or not has_ended:
+                assert ended == expected, (kill_at, written)
+            check_deeds(calm, world, exact=written and not is_parallel(tree))
 
 
 @pytest.mark.timeout(300)  # hundreds of runs; on a busy machine they take minutes
@@ -183,7 +189,18 @@ def test_a_run_killed_again_and_again_ends_as_one_that_is_not(
     if ended is not None:
         assert ended == expected
     assert read_position(store, "m").data["outcome"] == (expected or ("",))[0]
-    check_deeds(calm, world, exact=all(written for _, written in kills))
+    exact = all(written for _, written in kills) and not is_parallel(tree)
+    check_deeds(calm, world, exact=exact)
+
+
+def is_parallel(tree: Tree) -> bool:
+    """Tell whether branches run side by side.
+
+    Their timing decides how many of them share a write, and a kill at the write of one may come
+    between a call of another one and the write of its result, so that the call is repeated.
+    """
+    kind, below = tree
+    return (kind == "concurrence" and len(below) > 1) or any(map(is_parallel, below))
 
 
 def check_deeds(calm: World, world: World, *, exact: bool) -> None:
