@@ -127,7 +127,7 @@ class Field:
     """One field: its ROS name, the Python attribute (they differ for keywords), its type.
 
     Attributes:
-        default: ROS 2's default value, None for that of the type.
+        default: ROS 2's default value, None for that of the type; a tuple, or bytes, of an array.
     """
 
     name: str
@@ -361,7 +361,8 @@ class _Ros2Reader(_Reader):
         quote = ""
         for index, character in enumerate(line):
             if quote:
-                quote = "" if character == quote else quote
+                escaped = line[index - 1] == "\\"
+                quote = "" if character == quote and not escaped else quote
             elif character == "#":
                 return line[:index], line[index + 1 :]
             elif character in {'"', "'"}:
@@ -447,15 +448,15 @@ def _ros2_value(kind: FieldType, text: str) -> Any:
         if not (kind.is_builtin and text.startswith("[") and text.endswith("]")):
             raise ValueError(f"got {text!r}; expected `[value, ...]` for an array of built-in type")
         # Commas within quotes do not separate.
-        parts = re.findall(r"\"[^\"]*\"|'[^']*'|[^,]+", text[1:-1])
+        parts = re.findall(r"\"(?:\\.|[^\"\\])*\"|'(?:\\.|[^'\\])*'|[^,]+", text[1:-1])
         values = [_ros2_value(kind.element, part.strip()) for part in parts if part.strip()]
         if kind.length not in {None, len(values)} or len(values) > (kind.most or len(values)):
             raise ValueError(f"got {len(values)} values; expected {kind}")
-        return bytes(values) if kind.base in OCTETS else values
+        return bytes(values) if kind.base in OCTETS else tuple(values)
     if not kind.is_builtin:
         raise ValueError(f"got {text!r}; expected none, the type is a message")
     if kind.base == "string" and len(text) > 1 and text[0] == text[-1] and text[0] in "\"'":
-        text = text[1:-1]
+        text = text[1:-1].replace(f"\\{text[0]}", text[0])
     return _constant_value(kind.base, text)
 
 

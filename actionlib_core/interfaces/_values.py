@@ -47,13 +47,16 @@ def default_source(
     field: Field, resolve: Callable[[str], type[Message]], scope: dict[str, Any]
 ) -> str:
     """Return the Python expression of a field's default value, its names put into `scope`."""
-    if isinstance(field.default, float):
-        return f"float({str(field.default)!r})"  # inf and nan have no literal
+    if isinstance(field.default, tuple):
+        return f"[{', '.join(map(_literal, field.default))}]"
     if field.default is not None:
-        return (
-            f"list({field.default!r})" if isinstance(field.default, list) else repr(field.default)
-        )
+        return _literal(field.default)
     return _type_default(field.type, resolve, scope)
+
+
+def _literal(value: Any) -> str:
+    # inf and nan have no literal
+    return f"float({str(value)!r})" if isinstance(value, float) else repr(value)
 
 
 def _type_default(
@@ -206,7 +209,7 @@ class _Check:
         base = kind.base
         try:
             if base in ROS2_TIMES and not isinstance(value, cls._nested[base]):
-                return self._ros2_time(cls._nested[base], value)
+                return self._ros2_time(cls._nested[base], value, path)
             if base not in _CONVERTERS:
                 return self.message(cls._nested[base], value, path)
             if self._from_plain and base in {"time", "duration"}:
@@ -220,7 +223,9 @@ class _Check:
             return None
         return result
 
-    def _ros2_time(self, cls: type[AnyMessage], value: Any) -> AnyMessage:
+    def _ros2_time(self, cls: type[AnyMessage], value: Any, path: str) -> Message | None:
+        if self._from_plain and hasattr(value, "keys") and set(value) <= set(cls.__slots__):
+            return self.message(cls, value, path)  # may be before 1970, which our `Time` is not
         if self._from_plain:
             value = _plain_time(value)
         return to_ros2_time(cls, value)

@@ -105,8 +105,8 @@ def test_distributions_differ() -> None:
     assert ros2.distros_of(sent, "RIHS01_0") == []
     assert ros2_registry("humble").hash(sent) == "TypeHashNotSupported"
     assert ros2.get_service("std_srvs/SetBool", "humble")._rihs01 == ros2.NO_HASH
-    with pytest.raises(InterfaceError, match="Kilted, Lyrical, Rolling has it"):
-        ros2.get_message("nav_msgs/msg/Goals", "jazzy")
+    with pytest.raises(InterfaceError, match="Jazzy, Kilted, Lyrical, Rolling has it"):
+        ros2.get_message("nav_msgs/msg/Goals", "humble")
     with pytest.raises(InterfaceError, match="Did you mean 'jazzy'"):
         ros2.get_message("nav_msgs/msg/Path", "jazy")
 
@@ -256,6 +256,29 @@ def test_defaults_of_a_definition() -> None:
     assert DockRobot.Goal().max_staging_time == 1000.0
 
 
+def test_defaults_of_arrays() -> None:
+    registry = Ros2Registry("jazzy", ours=True)
+    text = "int32[] a [1, -2]\nfloat64[2] b [0.5, inf]\nstring[<=2] c ['x, y', \"z\"]\nbyte[2] d [1, 255]"
+    cls: Any = registry.define("msg", "p/msg/Arrays", text)
+    message = cls()
+    assert (message.a, message.b, message.c) == ([1, -2], [0.5, math.inf], ["x, y", "z"])
+    assert message.d == b"\1\xff"
+    message.a.append(3)
+    assert cls().a == [1, -2]
+    assert cls.from_cdr(cls().to_cdr()) == cls()
+
+
+def test_quotes_in_quotes() -> None:
+    registry = Ros2Registry("jazzy", ours=True)
+    text = """string A='it\\'s # all' # so
+string a "say \\"#\\"" # so
+string[] b ["x, \\"y\\"", 'it\\'s']
+string c 'a "b"'"""
+    cls: Any = registry.define("msg", "p/msg/Quotes", text)
+    assert cls.A == "it's # all"
+    assert (cls().a, cls().b, cls().c) == ('say "#"', ['x, "y"', "it's"], 'a "b"')
+
+
 def test_stamps_take_times_and_seconds() -> None:
     from actionlib_core.interfaces.ros2.builtin_interfaces.msg import Duration as Duration2
     from actionlib_core.interfaces.ros2.builtin_interfaces.msg import Time as Time2
@@ -268,6 +291,10 @@ def test_stamps_take_times_and_seconds() -> None:
     assert Header.from_cdr(header.to_cdr()).stamp == Time2(sec=2)
     assert Header.from_dict({"stamp": {"sec": 1, "nanosec": 2}}).stamp == Time2(1, 2)
     assert Header.from_dict({"stamp": 1.5}).stamp.nanosec == 500_000_000
+    before_1970 = Header(stamp=Time2(sec=-5, nanosec=4_000_000_000))
+    assert Header.from_dict(before_1970.to_dict()) == before_1970
+    with pytest.raises(FieldError, match="sec: expected int32"):
+        Header.from_dict({"stamp": {"sec": 2**31}})
     from actionlib_core.interfaces.nav2_msgs.action import Wait
 
     assert Wait.Goal(time=Duration(-0.5)).time == Duration2(-1, 500_000_000)

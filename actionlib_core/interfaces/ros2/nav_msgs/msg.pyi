@@ -6,6 +6,15 @@ import actionlib_core.interfaces.ros2.std_msgs.msg as _std_msgs_msg
 from actionlib_core.interfaces import Ros2Message as _Ros2Message
 from actionlib_core.time import Time as _Time
 
+class Goals(_Ros2Message):
+    header: _std_msgs_msg.Header
+    goals: list[_geometry_msgs_msg.PoseStamped]
+    def __init__(
+        self,
+        header: _std_msgs_msg.Header | None = None,
+        goals: _Collection[_geometry_msgs_msg.PoseStamped] | None = None,
+    ) -> None: ...
+
 class GridCells(_Ros2Message):
     header: _std_msgs_msg.Header
     cell_width: float
