@@ -3,8 +3,8 @@
 export PYTHON
 export VENV := .venv$(if $(PYTHON),-$(patsubst python%,%,$(notdir $(PYTHON))))
 BIN := $(VENV)/bin
-DEFAULT_TESTS := -m "not slow and not browser and not ros1 and not postgres"
-# Continuous integration (CI=true) runs the slow tests, those in a browser, with ROS 1 and with PostgreSQL too.
+DEFAULT_TESTS := -m "not slow and not browser and not ros1 and not rclpy and not postgres"
+# Continuous integration (CI=true) runs the slow tests, those in a browser, with ROS 1, rclpy and PostgreSQL too.
 TESTS := $(if $(CI),,$(DEFAULT_TESTS))
 # One worker more than two cores: many tests wait for processes.
 WORKERS := -n 3 --dist worksteal
