@@ -6,7 +6,6 @@ import contextlib
 import gc
 import linecache
 import os
-import re
 import signal
 import sys
 import threading
@@ -242,9 +241,7 @@ class _DryNode(Node):
     """A node of a program that is only built: a stand-in, say a missing parameter, names itself."""
 
     def resolve(self, name: str, kind: str = "name") -> str:
-        if isinstance(name, Anything):
-            name = re.sub(r"\W+", "_", str(name))
-        return super().resolve(name, kind)
+        return super().resolve(str(name) if isinstance(name, Anything) else name, kind)
 
 
 def _go_virtual(stack: contextlib.ExitStack) -> None:

@@ -36,7 +36,7 @@ _MARKS = frozenset({"_md5sum", "nsecs", "to_nsec"})
 
 
 class Anything:
-    """A value that allows everything; in sums it is 0, as a list empty, as a condition true.
+    """A value that allows everything: in sums 0 or a word, as a list empty, as a condition true.
 
     As a base class it takes any arguments.
     """
@@ -94,7 +94,7 @@ class Anything:
         return f"<stand-in {self._stub_name}>"
 
     def __str__(self) -> str:
-        return str(self._stub_name.rpartition(".")[2])
+        return re.sub(r"\W+", "", self._stub_name.rpartition(".")[2].rpartition("/")[2])
 
     def __float__(self) -> float:
         return 0.0
@@ -182,8 +182,10 @@ def _wanted_items(frame: FrameType) -> int:
 
 def _number(name: str) -> Callable[..., Any]:
     def operate(self: Anything, *others: Any) -> Any:
-        if others and isinstance(others[0], str | list | tuple):
-            return others[0] if name != "mod" else str(self)
+        if others and isinstance(others[0], str):  # it is a text then: part of a name, of a path
+            return {"add": f"{self}{others[0]}", "radd": f"{others[0]}{self}"}.get(name, str(self))
+        if others and isinstance(others[0], list | tuple):
+            return others[0]
         return 0  # whole, as `range` takes it too
 
     operate.__name__ = name

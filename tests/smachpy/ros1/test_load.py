@@ -217,6 +217,7 @@ import nobody_lib
 from nobody_heads import Tilt
 rospy.init_node(rospy.get_param('~name'))
 rospy.Publisher(nobody_lib.join('a', 'b'), Bool, queue_size=1)
+assert '/' + rospy.get_param('~robot') + '/' + nobody_lib.part() == '/robot/part'
 Tilt.Tilt(3).go()
 rospy.Publisher(rospy.get_param('~out'), Bool, queue_size=1)
 rospy.Subscriber(rospy.get_param('~in') + '/raw', Bool)
