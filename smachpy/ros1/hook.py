@@ -27,6 +27,7 @@ from actionlib_core.interfaces import (
 )
 from smachpy.compat import MODULES as SMACH_MODULES
 from smachpy.ros1 import python2
+from smachpy.ros1.generated import config_file, config_module, define_generated
 from smachpy.ros1.session import session
 from smachpy.ros1.stubs import OldSection, StubModule, StubSection
 
@@ -153,6 +154,21 @@ class _Generated(Loader):
                 setattr(module, name + end, getattr(home, name + end))
 
 
+class _Config(Loader):
+    """Makes `pkg.cfg.NameConfig` out of its `.cfg` file, or the packages around it out of none."""
+
+    def __init__(self, file: Path | None) -> None:
+        self._file = file
+
+    def create_module(self, spec: ModuleSpec) -> None:
+        """Leave it to Python."""
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Run the file."""
+        if self._file is not None:
+            vars(module).update(config_module(self._file))
+
+
 class OldSourceLoader(SourceFileLoader):
     """Loads a module of the project, converted from Python 2 if need be; leaves no files behind."""
 
@@ -201,7 +217,19 @@ class OldNames(MetaPathFinder):
                 loader = _Stub(known=True, complete=not self._stub_missing)
                 return ModuleSpec(fullname, loader, is_package=True)
             found = _alias(fullname, f"{INTERFACES}.{fullname}")
-        return found or self._missing(fullname, path)
+        return found or self._config(fullname) or self._missing(fullname, path)
+
+    def _config(self, fullname: str) -> ModuleSpec | None:
+        """Find `pkg.cfg.NameConfig` by `cfg/Name.cfg`; `pkg` and `pkg.cfg`, too, if it has one."""
+        package, _, below = fullname.partition(".")
+        section, _, name = below.partition(".")
+        folder = self.project.packages().get(package)
+        if folder is None or section not in {"", "cfg"}:
+            return None
+        file = config_file(folder, name)
+        if file is None:
+            return None
+        return ModuleSpec(fullname, _Config(file if name else None), is_package=not name)
 
     def claims(self, name: str) -> bool:
         """Tell whether a module name is one of ROS's, so that another module must not have it."""
@@ -212,7 +240,7 @@ class OldNames(MetaPathFinder):
         """Tell whether a module was found by this finder."""
         if self.claims(name) or isinstance(module, (StubModule, OldSection)):
             return True
-        return isinstance(getattr(module, "__loader__", None), OldSourceLoader)
+        return isinstance(getattr(module, "__loader__", None), (OldSourceLoader, _Config))
 
     def _home_of(self, fullname: str) -> str | None:
         # `from sensor_msgs import point_cloud2` asks by the name that the package has here
@@ -231,19 +259,20 @@ class OldNames(MetaPathFinder):
         if package in self._known:
             return
         self._known.add(package)
+        folder = self.project.packages().get(package)
+        if folder is None:
+            return
         found = self.project.interfaces_of(package)
-        if not found:
-            return
-        folder = self.project.packages()[package]
-        if folder.name == package:
+        if found and folder.name == package:
             add_path(folder)
-            return
-        for kind, define in (
-            ("msg", define_message),
-            ("srv", define_service),
-            ("action", define_action),
-        ):
-            _define_all(package, found.get(kind, []), define)
+        else:
+            for kind, define in (
+                ("msg", define_message),
+                ("srv", define_service),
+                ("action", define_action),
+            ):
+                _define_all(package, found.get(kind, []), define)
+        define_generated(folder, package, [file for files in found.values() for file in files])
 
     def _in_project(self, fullname: str, path: Sequence[str] | None) -> ModuleSpec | None:
         name = fullname.rpartition(".")[2]

@@ -26,6 +26,8 @@ _DEPENDS: Final = re.compile(
     r"<(?:(?:build|build_export|exec|run)_)?depend\b[^>]*>\s*([\w-]+)\s*<"
     r"|<depend\s[^>]*?package=[\"']([\w-]+)[\"']"
 )
+_PACKAGE_DIR: Final = re.compile(r"package_dir\b[\"']?\s*[=:]\s*\{([^}]*)\}")
+_PAIR: Final = re.compile(r"[\"'](.*?)[\"']\s*:\s*[\"'](.*?)[\"']")
 _NAME: Final = re.compile(r"<name>\s*([A-Za-z]\w*)\s*</name>")
 
 
@@ -86,7 +88,7 @@ class Project:
         return {kind: files for kind, files in found.items() if files}
 
     def source_roots(self) -> Iterator[Path]:
-        """Yield the folders whose modules the script may import: its own, then `src` of packages.
+        """Yield the folders whose modules the script may import: its own, then those of packages.
 
         The script's own package comes before its neighbours.
         """
@@ -94,7 +96,7 @@ class Project:
         own = [folder for folder in self.packages().values() if self.folder.is_relative_to(folder)]
         others = [folder for folder in self.packages().values() if folder not in own]
         for folder in (*own, *others):
-            for below in ("src", "scripts", "nodes"):
+            for below in ("src", *_package_dirs(folder), "scripts", "nodes"):
                 if (folder / below).is_dir():
                     yield folder / below
         for folder in own:
@@ -149,6 +151,14 @@ def _name_of(folder: Path) -> str:
     """Return the name in package.xml, else the folder's."""
     match = _NAME.search(_read(folder / "package.xml"))
     return match[1] if match else folder.name
+
+
+def _package_dirs(folder: Path) -> list[str]:
+    """Return where a package's setup.py says that its modules are."""
+    match = _PACKAGE_DIR.search(_read(folder / "setup.py"))
+    pairs = _PAIR.findall(match[1]) if match else []
+    # {"": "lib"}: all in lib; {"robot": "lib/robot"}: this one in lib
+    return [place.removesuffix(name).rstrip("/") or "." for name, place in pairs]
 
 
 def _read(file: Path) -> str:

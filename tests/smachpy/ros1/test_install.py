@@ -84,9 +84,9 @@ def test_a_missing_package_is_named_with_its_place(names):
     assert caught.value.file == str(names / "uses.py")
     assert caught.value.line == 2
     assert "message package 'absent_msgs'" in str(caught.value)
-    (names / "more.py").write_text("import dynamic_reconfigure.server\n")
+    (names / "more.py").write_text("import dynamic_reconfigure.nobody\n")
     with pytest.raises(
-        ModuleNotFoundError, match=r"module 'dynamic_reconfigure.server' is missing"
+        ModuleNotFoundError, match=r"module 'dynamic_reconfigure.nobody' is missing"
     ):
         importlib.import_module("more")
 

@@ -6,8 +6,15 @@ from typing import Any
 
 from actionlib_core.interfaces import define_message, define_service
 
-for _name, _type in (("Bool", "bool"), ("Int", "int32"), ("Str", "string"), ("Double", "float64")):
-    define_message(f"dynamic_reconfigure/{_name}Parameter", f"string name\n{_type} value\n")
+
+def _parameter(name: str, kind: str) -> Any:
+    return define_message(f"dynamic_reconfigure/{name}", f"string name\n{kind} value\n")
+
+
+BoolParameter = _parameter("BoolParameter", "bool")
+IntParameter = _parameter("IntParameter", "int32")
+StrParameter = _parameter("StrParameter", "string")
+DoubleParameter = _parameter("DoubleParameter", "float64")
 define_message(
     "dynamic_reconfigure/GroupState", "string name\nbool state\nint32 id\nint32 parent\n"
 )

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from smachpy.ros1.names.dynamic_reconfigure import (
-    Config,
-    DynamicReconfigureParameterException,
-    Reconfigure,
-)
+from smachpy.ros1.names.dynamic_reconfigure import Config, Reconfigure
+from smachpy.ros1.names.dynamic_reconfigure.encoding import decode_config, encode_config
 from smachpy.ros1.names.rospy.exceptions import ROSException
 from smachpy.ros1.names.rospy.service import ServiceProxy
 from smachpy.ros1.names.rospy.topics import Subscriber
 from smachpy.ros1.session import session
-from smachpy.ros1.stubs import Anything
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -56,7 +52,7 @@ class Client:
         """Return what was heard last; asks for it when nothing was."""
         del timeout
         if self._config is None:
-            self._config = _read(self._proxy(Config()).config)
+            self._config = decode_config(self._proxy(Config()).config)
         return dict(self._config)
 
     def update_configuration(self, changes: dict[str, Any]) -> dict[str, Any]:
@@ -68,7 +64,7 @@ class Client:
 
         Blocks: until the answer.
         """
-        self._config = _read(self._proxy(_write(changes)).config)
+        self._config = decode_config(self._proxy(encode_config(changes)).config)
         return dict(self._config)
 
     def set_config_callback(self, value: Callable[[dict[str, Any]], object] | None) -> None:
@@ -82,32 +78,9 @@ class Client:
         self._proxy.close()
 
     def _on_config(self, message: Any) -> None:
-        self._config = _read(message)
+        self._config = decode_config(message)
         if self._callback is not None:
             self._callback(dict(self._config))
-
-
-def _read(config: Any) -> dict[str, Any]:
-    parts = (*config.bools, *config.ints, *config.strs, *config.doubles)
-    return {part.name: part.value for part in parts}
-
-
-def _write(changes: dict[str, Any]) -> Any:
-    config = Config()
-    for name, value in changes.items():
-        if isinstance(value, bool):
-            config.bools = [*config.bools, {"name": name, "value": value}]
-        elif isinstance(value, int):
-            config.ints = [*config.ints, {"name": name, "value": value}]
-        elif isinstance(value, float):
-            config.doubles = [*config.doubles, {"name": name, "value": value}]
-        elif isinstance(value, (str, Anything)):
-            config.strs = [*config.strs, {"name": name, "value": str(value)}]
-        else:
-            raise DynamicReconfigureParameterException(
-                f"{name}: got {value!r}; expected a bool, a number or a text."
-            )
-    return config
 
 
 __all__ = ["Client", "ROSException"]

@@ -1,0 +1,71 @@
+"""dynamic_reconfigure.encoding: configurations as messages, and the parameters of a description."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from smachpy.ros1.names.dynamic_reconfigure import (
+    BoolParameter,
+    DoubleParameter,
+    DynamicReconfigureParameterException,
+    IntParameter,
+    StrParameter,
+)
+from smachpy.ros1.names.dynamic_reconfigure import Config as ConfigMsg
+from smachpy.ros1.stubs import Anything
+
+
+class Config(dict[str, Any]):
+    """A configuration; its values are attributes, too."""
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return self[name]
+        except KeyError:
+            raise AttributeError(name) from None
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        self[name] = value
+
+
+def decode_config(msg: Any, description: Any = None) -> Config:
+    """Return the values of a message."""
+    del description
+    parts = (*msg.bools, *msg.ints, *msg.strs, *msg.doubles)
+    return Config({part.name: part.value for part in parts})
+
+
+def encode_config(config: dict[str, Any], flat: bool = True) -> Any:
+    """Return the message of some values.
+
+    Raises:
+        DynamicReconfigureParameterException: one is no bool, number or text.
+    """
+    del flat
+    msg = ConfigMsg()
+    for name, value in config.items():
+        for kind, make, place in (
+            (bool, BoolParameter, msg.bools),
+            (int, IntParameter, msg.ints),
+            (float, DoubleParameter, msg.doubles),
+            ((str, Anything), StrParameter, msg.strs),
+        ):
+            if isinstance(value, kind):
+                place.append(make(name, str(value) if place is msg.strs else value))
+                break
+        else:
+            raise DynamicReconfigureParameterException(
+                f"{name}: got {value!r}; expected a bool, a number or a text."
+            )
+    return msg
+
+
+def extract_params(group: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the parameters of a group and of those in it."""
+    found = list(group["parameters"])
+    for inner in group["groups"]:
+        found += extract_params(inner)
+    return found
+
+
+__all__ = ["Config", "decode_config", "encode_config", "extract_params"]

@@ -1,0 +1,120 @@
+"""dynamic_reconfigure.parameter_generator: what a package's `cfg/Name.cfg` is written in.
+
+ROS 1's build ran such a file, which wrote `pkg.cfg.NameConfig`; here the import of that module
+runs it.
+
+Source:
+    dynamic_reconfigure/parameter_generator_catkin.py for names and arguments.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from smachpy.ros1.names.dynamic_reconfigure.encoding import extract_params
+
+int_t, bool_t, str_t, double_t = "int", "bool", "str", "double"
+
+_NONE = {"int": 0, "double": 0.0, "str": "", "bool": False}
+_LEAST = {"int": -(2**31), "double": -math.inf, "str": "", "bool": False}
+_MOST = {"int": 2**31 - 1, "double": math.inf, "str": "", "bool": True}
+
+
+class Group:
+    """Some parameters, and groups of more."""
+
+    def __init__(self, name: str, type: str = "", state: bool = True) -> None:
+        self.name, self.type, self.state = name, type, state
+        self.parameters: list[dict[str, Any]] = []
+        self.groups: list[Group] = []
+
+    def add(
+        self,
+        name: str,
+        paramtype: str,
+        level: int = 0,
+        description: str = "",
+        default: Any = None,
+        min: Any = None,
+        max: Any = None,
+        edit_method: Any = "",
+    ) -> None:
+        """Add a parameter."""
+        self.parameters.append(
+            {
+                "name": name,
+                "type": paramtype,
+                "level": level,
+                "description": description,
+                "default": _NONE[paramtype] if default is None else default,
+                "min": _LEAST[paramtype] if min is None else min,
+                "max": _MOST[paramtype] if max is None else max,
+                "edit_method": edit_method,
+            }
+        )
+
+    def add_group(self, name: str, type: str = "", state: bool = True) -> Group:
+        """Add a group, and return it."""
+        self.groups.append(Group(name, type, state))
+        return self.groups[-1]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return its description, as generated modules have it."""
+        return {
+            "name": self.name,
+            "type": self.type,
+            "state": self.state,
+            "parameters": self.parameters,
+            "groups": [group.to_dict() for group in self.groups],
+        }
+
+
+class ParameterGenerator(Group):
+    """The parameters of a node.
+
+    Attributes:
+        module: Name -> value in the module that is generated; empty before `generate`.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("Default")
+        self._constants: dict[str, Any] = {}
+        self.module: dict[str, Any] = {}
+
+    def const(
+        self, name: str, type: str, value: Any, descr: str, cppname: str = ""
+    ) -> dict[str, Any]:
+        """Return a value of an enumeration."""
+        del cppname
+        self._constants[name] = value
+        return {"name": name, "type": type, "value": value, "description": descr}
+
+    def enum(self, constants: list[dict[str, Any]], description: str) -> dict[str, Any]:
+        """Return an enumeration, an `edit_method`."""
+        return {"enum": constants, "enum_description": description}
+
+    def generate(self, pkgname: str, nodename: str, name: str) -> int:
+        """Make the module; return 0, which the file ends with."""
+        del pkgname, nodename
+        description = self.to_dict()
+        found = extract_params(description)
+        of: dict[str, dict[str, Any]] = {
+            key: {one["name"]: one[key] for one in found}
+            for key in ("default", "min", "max", "level", "type")
+        }
+        levels = 0
+        for one in found:
+            levels |= one["level"]
+        self.module = {
+            **{f"{name}_{each}": value for each, value in self._constants.items()},
+            "config_description": description,
+            "extract_params": extract_params,
+            "defaults": of.pop("default"),
+            **of,
+            "all_level": levels,
+        }
+        return 0
+
+
+__all__ = ["ParameterGenerator", "bool_t", "double_t", "int_t", "str_t"]
