@@ -132,8 +132,10 @@ def _node_maker(options: RunOptions, stack: contextlib.ExitStack) -> Callable[[s
             from actionlib_core.node import has_node
 
             return get_node() if has_node() else init(name, argv=())
+        from smachpy.ros1.program import ScriptNode
+
         before = get_node()
-        node = Node(
+        node = ScriptNode(
             name,
             transport=before.transport,
             clock=before.clock,

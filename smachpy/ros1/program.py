@@ -237,10 +237,11 @@ def _node_in_force(_name: str) -> Node:
     return get_node()
 
 
-class _DryNode(Node):
-    """A node of a program that is only built: a stand-in, say a missing parameter, names itself."""
+class ScriptNode(Node):
+    """A node of a script in virtual time: a stand-in, say a missing parameter, names itself."""
 
     def resolve(self, name: str, kind: str = "name") -> str:
+        """Return the full name, remapped; see `Node.resolve`."""
         return super().resolve(str(name) if isinstance(name, Anything) else name, kind)
 
 
@@ -255,7 +256,7 @@ def _go_virtual(stack: contextlib.ExitStack) -> None:
     stack.enter_context(use_shutdown(Shutdown()))
     stack.enter_context(made.patched())
     node = stack.enter_context(
-        _DryNode("script", transport=MemoryNetwork(made).session(), clock=made)
+        ScriptNode("script", transport=MemoryNetwork(made).session(), clock=made)
     )
     stack.enter_context(use_node(node))
 
@@ -304,4 +305,4 @@ def _outermost(known: Sequence[Container]) -> Container | None:
     return outer[-max(sizes)[1]] if sizes else None
 
 
-__all__ = ["LOAD_S", "LoadError", "load", "run_script", "where_raised"]
+__all__ = ["LOAD_S", "LoadError", "ScriptNode", "load", "run_script", "where_raised"]

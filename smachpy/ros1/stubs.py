@@ -215,7 +215,7 @@ class StubModule(types.ModuleType):
             return unbound_names(sys._getframe(1))
         if name.startswith("__") and name.endswith("__"):
             raise AttributeError(name)
-        value = stand_in_class(name) if name[:1].isupper() else Anything(name)
+        value = _stand_in(name)
         setattr(self, name, value)
         return value
 
@@ -226,7 +226,12 @@ class _AnyClass(type):
     def __getattr__(cls, name: str) -> Any:
         if name.startswith("_") or name in _MARKS:
             raise AttributeError(name)
-        return stand_in_class(name) if name[:1].isupper() else Anything(name)
+        return _stand_in(name)
+
+
+def _stand_in(name: str) -> Any:
+    """Return a class for a name like a class's, `Gripper`; a value for `gripper` and `GRIPPER`."""
+    return stand_in_class(name) if name[:1].isupper() and not name.isupper() else Anything(name)
 
 
 def stand_in_class(name: str) -> type:
@@ -343,7 +348,7 @@ class StubSection(OldSection):
                     session().stand_in(each)
 
 
-def _message(package: str, name: str) -> type:
+def _message(package: str, name: str) -> Any:
     """Return a message class; of an action, when its name says that it is part of one."""
     for end in _ACTION_ENDS:
         if name.endswith(end) and name != end:
@@ -354,23 +359,19 @@ def _message(package: str, name: str) -> type:
     return permissive(define_message(f"{package}/{name}", ""))
 
 
-def _action_part(package: str, base: str, end: str) -> type:
+def _action_part(package: str, base: str, end: str) -> Any:
     from actionlib_core.interfaces import get_message
 
     action = define_action(f"{package}/{base}", "---\n---\n")
     for part in ("Goal", "Result", "Feedback"):
         loose = permissive(get_message(f"{package}/{base}{part}"))
         _fill(get_message(f"{package}/{base}Action{part}"), part.lower(), loose)
-    return (
-        action
-        if end == "Action"
-        else _loose.get(f"{package}/{base}{end}") or get_message(f"{package}/{base}{end}")
-    )
+    return action if end == "Action" else permissive(get_message(f"{package}/{base}{end}"))
 
 
-def _service(package: str, name: str) -> type:
+def _service(package: str, name: str) -> Any:
     base = name.removesuffix("Request").removesuffix("Response")
-    service = define_service(f"{package}/{base}", "---\n")
+    service = permissive(define_service(f"{package}/{base}", "---\n"))
     service._request_class = permissive(service._request_class)
     service._response_class = permissive(service._response_class)
     if name == base:
@@ -390,19 +391,18 @@ def _fill(holder: Any, field: str, loose: type) -> None:
     holder.__init__ = make
 
 
-_loose: dict[str, type] = {}
+_loose: dict[type, type] = {}
 
 
-def permissive(kind: type) -> type:
-    """Return a subclass of a message class without fields that takes and gives every field."""
-    name = kind._type  # type: ignore[attr-defined]
+def permissive(kind: type) -> Any:
+    """Return a subclass of a class of messages or services that takes and gives every field."""
     if issubclass(kind, _Loose):
         return kind
-    if name not in _loose:
+    if kind not in _loose:
         made: Any = type(kind.__name__, (_Loose, kind), {})
         made.__slots__ = _EveryName()
-        _loose[name] = made
-    return _loose[name]
+        _loose[kind] = made
+    return _loose[kind]
 
 
 class _EveryName(tuple[str, ...]):

@@ -57,6 +57,32 @@ def test_private_parameters_stand_where_rosrun_has_them(smachpy, tmp_path):
     assert "3 [1, 2] ['mine']" in output
 
 
+def test_what_is_missing_has_stand_ins_in_a_run_too(smachpy, tmp_path):
+    script = tmp_path / "explored.py"
+    script.write_text(
+        "import rospy, smach, nobody_names\n"
+        "from nobody_msgs.msg import Battery\n"
+        "from nobody_msgs.srv import Ask\n"
+        "def ask(ud):\n"
+        "    message = Ask()\n"
+        "    message.client_name = 'explorer'\n"
+        "    return 'done' if message.client_name == 'explorer' else 'not'\n"
+        "rospy.init_node('explored')\n"
+        "rospy.Subscriber(nobody_names.BATTERY, Battery, print)\n"
+        "speed = rospy.get_param('~speed')\n"
+        "sm = smach.StateMachine(outcomes=['done'])\n"
+        "with sm:\n"
+        "    sm.add('ASK', smach.CBState(ask, outcomes=['done']))\n"
+        "sm.execute()\n"
+    )
+    code, output = smachpy("run", "--ros1", script, "--stub-missing", "--time", "virtual")
+    assert "SM_ROOT  ended: done" in output, output
+    assert "parameter /explored/speed" in output
+    code, output = smachpy("run", "--ros1", script, "--time", "virtual")
+    assert code == 1
+    assert "module 'nobody_names' is missing" in output
+
+
 def test_scripts_are_drawn_and_checked_with_their_arguments(smachpy, tmp_path):
     script = tmp_path / "to_place.py"
     script.write_text(

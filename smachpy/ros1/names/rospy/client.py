@@ -37,7 +37,7 @@ def get_param(param_name: str, default: Any = _NO_DEFAULT) -> Any:
     except KeyError as error:
         if default is not _NO_DEFAULT:
             return default
-        if now.dry and now.stub_missing:
+        if now.stub_missing:
             from smachpy.ros1.stubs import Anything
 
             now.stand_in(f"parameter {name}")
