@@ -28,6 +28,7 @@ from actionlib_core.interfaces import (
 from smachpy.compat import MODULES as SMACH_MODULES
 from smachpy.ros1 import python2
 from smachpy.ros1.generated import config_file, config_module, define_generated
+from smachpy.ros1.project import is_package
 from smachpy.ros1.session import session
 from smachpy.ros1.stubs import OldSection, StubModule, StubSection
 
@@ -240,7 +241,14 @@ class OldNames(MetaPathFinder):
         """Tell whether a module was found by this finder."""
         if self.claims(name) or isinstance(module, (StubModule, OldSection)):
             return True
-        return isinstance(getattr(module, "__loader__", None), (OldSourceLoader, _Config))
+        return self._is_projects(module)
+
+    def _is_projects(self, module: Any) -> bool:
+        """Tell whether a module is one of the project's; None is none."""
+        if isinstance(getattr(module, "__loader__", None), (OldSourceLoader, _Config)):
+            return True
+        places = getattr(module, "__path__", ()) if not getattr(module, "__file__", None) else ()
+        return any(self.project.holds(place) for place in places)
 
     def _home_of(self, fullname: str) -> str | None:
         # `from sensor_msgs import point_cloud2` asks by the name that the package has here
@@ -294,7 +302,22 @@ class OldNames(MetaPathFinder):
                             [str(file.parent)] if file.name == "__init__.py" else None
                         ),
                     )
-        return None
+        return self._namespace(fullname, [place / name for place in places], path)
+
+    def _namespace(
+        self, fullname: str, folders: list[Path], path: Sequence[str] | None
+    ) -> ModuleSpec | None:
+        """Find a package without `__init__.py`: folders with modules, that nobody else has."""
+        found = [
+            str(folder)
+            for folder in folders
+            if not is_package(folder) and next(folder.glob("*.py"), None) is not None
+        ]
+        if not found or (path is None and self._is_elsewhere(fullname)):
+            return None
+        spec = ModuleSpec(fullname, None, is_package=True)
+        spec.submodule_search_locations = list(dict.fromkeys(found))
+        return spec
 
     def _missing(self, fullname: str, path: Sequence[str] | None) -> ModuleSpec | None:
         """Look whether nobody else has it; a stand-in then, or an error that says what to do."""
@@ -304,8 +327,7 @@ class OldNames(MetaPathFinder):
         if path is not None:
             above = fullname.rpartition(".")[0]
             parent = sys.modules.get(above)
-            lacks = isinstance(getattr(parent, "__loader__", None), OldSourceLoader)
-            lacks = lacks and self._stub_missing
+            lacks = self._stub_missing and self._is_projects(parent)
             if not (lacks or isinstance(parent, StubModule) or self.claims(above)):
                 return None  # its package was found, and Python says what it lacks
         elif self._is_elsewhere(fullname):

@@ -162,7 +162,7 @@ def load(
         stack.callback(made.be_live)
         OBSERVERS.append(made.stop)
         stack.callback(OBSERVERS.remove, made.stop)
-        stack.enter_context(_deadline(made, timeout))
+        late = stack.enter_context(_deadline(made, timeout))
         problem = _build(path, argv, call, made)
         stopped = made.stopped
     if stubbed is not None:
@@ -171,7 +171,8 @@ def load(
     if machine is None:
         machine = _outermost(known)
     if machine is None or (problem and stopped is None):
-        raise LoadError(path, problem or _NOTHING)
+        in_vain = f"it built no machine in {timeout:g} s. Try --timeout SECONDS."
+        raise LoadError(path, problem or (in_vain if late else _NOTHING))
     assert isinstance(machine, Container)
     return machine
 
@@ -262,15 +263,20 @@ def _go_virtual(stack: contextlib.ExitStack) -> None:
 
 
 @contextlib.contextmanager
-def _deadline(made: Session, seconds: float) -> Iterator[None]:
-    """End the script after so many real seconds, wherever it is; in the main thread only."""
+def _deadline(made: Session, seconds: float) -> Iterator[list[bool]]:
+    """End the script after so many real seconds, wherever it is; in the main thread only.
+
+    Yields a list that has an item once it did.
+    """
+    late: list[bool] = []
     if threading.current_thread() is not threading.main_thread():
-        yield
+        yield late
         return
     over: list[bool] = []
 
     def end(_number: int, _frame: FrameType | None) -> None:
         if not over:
+            late.append(True)
             made.stopped = made.stopped or Stop()
             raise made.stopped
 
@@ -279,7 +285,7 @@ def _deadline(made: Session, seconds: float) -> Iterator[None]:
     before = signal.signal(signal.SIGURG, end)
     timer = RealClock().call_later(seconds, lambda: signal.pthread_kill(main, signal.SIGURG))
     try:
-        yield
+        yield late
     finally:
         over.append(True)
         timer.cancel()

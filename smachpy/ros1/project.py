@@ -52,7 +52,7 @@ class Project:
         if self._packages is None:
             self._packages = {}
             for folder in _walk(self.root):
-                if _is_package(folder):
+                if is_package(folder):
                     self._packages.setdefault(_name_of(folder), folder)
         return self._packages
 
@@ -121,7 +121,7 @@ def _find_root(folder: Path) -> Path:
     for above in (folder, *folder.parents):
         if any((above / mark).exists() for mark in (".git", ".hg", ".catkin_workspace")):
             return above
-        if _is_package(above) or (above / "stack.xml").is_file():
+        if is_package(above) or (above / "stack.xml").is_file():
             package = above
         if above == above.parent or above == Path.home():
             break
@@ -141,7 +141,8 @@ def _walk(root: Path) -> Iterator[Path]:
             return
 
 
-def _is_package(folder: Path) -> bool:
+def is_package(folder: Path) -> bool:
+    """Tell whether a folder is a package of ROS."""
     if any((folder / name).is_file() for name in _MANIFESTS):
         return True
     return any(next((folder / kind).glob(f"*.{kind}"), None) is not None for kind in KINDS)

@@ -140,6 +140,7 @@ def straight(text: str) -> str:
     return _INDENT.sub(lambda match: match[0].expandtabs(8), text)
 
 
+@lru_cache(maxsize=64)  # star imports of what is missing look at their file again and again
 def _convert(text: str, filename: str) -> str:
     """Return what Python 3 can parse: as it stands, with spaces for tabs, or from Python 2."""
     try:

@@ -84,6 +84,9 @@ def package(tmp_path, request):
         "cfg/robot_arm.cfg": CFG,
         "manifest.xml": "<package/>",
         "lib/gen_lib/__init__.py": "there = True\n",
+        "src/gen_bare/states/more.py": "there = True\n",
+        "src/gen_empty/README": "no module",
+        "src/gen_bare/way.py": "from gen_bare.states import more\n",
         "setup.py": "setup(**generate_distutils_setup(\n"
         "    packages=['gen_lib'], package_dir={'gen_lib': 'lib/gen_lib'}))\n",
     }.items():
@@ -137,6 +140,14 @@ def test_a_configuration_is_made_of_its_cfg_file(package):
 
 def test_modules_lie_where_setup_py_says(package):
     assert importlib.import_module("gen_lib").there
+
+
+def test_a_package_needs_no_init_py(package):
+    assert importlib.import_module("gen_bare.way").more.there
+    with pytest.raises(ModuleNotFoundError):
+        importlib.import_module("gen_empty")
+    ros1.uninstall()
+    assert "gen_bare" not in sys.modules
 
 
 SERVER = """

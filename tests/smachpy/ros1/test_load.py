@@ -121,6 +121,7 @@ def test_a_script_that_never_gets_there_is_ended(load):
     with pytest.raises(ros1.LoadError) as caught:
         load("while True: pass", timeout=0.5)
     assert caught.value.script.name == "script.py"
+    assert caught.value.problem == "it built no machine in 0.5 s. Try --timeout SECONDS."
 
 
 def test_stand_ins_and_parameters(load):
