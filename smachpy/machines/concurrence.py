@@ -303,7 +303,7 @@ class Concurrence(Container):
         finally:
             frame.group = None  # else run and branches would wait for the garbage collector
             if not group.started:
-                group.let_go()
+                group.release()
 
     def _smachpy_terminal_labels(self, frame: Frame) -> list[str]:  # noqa: ARG002  that of any container
         return list(self._smachpy.children)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import _signal  # type: ignore[import-not-found]  # `signal` without its enums
+import _signal  # type: ignore[import-not-found]  # `signal` without enums, which are slow
 import contextlib
 import functools
 import inspect
@@ -91,14 +91,15 @@ class Container(Openable, Callbacks, State):
         if name is not None:
             self.name = problems.word("name", name)
         problems.raise_all()
-        data = self._smachpy  # a second call of __init__ begins anew
+        # Emptied here, not only in ContainerData: a second call of __init__ starts from scratch.
+        data = self._smachpy
         data.children, data.remappings = {}, {}
         data.start_cbs, data.transition_cbs, data.termination_cbs = [], [], []
 
     # -- structure -----------------------------------------------------------------------------
 
     def _repr_svg_(self) -> str | None:
-        """Return the picture that a notebook shows."""
+        """Return the picture that a Jupyter notebook shows."""
         from smachpy.pictures import draw_svg
 
         return draw_svg(self)
@@ -118,19 +119,19 @@ class Container(Openable, Callbacks, State):
     def set_initial_state(
         self, initial_states: Sequence[str], userdata: UserData | None = None
     ) -> None:
-        """Choose where the next run begins, and add to the userdata."""
+        """Choose where the next run begins, and update the userdata."""
         raise NotImplementedError
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Return the edges inside as (outcome, from label, to label or container outcome)."""
+        """Return the edges as (outcome, from label, to label or container outcome)."""
         raise NotImplementedError
 
     def find_problems(self, where: str) -> tuple[str, ...]:
-        """Return what is wrong with this container itself, its children left out."""
+        """Return the problems of this container itself, not of its children."""
         raise NotImplementedError
 
     def check_consistency(self) -> None:
-        """Check this container and all below it.
+        """Check this container and all containers below it.
 
         Raises:
             InconsistentMachineError: with all problems found.
@@ -141,22 +142,22 @@ class Container(Openable, Callbacks, State):
             raise InconsistentMachineError(f"{type(self).__name__} {where!r}", problems)
 
     def __own_problems(self, where: str) -> Iterator[str]:
-        """Yield what is wrong with its options, which `add` checks if it is no root."""
+        """Yield the problems of its options; those of a child are found by `add`."""
         for problem in retry_problems(self._smachpy.options, self._smachpy.outcomes):
             yield f"{where}: {problem}"
 
     def is_running(self) -> bool:
-        """Tell whether it runs."""
+        """Return whether the container is running."""
         return self._smachpy.frame is not None
 
     def wait_ended(self, timeout: float | None = None) -> bool:
-        """Wait until it does not run.
+        """Wait until the container is not running.
 
         Returns:
-            Whether that came within `timeout` [s].
+            Whether it ended within `timeout` [s].
 
         Raises:
-            InvalidStateError: `timeout` is no duration.
+            InvalidStateError: `timeout` is not a duration.
 
         Blocks: until then; None waits for ever.
         """
@@ -166,13 +167,14 @@ class Container(Openable, Callbacks, State):
         data, ended = self._smachpy, clock_of_run().event()
         data.end_waiters.append(ended)
         try:
-            # First the mark, then the look: see the end of `_run`.
+            # First register, then look at `data.frame`; the end of `__run` does it the other way
+            # round, so a run that ends in between is noticed here or sets the event.
             return data.frame is None or ended.wait(timeout)
         finally:
             data.end_waiters.remove(ended)
 
     def reset_userdata(self) -> None:
-        """Bring the userdata, also of all containers below, back to its defaults, or to none."""
+        """Reset the userdata of this container and of all below it to the defaults, or to empty."""
         reset(self.userdata)
         for child in self.get_children().values():
             if isinstance(child, Container):
@@ -185,7 +187,12 @@ class Container(Openable, Callbacks, State):
         remapping: Mapping[str, str] | None,
         problems: Problems | None = None,
     ) -> None:
-        """Add a child, unless something is wrong: with its arguments, or already in `problems`."""
+        """Add a child.
+
+        Raises:
+            InvalidStateError: an argument is wrong, or `problems` has some already.
+        """
+        # `accepts`: programs for ROS 1 are known to make these mistakes and must still run.
         if not isinstance(label, str) or not label:
             problem = f"label: got {label!r}; expected a string, not empty."
             if not isinstance(label, str) or not accepts(problem):
@@ -214,7 +221,7 @@ class Container(Openable, Callbacks, State):
         self._smachpy.plan = self._smachpy.plain_plan = None
 
     def _smachpy_exchange(self, label: str, state: State) -> None:
-        """Put another state in the place of a child; for doubles, between two runs."""
+        """Replace a child between two runs, by a test double for instance."""
         self._smachpy.children[label] = state
         self._smachpy.plan = self._smachpy.plain_plan = None
 
@@ -231,12 +238,12 @@ class Container(Openable, Callbacks, State):
         """Run to the end and return the outcome.
 
         Args:
-            parent_ud: Where input keys are copied from and output keys to.
+            parent_ud: The userdata from which input keys are copied and to which output keys are.
 
         Raises:
-            InconsistentMachineError: the machine does not hold together.
+            InconsistentMachineError: the machine has structural problems.
             InvalidUserCodeError: a state or callback raised; the cause is chained.
-            InvalidTransitionError: a state returned something that is none of its outcomes.
+            InvalidTransitionError: a state returned something that is not one of its outcomes.
 
         Blocks: until the machine has ended; after a preempt, see docs/preemption.md.
         Threads: one run at a time; from several threads one after another.
@@ -244,6 +251,7 @@ class Container(Openable, Callbacks, State):
         first: Frame | None = THREAD.get()
         parent = None if first is None else first.innermost
         if first is None or parent is None:
+            # `Container.execute`, not `self.execute`: an override has called this method already.
             return execute_root(self, MethodType(Container.execute, self), parent_ud)
         step = parent.step
         frame = Frame()
@@ -253,12 +261,12 @@ class Container(Openable, Callbacks, State):
         callback = parent.data.callback
         if callback is not None and callback.parent is parent:
             step = callback.step  # a callback of the parent runs this container
-        if step is None or step.state is self:
+        if step is None or step.state is self:  # the usual case: the parent runs it as its child
             return self.__run(frame, parent_ud)
         if frame.data.frame is not None:
             raise already_runs(frame.path)
-        # A state runs this container by hand, maybe in a thread that it has started: a preempt of
-        # the state is one of the container.
+        # The user's code calls `execute` inside a state, maybe in a thread that it has started. A
+        # preempt of the state must reach this container, which is not one of the children.
         token = None
         if first.thread != threading.get_ident():
             frame.begin_thread()
@@ -278,6 +286,8 @@ class Container(Openable, Callbacks, State):
         """Run in `frame`: copy the keys, call the callbacks, run the children."""
         data = frame.data
         plan = data.plan
+        # Compiled again only if something has changed. The windows of a plan refer to one userdata
+        # object, so replacing `self.userdata` makes the plan stale as well.
         if plan is None or plan.userdata is not self.userdata or plan.epoch != EPOCH.value:
             plan = data.plan = self.__current_plan(frame, plan)
         if data.frame is not None or data.callback is not None:
@@ -287,13 +297,14 @@ class Container(Openable, Callbacks, State):
             data.frame = frame.first.innermost = frame
             if data.listeners or data.buffers:
                 frame.run.watched = True
+            # A durable run that goes on inside this container has its userdata from the journal.
             journal = frame.run.journal
             resumed = journal is not None and journal.resumes(frame)
             if data.input_keys and parent_ud is not None and not resumed:
                 self.__copy_input_keys(parent_ud, self.userdata)
             try:
                 outcome = self._smachpy_run_children(frame, plan)
-            except Interruption:  # a callback did not listen
+            except Interruption:  # a callback outlasted its grace
                 outcome = self.__interrupted(frame)
             if data.termination_cbs:
                 outcome = self.__call_at_end(frame, outcome)
@@ -303,8 +314,10 @@ class Container(Openable, Callbacks, State):
             return outcome
         finally:
             frame.first.innermost = frame.parent or frame
-            # Whoever passes a preempt on sets its mark first and looks at the frame then; here
-            # it is the other way round, so one of the two always sees the other.
+            # A requester in another thread sets `_preempt_requested` and then reads `data.frame`
+            # (`smachpy.run.grace.pass_on`). Here `data.frame` is cleared first and the flag read
+            # after it. So at least one of the two sees the other, and no flag is left for the next
+            # run, without taking a lock at the end of each run.
             if data.frame is frame:
                 data.frame = None
                 data.answered = frame.answered
@@ -312,7 +325,7 @@ class Container(Openable, Callbacks, State):
                 leave(frame)
 
     def __run_inside(self, frame: Frame, parent_ud: UserData | Remapper | None) -> str:
-        """Run for code of the user around it, whose grace pauses as the children have theirs."""
+        """Run for the user's override of `execute`, whose grace pauses while the children run."""
         data = self._smachpy
         if data.frame is not None:
             raise already_runs(frame.path)
@@ -325,10 +338,10 @@ class Container(Openable, Callbacks, State):
                 around.begin()
 
     def __interrupted(self, frame: Frame) -> str:
-        """Return how the container ends when a callback of it outlasted the grace."""
+        """Return the outcome of the container after one of its callbacks was interrupted."""
         if frame.dead:
             raise Interruption
-        if not frame.answered:
+        if not frame.answered:  # else the event is out already
             frame.answered = True
             frame.emit_own(Preempted, "")
         return "preempted"
@@ -347,17 +360,17 @@ class Container(Openable, Callbacks, State):
         return [] if step is None else [step.label]
 
     def __current_plan(self, frame: Frame, plan: Any) -> Any:
-        """Return a plan for the states as they are now.
+        """Return a plan for the children as they are now.
 
         Raises:
-            InconsistentMachineError: the container does not hold together.
+            InconsistentMachineError: the container has problems.
         """
-        epoch = EPOCH.value
+        epoch = EPOCH.value  # read first: a change during compilation makes the plan stale again
         if plan is None or plan.userdata is not self.userdata or plan.is_stale():
             is_root = self._smachpy.root is not None and self._smachpy.options.retry is not None
             own = self.__own_problems if is_root else lambda _where: ()
             if any((*own(""), *self.find_problems(""))):
-                where = frame.path  # which takes a while, so it was left out
+                where = frame.path  # expensive, so it is made only for the error text
                 problems = [*own(where), *self.find_problems(where)]
                 raise InconsistentMachineError(f"{type(self).__name__} {where!r}", problems)
             plan = self._smachpy_compile()
@@ -365,7 +378,7 @@ class Container(Openable, Callbacks, State):
         return plan
 
     def _smachpy_compile(self) -> Any:
-        """Return the plan of this container, which holds together."""
+        """Return the plan of this container, which has no problems."""
         raise NotImplementedError
 
     def _smachpy_run_children(self, frame: Frame, plan: Any) -> str:
@@ -375,16 +388,17 @@ class Container(Openable, Callbacks, State):
     def request_preempt(self, *, by: str = "") -> None:
         """Ask the container and all active states below it to stop.
 
-        Before a run it ends the next one at once. When it returns, every active descendant has
-        been told; a signal handler's request is only noted, and a thread tells them at once.
+        A request before a run ends that run at once. When this returns, every active descendant has
+        been asked. Inside a signal handler the request is only noted, and another thread passes it
+        on at once.
 
         Args:
-            by: Who asks, for those who watch; "" finds out what it can (see
+            by: Who asks, for viewers and recordings; "" finds it out where possible (see
                 `smachpy.events.PreemptRequested`).
 
         Threads: any thread, callback or signal handler; never waits for a state.
         """
-        if REQUESTING.get() is self:
+        if REQUESTING.get() is self:  # `super().request_preempt()` of an override that was called
             return
         name = signal_being_handled()
         if name:
@@ -399,10 +413,11 @@ class Container(Openable, Callbacks, State):
         if run is not None and run.pending:
             run.flush()
 
+    # To find out whether a subclass overrides the method.
     _smachpy_request_preempt: ClassVar[object] = request_preempt
 
     def __note_request(self, origin: Origin) -> None:
-        """Note a signal handler's request: the code that it interrupted may hold any lock."""
+        """Note a request from a signal handler: no locks, as the interrupted code may hold any."""
         data = self._smachpy
         frame = data.root or data.frame
         if frame is None:
@@ -414,7 +429,7 @@ class Container(Openable, Callbacks, State):
             with asking(*origin):
                 request_soon(self, frame)
 
-        # A clock of its own, whose locks nobody holds.
+        # A new clock, because the interrupted code may hold the locks of the run's clock.
         RealClock().spawn(ask, name=f"preempt of {frame.here()}")
 
     def __copy_input_keys(self, parent_ud: UserData | Remapper, ud: UserData) -> None:
@@ -438,7 +453,7 @@ class Container(Openable, Callbacks, State):
 
 
 def control_of(container: Container) -> Control:
-    """Return the operator's control of a container, whatever its attribute `control` is."""
+    """Return the operator's control of a container, even if the user has an attribute `control`."""
     from smachpy.events.control import Control
 
     data = container._smachpy
@@ -449,10 +464,10 @@ def control_of(container: Container) -> Control:
 
 
 def state_problems(state: State) -> Iterator[str]:
-    """Yield what makes it impossible to run `state`, or an option of it useless.
+    """Yield the problems of `state` itself, such as an `execute` that cannot be called.
 
     Raises:
-        InvalidStateError: it was not initialised.
+        InvalidStateError: its `__init__` did not call that of `State`.
     """
     yield from retry_problems(state._smachpy.options, state.get_registered_outcomes())
     execute: Any = state.execute
@@ -469,7 +484,7 @@ def state_problems(state: State) -> Iterator[str]:
 
 
 def below(state: State) -> Iterator[State]:
-    """Yield `state` and all that it is made of."""
+    """Yield `state` and all states below it."""
     yield state
     if isinstance(state, Container):
         for child in state.get_children().values():
@@ -485,7 +500,7 @@ def _all_problems(container: Container, where: str) -> Iterator[str]:
 
 
 def _key_problems(container: Container, where: str) -> Iterator[str]:
-    """Yield the keys of children that typed userdata has no field for."""
+    """Yield a problem for each key of a child that is not a field of the typed userdata."""
     data = data_of(container.userdata)
     if not isinstance(data, CheckedDict):
         return
@@ -502,21 +517,23 @@ def _key_problems(container: Container, where: str) -> Iterator[str]:
                 )
 
 
-_MOST_ARGUMENTS = 4  # of a signal handler: itself, the number, the interrupted frame, one more
+_MAX_ARGUMENTS = 4  # of a signal handler: self, the number, the interrupted frame, one default
 
 
 def signal_being_handled() -> str:
-    """Return the name of the signal whose handler, the program's own, is running here, or "".
+    """Return the name of the signal whose handler (the program's own) is running here, or "".
 
-    A handler is found by its code, or, when it has given the signal another handler already, by
-    what Python calls it with: the number and the interrupted frame, which is its caller.
+    A handler is recognised by its code object. One that has already installed another handler for
+    its signal is recognised by its arguments: Python calls it with the signal's number and the
+    interrupted frame, which is also its caller.
     """
+    # CPython runs Python signal handlers in the main thread only.
     if threading.current_thread() is not threading.main_thread():
         return ""
     handlers: dict[CodeType, int] = {}
     for number in range(1, signal.NSIG):
         handler = _signal.getsignal(number)
-        if handler is None or isinstance(handler, int):  # not Python's, ignored, or the default
+        if handler is None or isinstance(handler, int):  # installed by C code, SIG_IGN or SIG_DFL
             continue
         code = _code_of(handler)
         if code is not None:
@@ -533,7 +550,7 @@ def signal_being_handled() -> str:
 
 
 def _code_of(handler: Any) -> CodeType | None:
-    """Return the code of a handler: a function, a method, a partial, or an object to call."""
+    """Return the code of a handler: a function, method, partial, or object with `__call__`."""
     while isinstance(handler, functools.partial):
         handler = handler.func
     function = getattr(handler, "__func__", handler)
@@ -544,10 +561,10 @@ def _code_of(handler: Any) -> CodeType | None:
 
 
 def _number_given(frame: FrameType) -> int | None:
-    """Return the signal's number if `frame` was called as signal handlers are."""
+    """Return the signal's number if `frame` was called with the arguments of a signal handler."""
     code = frame.f_code
     names = code.co_varnames[: code.co_argcount + bool(code.co_flags & inspect.CO_VARARGS)]
-    if not names or len(names) > _MOST_ARGUMENTS:
+    if not names or len(names) > _MAX_ARGUMENTS:
         return None
     local = frame.f_locals
     given: list[Any] = []

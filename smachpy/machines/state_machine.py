@@ -1,4 +1,4 @@
-"""The state machine: one child at a time, outcomes lead from one to the next."""
+"""The state machine: runs one child at a time; each outcome leads to the next child."""
 
 from __future__ import annotations
 
@@ -51,11 +51,11 @@ __all__ = ["StateMachine"]
 
 
 class _Plan:
-    """A state machine, compiled: each step knows what comes after each of its outcomes.
+    """A compiled state machine: each step has the next step or end for each of its outcomes.
 
     Attributes:
-        epoch: `EPOCH.value` for which it holds.
-        first: The step with which it begins.
+        epoch: The `EPOCH.value` for which the plan is valid.
+        first: The initial step.
     """
 
     __slots__ = ("epoch", "first", "steps", "userdata")
@@ -86,9 +86,9 @@ class _Plan:
 
 
 def _nested(step: Step) -> MachineData | None:
-    """Return the data of a child that the loop of its parent may enter without a call.
+    """Return the data of a child that the loop of its parent may enter without calling it.
 
-    None for a child with options around it or an `execute` of its own, which is to be called.
+    None for a child that has options or its own `execute`, and so must be called.
     """
     state, execute = step.state, step.execute
     if not isinstance(state, StateMachine) or getattr(execute, "__self__", None) is not state:
@@ -102,9 +102,9 @@ class MachineData(ContainerData):
     Attributes:
         transitions: Label -> outcome -> label of the next child, outcome of the machine, or None.
         initial: Label of the initial child.
-        next_initial: That of the next run alone; None: `initial`.
-        follow_connectors: A child, and those of its outcomes that lead to the one added next.
-        connector_outcome: Of a sequence: the outcome that connects its children.
+        next_initial: The initial child of the next run only; None for `initial`.
+        follow_connectors: The label of a child and its outcomes that lead to the child added next.
+        connector_outcome: Of a `Sequence`: the outcome that connects its children.
     """
 
     __slots__ = _kept = (
@@ -125,7 +125,7 @@ class MachineData(ContainerData):
 
 
 class StateMachine(Container):
-    """A container that runs one child after the other, as their outcomes say.
+    """A container that runs one child after another, following the transitions of their outcomes.
 
     The first state added is the initial one. An outcome without a transition ends the machine
     with the outcome of the same name.
@@ -159,7 +159,7 @@ class StateMachine(Container):
         super().__init__(
             outcomes, input_keys, output_keys, name=name, userdata_type=userdata_type, **options
         )
-        data = self._smachpy  # a second call of __init__ begins anew
+        data = self._smachpy  # reset for a second call of __init__, as in Container
         data.transitions = {}
         data.initial = data.next_initial = data.follow_connectors = None
 
@@ -183,13 +183,13 @@ class StateMachine(Container):
                 machine. Outcomes left out, or mapped to None, end the machine with the outcome of
                 the same name.
             remapping: Key of the state -> key of this machine's userdata.
-            constants: Key of the state -> fixed value; the key is made its own in the userdata.
+            constants: Key of the state -> fixed value, kept in the userdata under "LABEL.key".
 
         Returns:
             The state.
 
         Raises:
-            InvalidStateError: the label is taken, or `state` is no state.
+            InvalidStateError: the label is taken, or `state` is not a state.
             InvalidConstructionError: called on the class while no machine is open.
         """
         return self._smachpy_add(label, state, transitions, remapping, constants)
@@ -204,9 +204,9 @@ class StateMachine(Container):
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, Any] | None = None,
     ) -> State:
-        """Add a state whose `connector_outcomes` lead to the state that is added next.
+        """Add a state whose `connector_outcomes` lead to the state added next.
 
-        Transitions given explicitly take precedence. Other arguments as in `add`.
+        Explicit transitions take precedence. The other arguments are those of `add`.
         """
         connectors = unique_names(connector_outcomes, "connector_outcomes")
         self._smachpy_add(label, state, transitions, remapping, constants)
@@ -231,13 +231,14 @@ class StateMachine(Container):
         holds = "outcome -> label of the next state, outcome of this machine, or None"
         given = problems.names_of("transitions", transitions, holds, optional=True)
         stored = state
-        if accepting():
+        if accepting():  # programs for ROS 1 may add objects that only look like states
             stored = as_state(state, label)
             given = adopt_slips(label, stored, given)
         fixed = problems.mapping("constants", constants, "key of the state -> value")
         self._smachpy_store_child(label, stored, remapping, problems)
         self._smachpy.transitions[label] = given
         for key, value in fixed.items():
+            # The dot keeps it apart from the user's keys and lets typed userdata accept it.
             name = f"{label}.{key}"
             self.userdata[name] = value
             self._smachpy.remappings[label][key] = name
@@ -255,10 +256,12 @@ class StateMachine(Container):
     def set_initial_state(
         self, initial_states: Sequence[str], userdata: UserData | None = None
     ) -> None:
-        """Choose where the next run begins, that one only, and add to the userdata.
+        """Choose the initial state of the next run only, and update the userdata.
+
+        While the machine is being built, this sets the initial state for good.
 
         Raises:
-            InvalidStateError: more than one state, or one that is not there.
+            InvalidStateError: more than one state, or an unknown one.
         """
         if isinstance(initial_states, str):
             initial_states = [initial_states]
@@ -284,7 +287,7 @@ class StateMachine(Container):
             self.userdata.update(userdata)
 
     def get_initial_states(self) -> list[str]:
-        """Return the label of the state that the next run begins with."""
+        """Return the label of the state in which the next run begins."""
         label = self._smachpy.next_initial or self._smachpy.initial
         return [] if label is None else [label]
 
@@ -317,10 +320,11 @@ class StateMachine(Container):
                 )
 
     def find_problems(self, where: str) -> tuple[str, ...]:
-        """Return what is wrong with this machine itself."""
+        """Return the problems of this machine itself."""
         data = self._smachpy
+        # A subclass with its own `execute` needs no children.
         if not data.children and type(self).execute is not Container.execute:
-            return ()  # its own `execute` says what it does
+            return ()
         initial = data.next_initial or data.initial
         spec = MachineSpec(where, data.outcomes, tuple(self.__child_specs()), initial)
         return machine_problems(spec)
@@ -354,17 +358,20 @@ class StateMachine(Container):
 
     def _smachpy_run_children(self, frame: Frame, plan: _Plan) -> str:
         data: Any = frame.data
+        # A durable run that goes on in here has called the start callbacks in an earlier process.
         resumed = None if frame.run.journal is None else frame.run.journal.resumed_label(frame)
         if data.start_cbs and resumed is None:
             self.call_start_cbs()
         label, data.next_initial = resumed or data.next_initial or data.initial, None
         assert label is not None
         assert data.initial is not None
-        hears = data.start_cbs or data.transition_cbs or data.termination_cbs
-        copies = data.input_keys or data.output_keys
-        is_more = hears or copies or data.listeners or data.buffers
+        # From its second run on, a machine that has none of these is entered by the parent's loop.
+        # Whatever changes one of them increases EPOCH, which makes `plain_plan` stale.
+        callbacks = data.start_cbs or data.transition_cbs or data.termination_cbs
+        keys = data.input_keys or data.output_keys
+        must_be_called = callbacks or keys or data.listeners or data.buffers
         plan.first = plan.steps[data.initial]
-        data.plain_plan = None if is_more else plan
+        data.plain_plan = None if must_be_called else plan
         logged = frame.run.logged
         if logged:
             log.loginfo(f"{frame.path}: starting in {label!r}, keys {self.userdata.keys()}")
@@ -375,14 +382,15 @@ class StateMachine(Container):
 
 
 def _run(base: Frame, step: Step) -> End:  # noqa: C901, PLR0912, PLR0915  see below
-    """Run step after step; return how the machine ends, with the last step in its frame.
+    """Run step after step; return the end of the machine, with the last step still in its frame.
 
-    This is the hot path, so it is one loop. While nobody watches, waits or asks for a preempt, a
-    transition is one call, one look-up and a few flags. A nested machine of which nobody hears, and
-    that copies no keys, is entered and left right here without a call, in a third of the time:
-    `frame` is the innermost one, `machine` and `data` are its own, and those above are its
-    `parent`s. All other containers are called, and `Container.execute` does for them what is done
-    here; so are all while somebody watches, as the events of a child belong around its call.
+    This is the hot path, so it is one loop: while nobody watches or asks for a preempt, a
+    transition is one call, one look-up and a few flags. A nested machine that has a `plain_plan` is
+    entered and left inside the loop without a call, in a third of the time: `frame` is then the
+    innermost frame, `machine` and `data` belong to it, and the machines around it are found through
+    `parent`. Every other container is called; `Container.execute` does the same steps as written
+    out here. While somebody watches, all containers are called, because the events of a child go
+    around its call.
 
     Args:
         base: The frame of this machine.
@@ -397,13 +405,16 @@ def _run(base: Frame, step: Step) -> End:  # noqa: C901, PLR0912, PLR0915  see b
     try:
         while True:
             try:
+                # Turns until something is raised; after an interruption the outer loop goes on.
                 while True:
+                    # Leave machines that have ended; each end is an outcome of the one around it.
                     while following.final:
                         if frame is base:
                             return following
                         outcome, parent = following.outcome, frame.parent
                         first.innermost = parent
-                        if data.frame is frame:  # as at the end of `Container._run`
+                        # The order matters: see the end of `Container.__run`.
+                        if data.frame is frame:
                             data.frame = None
                             data.answered = frame.answered
                         if (
@@ -424,11 +435,12 @@ def _run(base: Frame, step: Step) -> End:  # noqa: C901, PLR0912, PLR0915  see b
                             except KeyError:
                                 _raise_bad_outcome(frame, step, outcome)
                     step = following
-                    # First the mark, then the look: see `smachpy.run.grace.ask`.
+                    # First write the step, then read the flags: see `smachpy.run.grace.ask`.
                     frame.step = step
                     if machine._preempt_requested or frame.visit is not None or data.transition_cbs:
                         following = _careful(frame, step)
                         continue
+                    # Somebody watches: the loops below publish the events.
                     if run.watched:
                         if run.careful:
                             following = _careful(frame, step)
@@ -437,6 +449,8 @@ def _run(base: Frame, step: Step) -> End:  # noqa: C901, PLR0912, PLR0915  see b
                         else:
                             following = _follow(frame, step, run_watched(frame, step))
                         continue
+                    # Enter a nested machine, unless it is running already (then it is called, and
+                    # refuses that) or its plan is stale.
                     state, nested = step.state, step.nested
                     if nested is not None and nested.frame is None:
                         plan = nested.plain_plan
@@ -457,7 +471,7 @@ def _run(base: Frame, step: Step) -> End:  # noqa: C901, PLR0912, PLR0915  see b
                             data.frame = first.innermost = frame
                             following = plan.first
                             continue
-                    execute = step.execute  # called right here, it would be found slower
+                    execute = step.execute  # in a call, `step.execute(...)`, it is found slower
                     outcome = execute(step.userdata)
                     if (
                         machine._preempt_requested
@@ -478,7 +492,8 @@ def _run(base: Frame, step: Step) -> End:  # noqa: C901, PLR0912, PLR0915  see b
                 step = frame.step
                 raise user_error(step.path_in(frame), step.state, error) from error
     finally:
-        while frame is not base:  # something was raised: the machines on the way are left
+        # Something was raised inside machines that this loop has entered: leave them.
+        while frame is not base:
             machine, parent = frame.container, frame.parent
             first.innermost = parent
             data = frame.data
@@ -490,11 +505,11 @@ def _run(base: Frame, step: Step) -> End:  # noqa: C901, PLR0912, PLR0915  see b
 
 
 def _buffered(frame: Frame, step: Step, buffer: EventBuffer) -> Following:
-    """Run step after step as `_run` does while one buffer is all that wants to know.
+    """Run step after step as `_run` does, while one event buffer is the only subscriber.
 
-    Returns how the machine goes on when something else comes up. A loop of its own, because
-    one entry says that a step ended and that the next began, with one look at the clock: there
-    is nothing in between, and a recorded transition costs little more than a plain one.
+    Returns to `_run` with the next step as soon as anything else is to be done. It is a loop of its
+    own because one entry of the buffer records both the end of a step and the begin of the next
+    one, with one look at the clock. So a recorded transition costs little more than a plain one.
     """
     run, subscriptions, container = frame.run, SUBSCRIPTIONS, frame.container
     version = subscriptions.version
@@ -504,6 +519,7 @@ def _buffered(frame: Frame, step: Step, buffer: EventBuffer) -> Following:
     run.flush()
     buffer.put((now(), base, None, None, step))
     while True:
+        # As many rounds as the buffer has room for, so that no round has to look.
         rounds, note = buffer.room()
         for _ in rounds:
             try:
@@ -527,12 +543,13 @@ def _buffered(frame: Frame, step: Step, buffer: EventBuffer) -> Following:
             if following.final:
                 buffer.put((now(), base, step, outcome, None))
                 return following
-            frame.step = following  # first the mark, then the look
+            frame.step = following  # first write the step, then read the flags, as in `_run`
             if (
                 container._preempt_requested
                 or frame.visit is not None
                 or subscriptions.version is not version
             ):
+                # The end of `step` is not in the buffer yet, and an event is about `frame.step`.
                 frame.step = step
                 publish_left(frame, step, outcome)
                 frame.step = following
@@ -544,13 +561,14 @@ def _buffered(frame: Frame, step: Step, buffer: EventBuffer) -> Following:
 
 
 def _careful(frame: Frame, step: Step) -> Following:
-    """Run one step with everything that may want to know of it."""
+    """Run one step with all checks: control, shutdown check, preempt, log, transition callbacks."""
     run = frame.run
     visit = frame.visit
-    if visit is not None and visit.step is not step:  # it had ended when it was asked
+    if visit is not None and visit.step is not step:  # the step before, asked after its end
         forget_visit(frame)
     if run.control is not None:
-        run.control.pass_gate(frame, step)
+        run.control.pass_gate(frame, step)  # blocks while the machine is paused
+        # An operator has called this one step off meanwhile: it is not started.
         called_off = frame.visit is not None and not frame.container._preempt_requested
         if called_off:
             return _follow_asked(frame, step, "preempted")
@@ -563,14 +581,14 @@ def _careful(frame: Frame, step: Step) -> Following:
     following = _follow(frame, step, outcome)
     if following.final or not (frame.data.transition_cbs or run.logged):
         return following
-    frame.step = following
+    frame.step = following  # the callbacks see the next child as the active one, as in SMACH
     if run.logged:
         log.loginfo(f"{frame.path}: {step.label!r} -{outcome}-> {following.label!r}")
     return _call_between(frame, following)
 
 
 def _call_between(frame: Frame, following: Step) -> Following:
-    """Call the transition callbacks; return what comes then."""
+    """Call the transition callbacks; return the next step, or the end if one was interrupted."""
     container: Any = frame.container
     try:
         container.call_transition_cbs()
@@ -582,7 +600,7 @@ def _call_between(frame: Frame, following: Step) -> Following:
 
 
 def _follow(frame: Frame, step: Step, outcome: Any) -> Following:
-    """Return what comes after `step`, whether somebody asked or not."""
+    """Return what follows `step`, which ended with `outcome`."""
     if (
         frame.container._preempt_requested
         or frame.visit is not None
@@ -597,7 +615,7 @@ def _follow(frame: Frame, step: Step, outcome: Any) -> Following:
 
 
 def _follow_asked(frame: Frame, step: Step, outcome: Any) -> Following:
-    """Return what comes after `step` when somebody may have asked it to stop meanwhile."""
+    """Return what follows `step` if it or its machine may have been asked to stop."""
     decision = end_visit(frame, outcome)
     if decision.why is Why.STOPPED:
         return _preempted(frame, step)
@@ -610,19 +628,19 @@ def _follow_asked(frame: Frame, step: Step, outcome: Any) -> Following:
 
 
 def _follow_interrupted(frame: Frame) -> Following:
-    """Return what comes after a child that was interrupted."""
+    """Return what follows a child that was interrupted."""
     if frame.dead:
         raise Interruption
     try:
         return _follow_asked(frame, frame.step, "preempted")
-    except Interruption:  # a second one was on its way
+    except Interruption:  # a second one was already pending
         if frame.dead:
             raise
         return _preempted(frame, frame.step)
 
 
 def _preempted(frame: Frame, step: Step) -> End:
-    """End because of a preempt; `step` was not started, or finished in vain."""
+    """End because of a preempt; `step` was not started, or its outcome is not followed."""
     frame.answered = True
     frame.emit_own(Preempted, step.label)
     return PREEMPTED
@@ -634,6 +652,6 @@ def _raise_bad_outcome(frame: Frame, step: Step, outcome: object) -> NoReturn:
 
 
 def _current(machine: StateMachine, name: str) -> Any:
-    """Return the attribute `name` of the step that runs; None when none does."""
+    """Return the attribute `name` of the running step; None between runs."""
     frame = machine._smachpy.frame
     return getattr(None if frame is None else frame.step, name, None)

@@ -1,9 +1,10 @@
-"""The visit of a child: asked to stop, given its grace, interrupted, left behind.
+"""Preemption at run time: a child is asked to stop, gets its grace, is interrupted, left behind.
 
-What happens to a visit is the table of `smachpy.run.visit`; here each effect of it is performed.
-All of it happens with the run's lock held, and no code of the user runs there but what waits for a
-request: events and logs are noted and told afterwards, and a child's own `request_preempt` has a
-thread of its own. Graces end on the clock's thread, which waits for no listener and no log.
+The table in `smachpy.run.visit` says what happens to a visit; this module performs its effects.
+They are performed with the run's lock held, so they must not run the user's code: events and log
+texts are queued and published later without the lock, and a state's own `request_preempt` is called
+in a thread of its own. Graces end on the clock's timer thread, which therefore never waits for a
+listener or a logger.
 """
 
 from __future__ import annotations
@@ -41,21 +42,21 @@ if TYPE_CHECKING:
     from smachpy.run.visit import Override
 
 DEFAULT_GRACE_S = 10.0
-PATIENCE_S = 0.1  # how long an interrupted state has to unwind before it is left behind
-LONGEST_PATIENCE_S = 1.0
+PATIENCE_S = 0.1  # time for an interrupted state to unwind its `finally` blocks
+LONGEST_PATIENCE_S = 1.0  # between two interruptions of a thread that cannot be left behind
 
 
 class Visit:
-    """One visit of the child that `frame` runs, and where it is.
+    """One visit of the child that `frame` runs.
 
     Attributes:
-        phase: Where it is.
+        phase: Its phase in the table.
         step: The child.
-        by_timeout: Nobody but its own timeout has asked.
-        serviced: It has said that it takes the request up.
-        timeout: Its own timeout [s], when that has passed.
-        override: What an operator wants instead of its outcome.
-        override_call: Its own `request_preempt`, which is running or has run.
+        by_timeout: Only its own timeout has asked it to stop.
+        serviced: It has serviced the request.
+        timeout: Its own timeout [s], once that has passed.
+        override: The outcome or jump that an operator chose instead of its outcome.
+        override_call: The thread of its own `request_preempt`, if it has one that was called.
     """
 
     __slots__ = (
@@ -81,38 +82,43 @@ class Visit:
         self.timeout: float | None = None
         self.override: Override | None = None
         self._frame = frame
-        self._injected = 0  # thread to which an interruption is on its way
+        self._injected = 0  # the thread for which an exception is pending, 0 for none
         self.override_call: Task | None = None
         self._patience = PATIENCE_S
         self._timer: Timer | None = None
         self._timer_number = 0
 
     def happen(self, event: Event) -> None:
-        """Let `event` happen; with the run's lock held."""
+        """Apply `event`: change the phase, then perform the effects; with the run's lock held."""
+        # The phase changes first: an effect may come back here, as a container passes a request on
+        # to its children, one of which may ask the container again.
         self.phase, effects = STEPS[self.phase, event]
         for effect in effects:
             self._PERFORM[effect](self)
 
     def is_asked(self) -> bool:
-        """Tell whether somebody wants the child to stop."""
+        """Return whether the child has been asked to stop."""
         return self.phase in IS_ASKED
 
     def has_answered(self, outcome: object) -> bool:
-        """Tell whether the child, which ended with `outcome`, took its request up.
+        """Return whether the child, which ended with `outcome`, serviced its request.
 
-        It did if it says 'preempted' or has serviced the request; work that just finished did not.
+        It did if the outcome is 'preempted' or if it called `service_preempt()`. A child that just
+        finished its work did not.
         """
         if outcome == "preempted":
             return self.is_asked() or self.phase is Phase.LEFT_BEHIND
         if not self.is_asked():
             return False
+        # `service_preempt` clears the flag of a leaf. The flag of a container is cleared at its
+        # end, so its last run says how it ended.
         state: Any = self.step.state
         return bool(
             state._smachpy.answered if state._smachpy_is_container else not state._preempt_requested
         )
 
     def service(self) -> None:
-        """Publish, once, that the child takes its request up."""
+        """Publish, once, that the child services its request."""
         run = self._frame.run
         with run.lock:
             if not self.serviced and self.is_asked():
@@ -122,9 +128,10 @@ class Visit:
             run.flush()
 
     def settle(self) -> None:
-        """Wait until the own `request_preempt` of the child that has ended has returned too.
+        """Wait until the `request_preempt` of the child, which has ended, has returned as well.
 
-        Else it might meet the child's next visit. One that blocks is left behind.
+        Otherwise a late one would preempt the child's next visit. If it blocks, its thread is left
+        behind.
         """
         frame, task = self._frame, self.override_call
         self.override_call = None
@@ -132,7 +139,7 @@ class Visit:
             return
         try:
             ended = task.join(LONGEST_PATIENCE_S)
-        except Interruption:  # it was for the child, which has ended
+        except Interruption:  # a late one for the child, which has ended
             if frame.dead:
                 raise
             return
@@ -159,7 +166,7 @@ class Visit:
                 pass_on(state)
             else:
                 mark_preempt(state)
-        except Exception as error:  # noqa: BLE001  its siblings are told all the same
+        except Exception as error:  # noqa: BLE001  a callback's: the siblings must be told too
             self._frame.note_failure(self._frame.here(), _request_of(state), error)
 
     def _call_override(self) -> None:
@@ -170,13 +177,14 @@ class Visit:
         call = partial(call_override, state, frame, path)
         try:
             self.override_call = frame.run.clock.spawn(call, name=f"request_preempt of {path}")
-        except Exception as error:  # noqa: BLE001  no thread, for one: told, as what it raises is
+        except Exception as error:  # noqa: BLE001  reported: no thread, for one
             frame.note_failure(path, _request_of(state), error)
 
     def _arm_grace(self) -> None:
+        # A container has no grace: each of its children has one.
         state = self.step.state
         grace = None if state._smachpy_is_container else grace_of(self._frame, state)
-        if grace is not None:  # a container's children have their own
+        if grace is not None:
             self._start_timer(grace, Event.GRACE_OVER)
 
     def _publish_serviced(self) -> None:
@@ -188,12 +196,14 @@ class Visit:
         frame, clock = self._frame, self._frame.run.clock
         grace = grace_of(frame, self.step.state)
         path, described = frame.here(), frame.described()
+        # Stack, time and subscribers are taken now: by the time the event is published, the thread
+        # may be elsewhere and the frame dead, which has no subscribers.
         now = clock.now(), clock.time_ns()
         lines = lines_of(frame.first.thread)
-        subscribers = frame.find_subscribers() if frame.run.watched else None  # before it is dead
+        subscribers = frame.find_subscribers() if frame.run.watched else None
 
-        def tell() -> None:
-            stack = text_of(lines)
+        def publish() -> None:
+            stack = text_of(lines)  # reads source files: not under the lock
             if subscribers is not None:
                 frame.give(subscribers, Abandoned(path, *now, grace or 0.0, stack))
             frame.run.note_log(
@@ -201,7 +211,7 @@ class Visit:
                 f"was at:\n{stack}"
             )
 
-        frame.run.pending.append(tell)
+        frame.run.pending.append(publish)
 
     def _arm_patience(self) -> None:
         patience, self._patience = self._patience, min(2 * self._patience, LONGEST_PATIENCE_S)
@@ -214,10 +224,8 @@ class Visit:
             self._injected = ident
 
     def _publish_left(self) -> None:
-        """Note the ends of all that is left behind with the child.
-
-        Those who listen are looked up now: a dead frame has none.
-        """
+        """Queue the `Left` events of the child and of all containers left behind with it."""
+        # The subscribers are looked up now: once the frames are dead they have none.
         frame, run = self._frame, self._frame.run
         first = frame.first
         last = outcome_left(first)
@@ -230,15 +238,16 @@ class Visit:
         run.note_log(f"{frame.described()}: did not react; its thread is left behind.")
 
     def _cut_off(self) -> None:
-        """Cut off what is left behind from userdata, events and later runs; then go on without.
+        """Cut the thread off from userdata, events and later runs; then report it as ended.
 
-        The thread that is left behind keeps dead frames: it can neither go on to another state,
-        nor write userdata, nor end a later run, nor publish events.
+        The thread keeps dead frames: it can neither start another state, nor write userdata, nor
+        end a later run, nor publish events.
         """
         frame = self._frame
         first: Any = frame.first
         chain = _up_to(frame, first)
         try:
+            # All frames are dead before the first one is taken apart: the thread is still running.
             for each in chain:
                 each.dead = True
                 each.subscribers = None
@@ -247,6 +256,7 @@ class Visit:
                     each.step.cut_off()
                     each.step.state._preempt_requested = False
                 data = each.data
+                # The steps stay with the thread, so the next run needs new ones.
                 data.plan = data.plain_plan = None
                 if data.callback is each:
                     data.callback = None
@@ -255,7 +265,7 @@ class Visit:
                     each.container._preempt_requested = False
                     for ended in tuple(data.end_waiters):
                         ended.set()
-        finally:
+        finally:  # whatever was raised, the mission must go on without the thread
             frame.dead = True
             first.abandon()
 
@@ -263,7 +273,7 @@ class Visit:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
-            self._timer_number += 1
+            self._timer_number += 1  # one that has fired and waits for the lock is stale now
         if self._injected:
             take_back(self._injected)
             self._injected = 0
@@ -277,16 +287,18 @@ class Visit:
 
     def _start_timer(self, seconds: float, event: Event) -> None:
         self._timer_number += 1
-        over = partial(self._overdue, event, self._timer_number)
+        over = partial(self._on_timer, event, self._timer_number)
         self._timer = self._frame.run.clock.call_later(seconds, over)
 
-    def _overdue(self, event: Event, number: int) -> None:
+    def _on_timer(self, event: Event, number: int) -> None:
         with self._frame.run.lock:
-            if not self._is_on() or number != self._timer_number:  # one that was cancelled late
+            if not self._is_on() or number != self._timer_number:  # cancelled after it had fired
                 return
+            # A callback of a concurrence is left behind only after the branches, whose graces are
+            # their own: the container goes on at that moment and must not leave running children.
             group = self._frame.waits_for() if event is Event.LEAVE else None
             if group is not None and group.running():
-                group.when_ended = partial(self._overdue, event, number)
+                group.when_ended = partial(self._on_timer, event, number)
                 return
             self.happen(event)
         self._frame.run.flush_soon()
@@ -307,52 +319,52 @@ class Visit:
     }
 
 
-# -- who asks -----------------------------------------------------------------------------------
+# -- the origin of a request --------------------------------------------------------------------
 #
-# A request is passed on to every active state in the thread that makes it, so what is said once
-# holds for all of them.
+# A request is passed on to every active state in the thread that makes it, so an origin set once
+# per thread holds for all of them.
 
 REQUESTING: ContextVar[object] = ContextVar("smachpy_requesting", default=None)
-"""The state whose `request_preempt` runs here: a second call from within changes nothing."""
+"""The state whose `request_preempt` runs in this context: a call from within it does nothing."""
 
 
-class _Said(threading.local):
-    """What was said in this thread; not in the context, which tasks would inherit."""
+class _ThreadOrigin(threading.local):
+    """The origin of this thread's requests; no context variable, as asyncio tasks inherit those."""
 
     origin: Origin | None = None
 
 
-_said = _Said()
+_thread = _ThreadOrigin()
 
 
 @contextlib.contextmanager
 def asking(source: str, by: str = "", why: str = "") -> Iterator[None]:
-    """Say who asks for the preempts that this thread requests inside the `with` block.
+    """Set the origin of all requests that this thread makes inside the `with` block.
 
-    Inside another such block it changes nothing: the outer one knows where the wish came from.
+    Inside another such block it changes nothing: the outer one is nearer to the first cause.
     """
-    before = _said.origin
+    before = _thread.origin
     if before is None:
-        _said.origin = Origin(source, by, why)
+        _thread.origin = Origin(source, by, why)
     try:
         yield
     finally:
-        _said.origin = before
+        _thread.origin = before
 
 
 @contextlib.contextmanager
 def shutdown_asking(shutdown: Shutdown) -> Iterator[None]:
-    """Say that the program's end asks, and the signal that requested it."""
+    """Set the origin to the program's shutdown, and to the signal that requested it."""
     reason = shutdown.reason or ""
     with asking("signal" if reason.startswith("SIG") else "shutdown", reason):
         yield
 
 
 def current_origin() -> Origin:
-    """Return who asks in this thread: what was said, else what can be seen."""
-    said = _said.origin
-    if said is not None:
-        return said
+    """Return the origin set for this thread, else the state that runs in it, else the thread."""
+    given = _thread.origin
+    if given is not None:
+        return given
     first: Frame | None = THREAD.get()
     if first is not None and first.innermost is not None:
         return Origin("state", first.innermost.here())
@@ -363,14 +375,16 @@ def current_origin() -> Origin:
 
 
 def on_preempt(state: Child, callback: Callable[[], object]) -> Callable[[], None]:
-    """Call `callback` on each request to `state`, at once if there is one.
+    """Call `callback` on each request to `state`, and at once if there is one already.
 
     Returns:
-        Forgets the callback.
+        A function that removes the callback.
 
     Threads: the callback runs in the requester's thread with the run's lock held, maybe in a signal
-        handler: it must not wait, and is none of the user's (`PreemptNotice`).
+        handler. It must not block, so it must not be the user's; see `PreemptNotice` for those.
     """
+    # First register, then look at the flag; `mark_preempt` does it the other way round. So a
+    # request that arrives in between is noticed here or there, maybe twice, never missed.
     callbacks = state._smachpy.preempt_callbacks
     callbacks.append(callback)
     if state._preempt_requested:
@@ -384,13 +398,16 @@ def on_preempt(state: Child, callback: Callable[[], object]) -> Callable[[], Non
 
 
 def wait_for_preempt(state: Child, clock: Clock, seconds: float | None) -> bool:
-    """Wait at most `seconds` for a request to `state`; tell whether there is one.
+    """Wait at most `seconds` for a request to `state`.
+
+    Returns:
+        Whether there is one.
 
     Blocks: that long; None waits for ever.
     """
     wake = clock.event()
     callbacks = state._smachpy.preempt_callbacks
-    callbacks.append(wake.set)
+    callbacks.append(wake.set)  # before the look at the flag, as in `on_preempt`
     try:
         if not state._preempt_requested:
             wake.wait(seconds)
@@ -400,7 +417,7 @@ def wait_for_preempt(state: Child, clock: Clock, seconds: float | None) -> bool:
 
 
 def mark_preempt(state: Child) -> None:
-    """Set the flag of `state` and call what waits for it.
+    """Set the preempt flag of `state` and call its preempt callbacks.
 
     Raises:
         Exception: the first one that a callback raised, after all were called.
@@ -410,46 +427,48 @@ def mark_preempt(state: Child) -> None:
     for callback in tuple(state._smachpy.preempt_callbacks):
         try:
             callback()
-        except Exception as error:  # noqa: BLE001  raised below: the others are called too
+        except Exception as error:  # noqa: BLE001  raised below, after the other callbacks
             failure = failure or error
     if failure is not None:
         raise failure
 
 
 def has_own_request(state: Child) -> bool:
-    """Tell whether `request_preempt` is the user's."""
+    """Return whether the user has overridden `request_preempt`."""
     try:
         function = getattr(state.request_preempt, "__func__", None)
-    except Exception:  # noqa: BLE001  a property of the user's: reported where it is called
+    except Exception:  # noqa: BLE001  a property that raises: reported where it is called
         return True
     return function is not type(state)._smachpy_request_preempt
 
 
 def _request_of(state: Child) -> Any:
-    """Return the function `request_preempt` of `state` to be named, without running a property."""
+    """Return the `request_preempt` of `state` for its name only, without running a property."""
     found = inspect.getattr_static(state, "request_preempt")
     return getattr(found, "fget", None) or found
 
 
 def ask(frame: Frame, step: Any = None, *, timeout: float | None = None) -> bool:
-    """Ask what runs in `frame` to stop; with the run's lock held.
+    """Ask the child that `frame` runs to stop; with the run's lock held.
 
     Args:
         frame: Where the child runs.
-        step: The child that is meant; None: whatever runs.
+        step: The child to ask; None: the one that runs.
         timeout: The child's own timeout [s], if that is what asks.
 
     Returns:
-        Whether it runs, or will.
+        Whether the child was running, or about to start.
     """
     before, meant = frame.visit, step or frame.step
     if meant is None:
         return False
+    # A child has no visit until somebody asks or watches: the hot path makes none.
     visit = before
     if visit is None or visit.step is not meant:
         visit = Visit(frame, meant)
-    # First the mark, then the look; the frame's thread sets its step first and looks at the mark
-    # then, so one of the two always sees the other.
+    # The thread of the frame goes on without this lock. It writes `frame.step` and then reads
+    # `frame.visit`; here `frame.visit` is written first and `frame.step` read after it. Whatever
+    # the order in time, at least one of the two sees what the other wrote, so no request is lost.
     frame.visit = visit
     if frame.step is not meant or frame.dead or frame.ended:
         frame.visit = before
@@ -466,7 +485,7 @@ def ask(frame: Frame, step: Any = None, *, timeout: float | None = None) -> bool
 
 
 def ask_child(frame: Frame, step: Any, override: Override | None = None) -> bool:
-    """Ask the child of `step` to stop, but not its container; tell whether it ran."""
+    """Ask the child of `step` to stop, but not its container; return whether it was running."""
     with frame.run.lock:
         asked = ask(frame, step)
         if asked and frame.visit is not None:
@@ -476,21 +495,24 @@ def ask_child(frame: Frame, step: Any, override: Override | None = None) -> bool
 
 
 def pass_on(container: Parent) -> None:
-    """Ask a container, then what runs in it; with the run's lock held.
+    """Set the flag of a container, then ask its running children; with the run's lock held.
 
     Raises:
-        Exception: what waits for a request to the container raised; all that runs was asked.
+        Exception: a preempt callback of the container raised; all its children were asked.
     """
     data = container._smachpy
     if data.is_passing_on:
-        return  # a child that is told runs this container, or asks it: it is asked
+        return  # a child's callback asks the container, which is just passing a request on
     data.is_passing_on = True
     try:
         try:
-            mark_preempt(container)  # first the mark, then the look: see `Container._run`
+            # First the flag, then the look at `data.frame`: see the end of `Container.__run`.
+            mark_preempt(container)
         finally:
+            # While a callback of the container runs, the frame's step is one that comes after it.
+            # The flag stops that one, so it is not asked. Branches run beside a callback.
             if data.frame is not None and (data.callback is None or data.frame.group is not None):
-                group = data.frame.group  # a child that comes after a callback is not told
+                group = data.frame.group
                 for each in (data.frame,) if group is None else group.running():
                     ask(each)
             if data.callback is not None:
@@ -500,11 +522,11 @@ def pass_on(container: Parent) -> None:
 
 
 def request(container: Parent, only: Frame | None = None) -> Run | None:
-    """Ask a container and all that runs in it to stop; publish nothing yet.
+    """Ask a container and everything running in it to stop; events are queued, not published.
 
     Args:
-        container: The container; before a run it is marked, and the next run ends at once.
-        only: Ask only if this frame's run is still on.
+        container: The container. Before a run only its flag is set, and the next run ends at once.
+        only: Ask only if the run of this frame is still on.
 
     Returns:
         The run that was asked, or None.
@@ -516,7 +538,8 @@ def request(container: Parent, only: Frame | None = None) -> Run | None:
         if frame is None and only is None:
             data.origin = origin
             pass_on(container)
-            frame = data.root or data.frame or data.callback  # it may have begun meanwhile
+            # A run that began meanwhile has seen the flag; the caller publishes its events.
+            frame = data.root or data.frame or data.callback
             return None if frame is None else frame.run
         if frame is None:
             return None
@@ -529,7 +552,7 @@ def request(container: Parent, only: Frame | None = None) -> Run | None:
                 ask(frame)
             elif frame is data.frame or frame is data.callback:
                 _pass_on_reported(container, frame)
-            else:  # it has just ended
+            else:  # it has just ended: the request is for its next run
                 container._preempt_requested = True
         return frame.run
 
@@ -537,14 +560,14 @@ def request(container: Parent, only: Frame | None = None) -> Run | None:
 def _pass_on_reported(container: Parent, frame: Frame) -> None:
     try:
         pass_on(container)
-    except Exception as error:  # noqa: BLE001  reported: all that runs was asked
+    except Exception as error:  # noqa: BLE001  reported; all children were asked
         frame.note_failure(frame.path, _request_of(container), error)
 
 
 def request_soon(container: Parent, only: Frame | None = None) -> None:
-    """Ask as `request` does, but wait for no code of the user, listeners neither.
+    """Ask as `request` does, without waiting for listeners or other code of the user.
 
-    A `request_preempt` of the container's own is called in a thread of its own.
+    If the container overrides `request_preempt`, that is called in a new thread.
     """
     run = request(container, only)
     data = container._smachpy
@@ -557,11 +580,11 @@ def request_soon(container: Parent, only: Frame | None = None) -> None:
 
 
 def call_override(state: Child, frame: Frame | None, path: str) -> None:
-    """Call the own `request_preempt` of a state that has been asked; its thread's whole work."""
+    """Call the overridden `request_preempt` of a state that was asked; the body of its thread."""
     REQUESTING.set(state)
     try:
         state.request_preempt()
-    except BaseException as error:  # a border: reported, and without effect on others
+    except BaseException as error:  # the end of this thread: reported, nobody else is affected
         if frame is None:
             raise
         frame.note_failure(path or frame.path, _request_of(state), error)
@@ -569,7 +592,9 @@ def call_override(state: Child, frame: Frame | None, path: str) -> None:
 
 
 class PreemptNotice:
-    """Calls a function of the user for requests to a state, in a thread where it holds up nobody.
+    """Calls a user's function on requests to a state, in a thread of its own: it blocks nobody.
+
+    Requests that arrive while the function runs are merged into one more call.
 
     Threads: any, also in a signal handler.
     """
@@ -580,21 +605,22 @@ class PreemptNotice:
         self._path = current_path()
         self._clock = clock_of_run()
         self._busy = threading.Lock()
-        self._asked = False  # no lock for it: a signal handler may interrupt whoever holds it
+        self._asked = False  # without a lock: a signal handler could interrupt its holder
 
     def __call__(self) -> None:
-        """Have the function called."""
+        """Start a thread that calls the function."""
         self._asked = True
         self._clock.spawn(self._work, name=f"on_preempt of {self._path or 'a state'}")
 
     def forget(self) -> None:
-        """Call it no more."""
+        """Stop calling the function."""
         self._function = None
 
     def _work(self) -> None:
-        while self._asked and self._busy.acquire(blocking=False):  # else another thread sees it
+        # If the lock is taken, the thread that holds it looks at the flag again after its call.
+        while self._asked and self._busy.acquire(blocking=False):
             try:
-                self._asked = False
+                self._asked = False  # before the call: a request during it needs another one
                 function = self._function
                 if function is not None:
                     self._call(function)
@@ -603,18 +629,18 @@ class PreemptNotice:
 
     def _call(self, function: Callable[[], object]) -> None:
         frame = self._frame
-        if frame is None:  # outside of any machine; the thread's border reports what it raises
+        if frame is None:  # outside of any machine: the clock reports what its threads raise
             function()
             return
         try:
             function()
-        except BaseException as error:  # noqa: BLE001  a border: reported, without effect on others
+        except BaseException as error:  # noqa: BLE001  the user's code in its own thread: reported
             frame.note_failure(self._path, function, error)
             frame.run.flush()
 
 
 def note_serviced(state: Child) -> None:
-    """Publish that `state`, which runs in this context, takes its request up."""
+    """Publish that `state`, which runs in this context, services its request."""
     first: Frame | None = THREAD.get()
     frame = None if first is None else first.innermost
     if frame is None:
@@ -625,7 +651,7 @@ def note_serviced(state: Child) -> None:
 
 
 def forget_visit(frame: Frame) -> None:
-    """End a visit that nobody follows: it was asked just when it had ended, or its frame ends."""
+    """End a visit whose outcome is not followed: its child, or its frame, has already ended."""
     with frame.run.lock:
         visit = frame.visit
         if visit is None or frame.dead:
@@ -637,14 +663,14 @@ def forget_visit(frame: Frame) -> None:
 
 
 def leave(frame: Frame) -> None:
-    """Forget the run of the container of `frame`; with it ends the preempt that belonged to it."""
+    """Clear the flags at the end of a container's run: a request belongs to one run."""
     container, data, step = frame.container, frame.data, frame.step
     with frame.run.lock:
         if frame.dead:
             return
-        if data.frame is None:
+        if data.frame is None:  # else it runs again by now
             container._preempt_requested = False
-        if step is not None:  # what a child that raised asked itself
+        if step is not None:  # a child that asked itself and then raised
             step.state._preempt_requested = False
     if frame.visit is not None:
         forget_visit(frame)
@@ -652,26 +678,26 @@ def leave(frame: Frame) -> None:
         ended.set()
 
 
-# -- its end -----------------------------------------------------------------------------------
+# -- the end of a visit ------------------------------------------------------------------------
 
 
 def end_visit(frame: Frame, outcome: Any) -> Decision:
-    """End the visit of what `frame` runs, which ended with `outcome`, and decide what comes now.
+    """End the visit of the child that `frame` runs, and decide where the container goes.
 
-    Called when somebody may have asked it, or its container, to stop. The frame's `answered` says
-    afterwards whether the container's own request was taken up.
+    Called only if the child or its container may have been asked to stop. Afterwards
+    `frame.answered` says whether the request to the container was serviced.
 
     Raises:
-        InvalidTransitionError: it has no such outcome.
-        Interruption: its thread was left behind meanwhile.
+        InvalidTransitionError: the child has no such outcome.
+        Interruption: the thread was left behind meanwhile.
     """
     step = frame.step
     state: Child = step.state
-    with frame.run.lock:  # whoever passes a request on is done after this
+    with frame.run.lock:  # a request is passed on completely before or after this, never in between
         if frame.dead:
             raise Interruption
         visit = frame.visit
-        if visit is not None and visit.step is not step:  # it was for the one before
+        if visit is not None and visit.step is not step:  # asked after the child before had ended
             forget_visit(frame)
             visit = None
         answered = visit is not None and visit.has_answered(outcome)
@@ -690,7 +716,7 @@ def end_visit(frame: Frame, outcome: Any) -> Decision:
             target = step.next.get(outcome) if isinstance(outcome, str) else None
             decision = Decision(Why.UNKNOWN if target is None else Why.FOLLOWED, target)
         frame.answered = answered
-        if decision.why is Why.ANSWERED:
+        if decision.why is Why.ANSWERED:  # the request is spent; a second one starts from here
             frame.container._preempt_requested = frame.answered = False
     if visit is not None and visit.override_call is not None:
         visit.settle()
@@ -702,7 +728,7 @@ def end_visit(frame: Frame, outcome: Any) -> Decision:
 
 
 def unknown_outcome(path: str, outcomes: Iterable[str], got: object) -> InvalidTransitionError:
-    """Return the error for a child that returned none of its outcomes."""
+    """Return the error for a child that returned something other than one of its outcomes."""
     known = sorted(outcomes)
     hint = did_you_mean(got, known) if isinstance(got, str) else ""
     if got is None:
@@ -719,7 +745,7 @@ def unknown_outcome(path: str, outcomes: Iterable[str], got: object) -> InvalidT
 
 
 def grace_of(frame: Frame, state: Child) -> float | None:
-    """Return the seconds that a child has after a request; None for as long as it likes."""
+    """Return the grace of a child after a request [s]; None for no limit."""
     rule, grace = state._smachpy_grace, state._smachpy.options.preempt_timeout
     if grace == "inherit" or rule is not None:
         inherited = inherited_grace(frame)
@@ -730,7 +756,7 @@ def grace_of(frame: Frame, state: Child) -> float | None:
 
 
 def inherited_grace(frame: Frame | None) -> Any:
-    """Return the `preempt_timeout` of the nearest container that has one, else "inherit"."""
+    """Return the `preempt_timeout` of the nearest container that sets one, else "inherit"."""
     while frame is not None:
         grace = frame.data.options.preempt_timeout
         if grace != "inherit":
@@ -740,7 +766,7 @@ def inherited_grace(frame: Frame | None) -> Any:
 
 
 def outcome_left(frame: Frame) -> str:
-    """Return the outcome of the child that `frame` runs if it is left behind now."""
+    """Return the outcome that the child of `frame` gets if it is left behind now."""
     visit = frame.visit
     late = visit is not None and visit.by_timeout
     outcome: str = frame.step.state._smachpy.options.timeout_outcome if late else "preempted"
@@ -748,7 +774,7 @@ def outcome_left(frame: Frame) -> str:
 
 
 def _up_to(frame: Frame, first: Frame) -> list[Frame]:
-    """Return the frames that are left behind with `frame`: itself and those up to `first`."""
+    """Return the frames left behind with `frame`: itself and its parents up to `first`."""
     chain = [frame]
     while chain[-1] is not first and chain[-1].parent is not None:
         chain.append(chain[-1].parent)
@@ -756,7 +782,7 @@ def _up_to(frame: Frame, first: Frame) -> list[Frame]:
 
 
 def lines_of(ident: int) -> list[tuple[str, int, str]]:
-    """Return where the thread `ident` is: file, line and function, the innermost last."""
+    """Return the stack of the thread `ident` as (file, line, function), innermost last."""
     top = sys._current_frames().get(ident)
     lines = []
     while top is not None:
@@ -766,7 +792,7 @@ def lines_of(ident: int) -> list[tuple[str, int, str]]:
 
 
 def text_of(lines: list[tuple[str, int, str]]) -> str:
-    """Return these lines as a traceback prints them."""
+    """Return stack lines formatted as in a traceback."""
     import traceback
 
     return "".join(traceback.format_list([traceback.FrameSummary(*line) for line in lines]))

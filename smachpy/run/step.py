@@ -1,4 +1,4 @@
-"""A child, ready to run: compiled, its options around it, its events, and what its errors say."""
+"""One child, compiled: its options, its events and its errors."""
 
 from __future__ import annotations
 
@@ -30,7 +30,6 @@ from smachpy.slips import ACCEPTING
 from smachpy.userdata.user_data import Remapper, revoke
 
 if TYPE_CHECKING:
-    import asyncio
     from collections.abc import Callable, Coroutine
 
     from actionlib_core.clock import Timer
@@ -46,7 +45,7 @@ _OURS: Final = tuple(
 )
 """Folders of our packages; a package's is that of its `__init__.py`."""
 
-_new = tuple.__new__  # half the time of a NamedTuple's own
+_new = tuple.__new__  # takes half as long as the `__new__` of a NamedTuple
 
 
 class Step:
@@ -55,13 +54,13 @@ class Step:
     Attributes:
         label: Its label.
         state: The child.
-        execute: Runs it: its own `execute`, or that with its options around it.
-        userdata: Its window into the container's userdata; what `execute` was given, for a root.
-        next: Outcome -> what comes then.
-        nested: The child's data, if it is a machine that the loop of the one above may enter.
-        interface: The child's interface version that this was compiled from.
-        writes: It may write userdata.
-        watched_window: The newest window that reports writes; None when its run has ended.
+        execute: Runs the child: its own `execute`, wrapped if it has options.
+        userdata: Its window into the container's userdata; for a root, the argument of `execute`.
+        next: Outcome -> the next step, or the `End` of the container.
+        nested: The child's data, if it is a machine that its parent's loop may enter directly.
+        interface: The version of the child's interface that this step was compiled from.
+        writes: The child may write userdata.
+        watched_window: The latest window that reports writes; None after its run has ended.
     """
 
     __slots__ = (
@@ -83,7 +82,7 @@ class Step:
     def __init__(self, label: str, state: Child, execute: Callable[[Any], Any]) -> None:
         data = state._smachpy
         self.label = label
-        self.final = False  # on the instance, where Python finds it faster; see `End`
+        self.final = False  # a slot is found faster than a class attribute; see `End`
         self.state = state
         self.execute = execute
         self.userdata: Any = None
@@ -95,12 +94,14 @@ class Step:
         self.watched_window: _WatchedRemapper | None = None
 
     def is_stale(self) -> bool:
-        """Tell whether the child's interface has changed."""
+        """Return whether the child's interface has changed since the step was compiled."""
         return self.interface != self.state._smachpy.version
 
     def cut_off(self) -> None:
-        """Let a thread that was left behind in this child get no further, and write nothing."""
-        self.next = _Nowhere()
+        """Stop a thread left behind in this child from writing userdata or starting a state."""
+        # `Visit._cut_off` also drops the plan, so the machine's next run compiles new steps and
+        # this one belongs to the abandoned thread alone.
+        self.next = _NoTransitions()
         for window in (self.userdata, self.watched_window):
             if isinstance(window, Remapper):
                 revoke(window)
@@ -108,6 +109,8 @@ class Step:
     def path_in(self, frame: Frame) -> str:
         """Return the child's path."""
         base = frame.path
+        # The identity is enough: a frame keeps one string as its path, and a wrong guess only
+        # builds the text again.
         if base is not self._base:
             self._base = base
             self._path = f"{base}/{self.label}"
@@ -124,11 +127,13 @@ class Step:
 
 
 def make_step(container: Parent, label: str) -> Step:
-    """Return a child of `container` ready to run: its `execute`, with its options around it."""
+    """Compile the child `label` of `container`."""
     data = container._smachpy
     state: Any = data.children[label]
     execute, kind, of_child = state.execute, type(state), state._smachpy
     is_async = of_child.is_async or inspect.iscoroutinefunction(execute)
+    # A container whose `execute` is overridden: the user's code around `super().execute()` would
+    # block a preempt for ever, so it gets the container's grace.
     is_own = (
         kind._smachpy_is_container
         and getattr(execute, "__func__", None) is not kind._smachpy_execute
@@ -141,8 +146,8 @@ def make_step(container: Parent, label: str) -> Step:
     return step
 
 
-class _Nowhere(dict[str, Any]):
-    """The transitions of a child that was left behind: every one ends its thread."""
+class _NoTransitions(dict[str, Any]):
+    """The transitions of a child that was left behind: following any of them ends its thread."""
 
     def __missing__(self, _key: object) -> Any:
         raise Interruption
@@ -155,13 +160,13 @@ Following: TypeAlias = Step | End
 
 
 class _WatchedRemapper(Remapper):
-    """A window that says who wrote what, when."""
+    """A window that publishes `UserdataWritten` for each write."""
 
     __slots__ = ("_scope_of",)
     _scope_of: tuple[Frame, str]
 
     def __init__(self, original: Remapper, frame: Frame, path: str) -> None:
-        set_slot = object.__setattr__
+        set_slot = object.__setattr__  # `self.name = ...` would write userdata
         for name in Remapper.__slots__:
             set_slot(self, name, getattr(original, name))
         set_slot(self, "_scope_of", (frame, path))
@@ -171,7 +176,7 @@ class _WatchedRemapper(Remapper):
         if frame.run.journal is not None and key in self._output:
             frame.run.journal.check_value(frame, path, self._output[key], item)
         super().__setitem__(key, item)
-        if frame.run.watched and key in self._output:  # else it was dropped
+        if frame.run.watched and key in self._output:  # other keys were ignored by the line above
             clock = frame.run.clock
             fields = (path, clock.now(), clock.time_ns(), self._output[key], item)
             frame.publish(_new(UserdataWritten, fields))
@@ -180,24 +185,26 @@ class _WatchedRemapper(Remapper):
         self[name] = value
 
 
-# -- with its options around it ----------------------------------------------------------------
+# -- options -----------------------------------------------------------------------------------
 
 
 _HOOKS = (("on_enter", 2), ("on_exit", 3), ("resume", 2), ("on_resume", 2))
-"""Methods that are options, and how many arguments they take."""
+"""Methods that act as options, and their number of arguments, `self` included."""
 
 
 def get_options(state: Child) -> Options:
-    """Return the options of `state`, hooks that are methods of its class included.
+    """Return the options of `state`, including hooks that are methods of its class.
 
-    A method `on_enter(self, userdata)` or `on_exit(self, userdata, outcome)` is a hook, and so are
-    `resume(self, userdata)` and `on_resume(self, userdata)`; a method of one of these names with
-    other arguments is the state's own.
+    The hooks are `on_enter(self, userdata)`, `on_exit(self, userdata, outcome)`,
+    `resume(self, userdata)` and `on_resume(self, userdata)`. A method with one of these names but
+    other arguments belongs to the user and is not called.
     """
     data = state._smachpy
     known, options = data.with_hooks, data.options
+    # Kept with the options it was made from: looking for methods takes longer than running a small
+    # machine. Setting an option replaces `data.options`, so a stale entry is noticed.
     if known is not None and known[0] is options:
-        return known[1]  # looking for methods takes longer than running a small machine
+        return known[1]
     hooks = {
         name: getattr(state, name)
         for name, count in _HOOKS
@@ -209,7 +216,8 @@ def get_options(state: Child) -> Options:
 
 
 def _is_hook(kind: type, name: str, count: int) -> bool:
-    """Tell whether the method `name` of a class takes `count` arguments, no fewer and no more."""
+    """Return whether the method `name` of a class takes exactly `count` arguments."""
+    # Static look-up: a property or `__getattr__` of the user's must not run here.
     method = inspect.getattr_static(kind, name, None)
     if not inspect.isfunction(method) or inspect.iscoroutinefunction(method):
         return False
@@ -230,20 +238,20 @@ def runner_of(
     is_async: bool = False,
     is_callback: bool = False,
 ) -> Callable[[Any], Any]:
-    """Return `execute` with `options` around it: itself when it asks for nothing more.
+    """Return `execute` wrapped by `options`, or `execute` itself if there is nothing to add.
 
     Args:
         state: The child.
         options: Its options.
-        execute: Runs it.
+        execute: Runs the child.
         is_async: `execute` is a coroutine function.
-        is_callback: `execute` is code of the user around a container's own.
+        is_callback: `execute` is the user's override of a container's `execute`.
     """
     if is_async:
         execute = _Async(state, execute)
     if is_callback:
         execute = _OwnExecute(state, execute)
-    if ACCEPTING[0]:
+    if ACCEPTING[0]:  # only programs for ROS 1 wait in rospy, whose waits raise `ProgramEnds`
         execute = _EndsWithProgram(execute)
     plain = options is NO_OPTIONS or (
         options.timeout is None
@@ -256,7 +264,7 @@ def runner_of(
 
 
 class _Async:
-    """Runs a state's coroutine; a preempt cancels it."""
+    """Runs a state's coroutine. A preempt cancels it."""
 
     def __init__(self, state: Child, execute: Callable[[Any], Coroutine[Any, Any, Any]]) -> None:
         self._state: Any = state
@@ -272,7 +280,8 @@ class _Async:
         task = asyncio.ensure_future(self._execute(userdata))
 
         def cancel() -> None:
-            loop.call_soon_threadsafe(_cancel, task)
+            # Runs in the requester's thread; `Task.cancel` is not thread-safe.
+            loop.call_soon_threadsafe(task.cancel)
 
         forget = on_preempt(self._state, cancel)
         try:
@@ -281,7 +290,7 @@ class _Async:
             if not self._state.preempt_requested():
                 own = asyncio.current_task()
                 if own is not None and own.cancelling():
-                    raise  # somebody ends the loop: Ctrl-C in a program that handles it itself
+                    raise  # the loop itself is ending: Ctrl-C in a program that handles it
                 raise RuntimeError("the coroutine was cancelled, by no preempt") from error
             self._state.service_preempt()
             return "preempted"
@@ -289,14 +298,10 @@ class _Async:
             forget()
 
 
-def _cancel(task: asyncio.Task[Any]) -> None:
-    task.cancel()
-
-
 class _OwnExecute:
-    """Runs a container's `execute` that is the user's: bounded by the grace but in the container's.
+    """Runs the user's override of a container's `execute`; the container's grace bounds it.
 
-    A container has no grace of its own, as its children have theirs.
+    The grace pauses inside `super().execute()`, where each child has its own.
     """
 
     def __init__(self, container: Any, execute: Callable[[Any], Any]) -> None:
@@ -310,11 +315,7 @@ class _OwnExecute:
 
 
 class _EndsWithProgram:
-    """Runs a state whose waits raise `ProgramEnds`: it was preempted then, as its machine is.
-
-    The wait may have heard of the program's end before the machine has, so the machine is asked
-    here.
-    """
+    """Runs a state whose waits raise `ProgramEnds` at shutdown, and treats that as a preempt."""
 
     def __init__(self, execute: Callable[[Any], Any]) -> None:
         self._execute = execute
@@ -327,6 +328,8 @@ class _EndsWithProgram:
             asked = shutdown.requested() and frame is not None and not frame.dead
             if not asked or not isinstance(error, ProgramEnds):
                 raise
+            # The wait may have noticed the shutdown before the machine was asked to stop. Ask the
+            # root now; otherwise it would go on with the next state.
             while frame is not None and frame.parent is not None:
                 frame = frame.parent
             assert frame is not None
@@ -337,7 +340,7 @@ class _EndsWithProgram:
 
 
 class _WithOptions:
-    """Runs a state with its hooks, timeout, retry and handlers of exceptions."""
+    """Runs a state with its hooks, timeout, retry and `on_exception`."""
 
     def __init__(self, state: Child, options: Options, execute: Callable[[Any], Any]) -> None:
         self._state = state
@@ -357,8 +360,10 @@ class _WithOptions:
         return outcome
 
     def _attempts(self, frame: Frame, userdata: Any) -> Any:
-        """Run until an attempt is good, or the last one was made, or somebody asks it to stop."""
+        """Run until an attempt succeeds, none are left, or a preempt arrives."""
         state, attempt = self._state, 1
+        # A durable run that goes on continues with the attempt in which the process ended, after
+        # the rest of the pause before it.
         if frame.run.journal is not None:
             attempt, wait = frame.run.journal.attempt(frame)
             if wait and wait_for_preempt(state, clock_of_run(), wait):
@@ -377,7 +382,7 @@ class _WithOptions:
             try:
                 result = "preempted" if passed else self._execute(userdata)
             except (Exception, Interruption) as error:
-                if frame.dead:
+                if frame.dead:  # the thread was left behind: no retry, no hook
                     raise
                 result = error
             finally:
@@ -393,6 +398,7 @@ class _WithOptions:
                 if not (wait and wait_for_preempt(state, clock_of_run(), wait)):
                     attempt += 1
                     continue
+                # Preempted during the pause: decide again without the retry.
                 decision = after_attempt(
                     result, options, attempt, asked=True, timed_out=False, applies=_applies
                 )
@@ -422,7 +428,7 @@ def _call_hook(frame: Frame, state: Any, hook: Callable[..., object], *arguments
 
 
 class Timeout:
-    """Asks what `frame` runs to stop when its time, `seconds`, is over."""
+    """The `timeout` of the child that `frame` runs: asks it to stop after `seconds`."""
 
     def __init__(self, frame: Frame, seconds: float) -> None:
         self._frame = frame
@@ -433,7 +439,12 @@ class Timeout:
         self._timer: Timer | None = None
 
     def begin(self) -> bool:
-        """Let the time begin; tell whether it passed before this process, with nothing to go on."""
+        """Start the timeout.
+
+        Returns:
+            Whether it passed before this process began, in a durable run that has no goal and no
+            children to go on with; then the attempt is over.
+        """
         journal, frame = self._frame.run.journal, self._frame
         left = self._seconds if journal is None else journal.time_left(frame, self._seconds)
         if left > 0.0:
@@ -443,24 +454,26 @@ class Timeout:
         return journal is not None and not journal.goes_on(frame)
 
     def start(self, left: float) -> None:
-        """Let the time be over in `left` seconds."""
+        """Start the timeout with `left` seconds."""
         self._timer = self._frame.run.clock.call_later(left, self.over)
 
     def is_alone(self) -> bool:
-        """Tell whether the time is over and nobody else wants the child to stop."""
+        """Return whether the timeout has passed and nobody else has asked the child to stop."""
         visit = self._frame.visit
         return self._passed and visit is not None and visit.step is self._step and visit.by_timeout
 
     def end(self, result: object) -> bool:
-        """The attempt has ended with `result`; tell whether nothing but the timeout had asked.
+        """End the attempt, whose outcome or exception is `result`.
 
-        Then the request ends with the attempt, and the next one begins anew. A request of somebody
-        else stays.
+        Returns:
+            Whether only this timeout had asked the child to stop. The request then ends with the
+            attempt, and the next attempt starts fresh; a request from anyone else stays.
         """
         if self._timer is not None:
             self._timer.cancel()
         frame = self._frame
         with frame.run.lock:
+            # A timer that was cancelled too late finds this in `over` and does nothing.
             self._ended = True
             if not self._passed or frame.dead:
                 return False
@@ -470,6 +483,7 @@ class Timeout:
         if frame.run.watched and visit.has_answered(result):
             visit.service()
         with frame.run.lock:
+            # Looked up under the lock: a request may have arrived since the timeout's.
             alone = visit.by_timeout and not frame.dead
             if alone:
                 visit.happen(Event.NEXT_ATTEMPT)
@@ -477,7 +491,7 @@ class Timeout:
         return alone
 
     def over(self) -> None:
-        """The time is over; only the first call counts."""
+        """Ask the child to stop; only the first call counts."""
         frame = self._frame
         with asking("timeout", frame.here(), f"{self._seconds:g} s"), frame.run.lock:
             if self._passed or self._ended or frame.dead:
@@ -491,11 +505,11 @@ def _reason(result: Any) -> str:
 
 
 def _applies(wanted: Callable[[BaseException], bool], error: BaseException) -> bool:
-    """Tell whether `wanted` is true of `error`, or of what a container made it from.
+    """Return whether `wanted` holds for `error`, or for the errors a container wrapped in it.
 
-    Several children of a concurrence may have raised; an error that nobody wants must not
-    disappear beside one that somebody does, so it must be true of all. A group that a state
-    itself has raised is one error.
+    If several children of a concurrence have raised, it must hold for all of them: otherwise an
+    unexpected error would disappear beside an expected one. An `ExceptionGroup` that a state has
+    raised itself counts as one error.
     """
     if wanted(error):
         return True
@@ -507,11 +521,11 @@ def _applies(wanted: Callable[[BaseException], bool], error: BaseException) -> b
     return _applies(wanted, cause)
 
 
-# -- with its events ---------------------------------------------------------------------------
+# -- events ------------------------------------------------------------------------------------
 
 
 def run_watched(frame: Frame, step: Step) -> Any:
-    """Run a step and publish that it was entered and left."""
+    """Run a step and publish its `Entered` and `Left` (or `Failed`)."""
     run = frame.run
     clock = run.clock
     path = step.path_in(frame)
@@ -536,13 +550,14 @@ def run_watched(frame: Frame, step: Step) -> Any:
     if frame.visit is not None or run.pending or run.control is not None:
         publish_left(frame, step, outcome)
     else:
-        text = outcome if isinstance(outcome, str) else repr(outcome)  # the machine refuses it next
+        # An outcome that is no string is refused by the machine right after this.
+        text = outcome if isinstance(outcome, str) else repr(outcome)
         frame.publish(_new(Left, (path, clock.now(), clock.time_ns(), text)))
     return outcome
 
 
 def publish_raised(frame: Frame, error: BaseException) -> None:
-    """Publish that the step that runs was ended by `error`."""
+    """Publish that the running step was ended by `error`."""
     if isinstance(error, Interruption):
         frame.emit(Left, "preempted")
     else:
@@ -550,8 +565,8 @@ def publish_raised(frame: Frame, error: BaseException) -> None:
 
 
 def trace_of(error: BaseException) -> str:
-    """Return the innermost lines of user code that an exception came through, a line each."""
-    import traceback  # only where something went wrong
+    """Return the innermost lines of user code in a traceback, one per line."""
+    import traceback  # here, as a machine that works does not need it
 
     frames = [
         one
@@ -563,7 +578,7 @@ def trace_of(error: BaseException) -> str:
 
 
 def publish_left(frame: Frame, step: Step, outcome: Any) -> None:
-    """Publish that `step` has just ended, and what goes with it."""
+    """Publish that `step` has ended, after the events noted meanwhile, and check breakpoints."""
     run = frame.run
     clock = run.clock
     visit = frame.visit
@@ -578,22 +593,22 @@ def publish_left(frame: Frame, step: Step, outcome: Any) -> None:
 
 
 def only_buffer(frame: Frame) -> EventBuffer | None:
-    """Return the buffer that alone hears the events of `frame`; None if there is none."""
+    """Return the event buffer of `frame` if it is the only subscriber, else None."""
     subscribers = frame.subscribers
     if subscribers is None or subscribers.version is not SUBSCRIPTIONS.version:
         subscribers = frame.find_subscribers()
     return subscribers.buffer
 
 
-# -- what goes wrong ---------------------------------------------------------------------------
+# -- errors ------------------------------------------------------------------------------------
 
 
 class ChildErrors(ExceptionGroup[Exception]):
-    """What the children of a concurrence raised; not a group that one of them raised itself."""
+    """The exceptions of a concurrence's children; a group that one child raised is no such one."""
 
 
 def user_error(path: str, state: Child, error: BaseException) -> InvalidUserCodeError:
-    """Return the error for code of a state that raised; raise it `from error`."""
+    """Return the error to raise, `from error`, when a state's code has raised."""
     hint = missing_init(state, error) if isinstance(error, AttributeError) else ""
     return InvalidUserCodeError(
         f"{path}: {type(state).__name__} raised {type(error).__name__}: {error}{hint}", path=path

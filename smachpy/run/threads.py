@@ -1,8 +1,8 @@
-"""The threads in which machines run: that of a root, and one for each child of a concurrence."""
+"""The threads of a machine: one for the root, and one for each child of a concurrence."""
 
 from __future__ import annotations
 
-import _signal  # type: ignore[import-not-found]  # `signal` without its enums, 20 us a run
+import _signal  # type: ignore[import-not-found]  # `signal` without enums saves 20 us a run
 import signal
 import threading
 from collections import deque
@@ -46,8 +46,8 @@ class Branch(Frame):
     """A thread in which one child runs: a child of a concurrence, or a root.
 
     Attributes:
-        outcome: What it ended with; None while it runs, or when it raised.
-        error: What it raised.
+        outcome: Its outcome; None while it runs, or if it raised.
+        error: The exception it raised.
     """
 
     path = ""
@@ -56,7 +56,7 @@ class Branch(Frame):
     error: BaseException | None = None
 
     def work(self) -> None:
-        """Run the child; the thread's whole work."""
+        """Run the child and report how it ended; the body of the thread."""
         self.first = self.innermost = self
         self.thread = threading.get_ident()
         THREAD.set(self)
@@ -67,13 +67,17 @@ class Branch(Frame):
             outcome = "preempted"
         except BaseException as error:  # noqa: BLE001  handed to the container's thread
             failure = error
+        # An interruption that was injected just before the child ended is raised at any later
+        # bytecode of this thread, so maybe here. Then start again: nothing was reported yet, and
+        # once `end` has marked the visit as ended no other one can arrive.
         while True:
             try:
                 if self.visit is not None and self.visit.override_call is not None:
                     self.visit.settle()
                 waiting = self.end(outcome, failure)
-            except Interruption:  # on its way when the child ended; `end` has done nothing yet
+            except Interruption:
                 continue
+            # Before the container goes on, so that this thread holds nothing of a run that ends.
             self.end_thread()
             if waiting is not None:
                 waiting.set()
@@ -88,15 +92,15 @@ class Branch(Frame):
         raise NotImplementedError
 
     def end(self, outcome: str | None, error: BaseException | None) -> ClockEvent | None:
-        """Note how the child ended; only the first call counts.
+        """Record how the child ended; only the first call counts.
 
         Returns:
-            To be set by the caller, for those who wait; None: nobody does.
+            An event for the caller to set, which wakes the waiting thread; None if nobody waits.
         """
         raise NotImplementedError
 
     def abandon(self) -> None:
-        """Go on without the child; its thread is left behind."""
+        """Report the child as ended although its thread, which is left behind, still runs."""
         waiting = self.end(outcome_left(self), None)
         if waiting is not None:
             waiting.set()
@@ -117,7 +121,7 @@ class ChildBranch(Branch):
         self._group = group
 
     def run_child(self) -> str:
-        """Run the child, again when an operator wants it so, and return its outcome."""
+        """Run the child, and again if an operator jumps to it; return its outcome."""
         while True:
             decision = end_visit(self, self._once())
             if decision.why is not Why.JUMPED:
@@ -131,8 +135,8 @@ class ChildBranch(Branch):
         step, visit, control = self.step, self.visit, self.run.control
         assert visit is not None
         if control is not None and not visit.is_asked():
-            control.pass_gate(self, step)
-        with self.run.lock:
+            control.pass_gate(self, step)  # blocks while the machine is paused
+        with self.run.lock:  # a request comes either before START or to a running child
             if visit.is_asked():
                 return "preempted"
             visit.happen(Event.START)
@@ -143,61 +147,63 @@ class ChildBranch(Branch):
         return self._group.end(self, outcome, error)
 
     def end_thread(self) -> None:
-        """Refer to itself no more, so that no run waits for the garbage collector."""
+        """Break the reference cycles through this frame: its run is freed without the collector."""
         self.innermost = None
         del self.first
-        self.let_go()
+        self.release()
 
-    def let_go(self) -> None:
-        """Refer to nothing that refers to it."""
+    def release(self) -> None:
+        """Drop the references to objects that refer back to this frame."""
         del self._group
         self.visit = None
         self.step.watched_window = None
 
 
 class _Threads:
-    """Starts branches in as many threads as they need: one each when they all block.
+    """Runs branches in threads: one each if they block, fewer if they end at once.
 
-    Whoever takes a branch calls another thread first if more branches wait, so none ever waits
-    for another one's end. A thread whose child has ended meanwhile takes the next branch itself:
-    children that do little cost no thread each, of which waking up is by far the greatest part.
+    A thread that takes a branch first starts another thread if more branches wait, so no branch
+    waits for the end of another. If its own child ends before that thread has woken up, it takes
+    the next branch itself. Waking a thread is by far the greatest cost of a branch that does
+    little.
 
-    Threads: `call` by the container's; `_work` by those that it brings.
+    Threads: the container's calls `start`; the started ones run `_work`.
     """
 
     def __init__(self, clock: RealClock, branches: list[ChildBranch]) -> None:
         self._clock = clock
+        # A context may be entered once at a time, so each branch gets its own copy.
         self._waiting = deque((branch, copy_context()) for branch in branches)
         self._lock = threading.Lock()
-        self._coming = False
+        self._is_starting = False
 
-    def call(self) -> None:
-        """Let a thread come for the branches that wait, unless one is on its way."""
+    def start(self) -> None:
+        """Start a thread if branches wait, unless one is already starting."""
         with self._lock:
-            if self._coming or not self._waiting:
+            if self._is_starting or not self._waiting:
                 return
-            self._coming = True
+            self._is_starting = True
             name = self._waiting[0][0].here()
         self._clock.spawn(self._work, name=name)
 
     def _work(self) -> None:
         thread = threading.current_thread()
         with self._lock:
-            self._coming = False
+            self._is_starting = False
         while True:
             with self._lock:
                 if not self._waiting:
                     return
                 branch, context = self._waiting.popleft()
             try:
-                self.call()
-            except RuntimeError as error:  # the system gives no more threads
+                self.start()
+            except RuntimeError as error:  # "can't start new thread": the system's limit
                 self._fail(error)
             thread.name = branch.here()
             context.run(branch.work)
 
     def _fail(self, error: RuntimeError) -> None:
-        """End the branches that no thread can come for."""
+        """End the branches for which no thread can be started."""
         with self._lock:
             branches = [branch for branch, _ in self._waiting]
             self._waiting.clear()
@@ -208,15 +214,16 @@ class _Threads:
 
 
 class Group:
-    """All branches of one run, and the queue on which they report to the container's thread.
+    """The branches of one run, and the queue on which they report to the container's thread.
 
     Attributes:
-        reports: Ended branches that the container has not looked at yet.
-        each: The container wants to be woken for every end, not only for the last.
+        reports: Ended branches that the container has not handled yet.
+        each: Every end wakes the container, not only the last one.
         failed: A branch or a callback has raised; the container will raise too.
-        started: The branches have threads, or are about to.
-        interruption: Ended a callback that did not listen; the container will be preempted.
-        when_ended: Called once when the last branch has ended; None: nothing.
+        started: The branches have threads, or will have them in a moment.
+        interruption: What interrupted a callback that outlasted its grace; the container will end
+            'preempted'.
+        when_ended: Called once after the last branch has ended; None for nothing.
     """
 
     __slots__ = (
@@ -249,13 +256,14 @@ class Group:
         self.started = True
         clock = self.frame.run.clock
         if isinstance(clock, RealClock):
-            _Threads(clock, self.branches).call()
+            _Threads(clock, self.branches).start()
             return
+        # One thread each, so that the seed of a virtual clock decides about the order of all.
         for branch in self.branches:
             clock.spawn(branch.work, name=branch.here())
 
     def ask(self, branches: Iterable[Branch]) -> None:
-        """Ask the children of `branches` to stop."""
+        """Ask the children of `branches` to stop; those that have ended are skipped."""
         with self.frame.run.lock:
             for branch in branches:
                 if not branch.ended:
@@ -265,29 +273,31 @@ class Group:
     def end(
         self, branch: ChildBranch, outcome: str | None, error: BaseException | None
     ) -> ClockEvent | None:
-        """Note how a branch ended; the first report of a branch counts.
+        """Record how a branch ended; only the first call for a branch counts.
 
         Returns:
-            To be set by the caller, as the container is to look; None: it is not.
+            An event for the caller to set, which wakes the container; None if it shall sleep on.
         """
-        with self.frame.run.lock:  # whoever passes a request on is done after this
-            if branch.ended:
+        with self.frame.run.lock:  # after this no request is being passed on to the branch
+            if branch.ended:  # its thread was left behind, and has ended now
                 return None
             visit = branch.visit
             if visit is not None:
                 branch.answered = branch.answered or visit.has_answered(outcome)
                 visit.happen(Event.END)  # from here on no interruption arrives
-            if not branch.dead:
+            if not branch.dead:  # else `Visit._cut_off` has cleared the flag
                 branch.step.state._preempt_requested = False
             branch.ended = True
             branch.outcome, branch.error = outcome, error
             if error is not None:
                 self.failed = True
-            self.reports.append(branch)  # before it is counted: who sees the last sees them all
+            # First the report, then the count: `wait` reads them without the lock, and must find
+            # every report when the count is 0.
+            self.reports.append(branch)
             self._left -= 1
             last = self._left == 0
             when_ended = self.when_ended if last else None
-        if when_ended is not None:
+        if when_ended is not None:  # it takes the lock again and may end the container
             when_ended()
         return self._wake if last or self.each or error is not None else None
 
@@ -297,7 +307,8 @@ class Group:
         Returns:
             Whether branches are still running.
 
-        Blocks: until a branch has something to report; an ignored preempt ends in a report too.
+        Blocks: until a branch has ended; one that ignores its preempt is reported too, once its
+            thread is left behind.
         """
         if not self.reports or not (self.each or self._left == 0):
             self._wake.wait()
@@ -308,13 +319,13 @@ class Group:
         """Return the branches that have not ended."""
         return [branch for branch in self.branches if not branch.ended]
 
-    def let_go(self) -> None:
-        """Let go of branches that were not started."""
+    def release(self) -> None:
+        """Release branches that were not started; a started one does it as its thread ends."""
         for branch in self.branches:
-            branch.let_go()
+            branch.release()
 
     def raise_errors(self, failure: InvalidUserCodeError | None) -> None:
-        """Raise what the branches raised, all of it, and `failure`, what a callback raised.
+        """Raise all exceptions of the branches, and `failure`, the exception of a callback.
 
         Raises:
             InvalidUserCodeError: `failure` when no branch raised, else from an `ExceptionGroup` of
@@ -346,7 +357,8 @@ class Group:
 
 # -- the root ------------------------------------------------------------------------------------
 
-# What a program that does not handle them itself does with the signals that ask it to end.
+# The handlers of a program that sets none of its own for the signals that ask it to end. Only these
+# are replaced during a run.
 _DEFAULTS = (
     (int(signal.SIGINT), signal.default_int_handler),
     (int(signal.SIGTERM), _signal.SIG_DFL),
@@ -354,27 +366,29 @@ _DEFAULTS = (
 
 
 OBSERVERS: list[Callable[[Any], Callable[[str | None], object] | None]] = []
-"""Called with each root before it runs; what one returns is called with the outcome, None if the
-root raised. For programs whose roots are not known before: `smachpy.ros1`."""
+"""Each is called with every root before it runs, and returns a function to call with its outcome
+(None if it raised), or None. For programs whose roots are not known in advance: `smachpy.ros1`."""
 
 
 def execute_root(root: Parent, execute: Callable[[Any], Any], parent_ud: Any) -> str:
-    """Run `root`, by `execute`, as the top of a machine.
+    """Run `root` as the top of a machine, by calling `execute`.
 
-    In the main thread it runs right there; a state that ignores its preempt is interrupted by a
-    signal. In another thread it runs in a thread of its own, because a state that blocks in C could
-    not be interrupted there: that thread can be left behind.
+    The main thread runs it itself, because there a signal can interrupt a state that ignores its
+    preempt. Any other thread starts one more thread for it: a state that blocks in C cannot be
+    interrupted there, so its thread must be one that can be left behind.
 
     Blocks: until it has ended.
     """
     top = Root(root, execute, parent_ud)
     running = top.data.root
-    if running is not None and not running.ended:  # before it is in the way of the run that is on
+    # Refused here, before this call touches the signal handlers and the shutdown of the other run.
+    if running is not None and not running.ended:
         raise already_runs(top.here())
     ends = [observe(root) for observe in OBSERVERS] if OBSERVERS else ()
     outcome: str | None = None
     runs = top.ending.runs
     try:
+        # First register, then look: a shutdown that begins in between finds the run in `runs`.
         runs.add(top)
         if top.ending.requested():
             top.stop()
@@ -396,7 +410,7 @@ def execute_root(root: Parent, execute: Callable[[Any], Any], parent_ud: Any) ->
 
 
 def _forget_late_request(root: Parent) -> None:
-    """Forget a request that came during the last steps: it was for this run."""
+    """Clear the flag of a request that arrived while the run was ending: it was for that run."""
     if root._smachpy.frame is None:
         root._preempt_requested = False
 
@@ -409,9 +423,10 @@ def already_runs(path: str) -> InvalidStateError:
 
 
 class _Itself:
-    """Stands for the attribute `run` of a root that has ended: a reference to itself would last.
+    """Provides `run` for a root that has ended.
 
-    A late timer and a scope that was kept still ask for it.
+    During a run the instance has `run = self`, a reference cycle, which `end_thread` removes. Late
+    timers and scopes that were kept still read the attribute; they find it here.
     """
 
     def __get__(self, root: Any, _owner: type) -> Any:
@@ -419,16 +434,16 @@ class _Itself:
 
 
 class Root(Branch, Run):
-    """The invisible top of a machine: what the root's visit happens in, and its `Run`.
+    """The invisible top of a machine, whose only child is the root; at the same time its `Run`.
 
     Attributes:
-        waits_for_ever: The root is given all the time it takes after a preempt.
-        ending: The end of the program, which stops the run.
+        waits_for_ever: The root's `preempt_timeout` is None: it is never interrupted.
+        ending: The program's shutdown, which preempts the run.
     """
 
     parent = None
     run: Any = _Itself()
-    _is_told = False
+    _is_shutting_down = False
     _has_signal = False
     _done: ClockEvent | None = None
 
@@ -436,8 +451,8 @@ class Root(Branch, Run):
         self.container = root
         data = self.data = root._smachpy
         if data.lock is None:
-            data.lock = threading.RLock()
-        self.run = self  # while it runs: see `_Itself`
+            data.lock = threading.RLock()  # kept, as making one takes as long as entering a machine
+        self.run = self  # removed by `end_thread`; see `_Itself`
         self.lock = data.lock
         self.visit = self.control = self.journal = None
         self._is_stopped = False
@@ -464,11 +479,12 @@ class Root(Branch, Run):
         return self.outcome
 
     def run_with_signals(self) -> str:
-        """Run the root here, in the main thread, where Ctrl-C and SIGTERM preempt it meanwhile.
+        """Run the root in the main thread; meanwhile Ctrl-C and SIGTERM preempt it.
 
-        Those that the program handles itself are left alone, also if it begins to meanwhile.
+        A handler that the program has set, before or during the run, is kept.
         """
         use_signals()
+        # Written out for the two signals instead of a loop, as every run passes here.
         handler, (interrupt, default), (terminate, ends) = self.on_signal, *_DEFAULTS
         is_ours = _signal.getsignal(interrupt) is default, _signal.getsignal(terminate) is ends
         try:
@@ -484,7 +500,7 @@ class Root(Branch, Run):
                 _signal.signal(terminate, ends)
 
     def run_here(self) -> str:
-        """Run the root in this thread."""
+        """Run the root in this thread, which is the caller's and cannot be left behind."""
         self.can_be_left = False
         self.first = self.innermost = self
         self.thread = threading.get_ident()
@@ -502,8 +518,10 @@ class Root(Branch, Run):
         journal = data.journal
         if self.watched or journal or data.control or data.listeners or data.buffers:
             self._begin()
-        data.root = self  # from here on a request is one of this run
-        if self._is_stopped or root._preempt_requested:  # first the mark, then the look: see `stop`
+        # From here on a request belongs to this run. First set `data.root`, then read the flags: a
+        # requester does it the other way round (see `stop`), so one of the two sees the other.
+        data.root = self
+        if self._is_stopped or root._preempt_requested:
             self._ask_at_start()
         data.origin = None
         outcome: str | None = None
@@ -515,7 +533,7 @@ class Root(Branch, Run):
                 else:
                     outcome = journal.execute(self, step, step.userdata)
                     journal.finish(outcome)
-            except Interruption:  # one of its own hooks did not listen
+            except Interruption:  # a hook of the root outlasted its grace
                 if self.dead:
                     raise
                 outcome = "preempted"
@@ -531,7 +549,7 @@ class Root(Branch, Run):
                 self.emit(Finished, outcome)
 
     def _begin(self) -> None:
-        """Let a journal, an operator and those who watch have their part in the run."""
+        """Attach the journal and the operator's control, and publish the start."""
         run, data = self.run, self.data
         if data.journal is not None:
             data.journal.attach(self)
@@ -545,31 +563,34 @@ class Root(Branch, Run):
             self.emit(Started, tuple(self.container.get_initial_states()))
 
     def _ask_at_start(self) -> None:
-        """Pass on what was requested before the run, by the program's end or by others."""
+        """Pass on a request made before the run, by the program's shutdown or by anyone else."""
         if self._is_stopped:
-            self._ask_as_program_ends()
+            self._ask_for_shutdown()
             return
         root = self.container
-        token = REQUESTING.set(root)  # its own `request_preempt`, if any, was called then
+        # The root's own `request_preempt`, if it has one, was called with that request: not again.
+        token = REQUESTING.set(root)
         with asking(*(self.data.origin or current_origin())), self.lock:
             ask(self)
         REQUESTING.reset(token)
         self.flush()
 
     def stop(self) -> None:
-        """Ask this run to end, as the program does; without effect before, after, or twice.
+        """Preempt this run because the program shuts down; only the first call has an effect.
+
+        Called before the run begins, it preempts it at its start; after the end it does nothing.
 
         Threads: any, but no signal handler.
         """
         self._is_stopped = True
         if self.data.root is self:
-            self._ask_as_program_ends()
+            self._ask_for_shutdown()
 
-    def _ask_as_program_ends(self) -> None:
+    def _ask_for_shutdown(self) -> None:
         with shutdown_asking(self.ending), self.lock:
-            if self._is_told:
+            if self._is_shutting_down:
                 return
-            self._is_told = True
+            self._is_shutting_down = True
             request_soon(self.container, self)
 
     def on_signal(self, number: int, _stack: FrameType | None) -> None:
@@ -592,17 +613,17 @@ class Root(Branch, Run):
             finally:
                 self.ending.request(name)
 
-        # Delivering takes locks, which the interrupted code may hold: another thread does it, of
-        # a clock of its own, whose locks nobody holds.
+        # `deliver` takes locks that the interrupted code may hold, so it needs another thread. A
+        # new clock starts it: the locks of the run's clock may be held as well.
         RealClock().spawn(deliver, name="shutdown")
 
     def end_thread(self) -> None:
-        """Refer to itself no more, so that no run waits for the garbage collector."""
+        """Break the reference cycles through this frame: its run is freed without the collector."""
         self.innermost = None
         del self.first, self.run
 
     def end(self, outcome: str | None, error: BaseException | None) -> ClockEvent | None:
-        """Let the caller of `execute` go on."""
+        """Record how the root ended; return the event for which the caller of `execute` waits."""
         with self.lock:
             if self.ended:
                 return None
