@@ -1,8 +1,8 @@
 """A callback of a container while it runs.
 
-A leaf has its grace after a preempt; so has code of the user that a container itself calls, else a
-callback that blocks would hold the container for ever. Such a callback is run in a frame of its
-own, whose visit goes through the table of `smachpy.run.visit` as that of a leaf does.
+Code of the user that a container itself calls has a grace after a preempt, as a leaf has: otherwise
+a callback that blocks would hold the container for ever. It runs in a frame of its own, whose visit
+follows the table of `smachpy.run.visit` like the visit of a leaf.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class _Code:
-    """Stands where a visit expects a step and its state: no options, outcomes or userdata."""
+    """The step, and at once the state, of a callback's visit; without options and userdata."""
 
     _preempt_requested = False
     _smachpy_is_container = False
@@ -40,12 +40,12 @@ class _Code:
         return self
 
     def request_preempt(self) -> None:
-        """Nothing: a function cannot be told."""
+        """Do nothing: a plain function has no way to notice a request."""
 
     _smachpy_request_preempt: ClassVar[object] = request_preempt
 
     def cut_off(self) -> None:
-        """Nothing: it has no userdata, and nothing follows it."""
+        """Do nothing: a callback has no userdata of its own, and no child follows it."""
 
 
 class CallbackFrame(Frame):
@@ -61,7 +61,8 @@ class CallbackFrame(Frame):
         self.run = parent.run
         self.first = parent.first
         above = parent.step
-        self._is_hook = above is not None and above.state is container  # called around its run
+        # A hook is called around the run, in the frame of the parent; other callbacks inside it.
+        self._is_hook = above is not None and above.state is container
         self._path = parent.here() if self._is_hook else parent.path
         self._step = _Code(function)
 
@@ -74,16 +75,16 @@ class CallbackFrame(Frame):
         return f"{self.path}: {self._step.label}"
 
     def is_in_child(self) -> bool:
-        """Tell that no child runs here."""
+        """Return False: a callback is not a child."""
         return False
 
     def note(self, path: str, kind: Callable[..., Event], *fields: Any) -> None:
-        """Note nothing: that its container was asked is known."""
+        """Publish nothing: the events of the container's own visit say that it was asked."""
 
     def waits_for(self) -> Any:
-        """Return the branches that its container has to wait for, before it can be left behind.
+        """Return the container's branches, which must end before the callback is left behind.
 
-        They end, as they were asked together with the callback.
+        They do end: they were asked together with the callback.
         """
         parent = self.parent
         assert parent is not None
@@ -91,19 +92,20 @@ class CallbackFrame(Frame):
         return group if group is not None and group.started else None
 
     def begin(self) -> None:
-        """The callback runs from here on."""
+        """Start the visit; called before the callback, and after the container has run in it."""
         container, parent = self.container, self.parent
         self.step = self._step
         self.data.callback = self
         assert parent is not None
         visit = parent.visit if self._is_hook else None
+        # Asked already: the grace of the callback begins now, or it would never be interrupted.
         if container._preempt_requested or (visit is not None and visit.is_asked()):
-            with self.run.lock:  # its grace begins now
+            with self.run.lock:
                 ask(self)
 
     def end(self) -> None:
-        """The callback has returned, raised, was interrupted, or runs the container now."""
-        self.step = None  # first the mark, then the look: see `smachpy.run.grace.ask`
+        """End the visit: the callback has ended, or runs the container now."""
+        self.step = None  # before the look at `visit`: see `smachpy.run.grace.ask`
         data = self.data
         if data.callback is self:
             data.callback = None
@@ -114,22 +116,22 @@ class CallbackFrame(Frame):
 def call_bounded(
     container: Parent, parent: Frame, function: Callable[..., Any], arguments: Sequence[Any]
 ) -> Any:
-    """Call code of the user for `container`; a preempt bounds it by the container's grace.
+    """Call the user's `function` for `container`; after a preempt the container's grace limits it.
 
     Args:
-        container: The container whose code it is.
+        container: The container to which the callback belongs.
         parent: The frame in which it runs: the container's own, or that of the container above.
         function: The callback.
         arguments: Its arguments.
 
     Returns:
-        What it returns.
+        Its result.
 
     Raises:
-        Interruption: it ran longer than the grace; with `parent.dead`, its thread was left behind.
+        Interruption: it outlasted the grace; with `parent.dead`, its thread was left behind.
     """
     data = container._smachpy
-    if data.callback is not None:  # code of the same container called this
+    if data.callback is not None:  # inside another callback of it, whose grace covers this one
         return function(*arguments)
     frame = CallbackFrame(container, parent, function)
     answer: Any = None
@@ -139,10 +141,12 @@ def call_bounded(
         answer = function(*arguments)
     except BaseException as error:  # noqa: BLE001  raised below, once nothing can interrupt it
         failure = error
+    # An interruption may still be pending for this thread, and be raised inside `end`. Repeat it
+    # then: once it is through, the visit has ended and none is pending any more.
     while True:
         try:
             frame.end()
-        except Interruption:  # on its way when the callback ended
+        except Interruption:
             if frame.dead:
                 raise
             continue

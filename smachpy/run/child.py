@@ -1,4 +1,4 @@
-"""What the library knows of one state or container, in one place: all else in it is the user's.
+"""The library's data of one state or container; all other attributes of it belong to the user.
 
 `smachpy.run` runs what is described here and imports no states; `smachpy.machines` builds them.
 """
@@ -27,9 +27,10 @@ if TYPE_CHECKING:
 
 
 class _Epoch:
-    """Counts changes of what machines were compiled from, so that nobody has to look everywhere.
+    """Counts changes of anything that plans are compiled from.
 
-    That is the interfaces of states, and the callbacks, listeners and initial states of machines.
+    These are the interfaces of states, and the callbacks, listeners and initial states of machines.
+    A run compares one number instead of asking every state below it whether it has changed.
     """
 
     value = 0
@@ -39,18 +40,19 @@ EPOCH = _Epoch()
 
 
 class StateData:
-    """What the library knows of one state.
+    """The library's data of one state.
 
     Attributes:
         outcomes: Its outcomes.
         input_keys: Keys that it reads.
         output_keys: Keys that it writes.
         options: Its options.
-        version: Changes with each of these.
-        with_hooks: Its options and what they are with the hooks of its class; None when not known.
+        version: Increases with each change of the above.
+        with_hooks: Its options, and the same options with the hooks of its class; None until
+            needed.
         preempt_callbacks: Called on each request to stop.
         is_async: Its callback is a coroutine function.
-        code: What it runs of the user's: functions that get the userdata, and messages made of it.
+        code: The user's functions that get its userdata, and the messages made from it.
     """
 
     __slots__ = (
@@ -84,12 +86,12 @@ class StateData:
         self.changed()
 
     def changed(self) -> None:
-        """Say that machines with this state are to be compiled again."""
+        """Mark the plans of all machines with this state as stale."""
         self.version += 1
         EPOCH.value += 1
 
     def copy(self) -> Self:
-        """Return the data for a copy of the state, which does not run and nobody waits for."""
+        """Return the data for a copy of the state, without anything that belongs to a run."""
         made = type(self)()
         for name in ("outcomes", "input_keys", "output_keys", "options", "version", "code"):
             setattr(made, name, getattr(self, name))
@@ -97,31 +99,32 @@ class StateData:
 
 
 class ContainerData(StateData):
-    """What the library knows of one container.
+    """The library's data of one container.
 
     Attributes:
         children: Label -> child, in the order in which they were added.
         remappings: Label -> key of the child -> key of the container.
-        start_cbs: Called at the start of each run, with their own arguments; likewise:
-        transition_cbs: after each transition;
-        termination_cbs: at the end.
-        open_tokens: One for each time that it is open now.
-        context_kwargs: What `opened` was given.
+        start_cbs: Called at the start of each run; each with its extra arguments.
+        transition_cbs: The same, after each transition.
+        termination_cbs: The same, at the end.
+        open_tokens: One for each `with` block in which it is open.
+        context_kwargs: The arguments of `opened`.
         frame: Where it runs; None between runs, and between two attempts of one run.
         root: The root's frame while it runs as the root of a machine.
-        lock: That of its runs as a root; made once, as that takes as long as entering a machine.
+        lock: The lock of its runs as a root; made once, as that takes as long as entering a
+            machine.
         plan: Its children, compiled; None when they have changed.
-        plain_plan: The plan of a state machine, as long as entering it takes no more than making a
-            frame: nobody hears of it, and no keys are copied. None: it has to be called.
-        listeners: Called at each event of it and of all below it.
-        buffers: Take these events down.
-        control: The operator's control, once somebody asked for it.
-        journal: Keeps its next run as a root; None: nobody does.
-        callback: Runs its callback or hook, while there is one.
-        answered: Its last run ended because a request to stop was taken up.
-        origin: Who asked it to stop before it ran.
-        is_passing_on: A request to stop is being passed on to what runs in it.
-        end_waiters: Set when it does not run any more.
+        plain_plan: The plan of a state machine that is entered just by making a frame, because it
+            has no callbacks, listeners or keys to copy. None if it must be called.
+        listeners: Called with each event of it and of all below it.
+        buffers: Event buffers that take the same events.
+        control: The operator's control, once it was used.
+        journal: The journal of its next run as a root, or None.
+        callback: The frame of its callback or hook that runs now, or None.
+        answered: Its last run ended because a request to stop was serviced.
+        origin: Who asked it to stop before its run.
+        is_passing_on: A request to stop is being passed on to its children.
+        end_waiters: Events to set when it stops running.
     """
 
     __slots__ = (
@@ -167,14 +170,14 @@ class ContainerData(StateData):
         self.buffers: tuple[EventBuffer, ...] = ()
         self.control: Gate | None = None
         self.journal: RunJournal | None = None
-        self.callback: Any = None  # a smachpy.run.callback.CallbackFrame
+        self.callback: Any = None  # a smachpy.run.callback.CallbackFrame, which imports this module
         self.answered = False
         self.origin: Origin | None = None
         self.is_passing_on = False
         self.end_waiters: list[ClockEvent] = []
 
     def copy(self) -> Self:
-        """Return the data for a copy of the container: its structure and callbacks, no run."""
+        """Return the data for a copy of the container: its structure and callbacks only."""
         made = super().copy()
         own = ("children", "remappings", "start_cbs", "transition_cbs", "termination_cbs")
         for name in (*own, *self._kept):
@@ -184,7 +187,7 @@ class ContainerData(StateData):
 
 
 class Child(Protocol):
-    """What running a state needs of it."""
+    """The part of a state that `smachpy.run` uses."""
 
     _preempt_requested: bool
     _smachpy_request_preempt: ClassVar[object]
@@ -195,20 +198,20 @@ class Child(Protocol):
     def _smachpy_is_container(self) -> bool: ...
     @property
     def execute(self) -> Callable[[Any], Any]:
-        """Does it and returns the outcome; may be a coroutine function."""
+        """Runs the state and returns the outcome; may be a coroutine function."""
         ...
 
     def request_preempt(self) -> None:
-        """Ask it to stop; may be the user's."""
+        """Ask it to stop; may be overridden by the user."""
 
     @property
     def _smachpy_grace(self) -> Callable[[Any], Any] | None:
-        """Its own rule: what it makes of the grace of its containers; None: its option."""
+        """Computes its grace from that of its containers; None to use its option."""
         ...
 
 
 class Parent(Child, Protocol):
-    """What running a container needs of it."""
+    """The part of a container that `smachpy.run` uses."""
 
     @property
     def _smachpy(self) -> ContainerData: ...

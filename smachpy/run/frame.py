@@ -1,7 +1,7 @@
-"""Where we are: the chain of running containers, in a context variable.
+"""The chain of running containers: which state runs in this context, in which run.
 
-A `Run` belongs to one execution of a root; every container in it has a `Frame`. The frames
-know the path and the listeners, so that states need to know neither.
+One `Run` belongs to one execution of a root; every running container in it has a `Frame`. Frames
+know the path and the subscribers, so that states need neither.
 """
 
 from __future__ import annotations
@@ -29,39 +29,39 @@ if TYPE_CHECKING:
 
 
 class Gate(Protocol):
-    """What a run needs of an operator's control."""
+    """The part of an operator's control that a run uses: `smachpy.events.control.Control`."""
 
     def attach(self, run: Run) -> None:
         """Control a new run."""
 
     def pass_gate(self, frame: Frame, step: Any) -> None:
-        """Hold the machine before `step` while it is paused."""
+        """Block before `step` while the machine is paused."""
 
     def release(self, path: str) -> None:
-        """Let the state at `path` look again whether it is called off."""
+        """Wake the state at `path`, which may wait at the gate, to see that it is called off."""
 
     def note_outcome(self, frame: Frame, step: Any, outcome: object) -> None:
         """Pause after `step` if there is a breakpoint on this outcome of it."""
 
 
 class RunJournal(Protocol):
-    """What a run needs of its journal, if it has one: `smachpy.durable`.
+    """The part of a journal that a durable run uses: `smachpy.durable.recorder`.
 
-    What a visit does is written before it is done or told. A run that goes on in another process
-    is entered down to the states that were active; for the containers and states on the way the
-    journal says where they were.
+    Each action of a visit is written before it is done or published. A run that is resumed in
+    another process is entered again down to the states that were active; on the way the journal
+    says where its containers and states were.
 
     Attributes:
-        run: Names the run, in its recordings and to viewers.
+        run: The run's name in recordings and viewers.
     """
 
     run: str
 
     def attach(self, root: Frame) -> None:
-        """Keep the run that begins in `root`, or go on with it."""
+        """Record the run that begins in `root`, or resume it."""
 
     def recovered(self) -> tuple[Any, ...] | None:
-        """Return what the event `Recovered` tells, of a run that goes on; None: it begins."""
+        """Return the fields of the event `Recovered` for a resumed run; None for a new one."""
         ...
 
     def finish(self, outcome: str) -> None:
@@ -71,29 +71,30 @@ class RunJournal(Protocol):
         """Write that `step` begins; return its outcome if it had ended before the resume."""
 
     def execute(self, frame: Frame, step: Any, userdata: Any) -> Any:
-        """Execute `step`, or what its option `resume` says; return the outcome."""
+        """Execute `step`, or its option `resume` instead; return the outcome."""
 
     def leave(self, frame: Frame, step: Any, outcome: Any) -> None:
         """Write that `step` has ended."""
 
     def resumes(self, frame: Frame) -> bool:
-        """Tell whether the container of `frame` goes on with children that had begun."""
+        """Return whether children of the container of `frame` had begun before the resume."""
         ...
 
     def resumed_label(self, frame: Frame) -> str | None:
-        """Return the child with which the state machine of `frame` goes on; None: anew."""
+        """Return the child in which the state machine of `frame` resumes; None if it starts."""
         ...
 
     def item(self, frame: Frame, number: int) -> int:
-        """Return where this item of the iterator of `frame` stands.
+        """Compare an item of the iterator of `frame` with the position before the resume.
 
-        Below 0: it was done before the resume. 0: it was the current one, which the userdata holds.
-        Above 0: it is new.
+        Returns:
+            < 0: the item was done. 0: it was the current one, and is in the userdata. > 0: it is
+            new.
         """
         ...
 
     def check_items(self, frame: Frame, count: int) -> None:
-        """Check that there were not fewer items than before the resume."""
+        """Check that there are at least as many items as before the resume."""
 
     def fired(
         self,
@@ -103,70 +104,74 @@ class RunJournal(Protocol):
         ends: Sequence[str],
         begins: Sequence[str],
     ) -> None:
-        """Write that transitions of the plan of `frame` have fired, by their ids.
+        """Write that transitions of the plan of `frame` have fired.
 
-        `marking` has the ids of the places that hold tokens now, `ends` the labels of the actions
-        that have to stop, if they run, and `begins` of those that begin.
+        Args:
+            frame: The frame of the plan.
+            transitions: Their ids.
+            marking: The ids of the places that hold tokens now.
+            ends: The labels of actions that must stop if they run.
+            begins: The labels of actions that begin.
         """
 
     def note_conditions(self, frame: Frame) -> None:
-        """Write what the conditions of the plan of `frame` are worth now, if that has changed."""
+        """Write the values of the conditions of the plan of `frame`, if they have changed."""
 
     def resumed_plan(self, frame: Frame) -> tuple[Sequence[str], Mapping[str, Any]] | None:
-        """Return where the plan of `frame` goes on; None: it begins.
+        """Return where the plan of `frame` resumes; None if it starts.
 
         Returns:
             The ids of the places that hold tokens, and label -> visit of each action that runs or
-            has ended: outcome (None: runs), begun_ns [ns since the epoch]; stopping: it runs, a
-            transition has let it stop; again: it begins anew after that.
+            has ended, with the fields: outcome (None while it runs); begun_ns [ns since the epoch];
+            stopping (a transition has asked it to stop); again (it starts again after that).
         """
         ...
 
     def began_inside(self, frame: Frame) -> bool:
-        """Tell whether what `frame` runs is a container whose children had begun."""
+        """Return whether `frame` runs a container whose children had begun before the resume."""
         ...
 
     def attempt(self, frame: Frame) -> tuple[int, float]:
-        """Return the number of the first attempt, and what is left of the pause before it [s]."""
+        """Return the number of the first attempt, and the rest of the pause before it [s]."""
         ...
 
     def time_left(self, frame: Frame, seconds: float) -> float:
-        """Return what is left of a timeout that began with the attempt [s]."""
+        """Return the rest of a timeout that began with the attempt [s]."""
         ...
 
     def goes_on(self, frame: Frame) -> bool:
-        """Tell whether what `frame` runs has something to go on with: children, or a goal."""
+        """Return whether the child of `frame` had children that began, or a goal, to resume."""
         ...
 
     def retried(self, frame: Frame, attempt: int, wait: float, reason: str) -> None:
         """Write that attempt number `attempt` has ended, and the next begins in `wait` [s]."""
 
     def asked(self, frame: Frame, origin: tuple[str, str, str]) -> bool:
-        """Write that somebody asked the container of `frame` to stop.
+        """Write that the container of `frame` was asked to stop.
 
         Returns:
-            Whether the journal asks it itself, once all that was active has been entered again:
-            what is not entered could not stop its goal.
+            Whether the journal will pass the request on itself, once all states that were active
+            have been entered again: a state that is not entered yet could not cancel its goal.
         """
         ...
 
     def asked_one(self, frame: Frame, step: Any, override: Any) -> None:
-        """Write that an operator asked the child of `step` to stop, and what he wants instead.
+        """Write that an operator asked the child of `step` to stop, with the override.
 
-        A run that goes on asks it again.
+        A resumed run asks it again.
         """
 
     def check_value(self, frame: Frame, path: str, key: str, value: Any) -> None:
-        """Raise if the state at `path` may not write `value`, as it cannot be kept."""
+        """Raise if the state at `path` writes a `value` that the journal cannot keep."""
 
     def decide(self, frame: Frame, userdata: Any) -> Any:
-        """Return the outcome that the option `resume` gives what `frame` runs; None: execute it."""
+        """Return the outcome that `resume` gives the child of `frame`; None to execute it."""
 
     def goal_of(self, frame: Frame) -> dict[str, Any] | None:
         """Return the goal that the state had sent before the resume, or None.
 
-        Its id, action, taken_ns (when a server took it [ns since the epoch]), status, text,
-        preempted and result (if it had ended; preempted: the state had been asked to stop), and
+        Its fields: id, action, taken_ns (when a server accepted it [ns since the epoch]), and, if
+        it had ended, status, text, result and preempted (the state had been asked to stop);
         stopped: the end of the process had cancelled it.
         """
         ...
@@ -183,11 +188,11 @@ class RunJournal(Protocol):
         """Write how the goal ended, and whether its state had been asked to stop."""
 
     def once(self, frame: Frame, key: str, call: Callable[[], Any]) -> Any:
-        """Return what `call` returned for `key` in this visit; call it if it has not."""
+        """Return the result of `call` for `key` in this visit; call it only the first time."""
 
 
 class Group(Protocol):
-    """The children of a concurrence while they run."""
+    """The running children of a concurrence: `smachpy.run.threads.Group`."""
 
     started: bool
     when_ended: Callable[[], object] | None
@@ -200,23 +205,23 @@ class Group(Protocol):
 class Run:
     """One execution of a root container, shared by all frames below it.
 
-    It is what the top frame of a machine is besides (`smachpy.run.threads.Root`): one object, as a
-    small machine takes little longer to run than that takes to make.
+    The top frame of a machine (`smachpy.run.threads.Root`) is its run at the same time: making a
+    second object would take almost as long as running a small machine.
 
     Attributes:
         clock: The clock of the run.
-        watched: Somebody wants to see each transition.
-        careful: Somebody wants more than to see them: a log, an operator, a shutdown check. Then it
-            is watched, too.
+        watched: Events have a subscriber, or `careful` holds.
+        careful: Each transition needs more than events: a log, control, journal or shutdown check.
         logged: Transitions go to the log.
         has_shutdown_check: `set_shutdown_check` was called.
-        control: The operator's control, once somebody asked for it.
-        journal: Keeps the run, so that another process can go on with it; None: nobody does.
-        lock: Held while a request to stop is passed on, and by whoever ends a child; one for all
-            frames, so that requests that begin at different containers cannot wait for each other.
-            Re-entrant, because a signal handler may come in between.
-        pending: What is to be told once no lock is held, in order: events to listeners, texts to
-            the log.
+        control: The operator's control, once it was used.
+        journal: The journal of a durable run, or None.
+        lock: Held while a request to stop is passed on, and while a child is ended. One for all
+            frames, so that requests that begin at different containers cannot deadlock. Re-entrant,
+            because passing a request on may come back to it, and a signal handler may interrupt
+            the thread that holds it.
+        pending: Functions to call in order once the lock is released: they publish events and write
+            to the log.
     """
 
     clock: Clock
@@ -230,40 +235,40 @@ class Run:
     pending: deque[Callable[[], object]]
 
     def flush(self) -> None:
-        """Tell what was noted; never with a lock held.
+        """Publish the pending events and log texts; never call it with a lock held.
 
         Blocks: as long as the listeners do.
         """
         while self.pending:
             try:
-                tell = self.pending.popleft()
+                publish = self.pending.popleft()
             except IndexError:  # another thread took the last one
                 return
-            tell()
+            publish()
 
     def flush_soon(self) -> None:
-        """Tell what was noted in a thread of its own: no timer waits for a listener or a log."""
+        """Flush in a new thread, so that no timer waits for a listener or a logger."""
         if not self.pending:
             return
         try:
             self.clock.spawn(self.flush, name="events")
-        except RuntimeError:  # the system gives no thread: whoever publishes next tells it
+        except RuntimeError:  # no thread can be started: the next event of the run flushes
             return
 
     def note_log(self, text: str) -> None:
-        """Note an error for the log."""
+        """Queue an error for the log."""
         self.pending.append(partial(_log_error, text))
 
 
 def _log_error(text: str) -> None:
     try:
         log.logerr(text)
-    except Exception:  # noqa: BLE001  a border: the program's own logger
+    except Exception:  # noqa: BLE001  the program's own logger; this thread must go on
         report_thread_exception()
 
 
 class _Subscriptions:
-    """Changes when somebody wants to hear, see or steer more or less than before."""
+    """Its version is replaced whenever a subscriber, callback or control is added or removed."""
 
     version = object()
 
@@ -272,13 +277,13 @@ SUBSCRIPTIONS = _Subscriptions()
 
 
 class Subscribers:
-    """Who hears the events of a frame, as long as nobody comes or goes.
+    """The subscribers of a frame, valid until `SUBSCRIPTIONS.version` changes.
 
     Attributes:
-        version: `SUBSCRIPTIONS.version` then.
+        version: The `SUBSCRIPTIONS.version` for which they are valid.
         listeners: Those of the container, then those of the containers above.
-        buffers: Likewise.
-        buffer: The only one that hears anything, if it is a buffer.
+        buffers: The same for event buffers.
+        buffer: The only subscriber, if that is a buffer, else None.
     """
 
     __slots__ = ("buffer", "buffers", "listeners", "version")
@@ -300,24 +305,26 @@ class Frame:
 
     Attributes:
         container: The container.
-        data: What the library knows of it; here Python finds it several times faster than there.
-        parent: The frame around it; None for the top, in which the root runs.
-        run: What all frames of this execution share.
-        step: What runs now: anything with `label` and `state`; None between runs.
-        visit: The visit of what runs; None while it just runs and nobody asks or watches.
+        data: Its `_smachpy`; reading it from there takes several times as long.
+        parent: The frame of the container above; None for the top, in which the root runs.
+        run: The run that all frames of this execution share.
+        step: The child that runs now: anything with `label` and `state`; None between runs.
+        visit: The visit of that child. A container's own frame has none until the child is asked to
+            stop; a `Branch` has one from the start.
         group: The children of a concurrence, while they run.
-        answered: The container ends because a request to stop was taken up.
+        answered: The container ends because a request to stop was serviced.
         dead: The thread was left behind.
-        above: What the parent runs while this frame lives: this container.
-        first: The frame with which its thread begins.
-        innermost: Of the first frame of a thread: the innermost one that runs there.
-        thread: Of the first frame of a thread: the thread's identifier.
-        can_be_left: That thread is ours to leave behind.
+        above: The parent's step that runs this container.
+        first: The first frame of this thread.
+        innermost: Only in the first frame of a thread: the innermost frame that runs there.
+        thread: Only in the first frame of a thread: the thread's identifier.
+        can_be_left: Only in the first frame of a thread: the thread can be left behind.
         ended: The child of a `Branch` has ended, and was reported.
     """
 
-    # Entering a container is a hot path: what is rarely set stands here, and there is no __init__,
-    # which takes as long as all else that a frame needs: who enters one sets the rest.
+    # Entering a container is a hot path. Attributes that are rarely set are class attributes, and
+    # there is no __init__, which would take as long as everything else: the code that enters a
+    # container (`Container.execute`, the loop of StateMachine) sets the rest.
     run: Run
     first: Frame
     innermost: Frame | None
@@ -340,7 +347,7 @@ class Frame:
     def path(self) -> str:
         """Path of the container."""
         path = self._path
-        if path is None:
+        if path is None:  # built only when somebody wants to know it
             parent = self.parent
             assert parent is not None
             above = self.above
@@ -353,18 +360,19 @@ class Frame:
         return self.path if step is None else f"{self.path}/{step.label}"
 
     def described(self) -> str:
-        """Name what runs now, for the log."""
+        """Return the name of what runs now, for the log."""
         return self.here()
 
     def is_in_child(self) -> bool:
-        """Tell whether a child runs, or a callback of the child, which is a container."""
+        """Return whether a child runs here; a callback of the container itself is none."""
         step, callback = self.step, self.data.callback
         if step is None or callback is None or callback.parent is not self:
             return step is not None
-        return step.state is self.container  # a hook of the root; else the child comes after it
+        # During a callback, `step` is the child that starts after it, except in a hook of the root.
+        return step.state is self.container
 
     def waits_for(self) -> Group | None:
-        """Return the branches that must end before what runs here is left behind; None: none."""
+        """Return the branches that must end before this frame's child is left behind, if any."""
         return None
 
     def running(self) -> Sequence[Frame]:
@@ -372,12 +380,12 @@ class Frame:
         return [self] if self.group is None else self.group.running()
 
     def begin_thread(self) -> None:
-        """Let the thread that runs here begin with this frame."""
+        """Make this the first frame of the current thread."""
         self.first = self.innermost = self
         self.thread = threading.get_ident()
 
     def end_thread(self) -> None:
-        """Refer to itself no more, so that no run waits for the garbage collector."""
+        """Break the reference cycles of this frame: its run is freed without the collector."""
         self.innermost = None
         del self.first
 
@@ -386,7 +394,7 @@ class Frame:
     def publish(self, event: Event) -> None:
         """Give `event` to the listeners of this container and of all above it.
 
-        A listener that raises is reported to the others and to the log; it hurts nobody.
+        A listener that raises is reported in the log; the others still get the event.
         """
         subscribers = self.subscribers
         if subscribers is None or subscribers.version is not SUBSCRIPTIONS.version:
@@ -401,13 +409,13 @@ class Frame:
         for listener in subscribers.listeners:
             try:
                 listener(event)
-            except Exception as error:  # noqa: BLE001  a border: reported below
+            except Exception as error:  # noqa: BLE001  the user's listener: reported in the log
                 self._listener_failed(listener, error, event)
 
     def find_subscribers(self) -> Subscribers:
-        """Return who hears the events of this frame now."""
-        version = SUBSCRIPTIONS.version
-        if self.dead:
+        """Look up the subscribers of this frame, and keep them until somebody comes or goes."""
+        version = SUBSCRIPTIONS.version  # read first: a change during the look-up counts as newer
+        if self.dead:  # a thread that was left behind must not publish
             self.subscribers = Subscribers(version, (), ())
             return self.subscribers
         container, parent = self.container, self.parent
@@ -417,6 +425,7 @@ class Frame:
             if above is None or above.version is not version:
                 above = parent.find_subscribers()
         data = self.data
+        # The top frame has the root as its container too, so the root's own are taken once.
         if above is None or parent is None or parent.container is not container:
             for buffer in data.buffers:
                 buffer.begin(self.here() if parent is None else self.path, self.run.clock)
@@ -440,13 +449,13 @@ class Frame:
 
     def _emit(self, path: str, kind: Callable[..., Event], fields: Any) -> None:
         run = self.run
-        if run.pending:
+        if run.pending:  # keeps the order of the events
             run.flush()
         clock = run.clock
         self.publish(kind(path, clock.now(), clock.time_ns(), *fields))
 
     def note(self, path: str, kind: Callable[..., Event], *fields: Any) -> None:
-        """Note an event while a lock is held; the next `Run.flush` or event publishes it."""
+        """Queue an event while the lock is held; the next `Run.flush` or event publishes it."""
         run = self.run
         if run.watched:
             clock = run.clock
@@ -454,14 +463,14 @@ class Frame:
             run.pending.append(partial(self.publish, event))
 
     def note_failure(self, path: str, callback: object, error: BaseException) -> None:
-        """Note that a callback of the state at `path` raised."""
+        """Queue, for the listeners and the log, that a callback of the state at `path` raised."""
         name = name_of(callback)
         text = f"{type(error).__name__}: {error}"
         self.note(path, CallbackFailed, name, text)
         self.run.note_log(f"{path}: {name} raised {text}")
 
     def callback_failed(self, callback: object, error: BaseException) -> None:
-        """Report a raising callback: to the log and to the listeners."""
+        """Report to the log and the listeners that a callback of the container raised."""
         name = name_of(callback)
         text = f"{type(error).__name__}: {error}"
         log.log_exception(f"{self.path}: callback {name} raised {text}", error)
@@ -490,11 +499,11 @@ class Scope:
 
     @property
     def is_watched(self) -> bool:
-        """Somebody wants to hear of each transition."""
+        """Whether the events of the run have a subscriber."""
         return self._frame.run.watched
 
     def emit(self, kind: Callable[..., Event], *fields: Any) -> None:
-        """Publish the event `kind(path, t, stamp_ns, *fields)`, if anybody listens.
+        """Publish the event `kind(path, t, stamp_ns, *fields)` if the run has a subscriber.
 
         Threads: any.
         """
@@ -507,13 +516,13 @@ class Scope:
 
 
 def current_scope() -> Scope | None:
-    """Return the scope of the state that runs in this context; None outside any machine."""
+    """Return the scope of the state that runs in this context; None outside of any machine."""
     frame = current_frame()
     return None if frame is None else Scope(frame)
 
 
 def clock_of_run() -> Clock:
-    """Return the clock of the run in this context, or outside of one that of the context."""
+    """Return the clock of the run in this context; outside of a run, the current clock."""
     frame = current_frame()
     return current_clock() if frame is None else frame.run.clock
 

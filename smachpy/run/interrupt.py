@@ -1,13 +1,13 @@
-"""Break into a thread that does not listen: the last resort of the preemption contract.
+"""Interrupt a thread whose state ignores its preempt: the last resort of preemption.
 
-Python offers two ways, and each reaches what the other does not:
+Python offers two ways, and each works where the other does not:
 
-- a signal to the main thread wakes blocking calls too (`Lock.acquire`, `socket.recv`,
-  `time.sleep`): they return, the handler runs, and what it raises goes through the state;
-- an exception set for another thread is raised there at the next bytecode, so it ends loops but
-  no call that blocks in C. Such a thread can only be left behind.
+- a signal to the main thread also ends blocking calls (`Lock.acquire`, `socket.recv`,
+  `time.sleep`): the handler runs, and the exception that it raises goes through the state;
+- an exception set for any other thread is raised there at the next bytecode, so it ends loops but
+  not a call that blocks in C. Such a thread can only be left behind.
 
-A virtual clock interrupts what waits on it by itself, so that tests stay deterministic.
+A virtual clock interrupts its own waits, so that tests stay deterministic.
 
 Source: CPython's `PyThreadState_SetAsyncExc` and the `signal` module's documentation, "Execution
 of Python signal handlers".
@@ -26,17 +26,20 @@ if TYPE_CHECKING:
 
     from actionlib_core.clock import Clock
 
-SIGNAL = signal.SIGURG  # ignored by default, so a late one does no harm
+SIGNAL = signal.SIGURG  # its default action is to ignore it, so a late one does no harm
 
 
 class Interruption(BaseException):
-    """Raised inside a state that ignored its preempt; never seen outside its container."""
+    """Raised inside a state that ignored its preempt; never leaves its container.
+
+    Not an `Exception`, so that `except Exception` in the state does not swallow it.
+    """
 
 
-class ProgramEnds(Exception):  # noqa: N818  a fact, no fault
-    """Raised by a wait inside a state as the program is to end, in programs for ROS 1.
+class ProgramEnds(Exception):  # noqa: N818  not an error
+    """Raised by a wait inside a state at shutdown, in programs for ROS 1.
 
-    A state that lets it through ends as one that was preempted.
+    A state that does not catch it ends as a preempted one.
     """
 
 
@@ -45,12 +48,12 @@ class InterruptingClock(Protocol):
     """A clock that can end a wait with an exception."""
 
     def interrupt(self, ident: int, error: BaseException) -> bool:
-        """Raise `error` in the thread `ident` if it waits on this clock; tell whether it did."""
+        """Raise `error` in the thread `ident` if it waits on this clock; return whether it did."""
         ...
 
 
-class _Breaker:
-    """What the signal handler shall break into, if it is still wanted then."""
+class _SignalHandler:
+    """The handler of `SIGNAL`: interrupts the main thread if that is still due when it runs."""
 
     def __init__(self) -> None:
         self.is_wanted: Callable[[], bool] | None = None
@@ -62,7 +65,7 @@ class _Breaker:
             raise Interruption
 
 
-_target: Any = _Breaker()
+_handler: Any = _SignalHandler()
 
 
 def interrupt(clock: Clock, ident: int, is_wanted: Callable[[], bool]) -> bool:
@@ -70,74 +73,75 @@ def interrupt(clock: Clock, ident: int, is_wanted: Callable[[], bool]) -> bool:
 
     Args:
         clock: The clock of the run.
-        ident: The thread; 0: none yet.
-        is_wanted: Asked in that thread just before, if it comes by a signal.
+        ident: The thread; 0 if it has not started yet.
+        is_wanted: Called in that thread just before the exception is raised, if a signal is used.
 
     Returns:
-        Whether it is on its way and has to be taken back (`take_back`) when the child ends first.
+        Whether an exception is now pending, which `take_back` must remove if the child ends first.
     """
     if not ident:
         return False
     if isinstance(clock, InterruptingClock) and clock.interrupt(ident, Interruption()):
         return False
     handler: Any = signal.getsignal(SIGNAL)
-    if ident == threading.main_thread().ident and handler is _target:
-        _target.is_wanted = is_wanted
+    if ident == threading.main_thread().ident and handler is _handler:
+        _handler.is_wanted = is_wanted
         signal.pthread_kill(ident, SIGNAL)
-        return False
+        return False  # nothing to take back: a late handler asks `is_wanted`
     _set_exception(ident, Interruption)
     return True
 
 
 def take_back(ident: int) -> None:
-    """Take back an interruption that has not arrived; with the run's lock held."""
+    """Remove an interruption that has not been raised yet; with the run's lock held."""
     _set_exception(ident, None)
 
 
-class _Attention(BaseException):
-    """Raised and caught in `_set_exception`, to be seen by nobody."""
+class _Dummy(BaseException):
+    """Raised and caught in `_set_exception` only."""
 
 
 def _set_exception(ident: int, kind: type[BaseException] | None) -> None:
-    """Set the exception that the thread `ident` raises next, or take it back with None.
+    """Set the exception that the thread `ident` raises next, or remove it with None.
 
-    Before 3.13 the interpreter then looks for it at every step of every thread until a thread has
-    raised one. It would look for ever when the exception is taken back or its thread stays in C,
-    which costs time, and in 3.11 a function that is traced then (by a debugger, by coverage) never
-    begins. So this thread raises one itself; a thread that returns from C looks on its own. No
-    function is called between the two, as it could be a traced one.
+    Before Python 3.13 a pending exception is announced to all threads by one flag, which is checked
+    at every step of the interpreter and cleared only when some thread raises its exception. If ours
+    is removed, or its thread stays in C, the flag would stay set: that costs time, and in 3.11 a
+    function that is traced meanwhile (by a debugger or coverage) never begins. So this thread
+    raises a dummy exception itself, which clears the flag. A thread that returns from C checks
+    again on its own. No function is called between the two calls, because it could be a traced one.
     """
     import ctypes
 
     set_exception = ctypes.pythonapi.PyThreadState_SetAsyncExc
     pointer = None if kind is None else ctypes.py_object(kind)
     target, me = ctypes.c_ulong(ident), ctypes.c_ulong(threading.get_ident())
-    attention = ctypes.py_object(_Attention)
+    dummy = ctypes.py_object(_Dummy)
     if sys.version_info >= (3, 13) or (kind is not None and target.value == me.value):
         set_exception(target, pointer)
         return
     try:
         set_exception(target, pointer)
-        set_exception(me, attention)
-        while True:  # it comes as this turns
+        set_exception(me, dummy)
+        while True:  # it is raised at the jump back
             pass
-    except _Attention:
+    except _Dummy:
         return
-    except BaseException:  # a signal's handler has raised first
+    except BaseException:  # a signal handler has raised first; the dummy is still to come
         try:
             while True:
                 pass
-        except _Attention:
+        except _Dummy:
             pass
         raise
 
 
 def use_signals() -> None:
-    """Let a signal break into states in the main thread; call it there.
+    """Install the signal handler that interrupts states in the main thread; call it there.
 
-    The handler stays, as it does nothing unless a state is overdue. A program that handles the
-    signal itself keeps its handler.
+    The handler stays, because it does nothing unless a state is overdue. A program that handles the
+    signal itself keeps its own handler.
     """
-    if not _target.installed and signal.getsignal(SIGNAL) is signal.SIG_DFL:
-        signal.signal(SIGNAL, _target)
-    _target.installed = True
+    if not _handler.installed and signal.getsignal(SIGNAL) is signal.SIG_DFL:
+        signal.signal(SIGNAL, _handler)
+    _handler.installed = True

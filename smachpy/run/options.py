@@ -1,4 +1,4 @@
-"""The options of a state: what they are, and what is wrong with those that were given."""
+"""The options of a state, and their checks."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class Retry:
     """Run a state again when it ends badly.
 
     Attributes:
-        attempts: How often it runs at most, the first time included; >= 1.
-        backoff: Wait before the second attempt [s]; it doubles each time.
-        on: Outcomes and exception types that ask for another attempt.
+        attempts: Maximum number of runs, including the first one; >= 1.
+        backoff: Wait before the second attempt [s]; doubled for each further one.
+        on: Outcomes and exception types after which the state runs again.
 
     Raises:
         InvalidStateError: a value is wrong; all problems at once.
@@ -51,7 +51,7 @@ class Retry:
             object.__setattr__(self, name, value)
 
     def wants(self, attempt: int, result: str | BaseException) -> bool:
-        """Tell whether to run again after attempt number `attempt` (from 1) gave `result`."""
+        """Return whether to run again after attempt number `attempt` (from 1) gave `result`."""
         if attempt >= self.attempts:
             return False
         if isinstance(result, BaseException):
@@ -70,7 +70,7 @@ class Retry:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Options:
-    """The options of one state; see `smachpy.machines.state.StateOptions` for what they do.
+    """The options of one state, checked; `smachpy.machines.state.StateOptions` describes them.
 
     Attributes:
         timeout: [s], or None.
@@ -80,10 +80,10 @@ class Options:
         on_exception: Exception type -> outcome.
         on_enter: Called before the state runs, or None.
         on_exit: Called after it ran, or None.
-        resume: What a durable run that goes on does in place of executing it again, or None.
-        on_resume: Called before it goes on in a durable run, or None.
-        idempotent: Its goal may be sent again when nobody knows whether it was done.
-        transient: Keys of a container that a durable run does not keep.
+        resume: What a resumed durable run does instead of executing the state again, or None.
+        on_resume: Called before the state continues in a resumed durable run, or None.
+        idempotent: Its goal may be sent again if it is unknown whether it was done.
+        transient: Keys of a container that the journal of a durable run does not keep.
     """
 
     timeout: float | None = None
@@ -99,14 +99,14 @@ class Options:
     transient: tuple[str, ...] = ()
 
     def made_outcomes(self) -> tuple[str, ...]:
-        """Return the outcomes that these options give a state."""
+        """Return the outcomes that these options add to a state."""
         own = () if self.timeout is None else (self.timeout_outcome,)
         skipped = () if self.skipped is None else (self.skipped,)
         return (*own, *self.on_exception.values(), *skipped)
 
     @property
     def skipped(self) -> str | None:
-        """The outcome of `resume="skip:OUTCOME"`; None when it is something else."""
+        """The outcome of `resume="skip:OUTCOME"`; None for any other `resume`."""
         is_skip = isinstance(self.resume, str) and self.resume.startswith(SKIP)
         return str(self.resume)[len(SKIP) :] if is_skip else None
 
@@ -118,7 +118,7 @@ NAMES = tuple(field.name for field in dataclasses.fields(Options))
 
 
 def as_retry(value: Any) -> Retry | None:
-    """Return `value` as a `Retry`: one already, (attempts, backoff, on), a number, or None.
+    """Convert a `Retry`, a tuple (attempts, backoff, on), a number of attempts, or None.
 
     Raises:
         InvalidStateError: it is none of these, or a part of it is wrong.
@@ -151,17 +151,18 @@ def _results(problems: Problems, on: Any) -> tuple[Any, ...]:
 
 
 def changed(options: Options, given: Mapping[str, Any], problems: Problems) -> Options:
-    """Return `options` with those in `given`, whose names are known, in their place."""
+    """Return a copy of `options` with the values in `given`, whose names are valid."""
     checked = {name: _CHECKS[name](problems, name, value) for name, value in given.items()}
     return dataclasses.replace(options, **checked)
 
 
 def retry_problems(options: Options, outcomes: Iterable[str]) -> list[str]:
-    """Return what is wrong with `retry` for a state with these outcomes."""
+    """Return the problems of `retry` for a state with these outcomes."""
     retry = options.retry
     if retry is None:
         return []
     known = {*outcomes, *options.made_outcomes(), "preempted"}
+    # One that can occur is enough; others beside it do no harm.
     if any(isinstance(one, type) or one in known for one in retry.on):
         return []
     text = (

@@ -1,4 +1,4 @@
-"""`set_preempt_handler`: a machine ends before its program does."""
+"""`set_preempt_handler`: let a machine end before its program does."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ if TYPE_CHECKING:
 
 
 def set_preempt_handler(sc: State, *, timeout: float | None = 60.0) -> None:
-    """Preempt `sc` when the program is to end, and let it finish before the network is left.
+    """Preempt `sc` at shutdown, and let it finish before the network is left.
 
-    A machine that runs is preempted by Ctrl-C and by the program's shutdown anyway. This makes the
-    program wait for one that runs in another thread, so that its goals are cancelled and not left
-    running; and, when called in the main thread, it makes SIGTERM a request to end as Ctrl-C is,
-    unless the program handles that itself.
+    Ctrl-C and the program's shutdown preempt a running machine anyway. This function makes the
+    program also wait for a machine that runs in another thread, so that its goals are cancelled and
+    not left running. Called in the main thread it also makes SIGTERM request the shutdown, as
+    Ctrl-C does, unless the program handles SIGTERM itself.
 
     Args:
         sc: A container, or a state.
         timeout: Longest wait for its end [s]; None waits for ever.
 
     Raises:
-        InvalidStateError: `sc` is no state, or `timeout` no duration.
+        InvalidStateError: `sc` is not a state, or `timeout` is not a duration.
     """
     from actionlib_core import shutdown
 
@@ -47,15 +47,20 @@ def set_preempt_handler(sc: State, *, timeout: float | None = 60.0) -> None:
                 log.logerr(f"{sc!r} still runs {timeout} s after its preempt; it is left behind.")
 
     current = shutdown.current_shutdown()
-    forget = _handle_sigterm()
-    if forget is not None:
-        current.at_exit(forget)
+    restore = _handle_sigterm()
+    if restore is not None:
+        current.at_exit(restore)
+    # Both: a program that just returns from `main` is never asked to shut down.
     current.on_shutdown(stop)
     current.at_exit(stop)
 
 
 def _handle_sigterm() -> Callable[[], object] | None:
-    """Let SIGTERM request the program's end; returns how to undo that, None if it was not done."""
+    """Make SIGTERM request the shutdown.
+
+    Returns:
+        A function that restores the handler; None if nothing was changed.
+    """
     import contextlib
     import signal
     import threading

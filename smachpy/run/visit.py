@@ -1,10 +1,11 @@
-"""The life cycle of a child as a table, and what its container does after it.
+"""The life cycle of a child as a table, and the decision of its container after it.
 
 A visit is one execution of one child, from the moment its container has chosen it until its outcome
-has been followed. A root is the child of an invisible top, so it has a visit like every other.
+has been followed. A root is the child of an invisible top, so it has a visit like any other child.
 
-Nothing here knows threads, clocks or logs. `smachpy.run.grace` holds one visit's state, feeds it
-events with the run's lock held, and performs the effects of each row in their order.
+This module knows no threads, clocks or logs. `smachpy.run.grace` keeps the phase of a visit,
+applies events to it with the run's lock held, and performs the effects of each row in their order.
+The table is drawn in docs/preemption.md.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Origin(NamedTuple):
-    """Who asked first, as `smachpy.events.PreemptRequested` tells it."""
+    """Who asked first; the fields of `smachpy.events.PreemptRequested`."""
 
     source: str
     by: str = ""
@@ -29,43 +30,43 @@ class Origin(NamedTuple):
 
 
 class _Name(Enum):
-    """A name; hashed as an object, because `Enum.__hash__` is a function in Python."""
+    """A name that is hashed by identity: `Enum.__hash__` is written in Python, and slower."""
 
     __hash__ = object.__hash__
 
 
 class Phase(_Name):
-    """Where a visit is."""
+    """The phases of a visit."""
 
-    CHOSEN = "chosen"  # its container will start it
-    CALLED_OFF = "called off"  # its container will not start it
+    CHOSEN = "chosen"  # the container will start the child
+    CALLED_OFF = "called off"  # asked to stop before it started: it will not be started
     RUNNING = "running"
-    ASKED = "asked"  # somebody wants it to stop
+    ASKED = "asked"  # it has been asked to stop
     OVERDUE = "overdue"  # its grace is over; it was interrupted
-    LEFT_BEHIND = "left behind"  # it did not react; its thread goes on without effect
+    LEFT_BEHIND = "left behind"  # it did not react; its thread runs on without effect
     ENDED = "ended"
 
 
 class Event(_Name):
-    """What happens to a visit."""
+    """The events of a visit."""
 
-    ASK = "ask"  # somebody wants it to stop, other than its own timeout
+    ASK = "ask"  # anyone except its own timeout asks it to stop
     TIME_OVER = "time over"  # its own timeout has passed
     START = "start"  # its thread is about to run it
-    SERVICE = "service"  # it takes the request up
+    SERVICE = "service"  # it services the request
     GRACE_OVER = "grace over"
     INTERRUPT_AGAIN = "interrupt again"  # still runs, in a thread that cannot be left behind
     LEAVE = "leave"  # still runs, in a thread that can be left behind
-    NEXT_ATTEMPT = "next attempt"  # an attempt ended that only its own timeout wanted to stop
+    NEXT_ATTEMPT = "next attempt"  # an attempt ended that only its own timeout had asked to stop
     END = "end"  # it returned or raised, or was not started
 
 
 class Effect(_Name):
-    """What is done when an event changes a visit."""
+    """The effects of an event on a visit."""
 
     PUBLISH_TIMED_OUT = "publish TimedOut"
     PUBLISH_REQUEST = "publish PreemptRequested"
-    TELL = "tell the child"  # sets its flag; a container tells its own children
+    TELL = "tell the child"  # sets its flag; a container passes the request on to its children
     CALL_OVERRIDE = "call its own request_preempt"
     ARM_GRACE = "arm grace"
     PUBLISH_SERVICED = "publish PreemptServiced"
@@ -78,11 +79,11 @@ class Effect(_Name):
 
 
 class Row(NamedTuple):
-    """One line of the table: an event leads from each of these phases to another."""
+    """One line of the table: `event` leads from any of `sources` to `target`."""
 
     event: Event
     sources: tuple[Phase, ...]
-    target: Phase | None  # None: the phase stays
+    target: Phase | None  # None: the phase does not change
     effects: tuple[Effect, ...] = ()
 
 
@@ -92,11 +93,12 @@ def _rows() -> Iterator[Row]:
     first = (do.PUBLISH_REQUEST, do.TELL, do.CALL_OVERRIDE, do.ARM_GRACE)
     again = (do.PUBLISH_REQUEST, do.TELL)  # a container may be running another child by now
 
-    # A child that never starts is told nothing, so it keeps no flag.
+    # A child that never starts is told nothing: its flag would still be set at its next visit.
     yield Row(e.ASK, (p.CHOSEN,), p.CALLED_OFF)
     yield Row(e.ASK, (p.CALLED_OFF,), None)
     yield Row(e.START, (p.CHOSEN,), p.RUNNING)
 
+    # A second request starts no new grace: repeated requests must not keep a child running.
     yield Row(e.ASK, (p.RUNNING,), p.ASKED, first)
     yield Row(e.ASK, (p.ASKED, p.OVERDUE), None, again)
     yield Row(e.TIME_OVER, (p.RUNNING,), p.ASKED, (do.PUBLISH_TIMED_OUT, *first))
@@ -111,7 +113,8 @@ def _rows() -> Iterator[Row]:
     yield Row(e.NEXT_ATTEMPT, (p.ASKED, p.OVERDUE), p.RUNNING, (do.CLEAR,))
     yield Row(e.END, tuple(x for x in p if x not in over), p.ENDED, (do.CLEAR,))
 
-    # What comes too late changes nothing; a request stays with the run.
+    # Late events change nothing here; a request stays with the run, and `after` or the next visit
+    # meets it.
     yield Row(e.ASK, over, None)
     yield Row(e.TIME_OVER, over, None)
     yield Row(e.SERVICE, (p.RUNNING, *over), None)
@@ -124,24 +127,24 @@ def _rows() -> Iterator[Row]:
 
 
 ROWS: tuple[Row, ...] = tuple(_rows())
-"""The table as it was written; a pair of phase and event that is missing cannot happen."""
+"""The table in rows. A pair of phase and event that is not in it cannot occur."""
 
 IS_ASKED = frozenset({Phase.CALLED_OFF, Phase.ASKED, Phase.OVERDUE})
-"""The phases of a child that somebody wants to stop."""
+"""The phases of a child that has been asked to stop and has not ended."""
 
 STEPS: Mapping[tuple[Phase, Event], tuple[Phase, tuple[Effect, ...]]] = {
     (source, row.event): (row.target or source, row.effects)
     for row in ROWS
     for source in row.sources
 }
-"""The table, compiled: (phase, event) -> the phase that follows, and what is done."""
+"""The same table for look-ups: (phase, event) -> (next phase, effects)."""
 
 
 # -- after an attempt, and after the visit -----------------------------------------------------
 
 
 class Again(NamedTuple):
-    """The child runs again, after `wait` seconds, because of `result`."""
+    """The child runs again after `wait` seconds, because `retry` covers `result`."""
 
     wait: float
     result: Any
@@ -156,25 +159,25 @@ def after_attempt(
     timed_out: bool,
     applies: Callable[[Callable[[BaseException], bool], BaseException], bool],
 ) -> Any:
-    """Decide after one attempt at a child with `options`: the first line that fits.
+    """Decide what follows one attempt at a child with `options`: the first rule that applies.
 
-    1. Only its own timeout asked, and it ended 'preempted' or was interrupted: `timeout_outcome`
-       takes the place of that.
-    2. It was interrupted: that is passed on.
-    3. `retry` wants another attempt, some are left, and nobody asked: `Again`.
-    4. `on_exception` names the error: that outcome.
-    5. The outcome, or the error.
+    1. Only its own timeout asked, and it ended 'preempted' or was interrupted: replace that result
+       by `timeout_outcome`, and go on with rule 3.
+    2. It was interrupted: raise that.
+    3. `retry` covers the result, attempts are left, and nobody else asked: `Again`.
+    4. `on_exception` covers the error: the outcome given there.
+    5. The outcome, or raise the error.
 
     Args:
         result: Its outcome, or what it raised; a BaseException that is no Exception interrupted it.
         options: The child's options.
         attempt: Number of this attempt, from 1.
-        asked: Somebody asked it to stop, other than its own timeout.
-        timed_out: Only its own timeout asked it to stop.
-        applies: Whether a condition holds for an error or for what a container made it from.
+        asked: Anyone except its own timeout has asked it to stop.
+        timed_out: Only its own timeout has asked it to stop.
+        applies: Whether a condition holds for an error, or for those a container wrapped in it.
 
     Returns:
-        `Again`, the outcome, or what is to be raised.
+        `Again`, the outcome, or the exception to raise.
     """
     is_interrupted = isinstance(result, BaseException) and not isinstance(result, Exception)
     if timed_out and (is_interrupted or (isinstance(result, str) and result == "preempted")):
@@ -198,10 +201,10 @@ def _is_a(kind: type[BaseException], error: BaseException) -> bool:
 
 
 class Why(Enum):
-    """Why a container goes where it goes."""
+    """The reason of a decision."""
 
     FOLLOWED = "the outcome leads there"
-    ANSWERED = "the child took the run's request up, which is spent with it"
+    ANSWERED = "the child serviced the run's request, which is spent with it"
     STOPPED = "the run was asked to stop"
     FORCED = "an operator chose the outcome"
     JUMPED = "an operator chose the next child"
@@ -213,7 +216,7 @@ class End:
     """The container ends with this outcome."""
 
     outcome: str
-    final: Literal[True] = True  # on the instance, where Python finds it faster
+    final: Literal[True] = True  # a slot is found faster than a class attribute; see `Step`
 
 
 PREEMPTED = End("preempted")
@@ -221,7 +224,7 @@ PREEMPTED = End("preempted")
 
 @dataclass(frozen=True, slots=True)
 class Override:
-    """What an operator wants instead of a child's own outcome: another one, or a jump."""
+    """An operator's choice instead of a child's own outcome: another outcome, or a jump."""
 
     outcome: str | None = None
     label: str | None = None
@@ -232,7 +235,7 @@ class Decision(NamedTuple):
 
     Attributes:
         why: The reason.
-        target: `End`, or the next child's record (`smachpy.run.step.Step`); with JUMPED its label,
+        target: `End` or the next `smachpy.run.step.Step`; with JUMPED the label of the next child,
             with UNKNOWN None.
     """
 
@@ -248,25 +251,25 @@ def after(
     answered: bool,
     override: Override | None = None,
 ) -> Decision:
-    """Decide where a container goes after a visit that somebody asked to stop.
+    """Decide where a container goes after a visit in which it, or its child, was asked to stop.
 
-    The first line that fits:
+    The first rule that applies:
 
-    1. 'preempted', which is no outcome of the child: the container ends 'preempted' too, unless
-       only an operator asked, who wants something else.
+    1. The outcome is 'preempted' and has no transition: the container ends 'preempted', unless only
+       an operator asked and chose something else.
     2. The run was asked to stop:
-       a. the outcome ends the container: so it does, finished work stands;
-       b. the child took the request up: where the outcome leads; the request is spent;
-       c. else it ends 'preempted', and nothing more is started.
-    3. An operator wants another outcome, or another child.
-    4. Where the outcome leads.
+       a. the outcome ends the container: it ends so, because finished work counts;
+       b. the child serviced the request: go where the outcome leads; the request is spent;
+       c. otherwise the container ends 'preempted' and starts no other child.
+    3. An operator chose another outcome, or another child: go there.
+    4. Go where the outcome leads.
 
     Args:
-        outcome: What the child returned.
+        outcome: The child's outcome.
         targets: Outcome -> `End` or the next child.
         run_asked: The container itself was asked to stop, not only this child.
-        answered: The child took its request up: it ended 'preempted', or said so.
-        override: What an operator wants.
+        answered: The child serviced its request: it ended 'preempted' or said so.
+        override: An operator's choice.
     """
     target = targets.get(outcome) if isinstance(outcome, str) else None
     if target is None and outcome == "preempted" and (override is None or run_asked):
