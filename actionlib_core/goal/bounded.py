@@ -1,4 +1,4 @@
-"""Memories with a limit: messages that wait for a slow reader, and what was seen lately."""
+"""Bounded collections: a queue of messages for a slow reader, and a set of recent keys."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from typing import Generic, TypeVar
 
 T = TypeVar("T")
 
-MESSAGES = 100_000  # that many may wait
-BYTES = 32 * 2**20  # and that much; the newest message always may
+MESSAGES = 100_000  # limit of a queue
+BYTES = 32 * 2**20  # its other limit; one message alone may be larger
 
 
 class Backlog(Generic[T]):
     """A bounded queue: when it is full, the oldest message is dropped and counted.
 
     Args:
-        messages: How many may wait.
-        size: How large they may be together [bytes].
+        messages: Limit on their number.
+        size: Limit on their total size [bytes]; the newest message is kept whatever its size.
 
     Attributes:
-        dropped: How many were dropped.
+        dropped: Number of messages dropped so far.
 
     Threads: none of its own, no lock; the owner calls it under its lock.
     """
@@ -37,7 +37,7 @@ class Backlog(Generic[T]):
         return len(self._waiting)
 
     def add(self, message: T, size: int) -> bool:
-        """Append a message of `size` bytes; return whether it fitted without dropping another."""
+        """Append a message of `size` bytes; return whether no other had to be dropped for it."""
         self._waiting.append((message, size))
         self._bytes += size
         dropped = self.dropped
@@ -49,7 +49,7 @@ class Backlog(Generic[T]):
         return self.dropped == dropped
 
     def take(self) -> T | None:
-        """Return the oldest message and remove it; None when none waits."""
+        """Remove and return the oldest message; None when the queue is empty."""
         if not self._waiting:
             return None
         message, size = self._waiting.popleft()
@@ -57,7 +57,7 @@ class Backlog(Generic[T]):
         return message
 
     def drop_all(self) -> int:
-        """Drop what waits; return how many messages that were."""
+        """Drop all messages; return their number."""
         count = len(self._waiting)
         self._waiting.clear()
         self._bytes = 0
@@ -66,9 +66,9 @@ class Backlog(Generic[T]):
 
 
 class Recent(dict[str, None]):
-    """Words that were added; beyond the limit, those that came first are forgotten.
+    """A set of words with a limit on its size: the word added first is dropped first.
 
-    A word that comes again keeps its place.
+    Adding a word again does not make it newer: a dict keeps the order of first insertion.
     """
 
     def __init__(self, limit: int) -> None:
@@ -76,7 +76,7 @@ class Recent(dict[str, None]):
         self._limit = limit
 
     def add(self, word: str) -> None:
-        """Keep a word."""
+        """Add a word."""
         self[word] = None
         if len(self) > self._limit:
             del self[next(iter(self))]

@@ -1,8 +1,11 @@
-"""What a client knows: about one goal, and about the servers of its action.
+"""The client's rules: the life of one goal, and the servers of its action.
 
-The client sends a goal again until the server has spoken of it, sends a cancel again until the
-server has taken it, and asks for what it has not heard. Being asked twice does no harm: the server
-runs a goal id once. Time is an argument everywhere.
+The network may lose messages. So the client repeats a goal until a server has acknowledged it,
+repeats a cancel until the server has answered it, and queries the server when it has not heard of a
+goal for some time. Repetitions do no harm, because a server runs a goal id only once.
+
+Nothing here reads a clock, takes a lock or sends: the time is an argument and the return values say
+what to send.
 """
 
 from __future__ import annotations
@@ -13,38 +16,38 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from actionlib_core.goal.bounded import Recent
 from actionlib_core.goal.life_cycle import client_life_cycle
-from actionlib_core.goal.states import TERMINAL, CommState, Status
+from actionlib_core.goal.states import OVER, STARTED, TERMINAL, CommState, Status
 
 if TYPE_CHECKING:
     from actionlib_core.exceptions import TypeMismatchError
     from actionlib_core.goal.ports import Server, StatusEntry
 
-RESEND_FIRST_S = 0.5  # first repetition of a goal or cancel; then twice as long each time
-ASK_FIRST_S = 0.2  # a final status is here and the result is not: ask for it
-SILENCE_S = 3.0  # nothing heard of a goal for so long: ask (the server speaks once a second)
-LONGEST_S = 2.0  # repetitions are never further apart
-UNLISTED_S = 5.0  # the server lists other goals but not this one for so long: it is lost
+RESEND_FIRST_S = 0.5  # delay of the first repetition of a goal or cancel; doubled each time
+ASK_FIRST_S = 0.2  # after a final status without a result, query for the result
+SILENCE_S = 3.0  # after no message about a goal, query it (servers send a list once a second)
+LONGEST_S = 2.0  # limit of the doubled delay
+UNLISTED_S = 5.0  # a goal missing in a tokenless server's lists for this time is LOST
 
-REMEMBERED = 1024  # sessions of servers that were there
-GIVES_WAY_S = 3.0  # of two servers the younger one has gone after this time
-STATUS_LIST_TIMEOUT_S = 5.0  # a server without a token is gone when it says nothing for so long
+REMEMBERED = 1024  # sessions of former servers
+GIVES_WAY_S = 3.0  # of two servers with one name, the younger has stopped within this time
+STATUS_LIST_TIMEOUT_S = 5.0  # a server without a token counts as gone after this silence
 
 
 TEXT_NEVER_SENT = "This goal was canceled before any action server was there"
 TEXT_NEVER_TAKEN = "This goal was canceled before any action server had taken it"
 
+# Read for every status of every goal: a dict, a list and sets instead of calls, enum properties
+# and chains of comparisons.
 _STEPS = client_life_cycle().steps
 _NAMES: Final = [status.name for status in Status]
 STATUSES: Final = {int(status): status for status in Status}
-_OVER: Final = frozenset({CommState.DONE, CommState.LOST})
 _AWAITED: Final = frozenset({CommState.WAITING_FOR_RESULT, CommState.WAITING_FOR_CANCEL_ACK})
-_BEGUN: Final = frozenset({CommState.ACTIVE, CommState.PREEMPTING})
 
 Path = tuple[CommState, ...]
 
 
 class Duty(enum.Flag):
-    """What the client has to send for a goal now."""
+    """The messages to send for a goal now."""
 
     NOTHING = 0
     GOAL = enum.auto()
@@ -59,18 +62,18 @@ class ClientGoal:
     Attributes:
         id: The goal's id.
         stamp_ns: When it was sent [ns since the epoch]; 0 when unknown.
-        attached: The goal was sent in an earlier life: it is never sent, only asked for.
-        ack_timeout: Without a word from a server for so long [s] the goal is LOST; None: no limit.
-        comm: Where it stands.
-        status: The last thing the server said; LOST once the goal is lost.
-        text: What the server said about that, or why the goal is lost.
-        result: The result message, once it is here.
+        attached: The goal was sent by an earlier process: it is never sent, only queried.
+        ack_timeout: Time for the acknowledgement [s]; then the goal is LOST. None: no limit.
+        comm: Its state.
+        status: The last status from the server; LOST once the goal is lost.
+        text: The text of that status, or why the goal is lost.
+        result: The result message, None before it has arrived.
         server: Session id of the server that may have the goal; "" when unknown.
-        address: The server that it was sent to first; None when it was sent to nobody, or to one
-            that does not show itself.
-        offered: It may have reached a server.
-        acknowledged: A server has spoken of it.
-        begun: The server has accepted it, now or before.
+        address: The server that it was first sent to; None when it was not sent yet, or to a
+            server without a token.
+        offered: It was sent and may have reached a server.
+        acknowledged: A server has named it in a status.
+        begun: The server has accepted it at some time.
         over: It is DONE or LOST.
 
     Threads: none of its own, no lock; the owner calls it under its lock.
@@ -97,10 +100,10 @@ class ClientGoal:
     _ack_by: float | None = None
     _unlisted_since: float | None = None
 
-    # -- what the user does --------------------------------------------------------------------
+    # -- calls of the program ------------------------------------------------------------------
 
     def begin(self, now: float) -> Duty:
-        """Start; return what to send."""
+        """Start following the goal; return what to send."""
         self._due = now + RESEND_FIRST_S
         if self.ack_timeout is not None:
             self.limit_ack(self.ack_timeout, now)
@@ -110,22 +113,22 @@ class ClientGoal:
         return Duty.ASK
 
     def limit_ack(self, ack_timeout: float | None, now: float) -> None:
-        """Be LOST without a word from a server for so long from now [s]; None: no limit."""
+        """Set the time for the acknowledgement [s], beginning now; None: no limit."""
         self.ack_timeout = ack_timeout
         self._ack_by = None
         if ack_timeout is not None and not self.acknowledged:
             self._ack_by = now + ack_timeout
 
     def on_offered(self, server: str, address: Server | None = None) -> None:
-        """Note that the goal was put on the network where a server could take it."""
+        """Note that the goal is being sent to a server, which may take it."""
         self.offered = True
         if not self.acknowledged:
             self.server, self.address = server, address
 
     def cancel(self, now: float) -> tuple[Path, Duty]:
-        """Ask for its end; return the states passed and what to send.
+        """Cancel the goal; return the states passed and what to send.
 
-        A goal that cannot have reached any server is recalled on the spot.
+        A goal that cannot have reached any server is RECALLED at once.
         """
         path = self._go("cancel")
         if self.over or self.comm is CommState.WAITING_FOR_RESULT:
@@ -137,41 +140,45 @@ class ClientGoal:
         self._due = now + self._pause
         return path, Duty.CANCEL
 
-    # -- what arrives --------------------------------------------------------------------------
+    # -- messages of servers -------------------------------------------------------------------
 
     def hear(self, entry: StatusEntry, session: str, now: float) -> Path | None:
-        """Take what a server says of the goal; return the states passed, None if it is no status.
+        """Handle a status of the goal; return the states passed, None if there is no such status.
 
         Args:
-            entry: What it says.
+            entry: The status.
             session: The server's; "" when unknown.
             now: The time [s, clock].
         """
         status = STATUSES.get(entry.status)
         if status is None:
             return None
-        if not self.stamp_ns:  # it was attached to
+        if not self.stamp_ns:  # of an attached goal only the server knows the stamp
             self.stamp_ns = entry.stamp_ns
         path = self.on_status(status, entry.text, now)
-        if session and self.acknowledged:  # not a server that knows of the cancel only
+        if session and self.acknowledged:  # not a server that has only received the cancel
             self.server = session
         return path
 
     def on_status(self, status: Status, text: str, now: float) -> Path:
-        """Take a status; return the states passed. One that was overtaken on the way is dropped."""
+        """Handle a status; return the states passed. An out-of-date status is ignored."""
         if self.over:
             return ()
         if status is Status.LOST:
             return self.lose(text)
-        # RECALLING may stand for a cancel that overtook its goal: the goal must still be sent.
+        # The server also lists a cancel that arrived before its goal, as RECALLING: that does not
+        # show that it has the goal, which must still be sent.
         if status is not Status.RECALLING or self.attached:
             self.acknowledged = True
         self._unlisted_since = self._ack_by = None
+        # While a result or the answer to a cancel is awaited, `_due` is the next repetition: the
+        # status lists of every second must not put it off.
         if self.acknowledged and self.comm not in _AWAITED:
             self._due = now + SILENCE_S
         if (self.comm, _NAMES[status]) not in _STEPS:
             return ()
         path = self._go(_NAMES[status])
+        # Once a final status is here, repeated or older ones must not replace it.
         if self.comm is not CommState.WAITING_FOR_RESULT or path:
             self.status, self.text = status, text
         if path and self.comm is CommState.WAITING_FOR_RESULT:
@@ -180,34 +187,38 @@ class ClientGoal:
         return path
 
     def on_sign_of_life(self, now: float) -> None:
-        """Take a status that says nothing new, of a goal that is acknowledged."""
+        """Handle an unchanged status of an acknowledged goal: the short way of `on_status`."""
         self._unlisted_since = None
         if self.comm is CommState.ACTIVE:
             self._due = now + SILENCE_S
 
     def on_result(self, status: Status, text: str, result: object, now: float) -> Path:
-        """Take the result with the final status; return the states passed."""
+        """Handle the result with its final status; return the states passed."""
         if self.over:
             return ()
         if status not in TERMINAL:
             return self.lose(f"the server sent a result with status {status.name}: {text}")
         path = self.on_status(status, text, now)
-        if self.comm is not CommState.WAITING_FOR_RESULT:  # a foreign server left states out
+        # A final status that the table does not allow here comes from a server that breaks ROS's
+        # rules. The result is here all the same, and ends the goal.
+        if self.comm is not CommState.WAITING_FOR_RESULT:
             self.comm = CommState.WAITING_FOR_RESULT
             path += (self.comm,)
         self.status, self.text, self.result = status, text, result
         return path + self._go("result")
 
     def on_unlisted(self, now: float, *, answers: bool) -> Path:
-        """Take a status list without this goal.
+        """Handle a status list without this goal.
 
         Args:
             now: The time [s, clock].
-            answers: The server is one that can be asked; a foreign one, that cannot, has forgotten
-                the goal.
+            answers: Whether the server can be queried. One that cannot (it has no token) and does
+                not list the goal for `UNLISTED_S` has forgotten it.
         """
         if not self.acknowledged or self.over:
             return ()
+        # Not LOST at once: the list may have been made before the server received the goal, or the
+        # goal has ended and its result is on the way.
         if self._unlisted_since is None:
             self._unlisted_since = now
             self._due = min(self._due, now + ASK_FIRST_S)
@@ -216,9 +227,9 @@ class ClientGoal:
         return ()
 
     def on_untaken(self, now: float) -> Path:
-        """Take the proof that the server it was offered to never took it and never will.
+        """Handle a farewell without this goal: the server has not taken it and never will.
 
-        The next server gets it; a goal whose cancel was on the way is recalled on the spot.
+        It will be sent to the next server; a goal that was cancelled is RECALLED at once.
         """
         if self.acknowledged or self.attached or self.over:
             return ()
@@ -230,7 +241,10 @@ class ClientGoal:
         return ()
 
     def on_unknown(self, text: str) -> Path:
-        """Take the server's answer that it has never heard of this goal."""
+        """Handle the reply that the server does not know this goal.
+
+        A goal that was not acknowledged has just not arrived yet: it is sent again.
+        """
         return self.lose(text) if self.acknowledged or self.attached else ()
 
     def lose(self, reason: str) -> Path:
@@ -244,19 +258,20 @@ class ClientGoal:
 
     @property
     def due(self) -> float:
-        """When `tick` has something to do [s, clock]."""
+        """When `tick` is to be called next [s, clock]."""
         return self._due if self._ack_by is None else min(self._due, self._ack_by)
 
     def hurry(self, now: float) -> None:
-        """Make everything due at once: the link is back, or a server has appeared."""
+        """Make repetitions due now: a server has appeared or come back."""
         self._pause = RESEND_FIRST_S
         self._due = now
 
     def tick(self, now: float) -> tuple[Path, Duty]:
-        """Return the states passed and what is to be sent because nothing was heard."""
+        """Return the states passed and what to send, as time has passed without a message."""
         if self.over:
             return (), Duty.NOTHING
         if self._ack_by is not None and now >= self._ack_by and not self.acknowledged:
+            # A copy of the goal may still reach a server, which must not run what is LOST here.
             return self.lose(f"no action server took this goal within {self.ack_timeout:g} s"), (
                 Duty.CANCEL if self.offered else Duty.NOTHING
             )
@@ -271,7 +286,7 @@ class ClientGoal:
         if self.attached and not self.acknowledged:
             return Duty.ASK
         if not self.acknowledged:
-            # The cancel goes first, so that the server recalls the goal instead of starting it.
+            # The cancel is sent first, so that the server recalls the goal instead of starting it.
             return Duty.CANCEL | Duty.GOAL if self._cancelled else Duty.GOAL
         if self._cancelled and self.comm is CommState.WAITING_FOR_CANCEL_ACK:
             return Duty.CANCEL | Duty.ASK
@@ -281,8 +296,8 @@ class ClientGoal:
         path = _STEPS[self.comm, event]
         if path:
             self.comm = path[-1]
-            self.over = self.comm in _OVER
-            if not self.begun and not _BEGUN.isdisjoint(path):
+            self.over = self.comm in OVER
+            if not self.begun and not STARTED.isdisjoint(path):
                 self.begun = True
         return path
 
@@ -295,11 +310,11 @@ def _age(server: Server) -> tuple[int, str]:
 
 
 class Appearance(NamedTuple):
-    """What the token of a server of our type means.
+    """The meaning of a server's token that has appeared.
 
     Attributes:
-        returned: The server was away and is here again, with its goals.
-        replaced: Those that were away and will not come back: another has their place.
+        returned: The server was away and is back, with its goals.
+        replaced: Servers that were away and will not come back, as another has taken their name.
     """
 
     returned: bool
@@ -307,11 +322,11 @@ class Appearance(NamedTuple):
 
 
 class Receiver(NamedTuple):
-    """Whom a goal is sent to.
+    """The server that a goal is sent to.
 
     Attributes:
         session: Its session.
-        server: The server, which the goal names; None for one that does not show itself.
+        server: The server, which the goal message names; None for a server without a token.
     """
 
     session: str
@@ -322,13 +337,16 @@ class KnownServers:
     """The servers of one action.
 
     Attributes:
-        current: The action's server, None while there is none of our type; of two the elder.
+        current: The action's server, None while there is none of our type; of two the older.
         away: Server whose token vanished -> until when it may come back [s].
-        foreign: Session that sends status lists and shows no token, a bridge for one -> until when
-            it counts as a server without another list [s].
+        foreign: Session that sends status lists but has no token, such as a bridge -> until when
+            it counts as a server unless it sends another list [s].
 
     Args:
-        status_list_timeout: That long after its last status list [s].
+        status_list_timeout: How long one status list lets such a session count as a server [s].
+
+    `_choose` derives `current`, `_fitting` and `_staying` from `_there` and `_leaving`; it runs
+    after each change of these two, so that lookups, which are more frequent, only read.
     """
 
     def __init__(self, status_list_timeout: float = STATUS_LIST_TIMEOUT_S) -> None:
@@ -336,18 +354,18 @@ class KnownServers:
         self.away: dict[Server, float] = {}
         self.foreign: dict[str, float] = {}
         self._status_list_timeout = status_list_timeout
-        self._there: dict[Server, TypeMismatchError | None] = {}
-        self._fitting: list[Server] = []  # those there whose type is ours
-        self._staying: list[Server] = []  # of them, those that have not said farewell
-        self._leaving: set[Server] = set()
-        self._met = Recent(REMEMBERED)
-        self._trusted = Recent(REMEMBERED)
-        self._latest = 0.0  # when the latest server appeared
+        self._there: dict[Server, TypeMismatchError | None] = {}  # those with a token now
+        self._fitting: list[Server] = []  # of those, the servers of our type
+        self._staying: list[Server] = []  # of those, the servers that have not said farewell
+        self._leaving: set[Server] = set()  # servers that have said farewell
+        self._met = Recent(REMEMBERED)  # sessions that have had a token
+        self._trusted = Recent(REMEMBERED)  # of those, the sessions with a server of our type
+        self._latest = 0.0  # when the newest server of our type appeared [s, clock]
 
     def appear(
         self, server: Server, error: TypeMismatchError | None, now: float = 0.0
     ) -> Appearance:
-        """Take the token of a server; `error` is what is wrong with its type."""
+        """Handle the token of a server; `error` when it is of another type."""
         self._there[server] = error
         self._meet(server)
         if error is None:
@@ -362,29 +380,29 @@ class KnownServers:
         return Appearance(returned, replaced)
 
     def vanish(self, server: Server) -> bool:
-        """Take a token away; return whether it was that of a server of our type."""
+        """Handle a token's end; return whether it was that of a server of our type."""
         if server not in self._there or self._there.pop(server) is not None:
             return False
         self._choose()
         return True
 
     def say_farewell(self, server: Server) -> None:
-        """Note that a server is about to leave: goals go to another one from now on."""
+        """Note that a server is about to leave: new goals are sent to another one."""
         self._meet(server)
         if server in self._there:
             self._leaving.add(server)
             self._choose()
 
     def has_said_farewell(self, server: Server) -> bool:
-        """Return whether a server has named the goals that are with it, before it leaves."""
+        """Return whether a server has announced its end, and with it the goals it has taken."""
         return server in self._leaving
 
     def expect_back(self, server: Server, until: float) -> None:
-        """Give a server whose token vanished some time: its link may be cut for a moment."""
+        """Let a server whose token vanished come back: perhaps only its link is interrupted."""
         self.away[server] = until
 
     def take_overdue(self, now: float) -> list[Server]:
-        """Return, and expect no more, those that have been away too long."""
+        """Remove and return the servers that have been away too long."""
         overdue = [server for server, until in self.away.items() if until <= now]
         for server in overdue:
             del self.away[server]
@@ -394,9 +412,9 @@ class KnownServers:
         """Forget a server that will not come back.
 
         Returns:
-            The sessions whose goals are lost with it; "" is that of goals sent to nobody in
-            particular. Those are not with a server that has said farewell, as it has named its
-            goals, and need not be lost while another server is there.
+            The sessions whose goals are lost with it. "" stands for goals of which no server is
+            known. Those are spared after a farewell, which has named the server's own goals, and
+            while there is another server, which may have them.
         """
         elsewhere = server in self._leaving or self.current is not None
         self._leaving.discard(server)
@@ -404,20 +422,20 @@ class KnownServers:
         return {server.session} if elsewhere else {"", server.session}
 
     def may_speak(self, session: str) -> bool:
-        """Return whether to believe what a session says of goals.
+        """Return whether a session's messages about goals are to be accepted.
 
-        While a server shows its token, only servers are believed: those that are there, and the
-        last words of those that were.
+        While a server of our type has a token, only sessions of servers are accepted, former ones
+        included, as their last messages may arrive after the end of their token.
         """
         return session in self._trusted or not self._fitting
 
     def hear_foreign(self, session: str, now: float) -> bool:
-        """Take a status list of a session that shows no token: a bridge may stand for a server.
+        """Handle a status list of a session without a token, which may be a bridge to a server.
 
-        The last words of a server that has left do not count.
+        Late lists of a server that has left do not count.
 
         Returns:
-            Whether somebody is there who was not there before.
+            Whether this makes the session a server that was not known before.
         """
         known = session in self.foreign
         if not known and (session in self._met or self._fitting):
@@ -426,7 +444,7 @@ class KnownServers:
         return not known
 
     def take_silent(self, now: float) -> list[str]:
-        """Return, and count as servers no more, the foreign ones that were silent too long."""
+        """Remove and return the sessions without a token that were silent too long."""
         silent = [session for session, until in self.foreign.items() if until <= now]
         for session in silent:
             del self.foreign[session]
@@ -434,20 +452,20 @@ class KnownServers:
 
     @property
     def is_there(self) -> bool:
-        """Whether the action has a server, or something that stands for one."""
+        """Whether the action has a server, with or without a token."""
         return self.current is not None or bool(self.foreign)
 
     @property
     def conflict(self) -> bool:
-        """Whether several servers show a token, of which one is to stay."""
+        """Whether several servers have a token; all but one of them will stop."""
         return len(self._fitting) > 1
 
     def find_receiver(self, goal: ClientGoal, now: float) -> Receiver | None:
-        """Return to whom a goal is sent now; None: to nobody.
+        """Return the server that a goal is to be sent to now; None: there is none.
 
-        A goal that was sent before goes to the same server again: another one might run it, too.
-        Of two servers the younger gives way; if it does not, the elder has died, and its token
-        outlasts it until a lease is over.
+        A goal that was sent before is sent to the same server again: another might run it as well.
+        Of two servers the younger stops, so the older is chosen. If both are still there after
+        `GIVES_WAY_S`, the older one has died: its token stays until Zenoh's lease is over.
         """
         if goal.address:
             return Receiver(goal.server, goal.address)
@@ -465,21 +483,21 @@ class KnownServers:
         return next((Receiver(session, None) for session in self.foreign), None)
 
     def find_wrong_type(self) -> TypeMismatchError | None:
-        """Return the error of a server that has another type, unless there is a right one too.
+        """Return the error of a server of another type, unless there is one of our type too.
 
-        One that is away or about to leave is right as well.
+        A server of our type that is away or about to leave counts as well.
         """
         if self.current is not None or self.foreign or self.away or self._leaving:
             return None
         return next((error for error in self._there.values() if error is not None), None)
 
     def _meet(self, server: Server) -> None:
-        """Note that a server is one of ours: it shows a token."""
+        """Note that a session has a token, so that it is none of the `foreign` ones."""
         self._met.add(server.session)
         self.foreign.pop(server.session, None)
 
     def _choose(self) -> None:
-        """Find the server after a change."""
+        """Derive the other attributes from `_there` and `_leaving`, which have changed."""
         self._fitting = [server for server, error in self._there.items() if error is None]
         self._staying = [server for server in self._fitting if server not in self._leaving]
         self.current = min(self._staying, key=_age, default=None)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.goal.life_cycle import client_life_cycle, server_life_cycle
-from actionlib_core.goal.states import TERMINAL, CommState, Status
+from actionlib_core.goal.states import OVER, TERMINAL, CommState, Status
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 _ENDS: dict[str, Collection[Any]] = {
     "server": TERMINAL,
-    "client": {CommState.DONE, CommState.LOST},
+    "client": OVER,
 }
 
 
@@ -22,7 +22,7 @@ def draw_life_cycles() -> str:
     """Return both life cycles as one DOT graph, a cluster each.
 
     An edge is drawn for each event that leads from one state to the next; a status that skips
-    states passes along several edges. What is possible everywhere (a goal is LOST) is said once.
+    states follows several edges. The event `lose`, possible in every state, is left to the title.
     """
     lines = [
         "digraph goal {",

@@ -1,12 +1,13 @@
 """The two life cycles of a goal as tables: the server's and the client's.
 
-Each table is written once, as rows. `transitions` builds a machine from the rows, which checks the
-names of states and rejects what could not be reached; the machine is drawn in the documentation and
-compiled to a dict, which is what runs.
+Each table is written once, as rows. `transitions` builds a machine from the rows and checks the
+names of the states; states that cannot be reached are an error. The rows are also drawn in the
+documentation. At run time only a dict made from them is used, because a lookup costs far less than
+an event of `transitions`.
 
 Source:
-    The state diagrams of http://wiki.ros.org/actionlib/DetailedDescription; where a status arrives
-    that skips states, the states it passes on the way are those of the ROS 1 client.
+    The state diagrams of http://wiki.ros.org/actionlib/DetailedDescription. When a status skips
+    states, the states passed in between are those of the ROS 1 client.
 """
 
 from __future__ import annotations
@@ -32,9 +33,10 @@ class Row(Generic[S]):
     """One line of a table.
 
     Attributes:
-        event: What happens.
-        sources: In which states it may happen.
-        path: The states that follow; the last one stays. Empty: the event changes nothing.
+        event: The event's name.
+        sources: The states in which it may happen.
+        path: The states that it passes through; the last one is the new state. Empty: the event
+            is allowed and changes nothing.
     """
 
     event: str
@@ -48,9 +50,9 @@ class LifeCycle(Generic[S]):
 
     Attributes:
         name: "server" or "client".
-        initial: Where a goal begins.
-        rows: The table as it was written.
-        steps: (state, event) -> the states that follow.
+        initial: The state of a new goal.
+        rows: The table as written above.
+        steps: (state, event) -> path, as in `Row`.
     """
 
     name: str
@@ -63,13 +65,13 @@ class LifeCycle(Generic[S]):
         return [state for state, name in self.steps if name == event]
 
     def step(self, state: S, event: str, *, goal: str, call: str) -> tuple[S, ...]:
-        """Return the states that follow `state` on `event`; () when it changes nothing.
+        """Return the path from `state` on `event`; () when the event changes nothing.
 
         Args:
             state: The present state.
-            event: What happens.
-            goal: Names the goal in the error, for example "goal 7f3a on 'arm/move'".
-            call: Names what the user did, for example "set_succeeded()".
+            event: The event's name.
+            goal: The goal, for the error: "goal 7f3a on 'arm/move'".
+            call: What the user called, for the error: "set_succeeded()".
 
         Raises:
             IllegalTransitionError: `event` may not happen in `state`.
@@ -91,7 +93,7 @@ class LifeCycle(Generic[S]):
 
 
 def _compile(name: str, initial: S, rows: Iterable[Row[S]]) -> LifeCycle[S]:
-    """Let `transitions` check the rows, and turn its machine into a dict."""
+    """Check the rows with `transitions`, and turn its machine into a dict."""
     rows = tuple(rows)
     machine = Machine(
         model=None,
@@ -109,6 +111,7 @@ def _compile(name: str, initial: S, rows: Iterable[Row[S]]) -> LifeCycle[S]:
     steps: dict[tuple[S, str], tuple[S, ...]] = {}
     for event in machine.events.values():
         for source, choices in event.transitions.items():
+            # `transitions` allows several rows for one event, tried in order (it has conditions).
             if len(choices) != 1:
                 raise ValueError(
                     f"{name}: {source} on {event.name}: got {len(choices)} rows; expected 1"
@@ -119,6 +122,7 @@ def _compile(name: str, initial: S, rows: Iterable[Row[S]]) -> LifeCycle[S]:
 
 
 def _check_reachable(name: str, initial: S, steps: Mapping[tuple[S, str], tuple[S, ...]]) -> None:
+    # A path's inner states count as reached too: clients show them, and events may follow them.
     reached, found = {initial}, True
     while found:
         found = False
@@ -145,8 +149,10 @@ def _server_rows() -> Iterator[Row[Status]]:
 
 
 def _waiting_rows() -> Iterator[Row[CommState]]:
-    """What statuses do to a goal the server has not begun."""
+    """Yield the effect of each status on a goal that, as far as known, has not started."""
     c = CommState
+    # Status lists are sent once a second at least, and may be lost: a client often sees only some
+    # of the statuses. A path fills in the missing ones, so that callbacks see each state in order.
     ack, pending, result = c.WAITING_FOR_GOAL_ACK, c.PENDING, c.WAITING_FOR_RESULT
     yield Row("PENDING", (ack,), (pending,))
     yield Row("PENDING", (pending,), ())
@@ -164,8 +170,9 @@ def _waiting_rows() -> Iterator[Row[CommState]]:
 
 
 def _running_rows() -> Iterator[Row[CommState]]:
-    """What statuses do to a goal that runs, or whose result is awaited."""
+    """Yield the effect of each status on a goal that runs, or whose result is awaited."""
     c = CommState
+    # An older ACTIVE may arrive after a newer status: servers send their lists without a lock.
     yield Row("ACTIVE", (c.ACTIVE, c.PREEMPTING, c.WAITING_FOR_RESULT, c.DONE), ())
     yield Row("PREEMPTING", (c.ACTIVE,), (c.PREEMPTING,))
     yield Row("PREEMPTING", (c.PREEMPTING,), ())
@@ -173,14 +180,16 @@ def _running_rows() -> Iterator[Row[CommState]]:
     yield Row("PREEMPTED", (c.PREEMPTING,), (c.WAITING_FOR_RESULT,))
     for event in ("SUCCEEDED", "ABORTED"):
         yield Row(event, (c.ACTIVE, c.PREEMPTING), (c.WAITING_FOR_RESULT,))
+    # The server lists a goal for some seconds after its end, so final statuses come repeatedly.
     for event in ("REJECTED", "RECALLED", "PREEMPTED", "SUCCEEDED", "ABORTED"):
         yield Row(event, (c.WAITING_FOR_RESULT, c.DONE), ())
 
 
 def _cancelling_rows() -> Iterator[Row[CommState]]:
-    """What statuses do to a goal that was cancelled before it began."""
+    """Yield the effect of each status on a goal whose cancel has been sent."""
     c = CommState
     asked, recalling, result = c.WAITING_FOR_CANCEL_ACK, c.RECALLING, c.WAITING_FOR_RESULT
+    # PENDING and ACTIVE were sent before the server received the cancel: they change nothing.
     yield Row("PENDING", (asked, recalling), ())
     yield Row("ACTIVE", (asked, recalling), ())
     yield Row("REJECTED", (asked, recalling), (result,))
@@ -200,6 +209,7 @@ def _client_rows() -> Iterator[Row[CommState]]:
     yield from _cancelling_rows()
     live = tuple(state for state in c if state not in {c.DONE, c.LOST})
     yield Row("cancel", (c.WAITING_FOR_GOAL_ACK, c.PENDING, c.ACTIVE), (c.WAITING_FOR_CANCEL_ACK,))
+    # No error in the other states: the goal may end while the program is calling `cancel`.
     yield Row(
         "cancel", (c.WAITING_FOR_CANCEL_ACK, c.RECALLING, c.PREEMPTING, c.WAITING_FOR_RESULT), ()
     )
@@ -210,7 +220,7 @@ def _client_rows() -> Iterator[Row[CommState]]:
 
 @cache
 def server_life_cycle() -> LifeCycle[Status]:
-    """Return the server's table: what may be done to a goal in which status.
+    """Return the server's table: which events a goal's status allows.
 
     Events: accept, request_cancel, cancel, reject, abort, succeed.
     """
@@ -219,9 +229,9 @@ def server_life_cycle() -> LifeCycle[Status]:
 
 @cache
 def client_life_cycle() -> LifeCycle[CommState]:
-    """Return the client's table: what a status, a result or a cancel does to a goal.
+    """Return the client's table: the effect of a status, a result and a cancel on a goal.
 
-    Events: the names of `Status` (one arrived from the server), cancel, result, lose. A status that
-    is missing in a row cannot follow that state: when one arrives, it was overtaken on the way.
+    Events: the names of `Status` (the server has sent that status), cancel, result, lose. A status
+    without a row for the present state is out of date: newer messages have overtaken it.
     """
     return _compile("client", CommState.WAITING_FOR_GOAL_ACK, _client_rows())

@@ -1,11 +1,11 @@
-"""The border between the rules of actions and the network: what each side asks of the other.
+"""The interfaces between the rules of actions and the network.
 
-An `ActionClient` speaks to the network through a `ClientPort` and listens as a `ClientListener`, an
-`ActionServer` through a `ServerPort` and as a `ServerListener`. Only the ports know keys and
-encodings; goals, results and feedback pass as the bytes (`body`) that the port itself has packed.
+An `ActionClient` sends through a `ClientPort` and receives as a `ClientListener`; an `ActionServer`
+sends through a `ServerPort` and receives as a `ServerListener`. Only the ports know keys and
+encodings: goals, results and feedback cross here as the bytes (`body`) that the port has packed.
 
 Threads: ports may be used from any thread. Listeners are called on the network's threads, in order
-per sender, and must not wait.
+per sender, and must not block.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class StatusEntry(NamedTuple):
 
 
 class Server(Protocol):
-    """A server that shows that it is there; hashable, equal when it is the same one."""
+    """A server that announces itself with a token; hashable, equal when it is the same server."""
 
     @property
     def session(self) -> str:
@@ -40,29 +40,29 @@ class Server(Protocol):
 
     @property
     def age(self) -> tuple[int, str]:
-        """The greater, the later it came."""
+        """Sorts servers by their start: the later, the greater."""
 
 
 class ClientPort(Protocol):
     """A client's end of the wire."""
 
     def open(self, listener: ClientListener) -> None:
-        """Listen, then show that the client is there.
+        """Subscribe, then announce the client.
 
         Raises:
             TransportError: the session is closed.
         """
 
     def close(self) -> None:
-        """Leave the name; a second call does nothing."""
+        """Withdraw from the network; a second call does nothing."""
 
     def is_heard(self) -> bool:
-        """Return whether anybody listens for goals."""
+        """Return whether anybody subscribes to goals."""
 
     def explain_absence(self) -> str:
-        """Return why there may be no server and what to try; "" when nothing is known of it.
+        """Return why there may be no server and what to try; "" when there is nothing to say.
 
-        Blocks: until the network has said who there is, 1 s at most.
+        Blocks: for the network's answers, 1 s at most.
         """
 
     def pack_goal(self, goal: Any) -> bytes:
@@ -76,7 +76,7 @@ class ClientPort(Protocol):
         """Return the feedback message.
 
         Raises:
-            ValueError, ActionlibError: it cannot be read.
+            ValueError, ActionlibError: the bytes are malformed.
         """
 
     def read_result(self, body: bytes) -> Any:
@@ -85,38 +85,41 @@ class ClientPort(Protocol):
     def send_goal(
         self, goal_id: str, stamp_ns: int, body: bytes, server: Any, *, wait: bool = True
     ) -> None:
-        """Send a goal to one server; None: to one that does not show itself.
+        """Send a goal to one server; None: to a server without a token.
 
-        Blocks: with `wait`, while a link is full; else the goal is dropped then.
+        Blocks: with `wait`, while a link is full; without, the goal is then dropped.
         """
 
     def send_cancel(self, goal_id: str, stamp_ns: int, *, wait: bool = True) -> None:
-        """Send a cancel; see `ServerGoals.on_cancel` for what it means. Blocks as `send_goal`."""
+        """Send a cancel; see `ServerGoals.on_cancel` for its meaning. Blocks as `send_goal`."""
 
     def acknowledge(self, goal_ids: list[str], *, farewell: bool = False) -> None:
-        """Say that the results of these goals have arrived, and maybe a server's farewell.
+        """Acknowledge the results of these goals and, if asked, a server's farewell.
 
-        Never waits; it may get lost.
+        Never blocks; the message may get lost.
         """
 
     def ask(self, goal_id: str, on_done: Callable[[], None]) -> None:
-        """Ask the server what became of a goal; the answer goes to the listener."""
+        """Query the server for the state of a goal; the reply goes to the listener.
+
+        `on_done` is called after the reply, or when none came in time.
+        """
 
 
 class ClientListener(Protocol):
-    """What a client does about what arrives. `session` is the sender's; "" when unknown."""
+    """The client's side of the port. `session` is the sender's; "" when unknown."""
 
     def on_server(self, server: Any, error: TypeMismatchError | None) -> None:
         """Handle the appearance of a server; `error` when it has another type."""
 
     def on_server_gone(self, server: Any, why: str = "is gone") -> None:
-        """Handle the disappearance of a server; `why` goes into the text of the goals it had."""
+        """Handle the disappearance of a server; `why` goes into the text of its goals."""
 
     def on_statuses(self, entries: list[StatusEntry], session: str, *, whole: bool = True) -> None:
-        """Handle a list of all goals; without `whole`, of those of which there is news."""
+        """Handle a list of all the server's goals; without `whole`, of the changed ones only."""
 
     def on_farewell(self, entries: list[StatusEntry], server: Any) -> None:
-        """Handle the last list of a server that leaves: the goals it ever took."""
+        """Handle the last list of a server that leaves: every goal that it has ever taken."""
 
     def on_feedback(self, entry: StatusEntry, body: bytes, session: str) -> None:
         """Handle feedback."""
@@ -124,51 +127,54 @@ class ClientListener(Protocol):
     def on_result(
         self, entry: StatusEntry, body: bytes | None, session: str, *, answered: bool = False
     ) -> None:
-        """Handle a result; `answered`: it was asked for, and without a `body` is not kept."""
+        """Handle a result. `answered`: it is the reply to `ask`; `body` None: no longer kept."""
 
     def on_answer(self, entry: StatusEntry, session: str = "") -> None:
-        """Handle the answer to `ask` when there is no result to send."""
+        """Handle a reply to `ask` without a result."""
 
     def follows(self, goal_id: str) -> bool:
-        """Return whether a goal is followed, and not over."""
+        """Return whether a goal is followed and has not ended."""
 
     def on_stranger(self, session: str) -> None:
-        """Report a session that speaks as a server it is not."""
+        """Report a session that sends as a server but is not the action's server."""
 
 
 class ServerPort(Protocol):
     """A server's end of the wire."""
 
     def open(self, listener: ServerListener) -> None:
-        """Listen, then show that the server is there.
+        """Subscribe, then announce the server.
 
         Raises:
             ServerConflictError: the name has a server.
             TransportError: the session is closed.
 
-        Blocks: until the network has said who has the name, 1 s at most.
+        Blocks: until the network has answered who has the name, 1 s at most.
         """
 
     def close(self) -> None:
-        """Leave the name; a second call does nothing."""
+        """Withdraw from the network; a second call does nothing."""
 
     def has_clients(self) -> bool:
-        """Return whether a client of the action is there."""
+        """Return whether the action has a client."""
 
     def begin_farewell(self) -> bool:
-        """Note which clients are to answer the farewell; return whether anybody listens.
+        """Note the clients that are to acknowledge the farewell; return whether there are any.
 
         Raises:
             TransportError: the session is closed.
 
-        Blocks: until the network has said who there is, 0.2 s at most.
+        Blocks: until the network has answered who is there, 0.2 s at most.
         """
 
     def send_farewell(self, taken: Iterable[StatusEntry]) -> None:
-        """Say that the server leaves and which goals it has taken, and so which it has not."""
+        """Announce that the server leaves, with every goal that it has taken.
+
+        Clients conclude that it will never take any other goal.
+        """
 
     def is_farewell_heard(self) -> bool:
-        """Return whether all clients have answered the farewell."""
+        """Return whether all clients have acknowledged the farewell."""
 
     def pack_result(self, result: Any) -> bytes:
         """Return the bytes of a result message.
@@ -182,15 +188,15 @@ class ServerPort(Protocol):
 
     @property
     def send_accepted(self) -> Callable[[StatusEntry], None] | None:
-        """Says that a goal is accepted; None where the status list, which follows, says it."""
+        """Function that sends the acceptance of a goal; None where the status list suffices."""
 
     def send_status(self, entries: Iterable[StatusEntry]) -> None:
-        """Send the status list; dropped when the network is slow, as it is sent again."""
+        """Send the status list; dropped when a link is full, since it is repeated."""
 
     def send_result(self, entry: StatusEntry, body: bytes, *, wait: bool = True) -> None:
         """Send a result.
 
-        Blocks: with `wait`, while a link is full; else the result is dropped then.
+        Blocks: with `wait`, while a link is full; without, the result is then dropped.
         """
 
     def send_feedback(self, entry: StatusEntry, body: bytes) -> None:
@@ -201,26 +207,26 @@ class ServerPort(Protocol):
 
 
 class ServerListener(Protocol):
-    """What a server does about what arrives."""
+    """The server's side of the port."""
 
     def on_goal(self, goal_id: str, stamp_ns: int, content: Any, client: str) -> bool:
-        """Handle a goal; `client` is who sent it, as in `on_client_lost`.
+        """Handle a goal; `client` identifies its sender, as in `on_client_lost`.
 
         Returns:
             Whether it is new and has been taken.
         """
 
     def on_cancel(self, goal_id: str, stamp_ns: int) -> list[StatusEntry]:
-        """Handle a cancel; return the goals that are asked to stop and were not before."""
+        """Handle a cancel; return the goals that it asks to stop and that were not asked before."""
 
     def on_acknowledged(self, goal_ids: list[str]) -> None:
-        """Handle acknowledged results; `is_farewell_heard` may have changed too."""
+        """Handle acknowledged results; the answer of `is_farewell_heard` may change too."""
 
     def on_client_lost(self, client: str) -> None:
         """Handle the death of a client, or of its session."""
 
     def on_conflict(self, error: Any) -> None:
-        """Stop: an older server has the name."""
+        """Stop, because an older server has the name."""
 
     def list_goals(self) -> list[StatusEntry]:
         """Return the status list."""
@@ -229,4 +235,4 @@ class ServerListener(Protocol):
         """Return the status of a goal, LOST when it is unknown, and its result if it has one."""
 
     def find_goal(self, goal_id: str) -> tuple[int, Any] | None:
-        """Return stamp [ns] and message of a goal; None when it is not known any more."""
+        """Return stamp [ns] and message of a goal; None when it is no longer tracked."""

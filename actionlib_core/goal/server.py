@@ -1,6 +1,7 @@
-"""What a server knows about its goals, and what it does when something arrives.
+"""The server's rules: the goals of one action server and the reactions to messages.
 
-One `ServerGoals` per action server. It decides; the shell sends, calls back and keeps time.
+`ServerGoals` only decides; `GoalKeeper` (`actionlib_core.action.server`) sends, calls the program's
+callbacks and keeps time.
 """
 
 from __future__ import annotations
@@ -17,13 +18,12 @@ from actionlib_core.goal.states import TERMINAL, Status
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-LISTED_S = (
-    5.0  # a finished goal and an early cancel stay in the status list (ROS: status_list_timeout)
-)
-RESULT_TIMEOUT_S = 60.0  # a result nobody acknowledged is kept this long
-FUTURE_NS = 1_000_000_000  # clocks of two computers may differ by so much; more is a mistake
-MEMORY_S = 3600.0  # ids of finished goals are remembered this long, so that a late copy is dropped
-MEMORY_GOALS = 100_000  # and no more than these, the oldest forgotten first
+# A finished goal, and a cancel that came before its goal, stay in the status list for this time.
+LISTED_S = 5.0  # ROS's parameter status_list_timeout
+RESULT_TIMEOUT_S = 60.0  # a result without acknowledgement is kept for this time
+FUTURE_NS = 1_000_000_000  # tolerated difference between the clocks of two computers
+MEMORY_S = 3600.0  # ids of finished goals are remembered, so that a late copy is not run again
+MEMORY_GOALS = 100_000  # limit on their number; the oldest is forgotten first
 
 TEXT_CANCELLED_BEFORE = (
     "This goal handle was canceled by the action server because its timestamp is before the "
@@ -33,16 +33,16 @@ TEXT_CANCEL_CAME_FIRST = "This goal was canceled before it arrived"
 
 
 class Arrival(enum.Enum):
-    """What a goal that arrived is to the server."""
+    """The server's decision about a goal that arrived."""
 
     NEW = enum.auto()
     """Run it."""
     RECALLED = enum.auto()
-    """A cancel came first: answer RECALLED, never run it."""
+    """Its cancel came first: answer RECALLED, never run it."""
     REPEAT = enum.auto()
-    """Known: say again what is known of it."""
+    """A repetition: send its status or result again."""
     LATE = enum.auto()
-    """The server takes no more goals: say nothing, the next server may have it."""
+    """The server takes no more goals: do not answer, so that the next server may have it."""
 
 
 @dataclass(slots=True, eq=False)
@@ -51,15 +51,15 @@ class ServerGoal:
 
     Attributes:
         id: The goal's id, unique on the network.
-        stamp_ns: When the client sent it [ns since the epoch]; cancels and preemption go by it.
-        status: Where it stands.
-        text: What the server says about that.
+        stamp_ns: When the client sent it [ns since the epoch]; cancels and preemption compare it.
+        status: Its state in the server's life cycle.
+        text: The text of that status.
         client: Session id of its sender; "" when unknown.
         arrived: False while only a cancel has come for this id.
-        result: What is sent as the result, once there is one.
-        listed_until: End of its time in the status list [s, clock]; None: no end yet.
+        result: The result as it is sent, once there is one.
+        listed_until: End of its time in the status list [s, clock]; None: no end yet, or passed.
         kept_until: End of its result's time [s, clock]; None: no end yet.
-        tag: What the shell keeps beside it.
+        tag: Data of the caller, which is not read here.
     """
 
     id: str
@@ -74,7 +74,7 @@ class ServerGoal:
     tag: object = None
 
     def entry(self) -> StatusEntry:
-        """Return what the status list says of it."""
+        """Return its entry in the status list."""
         return StatusEntry(self.id, self.stamp_ns, self.status, self.text)
 
 
@@ -87,7 +87,7 @@ class ServerGoals:
 
     Attributes:
         closed: No more goals are taken.
-        tracked: Id -> goal that runs, or whose end its client may not know.
+        tracked: Id -> goal that runs, or whose end its client may not know yet.
 
     Threads: none of its own, no lock; the owner calls it under its lock.
     """
@@ -96,9 +96,11 @@ class ServerGoals:
         self.name = name
         self.result_timeout = result_timeout
         self.tracked: dict[str, ServerGoal] = {}
-        # Status, when it was forgotten, whether acknowledged; plain numbers: nothing to collect.
+        # Status, when it was forgotten, whether acknowledged. Tuples of plain numbers, because
+        # CPython's garbage collector does not have to visit these, of which there may be 100,000.
         self._past: dict[str, tuple[int, float, bool]] = {}
-        self._oldest: deque[str] = deque()  # its ids; a dict is slow to tell its first one
+        # Its ids in order. `next(iter(dict))` steps over the gaps of all entries deleted before.
+        self._oldest: deque[str] = deque()
         self.closed = False
         self._last_cancel_ns = 0
         self._steps = server_life_cycle()
@@ -109,16 +111,16 @@ class ServerGoals:
         return goal if goal is not None and goal.arrived else None
 
     def past_status(self, goal_id: str) -> Status | None:
-        """Return how a goal ended whose result is no longer kept; None: never heard of it."""
+        """Return the end of a goal whose result is no longer kept; None: not known."""
         past = self._past.get(goal_id)
         return None if past is None else Status(past[0])
 
     def on_goal(self, arrived: ServerGoal, now: float) -> tuple[Arrival, ServerGoal | None]:
-        """Take a goal that arrived, for the first time or again.
+        """Decide about a goal that arrived, for the first time or again.
 
         Returns:
-            What it is, and the goal as it is tracked; None for a repeat of one that ended long ago,
-            and for one that comes too late.
+            The decision, and the tracked goal; None for the repetition of a goal that is no longer
+            tracked, and for one that comes too late.
         """
         known = self.tracked.get(arrived.id)
         if known is not None and known.arrived:
@@ -128,7 +130,7 @@ class ServerGoals:
         if self.closed:
             return Arrival.LATE, None
         self.tracked[arrived.id] = arrived
-        if known is not None:
+        if known is not None:  # not arrived: the entry that an early cancel has left
             text = TEXT_CANCEL_CAME_FIRST
         elif 0 < arrived.stamp_ns <= self._last_cancel_ns:
             text = TEXT_CANCELLED_BEFORE
@@ -138,16 +140,18 @@ class ServerGoals:
         return Arrival.RECALLED, arrived
 
     def on_cancel(self, goal_id: str, stamp_ns: int, now: float, now_ns: int) -> list[ServerGoal]:
-        """Apply the four cancel rules; `now_ns` is the time since the epoch, which stamps tell.
+        """Apply the four cancel rules of actionlib; `now_ns` [ns since the epoch], as in stamps.
 
         Neither id nor stamp: all goals. Stamp only: goals at or before it. Id only: that goal.
-        Both: that goal and those at or before the stamp. A cancel for an unknown id is remembered
-        for a while; a goal with that id that comes later is recalled. So is a goal with a stamp at
-        or before that of a cancel; but a cancel from more than `FUTURE_NS` in the future, by a
-        clock that is wrong, counts as one from now.
+        Both: that goal and those at or before the stamp.
+
+        A cancel for an unknown id is remembered for `LISTED_S`: a goal with that id that arrives
+        later is recalled. So is every goal with a stamp at or before that of a cancel. A stamp more
+        than `FUTURE_NS` ahead comes from a wrong clock and counts as `now_ns`, as it would recall
+        all goals until then.
 
         Returns:
-            The goals that are now asked to stop and were not before.
+            The goals that this cancel asks to stop and that were not asked before.
         """
         everything = not goal_id and not stamp_ns
         asked = [
@@ -165,7 +169,7 @@ class ServerGoals:
         return asked
 
     def on_client_lost(self, client: str) -> list[ServerGoal]:
-        """Ask the goals of a client that died to stop; return those that were not asked before."""
+        """Ask the goals of a dead client to stop; return those that were not asked before."""
         return [
             goal
             for goal in self.tracked.values()
@@ -173,7 +177,7 @@ class ServerGoals:
         ]
 
     def request_cancel(self, goal: ServerGoal) -> bool:
-        """Mark a goal as asked to stop; False when it cannot be, or was already."""
+        """Mark a goal as asked to stop; False when it has ended or was asked before."""
         path = self._steps.steps.get((goal.status, "request_cancel"))
         if path is None or not goal.arrived:
             return False
@@ -183,21 +187,22 @@ class ServerGoals:
     def step(
         self, goal: ServerGoal, event: str, call: str, now: float, text: str = ""
     ) -> StatusEntry:
-        """Move a goal along its life cycle; one that has ended is forgotten after a time.
+        """Apply an event to a goal; a goal that has ended is forgotten after some time.
 
         Args:
             goal: The goal.
             event: Event of the server's table.
             call: What the user called, for the error.
             now: The time [s, clock].
-            text: What the status says from now on.
+            text: The text of its new status.
 
         Returns:
-            Its status now.
+            Its new entry in the status list.
 
         Raises:
             IllegalTransitionError: its status does not allow the event.
         """
+        # Looked up here too: `LifeCycle.step` wants a text for its error, which takes time to make.
         path = self._steps.steps.get((goal.status, event))
         if path is None:
             where = f"goal {goal.id} on '{self.name}'"
@@ -210,30 +215,30 @@ class ServerGoals:
         return StatusEntry(goal.id, goal.stamp_ns, goal.status, text)
 
     def on_acknowledged(self, goal_ids: Iterable[str], now: float) -> None:
-        """Forget the results that their clients have."""
+        """Forget results that have arrived at their clients."""
         for goal_id in goal_ids:
             goal = self.tracked.get(goal_id)
             if goal is not None and goal.kept_until is not None:
                 self._forget(goal, now, acknowledged=True)
 
     def has_unacknowledged(self) -> bool:
-        """Tell whether a result waits for its acknowledgement."""
+        """Return whether a result waits for its acknowledgement."""
         return any(goal.kept_until is not None for goal in self.tracked.values())
 
     def release(self, goal: ServerGoal, now: float) -> None:
-        """Note that nobody will ever end this goal: it is LOST once its time in the list is up."""
+        """Note that no code will end this goal: it becomes LOST after `LISTED_S`."""
         if goal.status not in TERMINAL:
             goal.listed_until = now + LISTED_S
 
     def restore(self, goal: ServerGoal, now: float) -> None:
-        """Track a goal that an earlier server of this name had taken."""
+        """Track a goal that an earlier server process had taken."""
         self.tracked[goal.id] = goal
         if goal.status in TERMINAL:
             goal.listed_until = now + LISTED_S
             goal.kept_until = now + self.result_timeout
 
     def restore_past(self, goal_id: str, status: int, now: float) -> None:
-        """Remember how a goal of an earlier server ended, so that a late copy of it is dropped."""
+        """Remember the end of an earlier server's goal, so that a late copy is not run."""
         if goal_id not in self._past:
             self._past[goal_id] = (status, now, True)
             self._oldest.append(goal_id)
@@ -243,9 +248,9 @@ class ServerGoals:
         self.closed = True
 
     def taken(self) -> Iterator[tuple[str, Status, ServerGoal | None]]:
-        """Return the goals ever taken, without those whose clients have acknowledged their end.
+        """Yield id, status and goal of all goals ever taken whose end is not acknowledged.
 
-        Each with its id and status; None for one whose result is no longer kept.
+        The goal is None when its result is no longer kept.
         """
         for goal in self.tracked.values():
             if goal.arrived:
@@ -263,7 +268,7 @@ class ServerGoals:
         ]
 
     def list_statuses(self) -> list[StatusEntry]:
-        """Return the status list."""
+        """Return the status list: `entry` of each of `listed`, written out for speed."""
         return [
             StatusEntry(goal.id, goal.stamp_ns, goal.status, goal.text)
             for goal in self.tracked.values()
@@ -271,7 +276,7 @@ class ServerGoals:
         ]
 
     def expire(self, now: float) -> float | None:
-        """Forget what is past its time; return when the next thing is [s, clock]."""
+        """Forget what is past its time; return when to call again [s, clock]; None: never."""
         soonest: float | None = None
         for goal in list(self.tracked.values()):
             due = self._expire(goal, now)
@@ -283,10 +288,10 @@ class ServerGoals:
     def _expire(self, goal: ServerGoal, now: float) -> float | None:
         if goal.listed_until is not None and goal.listed_until <= now:
             goal.listed_until = None
-            if not goal.arrived:
+            if not goal.arrived:  # an early cancel: its goal never came
                 del self.tracked[goal.id]
                 return None
-            if goal.status not in TERMINAL:
+            if goal.status not in TERMINAL:  # see `release`
                 goal.status = Status.LOST
                 self._forget(goal, now)
                 return None

@@ -1,8 +1,8 @@
-"""One goal at a time: which goal runs, which waits, which is turned away.
+"""The rules of a server that runs one goal at a time: which goal runs, waits or is refused.
 
 Source:
-    `SimpleActionServer` of ROS 1 actionlib for the policy "preempt": a newer goal preempts the one
-    that runs and recalls the one that waits; a goal with an older stamp is recalled itself.
+    `SimpleActionServer` of ROS 1 actionlib for the policy "preempt": a newer goal preempts the
+    running goal and recalls the waiting one; a goal with an older stamp is itself recalled.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 
 class Goal(Protocol):
-    """What this needs to know of a goal."""
+    """A goal, as far as these rules need it."""
 
     @property
     def record(self) -> ServerGoal:
-        """Its place in the life cycle."""
+        """The goal's life cycle."""
         ...
 
 
@@ -34,13 +34,13 @@ POLICIES: tuple[Policy, ...] = ("preempt", "queue", "reject")
 
 @dataclass(frozen=True, slots=True)
 class Decision(Generic[G]):
-    """What is to be done with a goal or a cancel that arrived.
+    """The reaction to a goal or a cancel that arrived.
 
     Attributes:
-        recall: Goals to answer with RECALLED: a newer one came, or they were cancelled.
-        reject: The new goal, when it is to be answered with REJECTED.
-        preempt: Tell the running goal's code to stop.
-        announce: Tell that a new goal waits.
+        recall: Goals to end as RECALLED: replaced by a newer goal, or cancelled.
+        reject: The new goal, when it is to be ended as REJECTED.
+        preempt: Ask the code of the running goal to stop.
+        announce: Notify the server's code that a new goal waits.
     """
 
     recall: tuple[G, ...] = ()
@@ -51,7 +51,7 @@ class Decision(Generic[G]):
 
 @dataclass(slots=True, eq=False)
 class _Waiting(Generic[G]):
-    """A goal that waits to be accepted, and whether it was asked to stop meanwhile."""
+    """A goal that waits to be accepted, and whether it was cancelled in the meantime."""
 
     goal: G
     stamp_ns: int
@@ -70,8 +70,8 @@ class SingleGoal(Generic[G]):
 
     Attributes:
         current: The goal that was accepted last.
-        preempt_requested: It was asked to stop.
-        waiting: The goals that wait to be accepted.
+        preempt_requested: Whether its code was asked to stop.
+        waiting: The goals that wait to be accepted, oldest first; under "preempt" one at most.
 
     Threads: none of its own, no lock; the owner calls it under its lock.
     """
@@ -96,23 +96,26 @@ class SingleGoal(Generic[G]):
         return self.current is not None and self.current.record.status not in TERMINAL
 
     def find(self, goal: G) -> G:
-        """Return the object known here that equals `goal`, else `goal`."""
+        """Return the stored object that equals `goal`, or `goal` itself.
+
+        Handles of one goal are equal but need not be one object, and `on_cancel` compares by `is`.
+        """
         known = [self.current, *(waiting.goal for waiting in self.waiting)]
         return next((entry for entry in known if entry is not None and entry == goal), goal)
 
     def withdraw(self) -> G | None:
-        """Take the goal out that waits to be accepted next; None when none waits."""
+        """Remove and return the goal that would be accepted next; None when none waits."""
         return self.waiting.popleft().goal if self.waiting else None
 
     def on_stop(self) -> list[G]:
-        """Note that everything ends; return the goals that wait, which wait no more."""
+        """Request the preempt of the running goal; remove and return the waiting ones."""
         self.preempt_requested = self.running
         waiting = [entry.goal for entry in self.waiting]
         self.waiting.clear()
         return waiting
 
     def on_goal(self, goal: G, stamp_ns: int) -> Decision[G]:
-        """Take a goal that arrived."""
+        """Decide about a goal that arrived."""
         if self.policy == "queue":
             self.waiting.append(_Waiting(goal, stamp_ns))
             return ANNOUNCE
@@ -121,6 +124,7 @@ class SingleGoal(Generic[G]):
                 return Decision(reject=goal)
             self.waiting.append(_Waiting(goal, stamp_ns))
             return ANNOUNCE
+        # "preempt", by stamps rather than by arrival: the network may deliver goals out of order.
         newest = self.waiting[-1].stamp_ns if self.waiting else 0
         if stamp_ns < newest or stamp_ns < self._current_stamp_ns:
             return Decision(recall=(goal,))
@@ -134,12 +138,12 @@ class SingleGoal(Generic[G]):
         return Decision(recall=older, preempt=self.running, announce=True)
 
     def on_cancel(self, goal: G, *, recall_waiting: bool) -> Decision[G]:
-        """Take a cancel for a goal.
+        """Decide about a cancel for a goal.
 
         Args:
             goal: The goal.
-            recall_waiting: A goal that only waits is recalled at once; else it is accepted first,
-                as in ROS, and finds itself preempted.
+            recall_waiting: Recall a waiting goal at once; else it is accepted first, as in ROS, and
+                its code finds the preempt already requested.
         """
         if goal is self.current and self.running:
             self.preempt_requested = True
@@ -156,12 +160,12 @@ class SingleGoal(Generic[G]):
         """Make the waiting goal the current one.
 
         Returns:
-            The goal to accept, None when none waits; and the one it pushes aside, if any runs.
+            The goal to accept, None when none waits; and the running goal that it replaces, if any.
         """
         if not self.waiting:
             return None, None
-        pushed = self.current if self.running else None
+        replaced = self.current if self.running else None
         new = self.waiting.popleft()
         self.current, self._current_stamp_ns = new.goal, new.stamp_ns
         self.preempt_requested = new.cancelled
-        return self.current, pushed
+        return self.current, replaced

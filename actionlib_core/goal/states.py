@@ -10,7 +10,7 @@ from enum import IntEnum
 
 
 class Status(IntEnum):
-    """What a server says about a goal (actionlib_msgs/GoalStatus)."""
+    """The status that a server reports for a goal (actionlib_msgs/GoalStatus)."""
 
     PENDING = 0
     ACTIVE = 1
@@ -25,7 +25,7 @@ class Status(IntEnum):
 
 
 class CommState(IntEnum):
-    """Where a goal stands in the view of the client that sent it."""
+    """The state of a goal as its client sees it."""
 
     WAITING_FOR_GOAL_ACK = 0
     PENDING = 1
@@ -60,4 +60,10 @@ class SimpleGoalState(IntEnum):
 TERMINAL = frozenset(
     {Status.PREEMPTED, Status.SUCCEEDED, Status.ABORTED, Status.REJECTED, Status.RECALLED}
 )
-"""Statuses that a server never leaves."""
+"""The final statuses of a server. LOST is not among them: only clients conclude it."""
+
+OVER = frozenset({CommState.DONE, CommState.LOST})
+"""The final states of a client."""
+
+STARTED = frozenset({CommState.ACTIVE, CommState.PREEMPTING})
+"""The states in which the server has accepted the goal and it has not ended."""
