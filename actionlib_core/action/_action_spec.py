@@ -1,4 +1,7 @@
-"""The shape of action classes, for type checkers: an action knows its goal, result and feedback."""
+"""Types of action classes: type checkers find an action's goal, result and feedback through them.
+
+Action classes are generated and have no common base class, so these are protocols.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where user callbacks run: off the network's thread, in order, knowing their clock and node."""
+"""The queue in which user callbacks run: in order, and not on the network's thread."""
 
 from __future__ import annotations
 
@@ -20,20 +20,21 @@ if TYPE_CHECKING:
     from actionlib_core.node import Node
 
 
-PATIENCE_S = 0.02  # what is urgent waits no longer for callbacks that were there before it
-HELPERS = 8  # threads at most for what is urgent, when callbacks do not return
+PATIENCE_S = 0.02  # an urgent callback waits this long for those queued before it
+HELPERS = 8  # most threads for urgent callbacks, when none of the others returns
 
 
 class CallbackQueue:
-    """Runs the callbacks of one client or server, one at a time, in the order they were given.
+    """Runs the callbacks of one client or server one at a time, in the order of the calls.
 
     They run with the owner's clock and node as the current ones. No thread exists while idle.
-    What is urgent overtakes callbacks that take longer than `PATIENCE_S`, in another thread.
+    Urgent callbacks (a cancel) run beside others that take longer than `PATIENCE_S`, in another
+    thread: the callback that blocks is often the one that the cancel is to end.
 
     Attributes:
-        context: The context they run in; to be copied.
+        context: The context of the callbacks. Run a copy: one context cannot be entered twice.
 
-    Threads: any; `call` never waits, so it may be used under a lock.
+    Threads: any; `call` never blocks, so it may be used under a lock.
     """
 
     def __init__(self, node: Node, name: str) -> None:
@@ -42,20 +43,21 @@ class CallbackQueue:
         self._clock = node.clock
         self._name = name
         self._executor = SerialExecutor(node.clock, name, self._spawn_marked)
-        self._thread: int | None = None  # that runs callbacks now
-        self._lock = threading.Lock()  # guards the two below
+        self._thread: int | None = None  # id of the thread that runs callbacks now
+        self._lock = threading.Lock()  # guards the next two
         self._urgent: deque[_Once] = deque()
         self._helpers = 0
 
     def call(self, function: Callable[..., object], *args: object) -> None:
-        """Run `function(*args)` after everything given before."""
+        """Run `function(*args)` after everything queued before."""
         self._executor.submit(partial(function, *args) if args else function)
 
     def call_urgently(self, function: Callable[..., object], *args: object) -> None:
-        """As `call`; but if other callbacks hold it up, run it beside them in another thread."""
+        """As `call`; but if other callbacks delay it, run it beside them in another thread."""
         once = _Once(partial(function, *args))
+        # Both the timer and the queue get it; the first of them runs it.
         once.timer = self._clock.call_later(PATIENCE_S, partial(self._overtake, once))
-        self._executor.submit(once)  # whichever of the two comes first runs it
+        self._executor.submit(once)
 
     def _overtake(self, once: _Once) -> None:
         with self._lock:
@@ -69,12 +71,12 @@ class CallbackQueue:
         while True:
             with self._lock:
                 if not self._urgent:
-                    self._helpers -= 1  # with the lock: what comes next gets a new thread
+                    self._helpers -= 1  # under the lock: the next callback gets a new thread
                     return
                 once = self._urgent.popleft()
             try:
                 once()
-            except Exception:  # noqa: BLE001  a border: reported, the next one still runs
+            except Exception:  # noqa: BLE001  user code: reported, the next one still runs
                 report_thread_exception()
             except BaseException:  # `sys.exit`, which ends this thread
                 with self._lock:
@@ -86,24 +88,24 @@ class CallbackQueue:
         return self.context.copy().run(partial(self._clock.spawn, target, name=name))
 
     def is_inside(self) -> bool:
-        """Tell whether the calling thread is running one of the callbacks."""
+        """Return whether the calling thread is running one of the queued callbacks."""
         return self._thread == get_ident()
 
     def _spawn_marked(self, target: Callable[[], object], name: str) -> Task:
         return self.spawn(partial(self._mark, target), name)
 
     def _mark(self, target: Callable[[], object]) -> None:
-        """Run `target`, and know that this thread runs callbacks meanwhile."""
+        """Run `target`, with this thread noted as the one that runs callbacks."""
         me = self._thread = get_ident()
         try:
             target()
         finally:
-            if self._thread == me:  # else the next one has begun
+            if self._thread == me:  # else the next thread has already started
                 self._thread = None
 
 
 class _Once:
-    """Runs a function in whichever thread comes first."""
+    """Runs a function once, in the first thread that calls it."""
 
     __slots__ = ("_functions", "timer")
 
@@ -113,7 +115,7 @@ class _Once:
 
     def __call__(self) -> None:
         try:
-            function = self._functions.pop()  # atomic
+            function = self._functions.pop()  # atomic: one thread gets it
         except IndexError:  # another thread has taken it
             return
         if self.timer is not None:

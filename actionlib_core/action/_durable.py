@@ -1,7 +1,7 @@
-"""What a durable action server keeps in a file: its goals, how they stand, and their results.
+"""The file of a durable action server: its goals with their statuses and results.
 
-Every change is in the file before anybody is told of it. A row stays after its client has
-acknowledged the result, without goal and result: a copy of the goal that comes late is no new one.
+Every change is written before it is sent to clients. After a result was acknowledged, its row stays
+without goal and result, so that a late copy of the goal is not run as a new one.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ log = logging.getLogger(__name__)
 
 VERSION: Final = 1
 _APPLICATION: Final = 0x736D6767  # marks the file ("smgg", `PRAGMA application_id`)
-_PATIENCE_S: Final = 2.0
+_PATIENCE_S: Final = 2.0  # how long SQLite waits for other servers that write to the file
 _TABLE: Final = """CREATE TABLE goals (
     action TEXT NOT NULL, id TEXT NOT NULL, type TEXT NOT NULL,
     stamp_ns INTEGER NOT NULL, client TEXT NOT NULL, status INTEGER NOT NULL, text TEXT NOT NULL,
@@ -36,12 +36,12 @@ _TABLE: Final = """CREATE TABLE goals (
 
 @dataclass(frozen=True)
 class KeptGoal:
-    """A goal as an earlier server left it.
+    """A goal read from the file.
 
     Attributes:
-        record: Its place in the life cycle; ended ones have their result.
+        record: Its status and, when it has ended, its result.
         content: The goal message.
-        begun: It was accepted once.
+        begun: Whether it was ever accepted.
     """
 
     record: ServerGoal
@@ -50,25 +50,27 @@ class KeptGoal:
 
 
 class GoalFile:
-    """The goals of one action server in a file of SQLite, which servers may share.
+    """The goals of one action server in an SQLite file, which servers may share.
 
-    A transaction is durable when it returns (`synchronous = FULL`).
+    A change is on the disk when the call returns (`synchronous = FULL`).
 
     Args:
-        path: The file; it is made when it is missing, also its folder.
+        path: The file; it is created when it is missing, and so is its folder.
         action: The action's full name.
         types: Its message classes.
 
     Raises:
-        DurableGoalsError: the file cannot be opened, or is another program's or version's.
+        DurableGoalsError: the file cannot be opened, or was made by another program or a newer
+            version.
 
-    Threads: every method may be called from any thread; each blocks for the disk.
+    Threads: every method may be called from any thread; each waits for the disk.
     """
 
     def __init__(self, path: str | Path, action: str, types: ActionTypes) -> None:
         self._file = str(path)
         self._action = action
         self._types = types
+        # Packed goals of another definition would be read wrongly, so each row has its type's hash.
         goal = types.goal
         self._type = f"{goal._type} {getattr(goal, '_rihs01', None) or goal._md5sum}"
         self._lock = threading.Lock()
@@ -90,7 +92,7 @@ class GoalFile:
 
     def _prepare(self) -> None:
         run = self._connection.execute
-        run("BEGIN IMMEDIATE")
+        run("BEGIN IMMEDIATE")  # of two servers that start, one creates the table
         version = run("PRAGMA user_version").fetchone()[0]
         ours = run("PRAGMA application_id").fetchone()[0] == _APPLICATION
         if ours and version > VERSION:
@@ -104,17 +106,18 @@ class GoalFile:
             run(f"PRAGMA user_version = {VERSION}")
             run(f"PRAGMA application_id = {_APPLICATION}")
         run("COMMIT")
+        # Not within a transaction, where SQLite does not change these two.
         run("PRAGMA journal_mode = WAL")
         run("PRAGMA synchronous = FULL")
 
     def load(self, now: float) -> tuple[list[KeptGoal], dict[str, int]]:
-        """Return the goals that are not over for their clients, and the statuses of those that are.
+        """Return the goals whose ends are not acknowledged, and the statuses of the other goals.
 
         Args:
-            now: Seconds since the Unix epoch; what ended long before it is forgotten.
+            now: Seconds since the Unix epoch; goals that ended long before are deleted.
 
         Raises:
-            DurableGoalsError: a goal cannot be read, or is one of another definition.
+            DurableGoalsError: a goal cannot be read, or has another definition.
         """
         goals: list[KeptGoal] = []
         past: dict[str, int] = {}
@@ -146,7 +149,7 @@ class GoalFile:
         return goals, past
 
     def add(self, record: ServerGoal, content: Any) -> str | None:
-        """Keep a new goal; return what went wrong, None when it is kept."""
+        """Write a new goal; return the error's text, None when it was written."""
         return self._write(
             "INSERT INTO goals VALUES (?, ?, ?, ?, ?, ?, ?, 0, ?, ?, ?)",
             lambda: (
@@ -157,11 +160,13 @@ class GoalFile:
         )
 
     def update(self, record: ServerGoal, now: float) -> None:
-        """Keep how a goal stands now; when that fails it is told in the log."""
+        """Write a goal's present status and result; a failure is logged."""
         problem = self._write(
             "UPDATE goals SET status = ?, text = ?, result = ?, begun = MAX(begun, ?), changed = ? "
             "WHERE action = ? AND id = ?",
-            lambda: (  # made under the lock: of two changes at once, the later one stays
+            # Read under the lock: of two threads that change the goal, the last writes its final
+            # state. `begun` stays set once the goal was ACTIVE.
+            lambda: (
                 *(int(record.status), record.text, record.result),
                 int(record.status is Status.ACTIVE),
                 *(now, self._action, record.id),
@@ -169,12 +174,12 @@ class GoalFile:
         )
         if problem is not None:
             log.error(
-                "goal %s on '%s': status %s cannot be kept: %s",
+                "goal %s on '%s': status %s cannot be written: %s",
                 *(record.id, self._action, record.status.name, problem),
             )
 
     def forget(self, goal_ids: Iterable[str], now: float) -> None:
-        """Keep no more than the statuses of goals whose clients have their results."""
+        """Delete goals and results, but not the statuses, as the clients have the results."""
         for goal_id in goal_ids:
             self._write(
                 "UPDATE goals SET goal = NULL, result = NULL, changed = ? "

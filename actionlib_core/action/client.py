@@ -1,8 +1,11 @@
 """`ActionClient`: any number of goals at once, each followed through its handle.
 
-Three objects hold a goal at its client: `ClientGoal` decides (`actionlib_core.goal.client`), the
-`ClientGoalHandle` around it is what programs hold, and the client's `GoalManager` brings decisions,
-network, time and callbacks together, under one lock.
+Three objects follow a goal at its client. `ClientGoal` (`actionlib_core.goal.client`) makes the
+decisions, `ClientGoalHandle` is the program's view of it, and `GoalManager`, one per client,
+connects them with the network, the clock and the callbacks, under one lock.
+
+The lock is held neither while user callbacks run nor while messages are sent: both may block, or
+lead back into the client.
 """
 
 from __future__ import annotations
@@ -38,7 +41,7 @@ from actionlib_core.goal.client import (
     KnownServers,
     Path,
 )
-from actionlib_core.goal.states import TERMINAL, CommState, Status, TerminalState
+from actionlib_core.goal.states import OVER, TERMINAL, CommState, Status, TerminalState
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID
 from actionlib_core.node import get_node
 from actionlib_core.shutdown import current_shutdown
@@ -69,18 +72,16 @@ __all__ = [
     "get_name_of_constant",
 ]
 
-# Among the tokens that a client finds at first, one of a wrong type may come before the right one.
+# At first the token of a server of a wrong type may be found before that of the right one.
 MISMATCH_S = 0.2
-TICK_S = 0.05  # repetitions and acknowledgements due within this time go out together
-ACK_AT = 64  # or as soon as so many acknowledgements wait
-REMEMBERED = 1024  # ids of ended goals whose result may come again
-FEEDBACK_S = 0.5  # a feedback callback that takes longer after the goal's end gets no more feedback
-ABSENT_S = 3.0  # who has waited so long for a server is told where it was looked for
-CALLBACKS_S = 1.0  # waiting for a goal's end waits no longer for callbacks that do not return
+TICK_S = 0.05  # repetitions and acknowledgements due within this time are sent together
+ACK_AT = 64  # this number of waiting acknowledgements is sent at once
+REMEMBERED = 1024  # ids of ended goals whose result may arrive again
+FEEDBACK_S = 0.5  # a feedback callback slower than this after the goal's end is the last one
+ABSENT_S = 3.0  # after this time without a server, log where it was looked for
+CALLBACKS_S = 1.0  # `wait` gives callbacks this time to return after the goal's end
 
 UNSURE = " and had not acknowledged the goal, which may or may not have begun"
-
-_OVER = frozenset({CommState.DONE, CommState.LOST})
 
 A_co = TypeVar("A_co", covariant=True)
 G = TypeVar("G")
@@ -88,15 +89,15 @@ R = TypeVar("R")
 F = TypeVar("F")
 
 
-_count = itertools.count(1)  # one per process: `next` is atomic
+_count = itertools.count(1)  # for the whole process; `next` is atomic, so it needs no lock
 
 
 class GoalIDGenerator:
     """Makes ids that differ from all others on the network.
 
     Args:
-        name: What an id begins with; the name of the default node when None.
-        clock: Gives the stamp; the current clock when None.
+        name: Prefix of the ids; None: the name of the default node.
+        clock: Source of the stamps; None: the current clock.
 
     Threads: any; ids never repeat within a process, those of a virtual clock never on that clock.
     """
@@ -109,7 +110,7 @@ class GoalIDGenerator:
         self.set_name(name)
 
     def set_name(self, name: str) -> None:
-        """Set what ids begin with.
+        """Set the prefix of the ids.
 
         Args:
             name: Usually the node's name.
@@ -121,7 +122,8 @@ class GoalIDGenerator:
         clock = self._clock if self._clock is not None else current_clock()
         stamp_ns = clock.time_ns()
         secs, nsecs = divmod(stamp_ns, 1_000_000_000)
-        count = getattr(clock, "numbers", _count)  # a virtual clock's own: each run has the same
+        # A virtual clock counts by itself, so that repeated runs of a test have the same ids.
+        count = getattr(clock, "numbers", _count)
         return f"{self.name}-{next(count)}-{secs}.{nsecs}", stamp_ns
 
     def generate_ID(self) -> GoalID:  # noqa: N802  actionlib's name
@@ -148,7 +150,7 @@ def get_name_of_constant(C: Any, n: int) -> str:  # noqa: N803  actionlib's name
 
 @dataclass(slots=True, weakref_slot=True, eq=False, repr=False)
 class ClientGoalHandle:
-    """One goal as its client holds it. Two handles are equal when they are of one goal.
+    """A program's handle for one goal. Two handles are equal when they belong to the same goal.
 
     Dropping the handle changes nothing: the goal is followed until it is over. ROS's attribute
     `comm_state_machine` is the handle itself.
@@ -157,16 +159,16 @@ class ClientGoalHandle:
         manager: The client's goals.
         goal: The goal's life cycle.
         body: The packed goal message.
-        on_state: Called under the manager's lock with each state passed; must only note it.
-        on_feedback: The same, when feedback has come; None when nobody wants any.
-        feedback: The feedback that nobody has taken, None while none has come; guarded by the
-            manager's lock.
+        on_state: Called under the manager's lock with each state passed; must not block.
+        on_feedback: The same, for feedback; None when no feedback is wanted.
+        feedback: Feedback that was not taken yet, None before the first; guarded by the manager's
+            lock.
         keeps_result: The server is to keep the result until `acknowledge` is called.
         calls_back: The goal has callbacks, which `wait` waits for.
-        settled: The goal is over and its last callback has returned, or nobody follows it.
-        ended_at: When the goal was over [s, clock]; None while it is not.
-        last_call: The callback that reports the goal's end has begun.
-        asking: A question about the goal is under way.
+        settled: The goal is over and its last callback has returned, or it is no longer followed.
+        ended_at: When the goal ended [s, clock]; None before.
+        last_call: The callback that reports the goal's end has started.
+        asking: A query about the goal is pending.
 
     Threads: every method may be called from any thread and any callback.
     """
@@ -183,30 +185,32 @@ class ClientGoalHandle:
     ended_at: float | None = None
     last_call: bool = False
     asking: bool = False
-    # Most goals are waited for once at most: these exist when somebody waits.
+    # Made by the first thread that waits: most goals need neither of them.
     _ended: Event | None = None
     _settled: Event | None = None
+    # During a transition callback: the state that it reports, and the callback's thread. Other
+    # threads see the goal's present state.
     _shown: CommState | None = None
     _shown_to: int = 0
 
     # -- for programs --------------------------------------------------------------------------
 
     def cancel(self) -> None:
-        """Ask for the goal's end. The answer comes as a transition; a goal that is over stays."""
+        """Cancel the goal; the server's answer comes as a transition. No effect after its end."""
         self.manager.cancel(self)
 
     def get_comm_state(self) -> CommState:
-        """Return where the goal stands; in a transition callback, the state it is called for."""
+        """Return the goal's state; in a transition callback, the state that it reports."""
         if self._shown is not None and self._shown_to == threading.get_ident():
             return self._shown
         return self.goal.comm
 
     def get_goal_status(self) -> int:
-        """Return the last status the server gave (`GoalStatus`); LOST once the goal is lost."""
+        """Return the last status from the server (`GoalStatus`); LOST once the goal is lost."""
         return int(self.goal.status)
 
     def get_goal_status_text(self) -> str:
-        """Return what the server said about the status, or why the goal is lost."""
+        """Return the text of the last status, or why the goal is lost."""
         return self.goal.text
 
     def get_result(self) -> Any:
@@ -232,21 +236,21 @@ class ClientGoalHandle:
 
     @property
     def dropped_feedback(self) -> int:
-        """How many feedback messages were dropped, as the callback was slower than they came."""
+        """Number of feedback messages dropped because the callback was too slow."""
         return 0 if self.feedback is None else self.feedback.dropped
 
     def wait(self, timeout: float | None = None) -> bool:
         """Wait until the goal is over and its last callback has returned.
 
-        Called from a callback of this client, it does not wait for callbacks. Nor does it wait
-        longer than 1 s after the goal's end for one that does not return, but for the transition
-        callback that reports the end.
+        Called from a callback of this client, it does not wait for callbacks. Otherwise it gives
+        them 1 s after the goal's end to return; only for the transition callback that reports the
+        end it waits without this limit.
 
         Args:
             timeout: Longest wait [s]; None waits for ever (a server that dies ends the wait).
 
         Returns:
-            Whether it is over; False also when nobody follows it any more.
+            Whether it is over; False also when it is no longer followed.
 
         Blocks: until then.
         """
@@ -273,7 +277,7 @@ class ClientGoalHandle:
     def __repr__(self) -> str:
         return f"<ClientGoalHandle {self.goal.id} {self.goal.comm.name} {self.goal.status.name}>"
 
-    # -- for whoever follows the goal ----------------------------------------------------------
+    # -- for the client classes ----------------------------------------------------------------
 
     def acknowledge(self) -> None:
         """Let the server forget a result that it was to keep (`keeps_result`)."""
@@ -281,24 +285,24 @@ class ClientGoalHandle:
 
     @property
     def forgotten(self) -> bool:
-        """Whether the goal runs on and nobody follows it."""
+        """Whether the goal still runs but is no longer followed."""
         return self.settled and not self.goal.over
 
     def note_ended(self) -> None:
-        """Wake those who wait for the goal's end. Needs the manager's lock."""
+        """Wake the threads that wait for the goal's end. Needs the manager's lock."""
         if self._ended is not None:
             self._ended.set()
 
     def settle(self) -> None:
-        """Note that the goal is over, or nobody follows it, and its last callback has returned."""
+        """Set `settled`, and wake the threads that wait for it."""
         with self.manager.lock:
             self.settled = True
-            for event in (self._ended, self._settled):  # a goal that is forgotten ends both waits
+            for event in (self._ended, self._settled):  # forgetting a goal ends both waits
                 if event is not None:
                     event.set()
 
     def wait_ended(self, timeout: float | None) -> None:
-        """Wait until the goal is over or nobody follows it, `timeout` [s] at most."""
+        """Wait until the goal is over or no longer followed, `timeout` [s] at most."""
         with self.manager.lock:
             if self.goal.over or self.settled:
                 return
@@ -314,20 +318,20 @@ class ClientGoalHandle:
         return settled.wait(timeout)
 
     def call(self, state: CommState, callback: Callable[..., object], *args: object) -> None:
-        """Run a user callback, for which the goal stands in `state`, after those before it."""
+        """Queue a user callback in which `get_comm_state` returns `state`."""
         self.manager.callbacks.call(self._show, state, callback, *args)
 
     def _show(self, state: CommState, callback: Callable[..., object], *args: object) -> None:
-        # The thread first: another one that reads in between must not take the state for its own.
+        # The thread first: in the other order, another thread could read this state in between.
         self._shown_to, self._shown = threading.get_ident(), state
-        self.last_call = state in _OVER
+        self.last_call = state in OVER
         try:
             callback(*args)
         finally:
             self._shown = None
 
     def call_with_feedback(self, callback: Callable[[Any], object]) -> None:
-        """Run a user callback with the next feedback, after the callbacks before it."""
+        """Queue a user callback that is called with the next feedback."""
         self.manager.callbacks.call(self._deliver_feedback, callback)
 
     def _deliver_feedback(self, callback: Callable[[Any], object]) -> None:
@@ -340,8 +344,8 @@ class ClientGoalHandle:
                 self.drop_feedback_after(started)
 
     def keep_feedback(self, feedback: Any, size: int) -> None:
-        """Keep feedback of `size` bytes for whoever wants it. Needs the manager's lock."""
-        if self.on_feedback is None:  # the goal was forgotten since the feedback was read
+        """Store feedback of `size` bytes until it is taken. Needs the manager's lock."""
+        if self.on_feedback is None:  # the goal was forgotten while the feedback was decoded
             return
         if self.feedback is None:
             self.feedback = Backlog()
@@ -350,23 +354,24 @@ class ClientGoalHandle:
             self.on_feedback()
         elif not dropped_before:
             log.warning(
-                "action '%s': the feedback of goal %s comes faster than it is taken, and the "
-                "oldest of %d messages is dropped. Try a callback that takes no time.",
+                "action '%s': the feedback of goal %s arrives faster than it is processed: of %d "
+                "waiting messages, the oldest is dropped. Try a faster callback.",
                 self.manager.name,
                 self.goal.id,
                 len(self.feedback),
             )
 
     def take_feedback(self) -> Any:
-        """Return the next feedback; None when none waits."""
+        """Remove and return the oldest feedback; None when there is none."""
         with self.manager.lock:
             return None if self.feedback is None else self.feedback.take()
 
     def drop_feedback_after(self, started: float, limit: float = FEEDBACK_S) -> None:
-        """Drop what waits if the goal is over and a callback did not keep up.
+        """Drop the remaining feedback if the goal is over and a callback was too slow.
 
-        That is one that has taken longer than `limit` [s] since it `started` or, if that was later,
-        since the end of the goal. What is dropped is counted and logged.
+        It was too slow if it has taken longer than `limit` [s] since it `started` or, if that was
+        later, since the goal's end. The done callback is queued behind the feedback, so it would
+        come much too late. The dropped messages are counted and logged.
         """
         ended_at = self.ended_at
         if ended_at is None or self.manager.clock.now() < max(started, ended_at) + limit:
@@ -375,8 +380,8 @@ class ClientGoalHandle:
             dropped = 0 if self.feedback is None else self.feedback.drop_all()
         if dropped:
             log.warning(
-                "action '%s': goal %s is over: the last %d messages of its feedback were dropped, "
-                "%d in all, as its callback is slower than they came.",
+                "action '%s': goal %s is over: its last %d feedback messages were dropped (%d in "
+                "all), because the callback is too slow.",
                 self.manager.name,
                 self.goal.id,
                 dropped,
@@ -385,14 +390,14 @@ class ClientGoalHandle:
 
 
 CommStateMachine = ClientGoalHandle
-"""ROS's name for what a client keeps of one goal."""
+"""ROS's name for a client's record of one goal."""
 
 
 _managers: weakref.WeakSet[GoalManager] = weakref.WeakSet()
 
 
 def _renew_locks() -> None:
-    """Give a forked child locks of its own: who held one then is a thread of its parent."""
+    """Replace the locks in a forked child: a thread that held one exists only in the parent."""
     for manager in _managers:
         manager.lock = threading.RLock()
 
@@ -401,18 +406,16 @@ os.register_at_fork(after_in_child=_renew_locks)
 
 
 class GoalManager:
-    """The goals of one client. Registers a goal before it is sent; nothing that comes back is lost.
-
-    It outlives an `ActionClient` that is dropped, until the goals are over.
+    """The goals of one client. It outlives a dropped `ActionClient` until its goals are over.
 
     Args:
-        node: On whose clock.
+        node: The client's node, whose clock counts.
         name: The action's full name.
-        port: The way to the network.
-        callbacks: Where user callbacks run.
+        port: The client's connection to the network.
+        callbacks: Runs the user callbacks.
         server_lost_timeout: How long a server may be away before its goals are LOST [s].
-        status_list_timeout: How long a server that does not show itself may be silent before they
-            are [s].
+        status_list_timeout: How long a server without a token may be silent before its goals are
+            LOST [s].
 
     Attributes:
         lock: Guards the goals. User callbacks run without it, in `callbacks`.
@@ -441,20 +444,20 @@ class GoalManager:
         self._status_list_timeout = status_list_timeout
         self._servers = KnownServers(status_list_timeout)
         self._goals: dict[str, ClientGoalHandle] = {}  # by id, those that are not over
-        self._ended: dict[str, None] = {}  # ids of the others: a `Recent`, written out for speed
+        self._ended: dict[str, None] = {}  # ids of ended ones: a `Recent`, written out for speed
         self._strangers = Recent(REMEMBERED)  # sessions that were reported
-        self._acks: list[str] = []  # ids of goals whose result is here, for the next message
+        self._acks: list[str] = []  # goal ids for the next acknowledgement message
         self._ack_timer: Timer | None = None
-        self._waiters: list[Event] = []  # for a server; woken once, they come again
+        self._waiters: list[Event] = []  # of `wait_for_server`; each waking removes them
         self._timer: Timer | None = None
         self._due = math.inf  # when the timer runs [s, clock]; without one, never
         self._closed = False
-        self._dropped = False  # the last goal that ends closes this
-        port.open(self)  # last: the network tells at once of the servers that are there
+        self._dropped = False  # by the program: the end of the last goal closes this
+        port.open(self)  # last, as it already reports the servers that are there
         self._forget_on_close = node.on_close(self.close)
 
     def close(self) -> None:
-        """Acknowledge what has arrived, leave the name; goals that still run are LOST here."""
+        """Withdraw from the network; goals that still run are LOST for this client."""
         with self.lock:
             if self._closed:
                 return
@@ -465,14 +468,15 @@ class GoalManager:
             if self._timer is not None:
                 self._timer.cancel()
             self._wake()
-        # Without the lock: closing waits for callbacks of the network, which may wait for it.
+        # Without the lock: closing waits for the network's callbacks, which may wait for the lock.
         self._send_acks()
         self.port.close()
 
     def let_go(self) -> None:
-        """Close once no goal runs any more: the client was dropped.
+        """Close as soon as no goal runs any more; called when the program has dropped the client.
 
-        Threads: any, also one that collects garbage, at any moment.
+        Threads: any, at any moment: also in a garbage collection, where this thread may hold the
+            lock halfway through a change. So another thread does the work.
         """
         self.node.let_go(self._close_when_idle)
 
@@ -483,7 +487,7 @@ class GoalManager:
         if idle:
             self.close()
 
-    # -- what the program does -----------------------------------------------------------------
+    # -- calls of the program ------------------------------------------------------------------
 
     def wait_for_server(self, timeout: float | None) -> bool:
         """Wait for a server; return whether there is one.
@@ -491,20 +495,21 @@ class GoalManager:
         Raises:
             TypeMismatchError: there is one of another type.
 
-        Blocks: until then or until the client is stopped, `timeout` [s] at most; None: no limit,
-            but until the program is to end.
+        Blocks: until then or until the client is stopped, `timeout` [s] at most. None: no limit
+            except the program's shutdown.
         """
         started = self.clock.now()
-        if timeout is None or timeout > ABSENT_S + 1.0:  # looking around takes up to a second
+        # Only if there is time for `explain_absence`, which takes up to 1 s.
+        if timeout is None or timeout > ABSENT_S + 1.0:
             if self._await_server(started + ABSENT_S, ends=timeout is None):
                 return True
             if not (self._closed or (timeout is None and current_shutdown().requested())):
-                self._tell_absence()
+                self._log_absence()
         deadline = None if timeout is None else started + timeout
         return self._await_server(deadline, ends=timeout is None)
 
     def _await_server(self, deadline: float | None, *, ends: bool) -> bool:
-        """Wait for a server until `deadline` [s, clock]; `ends`: or until the program is to end."""
+        """Wait for a server until `deadline` [s, clock]; `ends`: or until shutdown is requested."""
         changed = self.clock.event()
         ending = current_shutdown()
         forget = ending.on_shutdown(changed.set) if ends else None
@@ -518,7 +523,8 @@ class GoalManager:
                     error = self._servers.find_wrong_type()
                     if error is not None:
                         raise error
-                    changed.clear()  # with the lock: a server that appears now sets it again
+                    # Under the lock, so that a server that appears from now on sets it again.
+                    changed.clear()
                     if changed not in self._waiters:
                         self._waiters.append(changed)
                 left = None if deadline is None else deadline - self.clock.now()
@@ -532,27 +538,27 @@ class GoalManager:
             if forget is not None:
                 forget()
 
-    def _tell_absence(self) -> None:
-        """Say where a server was looked for in vain, where the network knows more of it."""
+    def _log_absence(self) -> None:
+        """Log why there may be no server, if the network knows a reason."""
         with contextlib.suppress(TransportError):  # the session is closed: the wait ends with it
             why = self.port.explain_absence()
             if why:
                 log.warning("action '%s': no server after %g s: %s", self.name, ABSENT_S, why)
 
     def begin(self, handle: ClientGoalHandle) -> None:
-        """Follow a goal: send it, or ask for one that was sent before.
+        """Follow a goal: send it, or query the server for one that was sent before.
 
         Raises:
             ActionlibError: the goal is followed already.
             TypeMismatchError: the action's server has another type.
             TransportError: the client is stopped.
         """
-        heard = self.port.is_heard()  # asks the network, which may itself wait for our lock
+        heard = self.port.is_heard()  # without the lock, for which the network's threads may wait
         with self.lock:
             if self._closed:
                 raise self._stopped()
             goal, now = handle.goal, self.clock.now()
-            if goal.over:  # cancelled meanwhile, by another thread or a signal handler
+            if goal.over:  # cancelled before it was sent, by another thread or a signal handler
                 return
             known = self._goals.get(goal.id)
             if known is not None:
@@ -566,16 +572,17 @@ class GoalManager:
                 receiver = self._servers.find_receiver(goal, now)
             if receiver is not None:
                 goal.on_offered(*receiver)
+            # Before the goal is registered: starting a timer raises when no thread can be started.
             if goal.due < self._due:
-                self._arm(goal.due)  # before the next line: it raises when there is no thread
-            self._goals[goal.id] = handle  # before it is sent: the answer may be here at once
+                self._arm(goal.due)
+            self._goals[goal.id] = handle  # before sending: the answer may arrive at once
         if receiver is not None:
             self.port.send_goal(goal.id, goal.stamp_ns, handle.body, receiver.server)
         elif duty is Duty.ASK:
             self._fulfil(handle, duty)
 
     def _take_over(self, known: ClientGoalHandle, handle: ClientGoalHandle) -> None:
-        """Let `handle` follow a goal that was forgotten and still runs. Needs the lock."""
+        """Let a new handle follow a forgotten goal that still runs. Needs the lock."""
         if not known.forgotten:
             raise ActionlibError(
                 f"goal {known.goal.id} on '{self.name}': this client follows it already."
@@ -590,13 +597,13 @@ class GoalManager:
             self._pass(handle, (goal.comm,))
 
     def cancel(self, handle: ClientGoalHandle) -> None:
-        """Ask for a goal's end."""
+        """Cancel a goal."""
         with self.lock:
             duty = self._cancel(handle)
         self._fulfil(handle, duty)
 
     def _cancel(self, handle: ClientGoalHandle) -> Duty:
-        """Note that a goal is to end; return what to send. Needs the lock."""
+        """Mark a goal as cancelled; return what to send. Needs the lock."""
         path, duty = handle.goal.cancel(self.clock.now())
         self._pass(handle, path)
         self._arm(handle.goal.due)
@@ -605,8 +612,8 @@ class GoalManager:
     def cancel_many(self, stamp_ns: int) -> None:
         """Cancel the goals of all clients: all of them (0), or those at or before a stamp [ns].
 
-        This is said once. Our own goals among them are cancelled by their ids as well: that is
-        repeated until the server has heard it.
+        That message is sent only once. Our own goals among them are also cancelled by id, which is
+        repeated until the server answers.
 
         Raises:
             TransportError: the client is stopped.
@@ -622,7 +629,7 @@ class GoalManager:
             duties = [(handle, self._cancel(handle)) for handle in meant]
         self.port.send_cancel("", stamp_ns)
         for handle, duty in duties:
-            if not handle.goal.acknowledged:  # the goal itself may still be on its way
+            if not handle.goal.acknowledged:  # the cancel may arrive before the goal itself
                 self._fulfil(handle, duty)
 
     def _stopped(self) -> TransportError:
@@ -639,8 +646,10 @@ class GoalManager:
             return goal.over
         deadline = None if timeout is None else self.clock.now() + timeout
         handle.wait_ended(timeout)
+        # Inside a callback, waiting for callbacks would wait for itself.
         if not goal.over or self.callbacks.is_inside():
             return goal.over
+        # The callbacks have until `CALLBACKS_S` after the goal's end, within the timeout.
         now = self.clock.now()
         left = None if deadline is None else deadline - now
         ended_at = now if handle.ended_at is None else handle.ended_at
@@ -648,12 +657,12 @@ class GoalManager:
         first = patience if left is None else min(patience, left)
         if handle.wait_settled(first):
             return True
-        if handle.last_call:
+        if handle.last_call:  # the program's own done callback: wait for it as in ROS
             handle.wait_settled(None if left is None else left - first)
         elif first == patience:
             log.warning(
                 "action '%s': goal %s is over, but a callback of this client has not returned for "
-                "%g s: those that wait behind it are late. Try a callback that takes no time.",
+                "%g s and delays the others. Try a faster callback.",
                 self.name,
                 goal.id,
                 CALLBACKS_S,
@@ -661,7 +670,7 @@ class GoalManager:
         return True
 
     def forget(self, handle: ClientGoalHandle) -> None:
-        """Follow a goal no more; it runs on. Its result is acknowledged when it comes."""
+        """Stop following a goal, which runs on. Its result is acknowledged when it arrives."""
         with self.lock:
             if handle.goal.over:
                 return
@@ -684,7 +693,7 @@ class GoalManager:
             self._wake()
 
     def _lose_mismatched(self) -> None:
-        """Give up the goals that wait for a server, if there is only one of another type."""
+        """Lose the goals that wait for a server, if all servers are of another type."""
         with self.lock:
             error = self._servers.find_wrong_type()
             for handle in list(self._goals.values()):
@@ -696,6 +705,7 @@ class GoalManager:
         with self.lock:
             if not self._servers.vanish(server):
                 return  # unknown, or of another type
+            # A server that has said farewell does not come back: its goals are lost now.
             if self._servers.has_said_farewell(server) or self._server_lost_timeout <= 0:
                 self._lose_goals_of(server, why)
             else:
@@ -704,9 +714,9 @@ class GoalManager:
                 self._arm(until)
 
     def on_farewell(self, entries: list[StatusEntry], server: Server) -> None:
-        """Handle the last list of a server that leaves, and answer it.
+        """Handle and acknowledge the last list of a server that leaves.
 
-        Any goal that it does not name it has not taken and never will: the next server gets it.
+        A goal missing in it was not taken by the server and will be sent to the next one.
         """
         now = self.clock.now()
         taken = {entry.id: entry for entry in entries}
@@ -725,27 +735,27 @@ class GoalManager:
         self.port.acknowledge(acks, farewell=True)
 
     def on_stranger(self, session: str) -> None:
-        """Report, once, a session whose words about goals are dropped."""
+        """Report, once, a session whose messages about goals are dropped."""
         with self.lock:
             known = session in self._strangers
             self._strangers.add(session)
         if not known:
             log.error(
-                "action '%s': session %s speaks for the action's server, which it is not: its "
-                "messages are dropped. Try access rules if it is a stranger, or a token if it is a "
-                "server.",
+                "action '%s': session %s sends as the action's server without being it: its "
+                "messages are dropped. Try access rules if it is an intruder, or a token if it is "
+                "a server.",
                 self.name,
                 session or "unknown",
             )
 
     def _wake(self) -> None:
-        """Wake those who wait for a server. Needs the lock."""
+        """Wake the threads that wait for a server. Needs the lock."""
         waiters, self._waiters = self._waiters, []
         for event in waiters:
             event.set()
 
     def _hurry(self, now: float, *, every: bool = False) -> None:
-        """Send at once what waits for a server; `every` goal, if it has to be asked for anew.
+        """Send now what waits for a server; with `every`, query all other goals too.
 
         Needs the lock.
         """
@@ -755,18 +765,18 @@ class GoalManager:
         self._arm(now)
 
     def _lose_goals_of(self, server: Server, what: str) -> None:
-        """Give up the goals that a server has, or may have. Needs the lock."""
+        """Lose the goals that a server has, or may have. Needs the lock."""
         reason = f"the action server of node '{server.node}' (session {server.session}) {what}"
         self._lose_goals(self._servers.forget(server), reason)
 
     def _lose_goals(self, sessions: Collection[str], reason: str) -> None:
-        """Give up the goals that these sessions have, or may have. Needs the lock."""
+        """Lose the goals that these sessions have, or may have. Needs the lock."""
         for handle in list(self._goals.values()):
             goal = handle.goal
             if goal.offered and goal.server in sessions:
                 self._pass(handle, goal.lose(reason if goal.acknowledged else reason + UNSURE))
 
-    # -- what arrives about goals --------------------------------------------------------------
+    # -- messages about goals ------------------------------------------------------------------
 
     def on_statuses(self, entries: list[StatusEntry], session: str, *, whole: bool = True) -> None:
         """Handle a status list, or with `whole` false a part of one."""
@@ -774,7 +784,7 @@ class GoalManager:
         servers, goals = self._servers, self._goals
         if servers.current is None or session in servers.foreign:
             self._hear_foreign(session, now)
-        if not goals:  # so it is with most lists that a client hears: no lock for them
+        if not goals:  # the usual case of an idle client: needs no lock
             return
         with self.lock:
             speaks, listed = servers.may_speak(session), set()
@@ -785,7 +795,7 @@ class GoalManager:
                     goal = handle.goal
                     path = goal.hear(entry, session, now)
                     if path and handle.on_state is None and not goal.over and goal.due >= self._due:
-                        continue  # nobody is to be told, and the timer looks in time
+                        continue  # what `_pass` would do here is nothing: saves the call
                     if path != ():
                         self._pass(handle, path, entry)
             if whole and (len(listed) < len(goals) or not listed.issuperset(goals)):
@@ -796,7 +806,7 @@ class GoalManager:
                         self._arm(handle.goal.due)
 
     def _hear_foreign(self, session: str, now: float) -> None:
-        """Take a status list of a session that may stand for a server without a token."""
+        """Handle a status list of a session that may be a server without a token."""
         with self.lock:
             if self._servers.hear_foreign(session, now):
                 self._hurry(now)
@@ -805,7 +815,7 @@ class GoalManager:
                 self._arm(self._servers.foreign[session])
 
     def _believes(self, session: str, handle: ClientGoalHandle) -> bool:
-        """Tell whether a session may speak of a goal; report one that may not."""
+        """Return whether a session may send about a goal; report one that may not."""
         goal = handle.goal
         its_own = goal.acknowledged and session == goal.server
         if its_own or self._servers.may_speak(session):
@@ -820,7 +830,7 @@ class GoalManager:
             return
         if not self._believes(session, handle):
             return
-        feedback = None
+        feedback = None  # decoded without the lock, and only if it is wanted
         if handle.on_feedback is not None:
             try:
                 feedback = self.port.read_feedback(body)
@@ -841,10 +851,10 @@ class GoalManager:
     def on_result(
         self, entry: StatusEntry, body: bytes | None, session: str, *, answered: bool = False
     ) -> None:
-        """Handle a result; `answered`: it was asked for, and without a `body` is not kept."""
+        """Handle a result. `answered`: it is the reply to a query; `body` None: no longer kept."""
         handle = self._goals.get(entry.id)
         if handle is None:
-            if entry.id in self._ended:  # the first acknowledgement was lost
+            if entry.id in self._ended:  # sent again, as our acknowledgement was lost
                 self.acknowledge(entry.id)
             return
         if not (answered or self._believes(session, handle)):
@@ -866,11 +876,11 @@ class GoalManager:
                 self._finish(handle, path)
 
     def follows(self, goal_id: str) -> bool:
-        """Return whether a goal is followed, and not over."""
+        """Return whether a goal is followed and has not ended."""
         return goal_id in self._goals
 
     def on_answer(self, entry: StatusEntry, session: str = "") -> None:
-        """Handle a status that was asked for: there is no result, or not yet."""
+        """Handle the status in reply to a query: there is no result, or not yet."""
         handle = self._goals.get(entry.id)
         if handle is None:
             return
@@ -881,11 +891,11 @@ class GoalManager:
             if entry.status != Status.LOST:
                 now = self.clock.now()
                 self._pass(handle, handle.goal.hear(entry, session, now), entry)
-            elif not self._servers.conflict:  # else another server may have it
+            elif not self._servers.conflict:  # of two servers, the other may have the goal
                 self._pass(handle, handle.goal.on_unknown(entry.text))
 
     def acknowledge(self, goal_id: str) -> None:
-        """Tell the server, soon, that a result has arrived."""
+        """Acknowledge a result, together with others of the next `TICK_S`."""
         with self.lock:
             if self._closed:
                 return
@@ -907,7 +917,7 @@ class GoalManager:
     def _pass(
         self, handle: ClientGoalHandle, path: Path | None, entry: StatusEntry | None = None
     ) -> None:
-        """Act on the states that a goal has passed, by `entry`. Needs the lock."""
+        """Report the states that a goal has passed because of `entry`. Needs the lock."""
         if path is None:
             log.error("action '%s': unknown status %s of a goal", self.name, entry)
         if not path:
@@ -923,7 +933,7 @@ class GoalManager:
             self._arm(goal.due)
 
     def _finish(self, handle: ClientGoalHandle, path: Path) -> None:
-        """Follow a goal that is over no more, and say so. Needs the lock."""
+        """Stop following a goal that has ended, and report its end. Needs the lock."""
         now = self.clock.now()
         self._goals.pop(handle.goal.id, None)
         self._ended[handle.goal.id] = None
@@ -937,18 +947,19 @@ class GoalManager:
             return
         handle.note_ended()
         if handle.on_state is None:
-            self.callbacks.call(handle.settle)  # behind the last feedback
+            self.callbacks.call(handle.settle)  # queued behind the last feedback
         else:
             for state in path:
-                handle.on_state(state)  # settles the handle behind the callbacks it queues
-        # They hold the handle and maybe its client, which would stay until a garbage collection.
+                handle.on_state(state)  # queues the callbacks and behind them `settle`
+        # They refer to the handle and perhaps the client: a cycle, freed only by the collector.
         handle.on_state = handle.on_feedback = None
 
-    # -- time, and what is sent ----------------------------------------------------------------
+    # -- time and sending ----------------------------------------------------------------------
 
     def _arm(self, due: float) -> None:
-        """Let the timer run at `due` or a little later. Needs the lock."""
-        if self._closed or self._due <= due:  # too early does no harm: it looks, and is set anew
+        """Let the timer run at `due` at the latest. Needs the lock."""
+        # One timer serves all goals. Running too early does no harm: it is then set again.
+        if self._closed or self._due <= due:
             return
         if self._timer is not None:
             self._timer.cancel()
@@ -957,7 +968,7 @@ class GoalManager:
 
     def _on_timer(self) -> None:
         now = self.clock.now()
-        duties = []  # fulfilled without the lock, which the network's threads wait for
+        duties = []  # sent without the lock, for which the network's threads may wait
         with self.lock:
             self._timer, self._due = None, math.inf
             if self._closed:
@@ -981,21 +992,21 @@ class GoalManager:
             if dues:
                 self._arm(max(min(dues), now + TICK_S))
         for handle, duty in duties:
-            self._fulfil(handle, duty, wait=False)  # a full link must not hold up other timers
+            self._fulfil(handle, duty, wait=False)  # a full link must not delay other timers
 
     def _fulfil(self, handle: ClientGoalHandle, duty: Duty, *, wait: bool = True) -> None:
-        """Send what a goal needs; without `wait`, not what finds the link full.
+        """Send what a goal needs; without `wait`, drop it when the link is full.
 
-        A goal is sent only if a server listens, and to that one: then it cannot run twice. Others
-        may listen too, so that it is heard is not enough; nor is a token, before the subscription
-        of its server is known.
+        A goal is sent only to one known server, so that it cannot run twice. Two things are needed:
+        a subscription (a token may be known earlier, and the goal would be lost) and a server (the
+        subscription may be another program's).
         """
         goal = handle.goal
         if Duty.CANCEL in duty:
             self.port.send_cancel(goal.id, 0, wait=wait)
         if Duty.GOAL in duty and self.port.is_heard():
             with self.lock:
-                # It may have been cancelled or lost while it had not been sent.
+                # It may have ended since the duty was decided.
                 now = self.clock.now()
                 receiver = None if goal.over else self._servers.find_receiver(goal, now)
                 if receiver is not None:
@@ -1007,7 +1018,7 @@ class GoalManager:
             self.port.ask(goal.id, partial(self._on_answered, goal.id))
 
     def _on_answered(self, goal_id: str) -> None:
-        """Note that a question was answered, or that its time is over."""
+        """Note that a query was answered, or has timed out."""
         handle = self._goals.get(goal_id)
         if handle is not None:
             handle.asking = False
@@ -1019,21 +1030,21 @@ class ActionClient(Generic[A_co]):
     Args:
         ns: The action's name.
         ActionSpec: The action class (XAction).
-        node: Where; the current node when None.
-        server_lost_timeout: How long the server may be away before its goals are LOST [s]; within
-            it a server that comes back is asked for what was missed. Peers find each other again
-            within 8 s; a shorter time is warned of.
-        status_list_timeout: How long a server that shows no token, as behind a bridge, may send no
-            status list before it counts as gone and its goals are LOST [s].
+        node: The client's node; None: the current node.
+        server_lost_timeout: How long the server may be away before its goals are LOST [s]; when it
+            comes back within this time, the client queries it for what it has missed. Peers need up
+            to 8 s to find each other again, so a shorter time is logged as a warning.
+        status_list_timeout: How long a server without a token, such as one behind a bridge, may
+            send no status list before it counts as gone and its goals are LOST [s].
 
     Raises:
         ActionException: `ActionSpec` is not an action class.
-        ActionlibError: one of the timeouts is no time, negative or without end.
+        ActionlibError: one of the timeouts is not a duration, negative or infinite.
         InvalidNameError: the name breaks the ROS rules.
         TransportError: the network session is closed.
 
-    A client that the program drops leaves the name once its goals are over; until then their
-    callbacks come.
+    A client that the program drops still calls the callbacks of its running goals, and withdraws
+    from the network when these are over.
 
     Threads: every method may be called from any thread and any callback. Callbacks run one at a
         time, in order, on a thread of their own, without any lock.
@@ -1055,8 +1066,8 @@ class ActionClient(Generic[A_co]):
         self.ns = self.node.resolve(ns, "action name")
         if 0 < grace < self.node.transport.rediscovery:
             log.warning(
-                "action '%s': server_lost_timeout: got %g; on this network a link that was lost is "
-                "found again within %g s, and goals may be LOST before. Try a longer one, or 0.",
+                "action '%s': server_lost_timeout: got %g; on this network it takes up to %g s to "
+                "restore a lost link, and goals may be LOST before. Try a longer time, or 0.",
                 self.ns,
                 grace,
                 self.node.transport.rediscovery,
@@ -1072,7 +1083,7 @@ class ActionClient(Generic[A_co]):
         )
         self._ids = GoalIDGenerator(f"/{self.node.full_name}", clock=self.node.clock)
         self._let_go = weakref.finalize(self, self.manager.let_go)
-        self._let_go.atexit = False
+        self._let_go.atexit = False  # there the node closes its clients itself
 
     @property
     def ActionSpec(self) -> Any:  # noqa: N802  actionlib's name
@@ -1080,10 +1091,10 @@ class ActionClient(Generic[A_co]):
         return self.types.action
 
     def stop(self) -> None:
-        """Leave the name. Goals that run go on at the server; here they are LOST.
+        """Withdraw from the network. Running goals go on at the server; here they are LOST.
 
-        A server with `on_client_lost="cancel"` cancels them, unless another client of the action
-        is left in this session.
+        A server with `on_client_lost="cancel"` cancels them, unless this session has another
+        client of the action.
         """
         self._let_go.detach()
         self.manager.close()
@@ -1100,11 +1111,11 @@ class ActionClient(Generic[A_co]):
 
         Returns:
             Whether there is one; False also when the client was stopped or, without a limit, when
-            the program is to end (`actionlib_core.shutdown`).
+            shutdown is requested (`actionlib_core.shutdown`).
 
         Raises:
             TypeMismatchError: there is one, but of another type.
-            InvalidDurationError: `timeout` is no time.
+            InvalidDurationError: `timeout` is not a duration.
 
         Blocks: until then.
         """
@@ -1118,18 +1129,18 @@ class ActionClient(Generic[A_co]):
         *,
         ack_timeout: float | Duration | None = None,
     ) -> ClientGoalHandle:
-        """Send a goal. Without a server it waits and goes out when one appears.
+        """Send a goal. Without a server, it is sent when one appears.
 
         Args:
             goal: The goal message (XGoal).
             transition_cb: Called with the handle at each new `CommState`.
             feedback_cb: Called with the handle and each XFeedback message.
-            ack_timeout: When no server has taken the goal after so long [s], it is LOST; None: it
-                waits as long as it takes; 0: it is LOST at once.
+            ack_timeout: Time within which a server must take the goal [s], else it is LOST. None:
+                no limit; 0: it is LOST at once.
 
         Raises:
             ActionException: `goal` is not of the action's type.
-            ActionlibError: `ack_timeout` is no time, or negative.
+            ActionlibError: `ack_timeout` is not a duration, or negative.
             FieldError: a field of `goal` has a wrong type.
             TypeMismatchError: the action's server has another type.
             TransportError: the client is stopped.
@@ -1145,13 +1156,14 @@ class ActionClient(Generic[A_co]):
         *,
         ack_timeout: float | Duration | None = None,
     ) -> ClientGoalHandle:
-        """Follow a goal that an earlier life of this program sent, by its id.
+        """Follow a goal by its id, for example one that this program sent before a restart.
 
-        The server is asked for it: its state, or its result when it has ended and the result is
-        still kept. A goal the server does not know is LOST. Arguments and errors as `send_goal`.
+        The server is queried for its state, or for its result when it has ended and the result is
+        still kept. A goal that the server does not know is LOST. Arguments and errors as
+        `send_goal`.
 
         Raises:
-            ActionlibError: `goal_id` is no id, or this client follows that goal.
+            ActionlibError: `goal_id` is not an id, or this client follows that goal.
         """
         limit = check_limit(f"action '{self.ns}'", "ack_timeout", ack_timeout)
         return self._begin(self.find_goal(goal_id, limit), transition_cb, feedback_cb)
@@ -1168,7 +1180,7 @@ class ActionClient(Generic[A_co]):
 
             def on_state(state: CommState) -> None:
                 handle.call(state, transition_cb, handle)
-                if state in _OVER:
+                if state in OVER:
                     handle.manager.callbacks.call(handle.settle)
 
             handle.on_state = on_state
@@ -1199,7 +1211,7 @@ class ActionClient(Generic[A_co]):
     def follow(
         self: ActionClient[Spec[G, R, F]], goal_id: str, *, timeout: float | Duration | None = None
     ) -> SentGoal[R, F]:
-        """Follow a goal sent in an earlier life of this program; as `send`, but by its id."""
+        """Follow a goal by its id, for example after a restart; otherwise as `send`."""
         limit = check_limit(f"action '{self.ns}'", "timeout", timeout)
         return self._send(self.find_goal(goal_id), limit)
 
@@ -1209,11 +1221,11 @@ class ActionClient(Generic[A_co]):
         return sent
 
     def cancel_all_goals(self) -> None:
-        """Ask the server to end all goals, also those of other clients."""
+        """Ask the server to cancel all goals, also those of other clients."""
         self.manager.cancel_many(0)
 
     def cancel_goals_at_and_before_time(self, time: Time | float) -> None:
-        """Ask the server to end the goals with a stamp at or before `time`, of all clients.
+        """Ask the server to cancel the goals of all clients with a stamp at or before `time`.
 
         Args:
             time: A `Time`, or seconds since the epoch.
@@ -1225,7 +1237,7 @@ class ActionClient(Generic[A_co]):
         """Return a handle for a new goal, which `manager.begin` sends.
 
         Args:
-            goal: The goal message (XGoal); later changes of it do not matter.
+            goal: The goal message (XGoal). It is packed here: later changes have no effect.
             ack_timeout: See `send_goal` [s].
 
         Raises:
@@ -1242,10 +1254,10 @@ class ActionClient(Generic[A_co]):
         return ClientGoalHandle(self.manager, life, self.manager.port.pack_goal(goal))
 
     def find_goal(self, goal_id: str, ack_timeout: float | None = None) -> ClientGoalHandle:
-        """Return a handle for a goal sent earlier, which `manager.begin` asks for.
+        """Return a handle for a goal sent earlier, for which `manager.begin` queries the server.
 
         Raises:
-            ActionlibError: `goal_id` is no id.
+            ActionlibError: `goal_id` is not an id.
         """
         if not isinstance(goal_id, str) or not goal_id:
             raise ActionlibError(

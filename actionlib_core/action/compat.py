@@ -1,4 +1,4 @@
-"""Names of ROS 1's actionlib for what has another shape here."""
+"""Classes of ROS 1's actionlib that this library does not need itself."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ if TYPE_CHECKING:
 
 
 class StatusTracker:
-    """What ROS's server keeps of one goal. Servers here keep a `ServerGoalHandle`, which has the
+    """A ROS server's record of one goal. Servers here keep a `ServerGoalHandle`, which has the
     same attributes.
 
     Args:
-        goal_id: The id (GoalID) of a goal of which only the id is known.
-        status: With `goal_id`: the status number it begins with.
+        goal_id: The id (GoalID), for a goal of which nothing else is known.
+        status: With `goal_id`: the goal's first status.
         goal: The XActionGoal message that arrived.
 
     Attributes:
         goal: See above.
-        record: Its place in the life cycle.
+        record: The goal's life cycle.
     """  # noqa: D205  one sentence
 
     def __init__(self, goal_id: Any = None, status: int | None = None, goal: Any = None) -> None:
@@ -38,18 +38,18 @@ class StatusTracker:
 
     @property
     def goal_id(self) -> GoalID:
-        """Id and stamp, as a message of its own."""
+        """Id and stamp, as a new message."""
         return GoalID(stamp=Time(0, self.record.stamp_ns), id=self.record.id)
 
     @property
     def status(self) -> GoalStatus:
-        """The status, as a message of its own."""
+        """The status, as a new message."""
         record = self.record
         return GoalStatus(goal_id=self.goal_id, status=int(record.status), text=record.text)
 
 
 class HandleTrackerDeleter:
-    """Gives a goal up when it is called: after five seconds the server lists it no more, and its
+    """Abandons a goal when it is called: after five seconds the server no longer lists it, and its
     client learns that it is LOST.
 
     Args:
@@ -64,5 +64,5 @@ class HandleTrackerDeleter:
         self.status_tracker = status_tracker
 
     def __call__(self, _reference: object = None) -> None:
-        """Give the goal up. Also usable as the callback of a `weakref.ref`."""
+        """Abandon the goal. Also usable as the callback of a `weakref.ref`."""
         self.action_server.keeper.release(self.status_tracker.record)

@@ -13,7 +13,7 @@
     with dock.start() as running:
         running.wait()
 
-The function can still be called as it is, which is how to test it.
+The function can still be called directly, which is how to test it.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ F = TypeVar("F")
 
 
 class GoalEnd(Exception):  # noqa: N818  an end is not always an error
-    """Ends the goal that is being executed; raise one of the three kinds.
+    """Ends the goal that is being executed; raise one of the three subclasses.
 
     Attributes:
-        text: Why, for people; the client sees it.
-        result: The result to send; None sends one with default values.
+        text: The reason, which the client sees.
+        result: The result to send; None: one with default values.
     """
 
     def __init__(self, text: str = "", result: Any = None) -> None:
@@ -57,17 +57,18 @@ class Abort(GoalEnd):
 
 
 class Preempted(GoalEnd):
-    """The goal was stopped as asked: PREEMPTED."""
+    """The goal was stopped on request: PREEMPTED."""
 
 
 class Reject(GoalEnd):
-    """The goal is refused: REJECTED; ABORTED when the context was used before."""
+    """The goal is refused: REJECTED, or ABORTED once the context was used."""
 
 
 class GoalContext(Generic[F]):
-    """What the function of `server` has besides the goal.
+    """The second argument of a `server` function: feedback and preempts of its goal.
 
     The goal is accepted when the function first uses the context, at the latest when it returns.
+    Until then the function can still reject it.
 
     Attributes:
         goal_id: The goal's id.
@@ -79,7 +80,7 @@ class GoalContext(Generic[F]):
         self.goal_id: str = handle.record.id
 
     def accept(self, text: str = TEXT_ACCEPTED) -> None:
-        """Accept the goal, if that has not happened: from now on it cannot be rejected."""
+        """Accept the goal unless it is accepted already; then it can no longer be rejected."""
         if self._handle.record.status in {Status.PENDING, Status.RECALLING}:
             self._handle.set_accepted(text)
 
@@ -108,7 +109,7 @@ class GoalContext(Generic[F]):
         return self._runner.wait_preempt(timeout)
 
     def sleep(self, seconds: float) -> bool:
-        """Let time pass, less of it when the goal is asked to stop.
+        """Sleep, but wake up when the goal is asked to stop.
 
         Returns:
             Whether the sleep ended early because of that.
@@ -119,7 +120,7 @@ class GoalContext(Generic[F]):
 
 
 class _Runner(SimpleActionServer):
-    """A simple action server that accepts goals when their function says so."""
+    """A simple action server whose goals are accepted by their function (`GoalContext.accept`)."""
 
     _accepts = False
 
@@ -204,8 +205,8 @@ class GoalServer(Generic[G, R, F]):
         """Offer the action.
 
         Args:
-            name: Another name than that of the decorator.
-            node: Where; the current node when None.
+            name: The action's name; None: the decorator's.
+            node: The server's node; None: the current node.
 
         Raises:
             ServerConflictError: the name has a server already.
@@ -232,7 +233,7 @@ def server(
     policy: Policy = "preempt",
     on_client_lost: OnClientLost = "continue",
 ) -> Callable[[Callable[[G, GoalContext[F]], R]], GoalServer[G, R, F]]:
-    """Make an action server of a function `execute(goal, ctx) -> result`.
+    """Turn a function `execute(goal, ctx) -> result` into an action server.
 
     The function returns the result (SUCCEEDED) or raises `Abort`, `Preempted` or `Reject`; any
     other exception aborts the goal with its text.
@@ -240,11 +241,11 @@ def server(
     Args:
         name: The action's name.
         ActionSpec: The action class (XAction).
-        policy: What a new goal does while one runs; see `SimpleActionServer`.
+        policy: The effect of a new goal while one runs; see `SimpleActionServer`.
         on_client_lost: What happens to the goal of a client that died; see `SimpleActionServer`.
 
     Returns:
-        Makes a `GoalServer` of the function; `start` it.
+        A decorator, which returns a `GoalServer`; `start` it.
     """
 
     def decorate(function: Callable[[G, GoalContext[F]], R]) -> GoalServer[G, R, F]:

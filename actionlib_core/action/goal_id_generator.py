@@ -1,4 +1,4 @@
-"""ROS 1's name for where goal ids are made."""
+"""ROS 1's module name for `GoalIDGenerator`."""
 
 from actionlib_core.action.client import GoalIDGenerator
 

@@ -1,4 +1,4 @@
-"""One goal as a `with` block: its feedback as a loop, its result as a value, plain or async.
+"""One goal as a `with` block: its feedback as a loop, its result as a value; also with `async`.
 
     with client.send(goal, timeout=60) as handle:
         for feedback in handle.feedback():
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from actionlib_core._arguments import check_delay
 from actionlib_core.exceptions import GoalFailedError, GoalTimeoutError
-from actionlib_core.goal.states import CommState, Status
+from actionlib_core.goal.states import OVER, Status
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Generator, Iterator
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from typing import Self
 
     from actionlib_core.action.client import ClientGoalHandle
+    from actionlib_core.goal.states import CommState
 
 R = TypeVar("R")
 F = TypeVar("F")
@@ -32,14 +33,14 @@ CANCEL_GRACE_S = 5.0
 
 
 class SentGoal(Generic[R, F]):
-    """A goal that was sent, or attached to. Made by `ActionClient.send` and `ActionClient.follow`.
+    """A goal that is followed. Made by `ActionClient.send` and `ActionClient.follow`.
 
     Args:
         handle: The goal.
-        timeout: Longest time to the end of the goal, from now [s]; None sets no limit.
+        timeout: Longest time to the end of the goal, from now [s]; None: no limit.
 
-    Threads: every method may be called from any thread and any callback; feedback goes to whoever
-        asks first.
+    Threads: every method may be called from any thread and any callback. Each feedback message goes
+        to one reader only, the first that asks.
     """
 
     def __init__(self, handle: ClientGoalHandle, timeout: float | None) -> None:
@@ -49,18 +50,18 @@ class SentGoal(Generic[R, F]):
         self._timeout = timeout
         self._deadline = None if timeout is None else self._clock.now() + timeout
         self._changed = self._clock.event(f"news of a goal of {self._name}")
-        # Without a lock, which a signal handler that cancels might find held: list operations are
-        # atomic.
+        # No lock: a signal handler that cancels the goal may have interrupted the thread that holds
+        # it. Appending to a list, removing from it and copying it are atomic.
         self._wakers: list[Callable[[], object]] = []
         handle.on_state = self._note_state
-        handle.on_feedback = self._tell
+        handle.on_feedback = self._notify
 
     def _note_state(self, state: CommState) -> None:
-        if state in {CommState.DONE, CommState.LOST}:
+        if state in OVER:
             self._handle.settle()
-        self._tell()
+        self._notify()
 
-    def _tell(self) -> None:
+    def _notify(self) -> None:
         self._changed.set()
         for wake in tuple(self._wakers):
             wake()
@@ -69,17 +70,17 @@ class SentGoal(Generic[R, F]):
 
     @property
     def id(self) -> str:
-        """The goal's id; `ActionClient.follow` takes it, also in a later life of the program."""
+        """The goal's id, for `ActionClient.follow`, also after a restart of the program."""
         return self._handle.goal.id
 
     @property
     def status(self) -> Status:
-        """The last status the server gave; LOST once the goal is lost."""
+        """The last status from the server; LOST once the goal is lost."""
         return self._handle.goal.status
 
     @property
     def text(self) -> str:
-        """What the server said about the status, or why the goal is lost."""
+        """The text of the last status, or why the goal is lost."""
         return self._handle.goal.text
 
     @property
@@ -89,12 +90,12 @@ class SentGoal(Generic[R, F]):
 
     @property
     def accepted(self) -> bool:
-        """Whether the server has accepted the goal, now or before."""
+        """Whether the server has accepted the goal, also when it has ended since."""
         return self._handle.goal.begun
 
     @property
     def dropped_feedback(self) -> int:
-        """How many feedback messages were dropped because too many waited."""
+        """Number of feedback messages dropped because too many waited."""
         return self._handle.dropped_feedback
 
     def get_result(self) -> R | None:
@@ -103,23 +104,23 @@ class SentGoal(Generic[R, F]):
         return result  # type: ignore[no-any-return]
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait for the goal's end and leave it at that; return whether it has come.
+        """Wait for the goal's end without cancelling it; return whether it has ended.
 
         Blocks: until then, `timeout` [s] at most; None: no limit.
         """
         return self._handle.wait_settled(check_delay(f"goal {self.id}", "timeout", timeout))
 
     def cancel(self) -> None:
-        """Ask for the goal's end; it ends when the server says so."""
+        """Ask the server to cancel the goal, which ends with the server's answer."""
         self._handle.cancel()
 
-    # -- plain ---------------------------------------------------------------------------------
+    # -- without async -------------------------------------------------------------------------
 
     def feedback(self) -> FeedbackStream[F]:
-        """Return the feedback, to loop over with `for` or `async for`, until the goal is over.
+        """Return the feedback until the goal's end, for a loop with `for` or `async for`.
 
-        What a loop has taken, another one does not see. Up to 100,000 messages of 32 MiB together
-        wait for the loop; beyond that the oldest are dropped, which the log tells, and counted.
+        Each message goes to one loop only. Up to 100,000 messages of together 32 MiB wait for it;
+        beyond that the oldest are dropped, logged and counted.
         """
         return FeedbackStream(self)
 
@@ -127,14 +128,14 @@ class SentGoal(Generic[R, F]):
         """Wait for the end and return the result.
 
         Args:
-            timeout: Longest wait [s] beside that of `send`; past either, the goal is cancelled.
+            timeout: Longest wait [s], besides that of `send`; after either, the goal is cancelled.
 
         Raises:
-            GoalTimeoutError: the time was over.
-            InvalidDurationError: `timeout` is no time.
-            GoalFailedError: the goal ended otherwise than SUCCEEDED.
+            GoalTimeoutError: one of the two timeouts has passed.
+            InvalidDurationError: `timeout` is not a duration.
+            GoalFailedError: the goal's end was not SUCCEEDED.
 
-        Blocks: until the goal is over; after a timeout 5 s more for the answer to the cancel.
+        Blocks: until the goal is over; after a timeout, 5 s more for the answer to the cancel.
         """
         timeout = check_delay(f"goal {self.id}", "timeout", timeout)
         if not self._wait(timeout):
@@ -144,18 +145,19 @@ class SentGoal(Generic[R, F]):
         return self._outcome()
 
     def news(self) -> Iterator[F | None]:
-        """Return what happens, to loop over: feedback, and None at each new state.
+        """Yield each feedback message, and None at each new state.
 
         Raises:
-            GoalTimeoutError: while looping; the time of `send` was over, the goal is cancelled.
+            GoalTimeoutError: while looping; the timeout of `send` has passed, the goal is
+                cancelled.
 
         Blocks: while looping, until there is something new or the goal is over.
         """
         while True:
             self._changed.clear()
-            over = self.over  # looked at first: what came before the end is then here
+            over = self.over  # read before the feedback: all that came before the end is then there
             if over:
-                self._changed.set()  # for those who wait in another thread
+                self._changed.set()  # stays set, for readers in other threads
             while (feedback := self._take()) is not None:
                 yield feedback
             yield None
@@ -167,20 +169,22 @@ class SentGoal(Generic[R, F]):
                 raise self._late(None)
 
     def next_feedback(self) -> F | None:
-        """Wait for feedback and take it; None once the goal is over and all was taken.
+        """Wait for feedback and return it; None once the goal is over and all was taken.
 
         Raises:
-            GoalTimeoutError: the time of `send` was over; the goal is cancelled.
+            GoalTimeoutError: the timeout of `send` has passed; the goal is cancelled.
 
         Blocks: until then.
         """
         taken = next((item for item in self.news() if item is not None), None)
         if self._handle.feedback:
-            self._changed.set()  # the rest is for another thread, should this one not come again
+            # `news` above was left with feedback waiting, whose signal it has cleared: another
+            # thread may be the one that takes it.
+            self._changed.set()
         return taken
 
     def _take(self) -> F | None:
-        """Take feedback, None when there is none; another thread may take it first."""
+        """Return the next feedback, None when there is none; another thread may take it first."""
         feedback: F | None = self._handle.take_feedback()
         return feedback
 
@@ -242,14 +246,14 @@ class SentGoal(Generic[R, F]):
         return self._outcome()
 
     async def next_feedback_async(self) -> F | None:
-        """Wait for feedback and take it; as `next_feedback`."""
+        """Wait for feedback and return it; as `next_feedback`."""
         if not await self._wait_async(lambda: self._handle.feedback or self.over, self._left(None)):
             self.cancel()
             raise self._late(None)
         return self._take()
 
     async def _wait_async(self, condition: Callable[[], object], limit: float | None) -> bool:
-        import asyncio  # programs without it start faster
+        import asyncio  # here, as it slows down the start of programs that do not use it
 
         loop = asyncio.get_running_loop()
         changed = asyncio.Event()
@@ -261,7 +265,7 @@ class SentGoal(Generic[R, F]):
         self._wakers.append(wake)
         try:
             async with asyncio.timeout(limit):
-                while not condition():  # looked at after `wake` is there: nothing is missed
+                while not condition():  # after `wake` was registered: no change is missed
                     await changed.wait()
                     changed.clear()
         except TimeoutError:

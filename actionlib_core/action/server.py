@@ -1,9 +1,11 @@
 """`ActionServer`: any number of goals at once, each accepted, refused and ended by your code.
 
-Three objects hold a goal at its server: `ServerGoal` is its place in the life cycle, about which
-`ServerGoals` decides (`actionlib_core.goal.server`), the `ServerGoalHandle` around it is what
-programs hold, and the server's `GoalKeeper` brings decisions, network and time together, under one
-lock.
+Three objects belong to a goal at its server. `ServerGoal` is its record, about which `ServerGoals`
+decides (`actionlib_core.goal.server`), `ServerGoalHandle` is the program's view of it, and
+`GoalKeeper`, one per server, connects the decisions with the network and the clock, under one lock.
+
+The lock is held neither while user code runs nor while messages are sent: both may block, or lead
+back into the server.
 """
 
 from __future__ import annotations
@@ -50,13 +52,13 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-DRAIN_S = 0.7  # how long `stop` waits for acknowledgements; less as one of many on a node
-FAREWELL_S = 0.1  # it says farewell again after so long
+DRAIN_S = 0.7  # longest wait of `stop` for acknowledgements; less when a whole node closes
+FAREWELL_S = 0.1  # interval of its farewells meanwhile, as each of them may get lost
 
-PERIOD_S = 1.0  # the status list is sent so often while goals are tracked
-GAP_S = 0.02  # changes that follow each other faster share a list
-SHORT = 8  # goals; a longer list is not sent before its time
-GAP_PER_GOAL_S = 100e-6  # a long list is sent less often
+PERIOD_S = 1.0  # interval of the status lists while goals are listed
+GAP_S = 0.02  # shortest interval of lists: changes within it share one
+SHORT = 8  # goals; `hurry` sends only lists up to this length
+GAP_PER_GOAL_S = 100e-6  # added to `GAP_S` per tracked goal: long lists are sent less often
 
 TEXT_STOPPED = "The action server was stopped"
 TEXT_CLIENT_LOST = "The client that sent this goal is gone"
@@ -69,18 +71,18 @@ OnRestart = Literal["abort", "resume"]
 
 @dataclass(slots=True, weakref_slot=True, eq=False, repr=False)
 class ServerGoalHandle:
-    """One goal of an `ActionServer`. Two handles are equal when they are of one goal.
+    """One goal of an `ActionServer`. Two handles are equal when they belong to the same goal.
 
     ROS's attribute `status_tracker` is the handle itself, with a tracker's `goal`, `goal_id` and
     `status`.
 
     Attributes:
         keeper: The server's goals.
-        record: The goal's place in the life cycle.
+        record: The goal's status and result.
         content: The goal message (XGoal).
-        begun: The goal callback has begun with it.
-        cancel_waits: It was asked to stop before that.
-        resumed: An earlier server, which was killed, had accepted it already.
+        begun: The goal callback has been called with it.
+        cancel_waits: A cancel came before that.
+        resumed: An earlier server, which was killed, had already accepted it.
 
     Threads: every method may be called from any thread and any callback.
     """
@@ -99,12 +101,12 @@ class ServerGoalHandle:
 
     @property
     def goal_id(self) -> GoalID:
-        """Id and stamp, as a message of its own."""
+        """Id and stamp, as a new message."""
         return GoalID(stamp=Time(0, self.record.stamp_ns), id=self.record.id)
 
     @property
     def status(self) -> GoalStatus:
-        """The status now, as a message of its own."""
+        """The present status, as a new message."""
         record = self.record
         return GoalStatus(goal_id=self.goal_id, status=int(record.status), text=record.text)
 
@@ -127,21 +129,21 @@ class ServerGoalHandle:
         self.keeper.step(self, "accept", "set_accepted()", text=text)
 
     def set_canceled(self, result: Any = None, text: str = "") -> None:
-        """End the goal as asked: RECALLED when it was never accepted, else PREEMPTED.
+        """End a cancelled goal: RECALLED if it was never accepted, else PREEMPTED.
 
         Args:
             result: The result message; None sends one with default values.
-            text: Why, for people.
+            text: The reason, for people.
 
         Raises:
             IllegalTransitionError: the goal has ended.
-            ActionException: `result` is not of the action's type, or `text` is not a string; the
-                goal goes on.
+            ActionException: `result` is not of the action's type, or `text` is not a string. The
+                goal's status does not change.
         """
         self.keeper.step(self, "cancel", "set_canceled()", result, text)
 
     def set_rejected(self, result: Any = None, text: str = "") -> None:
-        """Refuse the goal; arguments and errors as `set_canceled`, allowed before acceptance."""
+        """Refuse a goal that is not accepted yet; arguments and errors as `set_canceled`."""
         self.keeper.step(self, "reject", "set_rejected()", result, text)
 
     def set_aborted(self, result: Any = None, text: str = "") -> None:
@@ -153,7 +155,7 @@ class ServerGoalHandle:
         self.keeper.step(self, "succeed", "set_succeeded()", result, text)
 
     def set_cancel_requested(self) -> bool:
-        """Note that the goal is asked to stop; False when it has ended or was asked before."""
+        """Mark the goal as asked to stop; False when it has ended or was asked before."""
         return self.keeper.request_cancel(self)
 
     def publish_feedback(self, feedback: Any) -> None:
@@ -194,7 +196,7 @@ def nop_cb(goal_handle: ServerGoalHandle) -> None:
 
 
 def _past_entry(goal_id: str, status: Status) -> StatusEntry:
-    """Return what is said of a goal of which only its end is remembered, or nothing (LOST)."""
+    """Return the status entry of a goal that is no longer tracked; LOST: it is unknown."""
     text = (
         "The action server does not know this goal"
         if status is Status.LOST
@@ -204,15 +206,15 @@ def _past_entry(goal_id: str, status: Status) -> StatusEntry:
 
 
 class StatusPublisher:
-    """Sends the list of goals, and lets goals expire, with one timer that exists while needed.
+    """Sends the status list and lets goals expire, with one timer that exists only while needed.
 
-    The first change after a pause is sent at once; those that follow within `GAP_S` go together.
+    The first change after a pause is sent at once; changes that follow within `GAP_S` share a list.
 
     Args:
-        clock: Gives time and the timer.
+        clock: The server's clock.
         lock: The server's lock, which guards `goals`.
         goals: The server's goals.
-        port: The way to the network; used without the lock.
+        port: The server's connection to the network; used without the lock.
 
     Threads: any; the timer's calls come on the clock's thread.
     """
@@ -228,10 +230,10 @@ class StatusPublisher:
         self._lock = lock
         self._goals = goals
         self._port = port
-        self._published = clock.now() - PERIOD_S  # the last list
+        self._published = clock.now() - PERIOD_S  # when the last list was sent [s, clock]
         self._timer: Timer | None = None
-        self._due = 0.0  # when the timer runs
-        self._change_waits = False  # for the timer
+        self._due = 0.0  # when the timer runs [s, clock]
+        self._change_waits = False  # the timer is to send a list with a change
         self._closed = False
 
     def close(self) -> None:
@@ -250,8 +252,9 @@ class StatusPublisher:
         self._send(listed)
 
     def on_change(self) -> None:
-        """Note that a goal has changed: send the list now or soon."""
-        if self._change_waits:  # the list is made after this is reset, so this change is in it
+        """Send the list, now or soon, as a goal has changed."""
+        # Read without the lock: the list is made after this is reset, so it has this change.
+        if self._change_waits:
             return
         with self._lock:
             if not self.claim(self._clock.now()):
@@ -260,11 +263,11 @@ class StatusPublisher:
         self._send(listed)
 
     def claim(self, now: float, *, at_once: bool = False) -> bool:
-        """Note that a goal is about to change. Needs the lock, until the list is made.
+        """Prepare for a goal's change. The caller holds the lock until it has made the list.
 
         Returns:
-            Whether the caller is to send the list, `at_once` or as some time has passed since the
-            last one; else the timer sends it soon, or nobody does as the server has stopped.
+            Whether the caller is to send the list: `at_once`, or because the last one is old
+            enough. Otherwise the timer will send it, or nothing does as the server has stopped.
         """
         if self._closed:
             return False
@@ -285,11 +288,11 @@ class StatusPublisher:
         try:
             self._port.send_status(listed)
         except TransportError:
-            if not self._goals.closed:  # else the server stopped in between
+            if not self._goals.closed:  # else the server was stopped in the meantime
                 raise
 
     def hurry(self) -> None:
-        """Send a change that waits for others now, unless the list is long."""
+        """Send a waiting change now, unless the list is long."""
         if self._change_waits and len(self._goals.tracked) <= SHORT:
             self.publish()
 
@@ -309,7 +312,7 @@ class StatusPublisher:
             soonest = self._goals.expire(now)
             if not self._change_waits:
                 repeated = self._published + PERIOD_S
-                if now < repeated:  # the list was sent since the timer was set
+                if now < repeated:  # a list was sent after the timer was set
                     self._arm(repeated)
                     return
                 if not self._goals.listed():  # an empty list is not repeated
@@ -318,31 +321,31 @@ class StatusPublisher:
                     return
         try:
             self.publish()
-        except TransportError as error:  # the session was closed under the server
+        except TransportError as error:  # the program has closed the session, not the server
             self.close()
-            log.warning("%s Its status is sent no more.", error)
+            log.warning("%s Its status is no longer sent.", error)
 
 
 class GoalKeeper:
-    """The goals of one action server: what arrives is decided upon, sent and handed to its code.
+    """The goals of one action server: it connects their rules, the network and the server's code.
 
     Args:
-        node: On whose clock.
+        node: The server's node, whose clock counts.
         name: The action's full name.
         types: Its message classes.
-        port: The way to the network.
+        port: The server's connection to the network.
         on_client_lost: See `ActionServer`, also for `result_timeout` [s].
         deliver_goal: Called with the handle of each new goal, on the network's thread.
         deliver_cancel: Called with the handle of each goal that is asked to stop, likewise.
         on_stopped: Called when the server has stopped by itself.
-        durable: The file in which the goals are kept, None for nowhere.
+        durable: The file in which the goals are kept; None: only in memory.
         resumes: Goals that an earlier server had accepted are run again; else they are ABORTED.
 
     Attributes:
         lock: Guards the goals.
-        error: Why the server stopped by itself, None while all is well.
-        stopped: The server has left its name.
-        left: Set then.
+        error: Why the server has stopped by itself; None: it has not.
+        stopped: The server has withdrawn from the network.
+        left: Set after that.
 
     Threads: every method may be called from any thread.
     """
@@ -377,22 +380,22 @@ class GoalKeeper:
         self._deliver_goal = deliver_goal
         self._deliver_cancel = deliver_cancel
         self._on_stopped = on_stopped
-        self._drained: Event | None = None  # while it says farewell
+        self._drained: Event | None = None  # set when all clients have answered; made by `stop`
         self._durable = durable
         self._file: GoalFile | None = None
         self._resumes = resumes
 
-    # -- what an earlier server left -----------------------------------------------------------
+    # -- goals of an earlier server ------------------------------------------------------------
 
     def restore(self) -> list[ServerGoalHandle]:
-        """Take over the goals in the file; return those that `settle` is to deal with.
+        """Read the goals from the file; return those without an end, for `settle`.
 
         Raises:
             DurableGoalsError: it cannot be opened or read.
         """
         if self._durable is None:
             return []
-        from actionlib_core.action._durable import GoalFile
+        from actionlib_core.action._durable import GoalFile  # here: most servers need no SQLite
 
         self._file = GoalFile(self._durable, self.name, self.types)
         goals, past = self._file.load(self._clock.time_ns() / 1e9)
@@ -411,9 +414,10 @@ class GoalKeeper:
         return handles
 
     def settle(self, handles: list[ServerGoalHandle]) -> None:
-        """Run, or end, the goals that an earlier server did not end.
+        """Run or end the goals that an earlier server did not end.
 
-        One that was never accepted is as new. One that was asked to stop is not begun again.
+        A goal that was never accepted is treated as new. One that was asked to stop is not run
+        again.
         """
         for handle in handles:
             record = handle.record
@@ -423,24 +427,24 @@ class GoalKeeper:
                 self.give_up(handle, TEXT_RESTARTED)
             else:
                 with self.lock:
-                    record.status = Status.PENDING  # its server accepts it again
+                    record.status = Status.PENDING  # so that the server's code can accept it again
                 self._deliver_goal(handle)
         if handles:
             self.status.on_change()
 
     def close_file(self) -> None:
-        """Keep nothing more."""
+        """Close the file, if there is one."""
         file, self._file = self._file, None
         if file is not None:
             file.close()
 
     def _keep(self, record: ServerGoal) -> None:
-        """Write down how a goal stands, before anybody is told of it."""
+        """Write a goal's status to the file, which comes before any message about it."""
         file = self._file
         if file is not None:
             file.update(record, self._clock.time_ns() / 1e9)
 
-    # -- what the server's code does -----------------------------------------------------------
+    # -- calls of the server's code ------------------------------------------------------------
 
     def request_cancel(self, handle: ServerGoalHandle) -> bool:
         """Mark a goal as asked to stop; see `ServerGoalHandle.set_cancel_requested`."""
@@ -461,22 +465,22 @@ class GoalKeeper:
         *,
         wait: bool = True,
     ) -> None:
-        """Accept a goal or end it, and tell its client.
+        """Accept a goal or end it, and notify its client.
 
         Args:
             handle: The goal.
-            event: "accept", or one that ends it: see `server_life_cycle`.
+            event: "accept", or an event that ends it: see `server_life_cycle`.
             call: What the user called, for the error.
-            result: What a goal ends with; None sends one with default values.
-            text: Why, for people.
-            wait: For room on a link that is full; not on the network's thread, which others need.
+            result: The result of a goal that ends; None: one with default values.
+            text: The reason, for people.
+            wait: Whether to wait while a link is full; False on the network's thread.
 
         Raises:
-            IllegalTransitionError: the goal's state does not allow it.
-            ActionException: `result` is not of the action's type, or `text` is no text.
+            IllegalTransitionError: the goal's status does not allow it.
+            ActionException: `result` is not of the action's type, or `text` is not a string.
             FieldError: a field of `result` has a wrong type.
         """
-        # Whatever can fail comes first: a goal that has ended must have a result.
+        # First everything that can fail: a goal that has ended must have a result.
         if not (isinstance(text, str) and text.isascii()):
             text = self._as_text(text, call)
         body = None
@@ -492,7 +496,8 @@ class GoalKeeper:
             try:
                 entry = self.goals.step(record, event, call, now, text)
             except IllegalTransitionError:
-                self.status.on_change()  # the change whose list was claimed here still waits
+                # `claim` may have taken over another change's list, which must still be sent.
+                self.status.on_change()
                 raise
             if body is not None:
                 record.result = body
@@ -502,7 +507,8 @@ class GoalKeeper:
             self._keep(record)
         if stopped:
             return
-        # The result goes before the list, from which a client without it learns that it misses one.
+        # The result is sent before the list: a client that reads of an end without having its
+        # result queries the server for it.
         if body is not None:
             self.port.send_result(entry, body, wait=wait)
         elif self.port.send_accepted is not None:
@@ -511,36 +517,36 @@ class GoalKeeper:
             self.port.send_status(listed)
 
     def give_up(self, handle: ServerGoalHandle, text: str) -> None:
-        """End a goal that its code has left without an end; one that has ended stays."""
+        """Abort or reject a goal, if its code has not ended it."""
         status = handle.record.status
         if status not in TERMINAL:
             event = "abort" if status in {Status.ACTIVE, Status.PREEMPTING} else "reject"
             try:
                 self.step(handle, event, "the end of its callback", None, text)
             except IllegalTransitionError:
-                return  # another thread has just ended it
+                return  # another thread has ended it in the meantime
             except TransportError:
-                if not self.goals.closed:  # else the server stops after its session was closed
+                if not self.goals.closed:  # else the server is stopping, its session closed before
                     raise
 
     def release(self, record: ServerGoal) -> None:
-        """Give up a goal that nobody will end; its client learns that it is LOST."""
+        """Abandon a goal that no code will end; its client learns that it is LOST."""
         with self.lock:
             self.goals.release(record, self._clock.now())
         self.status.on_change()
 
     def send_result(self, entry: StatusEntry, result: Any) -> None:
-        """Send a result under any status; errors as `finish`."""
+        """Send a result under any status; errors as `step`."""
         message = self._checked(result, self.types.result, "publish_result()")
         self.port.send_result(entry, self.port.pack_result(message))
 
     def send_feedback(self, entry: StatusEntry, feedback: Any) -> None:
-        """Send feedback for a goal; errors as `finish`."""
+        """Send feedback for a goal; errors as `step`."""
         message = self._checked(feedback, self.types.feedback, "publish_feedback()")
         self.port.send_feedback(entry, self.port.pack_feedback(message))
 
     def _checked(self, message: Any, expected: Any, call: str) -> Any:
-        """Return a message of the type expected, one with default values for None."""
+        """Return `message` if it has the expected type; for None, one with default values."""
         if message is None:
             return expected()
         if not isinstance(message, expected):
@@ -551,7 +557,7 @@ class GoalKeeper:
         return message
 
     def _as_text(self, text: Any, call: str) -> str:
-        """Return `text` as it can be sent; characters that UTF-8 does not have are escaped."""
+        """Return a text that can be sent: characters that UTF-8 cannot encode are escaped."""
         if not isinstance(text, str):
             raise ActionException(
                 f"action '{self.name}': {call}: text: got {text!r}; expected a string. "
@@ -562,19 +568,19 @@ class GoalKeeper:
     # -- the end -------------------------------------------------------------------------------
 
     def close_to_goals(self) -> None:
-        """Take no more goals: what comes from now on is for the next server."""
+        """Take no more goals: those that come from now on are left to the next server."""
         with self.lock:
             self.goals.close()
 
     def stop(self) -> None:
-        """End all goals, tell the clients, and leave the name; see `ActionServer.stop`.
+        """End all goals, notify the clients, and withdraw; see `ActionServer.stop`.
 
-        Blocks: until the clients have heard all that, `DRAIN_S` at most.
+        Blocks: until the clients have acknowledged that, `DRAIN_S` at most.
         """
         with self.lock:
             self.goals.close()
             running = [goal for goal in self.goals.listed() if goal.status not in TERMINAL]
-        try:  # without the lock: results wait for room on a full link
+        try:  # without the lock: sending a result blocks while a link is full
             for goal in running:
                 if isinstance(goal.tag, ServerGoalHandle):
                     self.give_up(goal.tag, TEXT_STOPPED)
@@ -583,9 +589,10 @@ class GoalKeeper:
             self.leave()
 
     def _say_farewell(self) -> None:
-        """Name the goals that were ever taken, so that clients know which were not.
+        """Send the list of all goals ever taken: clients send any other goal to the next server.
 
-        Stays until they have that and the results: the end of the token may overtake them.
+        Waits for the clients' acknowledgements, since the end of the server's token could overtake
+        this list and the results.
         """
         with self.lock:
             drained = self._drained = self._clock.event("clients that take their results")
@@ -594,7 +601,7 @@ class GoalKeeper:
                 for goal_id, status, goal in self.goals.taken()
             ]
         until = self._clock.now() + self.node.time_to_leave(DRAIN_S)
-        with contextlib.suppress(TransportError):  # the session is closed: nobody can be told
+        with contextlib.suppress(TransportError):  # the session is closed: nothing can be sent
             listened = self.port.begin_farewell()
             while listened:
                 self.port.send_farewell(taken)
@@ -609,7 +616,7 @@ class GoalKeeper:
             return self.port.is_farewell_heard() and not self.goals.has_unacknowledged()
 
     def leave(self) -> None:
-        """Leave the name at once."""
+        """Withdraw from the network at once."""
         with self.lock:
             self.stopped = True
             self.status.close()
@@ -617,18 +624,18 @@ class GoalKeeper:
             self.port.close()
         finally:
             self.close_file()
-            self.left.set()  # last: who waits may start the next server, with the same file
+            self.left.set()  # last: then the program may start the next server on the same file
 
-    # -- what arrives (on the network's thread) ------------------------------------------------
+    # -- messages (on the network's thread) ----------------------------------------------------
 
     def on_goal(self, goal_id: str, stamp_ns: int, content: Any, client: str) -> bool:
-        """Handle a goal: a new one goes to the server's code, of a known one is said what is known.
+        """Handle a goal: deliver a new one, answer a repetition with its status or result.
 
         Returns whether it is new and has been taken.
 
-        Nothing here waits for a link that is full: a client that misses the answer asks again.
+        Nothing here waits while a link is full: a client that misses the answer asks again.
         """
-        if not goal_id:
+        if not goal_id:  # as in ROS: a goal of a program that only publishes messages
             from actionlib_core.action.client import GoalIDGenerator
 
             ids = GoalIDGenerator(f"/{self.node.full_name}", clock=self._clock)
@@ -640,7 +647,7 @@ class GoalKeeper:
             arrival, known = self.goals.on_goal(record, self._clock.now())
             if arrival is Arrival.LATE:
                 return False
-            # With the lock: a cancel that comes right behind it finds the handle.
+            # Under the lock, so that a cancel that follows at once finds the handle.
             handle = record.tag = ServerGoalHandle(self, record, content)
             if arrival is Arrival.RECALLED:
                 record.result = self.port.pack_result(self.types.result())
@@ -650,8 +657,8 @@ class GoalKeeper:
         if file is not None and arrival in {Arrival.NEW, Arrival.RECALLED}:
             unkept = file.add(record, content)
         if arrival is Arrival.NEW:
-            if unkept is not None:  # it could be run twice: better not at all
-                log.error("goal %s on '%s' cannot be kept: %s", goal_id, self.name, unkept)
+            if unkept is not None:  # after a restart it could run twice: rather reject it
+                log.error("goal %s on '%s' cannot be written: %s", goal_id, self.name, unkept)
                 self.step(handle, "reject", "its file", None, unkept, wait=False)
                 return True
             self._deliver_goal(handle)
@@ -664,15 +671,15 @@ class GoalKeeper:
         return False
 
     def on_cancel(self, goal_id: str, stamp_ns: int) -> list[StatusEntry]:
-        """Handle a cancel; return the goals that are now asked to stop."""
+        """Handle a cancel; return the goals that it asks to stop."""
         now_ns = self._clock.time_ns()
         with self.lock:
             asked = self.goals.on_cancel(goal_id, stamp_ns, self._clock.now(), now_ns)
             entries = [goal.entry() for goal in asked]
         if stamp_ns > now_ns + FUTURE_NS:
             log.warning(
-                "action '%s': a cancel of goals up to %.1f s in the future counts as one up to "
-                "now: a clock is wrong. Try setting the clocks of all computers by NTP.",
+                "action '%s': a cancel has a stamp %.1f s in the future and counts as sent now: "
+                "a clock is wrong. Try setting the clocks of all computers by NTP.",
                 self.name,
                 (stamp_ns - now_ns) / 1e9,
             )
@@ -706,9 +713,9 @@ class GoalKeeper:
             file.forget(goal_ids, self._clock.time_ns() / 1e9)
 
     def on_conflict(self, error: ServerConflictError) -> None:
-        """Leave the name to the older server."""
+        """Stop, because an older server has the name."""
         with self.lock:
-            if self.error is not None or self.stopped:  # each other token may tell of it
+            if self.error is not None or self.stopped:  # several tokens may report the conflict
                 return
             self.error = error
             self.goals.close()
@@ -730,7 +737,7 @@ class GoalKeeper:
             return goal.entry(), goal.result if isinstance(goal.result, bytes) else None
 
     def find_goal(self, goal_id: str) -> tuple[int, Any] | None:
-        """Return stamp [ns] and message of a goal; None when it is not known any more."""
+        """Return stamp [ns] and message of a goal; None when it is no longer tracked."""
         with self.lock:
             goal = self.goals.find(goal_id)
         if goal is None or not isinstance(goal.tag, ServerGoalHandle):
@@ -744,36 +751,36 @@ class ActionServer:
     Args:
         ns: The action's name.
         ActionSpec: The action class (XAction).
-        goal_cb: Called with the handle of each new goal; it or later code accepts or rejects it.
+        goal_cb: Called with the handle of each new goal, which it or later code accepts or rejects.
         cancel_cb: Called with the handle of each goal that is asked to stop.
         auto_start: Start at once. With False, call `start` when everything is ready.
-        node: Where; the current node when None.
+        node: The server's node; None: the current node.
         on_client_lost: What happens to the goals of a client that died: "continue" as in ROS, or
             "cancel", as if the client had cancelled them.
         result_timeout: How long a result waits for a client that lost its link [s]; 0 or more.
-        direct: The callbacks take no time and may be called on the network's thread.
-        on_stopped: Called when the server has stopped by itself; must take no time either.
+        direct: The callbacks return at once and may be called on the network's thread.
+        on_stopped: Called when the server has stopped by itself; must return at once too.
         durable: A file in which goals and results survive the end of the process; servers may share
             one. None: they are in memory only.
-        on_restart: With `durable`, what becomes of a goal that was accepted when the process was
-            killed: "abort" ends it ABORTED, with the reason; "resume" calls `goal_cb` again, whose
-            handle is `resumed`. A goal that was not yet accepted is as new with both.
+        on_restart: With `durable`, what happens to a goal that was accepted when the process was
+            killed: "abort" ends it ABORTED, with the reason; "resume" calls `goal_cb` again, with a
+            handle that is `resumed`. A goal that was not yet accepted is always treated as new.
 
     Attributes:
-        lock: Guards the server's data. Holding it keeps goals as they are; never wait with it.
+        lock: Guards the server's data. While it is held, no goal changes; do not block with it.
         keeper: The server's goals.
 
     Raises:
         ActionException: `ActionSpec` is not an action class.
-        ActionlibError: a callback is no function, or `result_timeout` no length of time.
+        ActionlibError: a callback is not a function, or `result_timeout` is not a duration.
         InvalidNameError: the name breaks the ROS rules.
         DurableGoalsError: the file cannot be used (from `start`).
         ServerConflictError: the name has a server already (from `start`).
         TransportError: the network session is closed.
 
     Threads: callbacks run one at a time, in order, on a thread of their own, without any lock. A
-        cancel callback waits 20 ms at most for callbacks that do not return, but not before the
-        goal callback of its goal has begun; then it runs beside them, in another thread.
+        cancel callback waits 20 ms at most for other callbacks to return, then it runs beside them,
+        in another thread; it never starts before the goal callback of its goal.
     """
 
     def __init__(
@@ -838,7 +845,7 @@ class ActionServer:
             TransportError: the network session is closed.
             ActionException: the server was stopped.
 
-        Blocks: until the network has said who has the name, 1 s at most.
+        Blocks: until the network has answered who has the name, 1 s at most.
         """
         with self.lock:
             if self.keeper.stopped:
@@ -865,16 +872,16 @@ class ActionServer:
         except BaseException:
             self.keeper.close_file()
             raise
-        self.keeper.settle(kept)  # behind `open`: what it says is heard
+        self.keeper.settle(kept)  # after `open`, without which clients would not get its messages
 
     def stop(self) -> None:
-        """End all goals (ABORTED, or REJECTED when not yet accepted) and leave the name.
+        """End all goals (ABORTED, or REJECTED when not yet accepted) and withdraw.
 
-        Clients see the result of each goal, then the server's absence; what they sent too late goes
-        to the next server. A second call does nothing, nor does one before `start`. A server that
-        was stopped is not started again.
+        Clients receive the result of each goal, then the server's absence; goals that came too late
+        are sent to the next server. A second call does nothing, nor does one before `start`. A
+        stopped server cannot be started again.
 
-        Blocks: until the clients have heard all that, 0.7 s at most.
+        Blocks: until the clients have acknowledged that, 0.7 s at most.
         """
         with self.lock:
             if self.keeper.stopped or not self._started:
@@ -903,12 +910,12 @@ class ActionServer:
 
     @property
     def error(self) -> ServerConflictError | None:
-        """Why the server stopped by itself, None while all is well."""
+        """Why the server has stopped by itself; None: it has not."""
         return self.keeper.error
 
     @property
     def stopped(self) -> bool:
-        """Whether the server has left its name."""
+        """Whether the server has withdrawn from the network."""
         return self.keeper.stopped
 
     @property
@@ -938,25 +945,25 @@ class ActionServer:
 
     @property
     def status_list(self) -> list[ServerGoalHandle]:
-        """The goals that the status list names now."""
+        """The goals in the present status list."""
         with self.lock:
             tags = [goal.tag for goal in self.keeper.goals.listed()]
         return [tag for tag in tags if isinstance(tag, ServerGoalHandle)]
 
     def register_goal_callback(self, cb: Callable[[ServerGoalHandle], object] | None) -> None:
-        """Replace the goal callback; None takes it away."""
+        """Replace the goal callback; None removes it."""
         check_function(f"action '{self.ns}'", "cb", cb)
         self.goal_callback = cb if cb is not None else nop_cb
 
     def register_cancel_callback(
         self, cancel_cb: Callable[[ServerGoalHandle], object] | None
     ) -> None:
-        """Replace the cancel callback; None takes it away."""
+        """Replace the cancel callback; None removes it."""
         check_function(f"action '{self.ns}'", "cancel_cb", cancel_cb)
         self.cancel_callback = cancel_cb if cancel_cb is not None else nop_cb
 
     def publish_result(self, status: GoalStatus, result: Any) -> None:
-        """Send a result under any status. Handles do it for you.
+        """Send a result under any status. Usually a handle does this.
 
         Raises:
             FieldError: `result` does not fit the action.
@@ -964,7 +971,7 @@ class ActionServer:
         self.keeper.send_result(_entry_of(status), result)
 
     def publish_feedback(self, status: GoalStatus, feedback: Any) -> None:
-        """Send feedback for the goal that `status` names.
+        """Send feedback for the goal in `status`.
 
         Raises:
             FieldError: `feedback` does not fit the action.
@@ -982,7 +989,7 @@ class ActionServer:
     # -- callbacks -----------------------------------------------------------------------------
 
     def _note_stopped(self) -> None:
-        """Note that another server has the name."""
+        """Unregister from the node and notify the owner: the server has stopped by itself."""
         if self._forget is not None:
             self._forget()
         if self._on_stopped is not None:
@@ -993,8 +1000,9 @@ class ActionServer:
         self.keeper.status.on_change()
 
     def _run_goal_callback(self, handle: ServerGoalHandle) -> None:
-        """Give a goal to the user's code; one that it raises on is ended, not forgotten."""
-        with self.lock:  # a cancel either came before and waits, or is delivered by itself
+        """Call the goal callback; if it raises, end the goal, which would otherwise stay."""
+        # Under the lock: a cancel came before this and waits, or will be delivered on its own.
+        with self.lock:
             handle.begun = True
             cancelled = handle.cancel_waits
         if cancelled:
@@ -1007,7 +1015,7 @@ class ActionServer:
             raise
 
     def _deliver_cancel(self, handle: ServerGoalHandle) -> None:
-        """Tell the user's code of a cancel, once it has been told of the goal."""
+        """Queue the cancel callback, at once or when the goal callback starts."""
         with self.lock:
             if not handle.begun:
                 handle.cancel_waits = True
@@ -1015,12 +1023,12 @@ class ActionServer:
         self.callback_queue.call_urgently(self._run_cancel_callback, handle)
 
     def _run_cancel_callback(self, handle: ServerGoalHandle) -> None:
-        """Tell the user's code of a cancel, unless the goal has ended since."""
+        """Call the cancel callback, unless the goal has ended in the meantime."""
         if handle.record.status not in TERMINAL:
             self.cancel_callback(handle)
 
 
 def _entry_of(status: GoalStatus) -> StatusEntry:
-    """Return what a status message says."""
+    """Return a status message as an entry of the status list."""
     goal_id = status.goal_id
     return StatusEntry(goal_id.id, goal_id.stamp.to_nsec(), status.status, status.text)

@@ -1,4 +1,4 @@
-"""`SimpleActionClient`: one goal at a time, three states."""
+"""`SimpleActionClient`: one goal at a time, seen in three states."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from actionlib_core._arguments import check_functions, check_limit, check_wait
 from actionlib_core.action.client import ActionClient
 from actionlib_core.goal.client import STATUS_LIST_TIMEOUT_S
-from actionlib_core.goal.states import CommState, SimpleGoalState, Status
+from actionlib_core.goal.states import OVER, STARTED, CommState, SimpleGoalState, Status
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,8 +24,6 @@ __all__ = ["SimpleActionClient", "SimpleGoalState"]
 A = TypeVar("A")
 log = logging.getLogger(__name__)
 
-_RUNNING = frozenset({CommState.ACTIVE, CommState.PREEMPTING})
-_OVER = frozenset({CommState.DONE, CommState.LOST})
 _SHOWN = {
     CommState.WAITING_FOR_GOAL_ACK: Status.PENDING,
     CommState.PENDING: Status.PENDING,
@@ -41,9 +39,9 @@ class SimpleActionClient(Generic[A]):
     Args:
         ns: The action's name.
         ActionSpec: The action class (XAction).
-        node: Where; the current node when None.
+        node: The client's node; None: the current node.
         server_lost_timeout: How long the server may be away before the goal is LOST [s].
-        status_list_timeout: How long a server that shows no token may be silent; see
+        status_list_timeout: How long a server without a token may be silent [s]; see
             `ActionClient`.
 
     Attributes:
@@ -51,7 +49,7 @@ class SimpleActionClient(Generic[A]):
 
     Raises:
         ActionException: `ActionSpec` is not an action class.
-        ActionlibError: one of the timeouts is no time, negative or without end.
+        ActionlibError: one of the timeouts is not a duration, negative or infinite.
         InvalidNameError: the name breaks the ROS rules.
         TransportError: the network session is closed.
 
@@ -77,7 +75,7 @@ class SimpleActionClient(Generic[A]):
             status_list_timeout=status_list_timeout,
         )
         self._handle: ClientGoalHandle | None = None
-        self._condition: threading.Condition | None = None
+        self._condition: threading.Condition | None = None  # made when a program asks for it
 
     # -- actionlib's attributes ----------------------------------------------------------------
 
@@ -102,7 +100,9 @@ class SimpleActionClient(Generic[A]):
             self._condition = threading.Condition()
             handle = self._handle
             if handle is not None and handle.on_state is None:
-                with handle.manager.lock:  # the goal was sent without: it may be ending just now
+                # The goal was sent when there was no condition to notify. It may be ending now, so
+                # this is decided under the lock.
+                with handle.manager.lock:
                     if not (handle.goal.over or handle.settled):
                         handle.calls_back = True
                         handle.on_state = self._make_on_state(handle)
@@ -118,7 +118,7 @@ class SimpleActionClient(Generic[A]):
 
         Returns:
             Whether there is one; False also when the client was stopped or, without a limit, when
-            the program is to end (`actionlib_core.shutdown`).
+            shutdown is requested (`actionlib_core.shutdown`).
 
         Raises:
             TypeMismatchError: there is one, but of another type.
@@ -128,10 +128,10 @@ class SimpleActionClient(Generic[A]):
         return self.action_client.wait_for_server(timeout)
 
     def stop(self) -> None:
-        """Leave the name. A goal that runs goes on at the server; here it is LOST.
+        """Withdraw from the network. A running goal goes on at the server; here it is LOST.
 
-        A server with `on_client_lost="cancel"` cancels it, unless another client of the action is
-        left in this session.
+        A server with `on_client_lost="cancel"` cancels it, unless this session has another client
+        of the action.
         """
         self.action_client.stop()
 
@@ -146,23 +146,25 @@ class SimpleActionClient(Generic[A]):
         *,
         ack_timeout: float | Duration | None = None,
     ) -> None:
-        """Send a goal; the former one is followed no more (if no error is raised), not cancelled.
+        """Send a goal; the previous goal is no longer followed, but is not cancelled.
+
+        If this raises an error, the previous goal is still followed.
 
         Args:
             goal: The goal message (XGoal).
             done_cb: Called with the terminal status (`GoalStatus`) and the result message; the
                 result is None when the goal is LOST. It may send the next goal.
             active_cb: Called when the goal starts to run.
-            feedback_cb: Called with each XFeedback message. When it is slower than they come, up to
-                100,000 messages of 32 MiB together wait and then the oldest are dropped. Once the
-                goal is over, a call that takes longer than 0.5 s is the last one. What was dropped
-                is logged and counted in `dropped_feedback`.
-            ack_timeout: When no server has taken the goal after so long [s], it is LOST; None: it
-                waits as long as it takes; 0: it is LOST at once.
+            feedback_cb: Called with each XFeedback message. When it is too slow, up to 100,000
+                messages of together 32 MiB wait for it, then the oldest are dropped. Once the goal
+                is over, a call that takes longer than 0.5 s is the last one. Dropped messages are
+                logged and counted in `dropped_feedback`.
+            ack_timeout: Time within which a server must take the goal [s], else it is LOST. None:
+                no limit; 0: it is LOST at once.
 
         Raises:
             ActionException: `goal` is not of the action's type.
-            ActionlibError: `ack_timeout` is no time, or negative.
+            ActionlibError: `ack_timeout` is not a duration, or negative.
             FieldError: a field of `goal` has a wrong type.
             TypeMismatchError: the action's server has another type.
             TransportError: the client is stopped.
@@ -179,10 +181,10 @@ class SimpleActionClient(Generic[A]):
         *,
         ack_timeout: float | Duration | None = None,
     ) -> None:
-        """Follow a goal by its id: an earlier life of this program sent it, or it was let go of.
+        """Follow a goal by its id: one sent before a restart, or no longer followed.
 
-        The former goal is followed no more, as with `send_goal`, unless an error is raised. See
-        `ActionClient.attach`; the other arguments are those of `send_goal`.
+        It replaces the previous goal as in `send_goal`, which also describes the other arguments;
+        see `ActionClient.attach`.
         """
         find = self.action_client.find_goal
         self._begin(find, goal_id, done_cb, active_cb, feedback_cb, ack_timeout)
@@ -196,19 +198,19 @@ class SimpleActionClient(Generic[A]):
         feedback_cb: Callable[[Any], object] | None,
         ack_timeout: float | Duration | None,
     ) -> None:
-        """Send a goal, or ask for it, and follow it instead of the former one."""
+        """Send a goal, or query the server for it, and follow it instead of the previous one."""
         where = f"action '{self.action_client.ns}'"
         if done_cb is not None or active_cb is not None or feedback_cb is not None:
             check_functions(where, done_cb=done_cb, active_cb=active_cb, feedback_cb=feedback_cb)
         limit = None if ack_timeout is None else check_limit(where, "ack_timeout", ack_timeout)
         handle = make(goal, limit)
-        # A goal without callbacks needs no thread: whoever waits for it is woken by the network's.
+        # Without callbacks, no thread is needed for them: the network's thread wakes the waiters.
         if done_cb is not None or active_cb is not None or self._condition is not None:
             handle.on_state = self._make_on_state(handle, done_cb, active_cb)
         if feedback_cb is not None:
             handle.on_feedback = partial(handle.call_with_feedback, feedback_cb)
         handle.calls_back = handle.on_state is not None or feedback_cb is not None
-        # It is the client's goal before anything can come back: a callback sees its own goal.
+        # Set before sending: a callback may come at once and must see its own goal.
         former, self._handle = self._handle, handle
         begun = False
         try:
@@ -217,7 +219,8 @@ class SimpleActionClient(Generic[A]):
         finally:
             if not begun and self._handle is handle:
                 self._handle = former
-        if former is not None and not former.goal.over:  # only now: an error leaves it followed
+        # Only now: if sending has raised an error, the previous goal is still followed.
+        if former is not None and not former.goal.over:
             former.manager.forget(former)
 
     def _make_on_state(
@@ -228,10 +231,10 @@ class SimpleActionClient(Generic[A]):
     ) -> Callable[[CommState], object]:
         def on_state(state: CommState) -> None:  # under the manager's lock
             nonlocal active_cb
-            if state in _RUNNING and active_cb is not None:
+            if state in STARTED and active_cb is not None:
                 handle.call(state, active_cb)
                 active_cb = None  # once
-            elif state in _OVER:
+            elif state in OVER:
                 if done_cb is not None:
                     handle.call(state, done_cb, int(handle.goal.status), handle.goal.result)
                 handle.manager.callbacks.call(self._settle, handle)
@@ -239,7 +242,7 @@ class SimpleActionClient(Generic[A]):
         return on_state
 
     def _settle(self, handle: ClientGoalHandle) -> None:
-        """Note that the last callback of a goal has returned."""
+        """Mark a goal as settled: its last callback has returned."""
         handle.settle()
         if self._condition is not None:
             with self._condition:
@@ -251,19 +254,20 @@ class SimpleActionClient(Generic[A]):
         execute_timeout: float | Duration = 0.0,
         preempt_timeout: float | Duration = 0.0,
     ) -> int:
-        """Send a goal and wait for its end; past `execute_timeout`, cancel it and wait again.
+        """Send a goal and wait for its end; after `execute_timeout`, cancel it and wait again.
 
         Args:
             goal: The goal message (XGoal).
-            execute_timeout: Longest run [s]; 0 sets no limit, nor does a negative time.
+            execute_timeout: Longest run [s]; 0 or a negative time: no limit.
             preempt_timeout: Longest wait for the end after the cancel [s]; likewise.
 
         Returns:
-            The status (`GoalStatus`), not yet a final one when `preempt_timeout` was too short.
+            The status (`GoalStatus`); not a final one when `preempt_timeout` was too short.
 
         Blocks: until the goal is over or both times have passed.
         """
-        execute = self._check_wait("execute_timeout", execute_timeout)  # before the robot moves
+        # Both are checked first: a wrong argument must not leave a robot moving.
+        execute = self._check_wait("execute_timeout", execute_timeout)
         preempt = self._check_wait("preempt_timeout", preempt_timeout)
         self.send_goal(goal)
         if not self.wait_for_result(execute):
@@ -274,25 +278,25 @@ class SimpleActionClient(Generic[A]):
     def wait_for_result(self, timeout: float | Duration | None = 0.0) -> bool:
         """Wait until the goal is over and `done_cb` has returned.
 
-        Called from a callback of this client, it does not wait for callbacks. Nor does it wait
-        longer than 1 s after the goal's end for another callback than `done_cb` to return.
+        Called from a callback of this client, it does not wait for callbacks. Otherwise it gives
+        callbacks other than `done_cb` 1 s after the goal's end to return.
 
         Args:
-            timeout: Longest wait [s]; 0 and None wait as long as it takes, as in actionlib: until
-                the goal is over, or its server dies, or the client is stopped. That the program is
-                to end does not end it, as the goal runs on: `shutdown.on_shutdown(cancel_goal)`.
-                A negative time sets no limit either, as in actionlib, with a warning: the rest of a
-                time that is over is better not waited for.
+            timeout: Longest wait [s]. 0 and None: no limit, as in actionlib; the wait ends with the
+                goal, with its server's death or with the client's `stop`. A requested shutdown does
+                not end it, since the goal runs on: use `shutdown.on_shutdown(cancel_goal)`. A
+                negative time is no limit either, as in actionlib, but is logged as a warning: it is
+                usually a mistake, such as the rest of a time that is already over.
 
         Returns:
             Whether the goal is over; False also when no goal was sent.
 
         Raises:
-            InvalidDurationError: `timeout` is no time.
+            InvalidDurationError: `timeout` is not a duration.
 
         Blocks: until then.
         """
-        no_limit = isinstance(timeout, float) and timeout == 0.0
+        no_limit = isinstance(timeout, float) and timeout == 0.0  # the default: spares the checks
         limit = None if no_limit else self._check_wait("timeout", timeout)
         handle = self._handle
         if handle is None:
@@ -300,13 +304,13 @@ class SimpleActionClient(Generic[A]):
         return handle.manager.wait(handle, limit)
 
     def _check_wait(self, argument: str, timeout: float | Duration | None) -> float | None:
-        """Return the limit of a wait for a goal's end; warn of one that is no limit by mistake."""
+        """Return the limit of a wait for a goal's end; warn of a negative one, as of a mistake."""
         where = f"action '{self.action_client.ns}'"
         limit = check_wait(where, argument, timeout)
         if limit != 0.0:
             return limit
         log.warning(
-            "%s: %s: got %s, which is negative; the goal's end is waited for without a limit.",
+            "%s: %s: got %s, which is negative; waiting for the goal's end without a limit.",
             where,
             argument,
             timeout,
@@ -320,15 +324,15 @@ class SimpleActionClient(Generic[A]):
 
     @property
     def dropped_feedback(self) -> int:
-        """How many feedback messages were dropped, as `feedback_cb` was slower than they came."""
+        """Number of feedback messages dropped because `feedback_cb` was too slow."""
         handle = self.gh
         return 0 if handle is None else handle.dropped_feedback
 
     def get_state(self) -> int:
         """Return the goal's status (`GoalStatus`).
 
-        RECALLING is shown as PENDING, PREEMPTING as ACTIVE, no goal as LOST. While an answer to a
-        cancel is awaited, it is the last status the server gave.
+        RECALLING is shown as PENDING, PREEMPTING as ACTIVE, no goal as LOST. While the answer to a
+        cancel is awaited, it is the last status from the server.
         """
         handle = self._handle
         if handle is None:
@@ -342,26 +346,26 @@ class SimpleActionClient(Generic[A]):
         return int(Status.PENDING) if status == Status.RECALLING else status
 
     def get_goal_status_text(self) -> str:
-        """Return what the server said about the status, or why the goal is lost."""
+        """Return the text of the last status, or why the goal is lost."""
         handle = self.gh
         return "" if handle is None else handle.get_goal_status_text()
 
     def cancel_all_goals(self) -> None:
-        """Ask the server to end all goals, also those of other clients."""
+        """Ask the server to cancel all goals, also those of other clients."""
         self.action_client.cancel_all_goals()
 
     def cancel_goals_at_and_before_time(self, time: Time | float) -> None:
-        """Ask the server to end the goals with a stamp at or before `time`, of all clients."""
+        """Ask the server to cancel the goals of all clients with a stamp at or before `time`."""
         self.action_client.cancel_goals_at_and_before_time(time)
 
     def cancel_goal(self) -> None:
-        """Ask for the end of the goal; without one, nothing happens."""
+        """Cancel the goal; no effect without a goal."""
         handle = self.gh
         if handle is not None:
             handle.cancel()
 
     def stop_tracking_goal(self) -> None:
-        """Follow the goal no more; it is not cancelled. Callbacks already due may still run."""
+        """Stop following the goal, which is not cancelled. Queued callbacks may still run."""
         handle, self._handle = self._handle, None
         if handle is not None:
             handle.manager.forget(handle)

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-LINGER_S = 0.1  # the thread that runs goals waits so long for another one
-STOP_GRACE_S = 0.4  # how long `stop` waits for the execute callback to notice
+LINGER_S = 0.1  # the thread that runs goals waits for the next goal before it ends
+STOP_GRACE_S = 0.4  # `stop` gives the execute callback this time to return
 
 TEXT_ACCEPTED = "This goal has been accepted by the simple action server"
 TEXT_NEWER = "This goal was canceled because another goal was received by the simple action server"
@@ -38,27 +38,27 @@ TEXT_NO_STATUS = "No terminal state was set."
 class SimpleActionServer:
     """Offers an action whose goals run one at a time.
 
-    With `execute_cb`, each goal is run by calling it, in a thread that exists while there are
+    With `execute_cb`, each goal is run by calling it, in a thread that exists only while there are
     goals. Without, register a goal callback and call `accept_new_goal` yourself.
 
     Args:
         name: The action's name.
         ActionSpec: The action class (XAction).
         execute_cb: Called with the goal message (XGoal); it must call `set_succeeded`,
-            `set_aborted` or `set_preempted` before it returns. The goal is accepted before, as in
-            ROS, so it can be aborted and not rejected any more; `server` offers both.
+            `set_aborted` or `set_preempted` before it returns. As in ROS, the goal is accepted
+            before the call, so it can be aborted but no longer rejected; `server` offers both.
         auto_start: Start at once; a goal may then come before the constructor has returned. When
             the callback uses the server, pass False and call `start` afterwards.
-        node: Where; the current node when None.
-        policy: What a new goal does while one runs: "preempt" asks the running one to stop, as in
-            ROS; "queue" waits its turn; "reject" is turned away.
+        node: The server's node; None: the current node.
+        policy: The effect of a new goal while one runs: "preempt" asks the running one to stop, as
+            in ROS; with "queue" the new goal waits; with "reject" it is rejected.
         on_client_lost: What happens to the goal of a client that died: "continue" as in ROS, or
             "cancel", as if the client had cancelled it.
         result_timeout: How long a result waits for a client that lost its link [s]; 0 or more.
         durable: A file in which goals and results survive the end of the process; see
             `ActionServer`.
-        on_restart: With `durable`, what becomes of a goal that ran when the process was killed:
-            "abort" ends it ABORTED, with the reason; "resume" runs it again: `is_resumed` tells.
+        on_restart: With `durable`, what happens to a goal that ran when the process was killed:
+            "abort" ends it ABORTED, with the reason; "resume" runs it again (see `is_resumed`).
 
     Attributes:
         action_server: The `ActionServer` beneath.
@@ -66,7 +66,7 @@ class SimpleActionServer:
 
     Raises:
         ActionException: `ActionSpec` is not an action class.
-        ActionlibError: a callback is no function, or `result_timeout` no length of time.
+        ActionlibError: a callback is not a function, or `result_timeout` is not a duration.
         InvalidNameError: the name breaks the ROS rules.
         ServerConflictError: the name has a server already (from `start`).
         TransportError: the network session is closed.
@@ -95,13 +95,14 @@ class SimpleActionServer:
         self.execute_callback = execute_cb
         self.goal_callback: Callable[[], object] | None = None
         self.preempt_callback: Callable[[], object] | None = None
-        # The lock guards all these, but one look at `_policy` is atomic and does without.
+        # The lock guards these. Reading one attribute of `_policy` is atomic and needs no lock.
         self._policy: SingleGoal[ServerGoalHandle] = SingleGoal(policy)
-        self._task: Task | None = None  # the thread that runs goals; it ends when none come
-        self._idle = False  # the thread that runs goals waits for one
+        self._task: Task | None = None  # the thread that runs goals, None while there is none
+        self._idle = False  # it waits for `_come`
         self._stopping = False
         self._grace_ends: float | None = None
-        # Its callbacks only note what came; direct calls save each goal a change of threads.
+        # Our two callbacks return at once, so they may be called directly on the network's thread,
+        # which saves each goal a change of threads.
         self.action_server = ActionServer(
             name,
             ActionSpec,
@@ -121,7 +122,7 @@ class SimpleActionServer:
         self.lock = self.action_server.lock
         self._name = self.action_server.ns
         self._queue = self.action_server.callback_queue
-        # Starts the thread that runs goals, in the context of callbacks.
+        # Starts the thread that runs goals, with the server's clock and node as the current ones.
         self._start: Callable[[], Task] = partial(
             self._queue.context.copy().run,
             partial(self._clock.spawn, self.executeLoop, name=f"{self._name} execute"),
@@ -142,7 +143,7 @@ class SimpleActionServer:
             TransportError: the network session is closed.
             ActionException: the server was stopped.
 
-        Blocks: until the network has said who has the name, 1 s at most.
+        Blocks: until the network has answered who has the name, 1 s at most.
         """
         self.action_server.start()
         with self.lock:
@@ -151,28 +152,28 @@ class SimpleActionServer:
                 self._forget = node.on_close(self.stop, ask=self._begin_to_stop)
 
     def stop(self) -> None:
-        """Ask the running goal to stop, end all goals, leave the name.
+        """Ask the running goal to stop, end all goals, and withdraw from the network.
 
-        A second call does nothing, nor does one before `start`. A stopped server is not started
+        A second call does nothing, nor does one before `start`. A stopped server cannot be started
         again.
 
         Blocks: until `execute_cb` has returned, 0.4 s at most (then its goal is ABORTED), and then
-            until the clients have heard the ends of all goals, 0.7 s at most.
+            until the clients have acknowledged the ends of all goals, 0.7 s at most.
         """
         forget, self._forget = self._forget, None
         if forget is None:
             return
         forget()
-        task = self._task  # before it is asked to stop, upon which it may end
+        task = self._task  # read before it is asked to stop: it then resets `_task`
         grace_ends = self._begin_to_stop()
         if task is not None:
             task.join(max(0.0, grace_ends - self._clock.now()))
         self.action_server.stop()
 
     def _begin_to_stop(self) -> float:
-        """Ask everything to end; return until when it may take its time [s, clock].
+        """Ask all goals to end; return the end of their grace [s, clock].
 
-        A node that closes does this for all its servers before it stops the first.
+        A node that closes calls this for all its servers first, so that they share one grace.
         """
         if self._grace_ends is None:
             self._grace_ends = self._clock.now() + STOP_GRACE_S
@@ -221,7 +222,7 @@ class SimpleActionServer:
         return self._policy.preempt_requested
 
     def accept_new_goal(self) -> Any:
-        """Accept the waiting goal; one that still runs becomes PREEMPTED.
+        """Accept the waiting goal; a goal that still runs becomes PREEMPTED.
 
         Returns:
             The goal message; None when no goal waits (check `is_new_goal_available` before).
@@ -239,48 +240,50 @@ class SimpleActionServer:
     def _take_next(self) -> ServerGoalHandle | None:
         """Make the waiting goal the current one, not yet accepted; None when none waits."""
         with self.lock:
-            asked = self._policy.preempt_requested  # of the goal before; then `_preempted` is set
-            new, pushed = self._policy.accept()
+            # `_preempted` follows `preempt_requested`, which here still belongs to the goal before.
+            asked = self._policy.preempt_requested
+            new, replaced = self._policy.accept()
             if new is None:
                 return None
             if self._policy.preempt_requested:
                 self._preempted.set()
             elif asked:
                 self._preempted.clear()
-        # Without the lock: sending its result waits for room on a full link.
-        if pushed is not None and pushed.record.status not in TERMINAL:
-            pushed.set_canceled(None, TEXT_NEWER)
+        # Without the lock: sending the result blocks while a link is full.
+        if replaced is not None and replaced.record.status not in TERMINAL:
+            replaced.set_canceled(None, TEXT_NEWER)
         return new
 
     def is_new_goal_available(self) -> bool:
-        """Tell whether a goal waits to be accepted."""
+        """Return whether a goal waits to be accepted."""
         return bool(self._policy.waiting)
 
     def is_preempt_requested(self) -> bool:
-        """Tell whether the current goal is asked to stop, by a cancel or a newer goal."""
+        """Return whether the current goal is asked to stop, by a cancel or a newer goal."""
         return self._policy.preempt_requested
 
     def wait_preempt(self, timeout: float | None = None) -> bool:
         """Wait until the current goal is asked to stop.
 
         Args:
-            timeout: Longest wait [s]; None waits for ever, a negative one does not wait.
+            timeout: Longest wait [s]; None: no limit; a negative time: do not wait.
 
         Returns:
             Whether it is asked to stop.
 
         Raises:
-            InvalidDurationError: `timeout` is no time.
+            InvalidDurationError: `timeout` is not a duration.
 
         Blocks: until then.
         """
         limit = check_delay(f"action '{self._name}'", "timeout", timeout)
         if not self._preempted.is_set():
-            self._keeper.status.hurry()  # a goal that waits is not over in a moment
+            # The goal will run for some time, so its acceptance need not wait to share a list.
+            self._keeper.status.hurry()
         return self._preempted.wait(limit)
 
     def is_active(self) -> bool:
-        """Tell whether a goal was accepted and has not ended."""
+        """Return whether a goal was accepted and has not ended."""
         goal = self._policy.current
         if goal is None:
             return False
@@ -291,12 +294,12 @@ class SimpleActionServer:
 
         Args:
             result: The result message (XResult); None sends one with default values.
-            text: Why, for people.
+            text: The reason, for people.
 
         Raises:
             IllegalTransitionError: the goal has ended already.
             ActionException: no goal was accepted, `result` is not of the action's type, or `text`
-                is not a string; the goal goes on.
+                is not a string. The goal's status does not change.
             FieldError: a field of `result` has a wrong type.
         """
         self._end("set_succeeded()", "succeed", result, text)
@@ -310,10 +313,10 @@ class SimpleActionServer:
         self._end("set_preempted()", "cancel", result, text)
 
     def set_rejected(self, result: Any = None, text: str = "") -> None:
-        """Turn away the goal that waits; see `set_succeeded`.
+        """Reject the goal that waits; see `set_succeeded`.
 
-        From a goal callback only: `execute_cb` runs with a goal already accepted, which it can end
-        with `set_aborted`.
+        For goal callbacks: the goal of `execute_cb` is already accepted and can only be ended, for
+        example with `set_aborted`.
         """
         with self.lock:
             handle = self._policy.withdraw()
@@ -354,7 +357,7 @@ class SimpleActionServer:
         goal.publish_feedback(feedback)
 
     def is_resumed(self) -> bool:
-        """Tell whether an earlier process had begun the current goal already."""
+        """Return whether an earlier process had already accepted the current goal."""
         goal = self._policy.current
         return goal is not None and goal.resumed
 
@@ -363,10 +366,10 @@ class SimpleActionServer:
         return self.action_server.ActionResultType()
 
     def register_goal_callback(self, cb: Callable[[], object] | None) -> None:
-        """Call `cb` when a goal has come that waits to be accepted.
+        """Call `cb` when a new goal waits to be accepted.
 
         Raises:
-            ActionException: the server has an `execute_cb`, which gets the goals.
+            ActionException: the server has an `execute_cb`, which runs the goals.
         """
         if self.execute_callback is not None and cb is not None:
             raise ActionException(
@@ -381,17 +384,17 @@ class SimpleActionServer:
         check_function(f"action '{self._name}'", "cb", cb)
         self.preempt_callback = cb
 
-    # -- what arrives (on the network's thread) ------------------------------------------------
+    # -- messages (on the network's thread) ----------------------------------------------------
 
     def internal_goal_callback(self, goal: ServerGoalHandle) -> None:
-        """Take a new goal; the `ActionServer` beneath calls it."""
+        """Handle a new goal; called by the `ActionServer` beneath."""
         if self._stopping:
             self._turn_away(goal, "reject", TEXT_STOPPED)
             return
         with self.lock:
             stamp_ns = goal.record.stamp_ns
             now_ns = self._clock.time_ns()
-            if stamp_ns > now_ns + FUTURE_NS:  # else it would hold up all others until then
+            if stamp_ns > now_ns + FUTURE_NS:  # else all later goals would count as older
                 log.warning(
                     "action '%s': goal %s has a stamp %.1f s in the future and counts as sent now: "
                     "a clock is wrong. Try setting the clocks of all computers by NTP.",
@@ -401,8 +404,10 @@ class SimpleActionServer:
                 )
                 stamp_ns = now_ns
             decision = self._policy.on_goal(goal, stamp_ns)
-            if decision.preempt:  # under the lock: the next goal clears it there
+            if decision.preempt:  # under the lock, as `_take_next` clears it for the next goal
                 self._preempted.set()
+            # Wake the thread that runs goals, or start one. A busy thread looks for the next goal
+            # by itself.
             if decision.announce and self._idle:
                 self._come.set()
             elif decision.announce and self.execute_callback is not None and self._task is None:
@@ -411,7 +416,7 @@ class SimpleActionServer:
             self._carry_out(decision, TEXT_NEWER)
 
     def internal_preempt_callback(self, preempt: ServerGoalHandle) -> None:
-        """Take a cancel; the `ActionServer` beneath calls it."""
+        """Handle a cancel; called by the `ActionServer` beneath."""
         with self.lock:
             goal = self._policy.find(preempt)
             decision = self._policy.on_cancel(
@@ -432,12 +437,13 @@ class SimpleActionServer:
             self._queue.call(self._call_goal_callback)
 
     def _turn_away(self, goal: ServerGoalHandle, event: str, text: str) -> None:
-        """End a goal that never began; on the network's thread, which must not wait for a link."""
+        """End a goal that never started. Does not wait for a link, as on the network's thread."""
         self._keeper.step(
             goal, event, f"the policy {self._policy.policy!r}", None, text, wait=False
         )
 
-    # In ROS these run as the message comes. Here others may run before, so look again.
+    # In ROS these two run as the message arrives. Here they are queued, so what they report may be
+    # out of date: another callback may have accepted or ended the goal.
 
     def _call_preempt_callback(self) -> None:
         callback, goal = self.preempt_callback, self._policy.current
@@ -453,11 +459,11 @@ class SimpleActionServer:
     # -- execution -----------------------------------------------------------------------------
 
     def executeLoop(self) -> None:  # noqa: N802  actionlib's name
-        """Run the goals that wait, until none has come for `LINGER_S`."""
+        """Run the waiting goals, until none has come for `LINGER_S`."""
         try:
             while self._wait_for_goal():
                 self._run_next()
-        except BaseException:  # `sys.exit` in a callback: another thread goes on with the rest
+        except BaseException:  # `sys.exit` in a callback ends only this thread; start another
             with self.lock:
                 self._task, self._idle = None, False
                 if self._policy.waiting:
@@ -473,17 +479,17 @@ class SimpleActionServer:
             self._idle = not self._policy.waiting
             if not self._idle:
                 return True
-            self._come.clear()  # a goal that comes from here on finds `_idle` and sets it
+            self._come.clear()  # a goal that comes from now on finds `_idle` true and sets it
         come = not self._stopping and self._come.wait(LINGER_S)
         with self.lock:
             self._idle = False
             if come or (self._policy.waiting and not self._stopping):
                 return True
-            self._task = None  # with the lock: the next goal starts another thread
+            self._task = None  # under the lock: the next goal starts another thread
         return False
 
     def _run_next(self) -> None:
-        """Run the goal that waits, if there is one, and make sure that it ends."""
+        """Run the next goal, if there is one, and make sure that it ends."""
         handle = self._take_next()
         if handle is None:
             return
@@ -492,9 +498,9 @@ class SimpleActionServer:
         text = TEXT_NO_STATUS
         try:
             self._execute(handle)
-        except Exception as error:  # noqa: BLE001  a border: told to the client and logged
+        except Exception as error:  # noqa: BLE001  user code: sent to the client and logged
             if handle.record.text == TEXT_STOPPED:
-                return  # `stop` has ended the goal, which the callback found out the hard way
+                return  # `stop` has ended the goal; the callback's own attempt has then failed
             text = self._report(error)
         except BaseException as error:
             text = text_of(error, repr)
