@@ -1,4 +1,4 @@
-"""The message classes of an action, which the user gives as one class."""
+"""The seven message classes of an action, read from its action class."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ class ActionTypes:
     """The message classes of an action.
 
     Attributes:
-        action: XAction, as the user gave it.
-        action_goal: XActionGoal, with header and goal id around the goal; that of a ROS 2 action
-            never travels, nor do the next two.
+        action: XAction, as the user passed it.
+        action_goal: XActionGoal, with header and goal id around the goal. Actions of ROS 2 have it
+            and the next two for this library only; they are never sent.
         action_result: XActionResult, with header and status around the result.
         action_feedback: XActionFeedback, with header and status around the feedback.
         goal: XGoal.
@@ -33,7 +33,7 @@ class ActionTypes:
 
     @classmethod
     def of(cls, spec: Any) -> ActionTypes:
-        """Read the classes off an action class, as ROS 1 code does.
+        """Find the classes through an object of the action class, as ROS 1's actionlib does.
 
         Raises:
             ActionException: `spec` is not the class of an action.

@@ -1,8 +1,8 @@
-"""An action on our own wire: its keys, the bytes of its messages, and both ends that speak it.
+"""An action on our own wire: its keys, the bytes of its messages, and the ports of both sides.
 
-The five topics of ROS 1 actionlib under the action's name, each with its ROS message, and two
-additions of ours: clients acknowledge results on `ack`, and a query on `result` asks for what was
-missed. `docs/wire_protocol.md` describes them for writers of other clients.
+It uses the five topics of ROS 1 actionlib under the action's name, each with its ROS message, and
+two additions: clients acknowledge results on `ack`, and query `result` for what they have missed.
+`docs/wire_protocol.md` describes them for authors of other clients.
 """
 
 from __future__ import annotations
@@ -50,20 +50,23 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-ASK_TIMEOUT_S = 2.0
+ASK_TIMEOUT_S = 2.0  # longest wait for the reply to a query about a goal
+FAREWELL_LIST_S = 0.2  # longest wait for the list of clients before a farewell
+
+# `express` messages are sent at once, the others may be put into one packet with later ones.
+# `block` waits while a link is full; without it, the message is then dropped.
 GOAL = Quality(express=True, block=True)
-AGAIN = Quality(express=True, block=False)  # what is repeated anyway need not wait for a full link
-ACK = Quality(express=False, block=False)
-FAREWELL_LIST_S = 0.2
+AGAIN = Quality(express=True, block=False)  # a repetition, which will be repeated again
+ACK = Quality(express=False, block=False)  # a lost one leads to a repetition of the result
 RESULT = Quality(express=True, block=True)
-RESULT_OR_NOT = Quality(express=True, block=False)  # a client that misses it asks for it
+RESULT_OR_NOT = Quality(express=True, block=False)  # a client that misses it queries for it
 FEEDBACK = Quality(express=False, block=True)
-STATUS = Quality(express=False, block=False)  # said again every second: never worth waiting
+STATUS = Quality(express=False, block=False)  # repeated every second
 
 _U32 = struct.Struct("<I")
 _HEADER = struct.Struct("<IIII")  # seq, stamp, length of the frame_id
 _ID = struct.Struct("<III")  # stamp, length of the id
-_FRONT = struct.Struct("<IIIIIII")  # a header with an empty frame_id, then stamp, length of the id
+_FRONT = struct.Struct("<IIIIIII")  # a header with an empty frame_id and an `_ID` as one
 _TAIL = struct.Struct("<BI")  # status, length of its text
 _NS = 1_000_000_000
 
@@ -91,16 +94,16 @@ def _too_short(what: str, payload: bytes) -> ValueError:
     return ValueError(f"{what}: got {len(payload)} bytes that end too early")
 
 
-# ROS 1 writes a message as its fields one after another, without gaps. So an XActionGoal is a
-# header and a goal id in front of the bytes of the XGoal, and the front can be written and read
-# without making objects of it. These functions are on the way of every goal, which is why they do
-# not call each other where a line more does.
+# ROS 1 serialises a message as its fields one after another, without gaps. So an XActionGoal is a
+# header and a goal id, followed by the bytes of the XGoal, and the front can be written and read
+# without message objects. Every goal and status passes through these functions. For speed, they
+# repeat a line rather than call each other.
 
 
 def pack_goal(
     sent_ns: int, goal_id: str, goal_stamp_ns: int, goal: bytes, server: str = ""
 ) -> bytes:
-    """Write an XActionGoal: header, goal id, goal; `server` is the token of the one it is for."""
+    """Write an XActionGoal: header, goal id, goal. `server` is the receiver's token."""
     frame, raw = server.encode(), goal_id.encode()
     header = _HEADER.pack(0, sent_ns // _NS, sent_ns % _NS, len(frame))
     front = _ID.pack(goal_stamp_ns // _NS, goal_stamp_ns % _NS, len(raw))
@@ -111,10 +114,10 @@ def unpack_goal(payload: bytes) -> tuple[str, int, bytes]:
     """Read an XActionGoal: its goal id, its stamp [ns], the bytes of the XGoal.
 
     Raises:
-        ValueError: the bytes are cut short or are not text where text belongs.
+        ValueError: the bytes end too early, or a text is not UTF-8.
     """
     try:
-        at = 16 + int(_U32.unpack_from(payload, 12)[0])
+        at = 16 + int(_U32.unpack_from(payload, 12)[0])  # behind the header and its frame_id
         secs, nsecs, length = _ID.unpack_from(payload, at)
     except _CUT_SHORT as error:
         raise _too_short("XActionGoal", payload) from error
@@ -134,7 +137,7 @@ def unpack_goal_id(payload: bytes) -> tuple[str, int]:
     """Read an actionlib_msgs/GoalID: the id, its stamp [ns].
 
     Raises:
-        ValueError: the bytes are cut short or are not text where text belongs.
+        ValueError: the bytes end too early, or a text is not UTF-8.
     """
     try:
         secs, nsecs, length = _ID.unpack_from(payload, 0)
@@ -157,7 +160,7 @@ def unpack_status(payload: bytes) -> StatusEntry:
     """Read an actionlib_msgs/GoalStatus.
 
     Raises:
-        ValueError: the bytes are cut short or are not text where text belongs.
+        ValueError: the bytes end too early, or a text is not UTF-8.
     """
     try:
         return _read_status(payload, 0)[0]
@@ -175,10 +178,10 @@ def pack_report(sent_ns: int, entry: StatusEntry, body: bytes) -> bytes:
 
 
 def unpack_report(payload: bytes) -> tuple[StatusEntry, int]:
-    """Read the front of an XActionResult or XActionFeedback: status, where the rest begins.
+    """Read the front of an XActionResult or XActionFeedback: status, position of the rest.
 
     Raises:
-        ValueError: the bytes are cut short or are not text where text belongs.
+        ValueError: the bytes end too early, or a text is not UTF-8.
     """
     try:
         return _read_status(payload, 16 + int(_U32.unpack_from(payload, 12)[0]))
@@ -187,7 +190,7 @@ def unpack_report(payload: bytes) -> tuple[StatusEntry, int]:
 
 
 def pack_statuses(sent_ns: int, entries: Iterable[StatusEntry], frame: str = "") -> bytes:
-    """Write an actionlib_msgs/GoalStatusArray; a `frame` makes it a farewell or its answer."""
+    """Write an actionlib_msgs/GoalStatusArray; `frame`: the token in a farewell or its answer."""
     raw, parts = frame.encode(), list(map(pack_status, entries))
     header = _HEADER.pack(0, sent_ns // _NS, sent_ns % _NS, len(raw))
     return b"".join((header, raw, _U32.pack(len(parts)), *parts))
@@ -197,7 +200,7 @@ def unpack_statuses(payload: bytes) -> list[StatusEntry]:
     """Read an actionlib_msgs/GoalStatusArray.
 
     Raises:
-        ValueError: the bytes are cut short or are not text where text belongs.
+        ValueError: the bytes end too early, or a text is not UTF-8.
     """
     entries = []
     try:
@@ -213,10 +216,10 @@ def unpack_statuses(payload: bytes) -> list[StatusEntry]:
 
 
 def unpack_frame(payload: bytes) -> str:
-    """Read the frame id of the header that a message begins with.
+    """Read the frame_id of the header at the beginning of a message.
 
     Raises:
-        ValueError: the bytes are cut short or are not text where text belongs.
+        ValueError: the bytes end too early, or a text is not UTF-8.
     """
     length = int.from_bytes(payload[12:16], "little")
     if len(payload) < 16 + length:
@@ -225,10 +228,10 @@ def unpack_frame(payload: bytes) -> str:
 
 
 def _read_status(payload: bytes, at: int) -> tuple[StatusEntry, int]:
-    """Read a GoalStatus that begins at `at`; return also where the rest begins."""
+    """Read a GoalStatus that begins at `at`; return it and the position of the rest."""
     secs, nsecs, length = _ID.unpack_from(payload, at)
     at, end = at + 12, at + 12 + length
-    status, length = _TAIL.unpack_from(payload, end)  # fails if the id is cut short
+    status, length = _TAIL.unpack_from(payload, end)  # fails if the bytes end within the id
     goal_id = payload[at:end].decode()
     at, end = end + 5, end + 5 + length
     if end > len(payload):
@@ -240,18 +243,19 @@ def _read_status(payload: bytes, at: int) -> tuple[StatusEntry, int]:
 
 
 class _Publishers(dict[tuple[str, Any, Quality], "PublisherPort"]):
-    """The publishers of one end by key, message class and quality; made when first asked for.
+    """The publishers of one port by key, message class and quality, made on first use.
 
     Args:
-        transport: Where.
-        stopped: Why there is none any more, once they are closed.
+        transport: The network session.
+        stopped: Text of the error once they are closed.
     """
 
     def __init__(self, transport: Transport, stopped: str) -> None:
         super().__init__()
         self._transport = transport
         self._stopped = stopped
-        self._lock = threading.RLock()  # a signal handler may send amid the first sending
+        # Reentrant: a signal handler that sends may interrupt this thread while it holds the lock.
+        self._lock = threading.RLock()
         self._closed = False
 
     def __missing__(self, which: tuple[str, Any, Quality]) -> PublisherPort:
@@ -259,14 +263,14 @@ class _Publishers(dict[tuple[str, Any, Quality], "PublisherPort"]):
         with self._lock:
             if self._closed:
                 raise TransportError(self._stopped)
-            publisher = self.get(which)  # another thread may have just made it
+            publisher = self.get(which)  # another thread may have made it in the meantime
             if publisher is None:
                 encoding = encoding_of(message_class)
                 publisher = self[which] = self._transport.publisher(key, encoding, quality)
         return publisher
 
     def take_all(self) -> list[PublisherPort]:
-        """Return all there are, which are to be closed; there will be no others."""
+        """Remove and return all publishers, to be closed; no new ones can be made."""
         with self._lock:
             self._closed = True
             publishers = list(self.values())
@@ -275,7 +279,7 @@ class _Publishers(dict[tuple[str, Any, Quality], "PublisherPort"]):
 
 
 class ActionClientPort:
-    """The keys of an action client; see `ports.make_client_port`."""
+    """A client's port on our own wire; see `ports.make_client_port`."""
 
     def __init__(
         self,
@@ -306,8 +310,8 @@ class ActionClientPort:
     def open(self, listener: ClientListener) -> None:
         self._listener = listener
         transport, keys = self._transport, self._keys
-        # The token after the subscriptions: a server that sees it may speak at once. Servers are
-        # looked for last, as goals go out to those that are found.
+        # Token after subscriptions: a server that sees it may send at once. Servers are watched
+        # last, since goals are sent to those that are found.
         self._declared = [
             transport.subscribe(keys.status, self._on_status, history=False),
             transport.subscribe(keys.feedback, self._feedback.take, history=False),
@@ -334,7 +338,7 @@ class ActionClientPort:
         *,
         wait: bool = True,
     ) -> None:
-        """Send an XActionGoal; its frame id is the token of the server that it is for."""
+        """Send an XActionGoal with the receiver's token as its frame_id."""
         token = token_key(server) if server is not None else ""
         goals = (
             self._goals
@@ -348,9 +352,9 @@ class ActionClientPort:
         cancels.put(pack_goal_id(goal_id, stamp_ns))
 
     def acknowledge(self, goal_ids: list[str], *, farewell: bool = False) -> None:
-        """Acknowledge results, and maybe a farewell: the frame id is our token then.
+        """Acknowledge results and, with our token as frame_id, a farewell.
 
-        Never waits: what is lost is sent again when the result, or the farewell, is repeated.
+        Never blocks: a lost acknowledgement is repeated with the result or farewell.
         """
         entries = [StatusEntry(goal_id, 0, 0, "") for goal_id in goal_ids]
         frame = token_key(self.endpoint) if farewell else ""
@@ -367,14 +371,15 @@ class ActionClientPort:
             on_done=on_done,
         )
 
-    # -- what arrives --------------------------------------------------------------------------
+    # -- messages ------------------------------------------------------------------------------
 
-    # Feedback may wait for the rest of a burst: what came before a status or a result goes first.
+    # Feedback may wait in `_feedback` for the rest of a burst. To keep the order of messages, it is
+    # handed on before any status, result or end of a server.
 
     def _on_status(self, sample: Sample) -> None:
         if self._feedback.waiting or self._feedback.lock.locked():
             self._feedback.flush()
-        # One comparison of strings in place of a call, for each status of each server.
+        # Comparing the strings here spares a call of `check` for nearly every status.
         if sample.encoding != self._encodings[0] and not self._readable.check(
             sample, GoalStatusArray
         ):
@@ -432,7 +437,7 @@ class ActionClientPort:
             self._report("an answer", error)
 
     def _report(self, what: str, error: object) -> None:
-        """Report a message that is dropped; once of a kind, a server may go on like this."""
+        """Report a dropped message, once per kind, as a server may keep sending them."""
         text = f"action '{self._name}': {what} cannot be read: {error}"
         self._readable.report(what, ActionlibError(text))
 
@@ -451,10 +456,10 @@ class ActionClientPort:
 
 
 class ActionServerPort:
-    """Declares the keys of an action server and speaks on them.
+    """A server's port on our own wire; see `ports.make_server_port`.
 
     Args:
-        node: On whose network.
+        node: The server's node.
         name: The action's full name.
         types: Its message classes.
 
@@ -469,13 +474,13 @@ class ActionServerPort:
         self._types = types
         self._name = name
         self._keys = action_keys(name)
-        self._lock = threading.Lock()  # `close` is called by two threads at once
+        self._lock = threading.Lock()  # two threads may call `close` at once
         self._declared: list[Closable] = []
         stopped = f"action {name!r}: the server is stopped. Try ending goals before."
         self._publishers = _Publishers(node.transport, stopped)
         self._token: Closable | None = None
         self._clients: dict[str, Endpoint] = {}  # by token
-        self._unaware: set[str] = set()  # tokens of clients that the farewell has not reached
+        self._unaware: set[str] = set()  # tokens of clients that have not answered the farewell
         self._readable = Readable(log)
         self._goal_encoding = encoding_of(types.action_goal)
         self._read_goal = codecs_of(types.goal)[1]
@@ -493,7 +498,7 @@ class ActionServerPort:
         if there:
             raise self._conflict(there[0])
         try:
-            # The token after the rest: a client that sees it sends its goals at once.
+            # Token after subscriptions: a client that sees it sends its goals at once.
             self._declared = [
                 transport.subscribe(keys.goal, self._on_goal, history=False),
                 transport.subscribe(keys.cancel, self._on_cancel, history=False),
@@ -502,6 +507,8 @@ class ActionServerPort:
                 transport.queryable(keys.goal, self._on_goal_query),
             ]
             self._token = transport.declare_alive(self._own_key)
+            # The watch last: it reports a server that has started at the same time as this one, and
+            # then the younger one of the two stops.
             self._declared += [
                 self._token,
                 transport.watch_alive(token_pattern(None, self._name), self._on_presence),
@@ -515,7 +522,7 @@ class ActionServerPort:
             declared, self._declared = self._declared, []
             declared.extend(self._publishers.take_all())
             token, self._token = self._token, None
-        # The token goes last: while it shows, a client that is not heard knows that it is not.
+        # The token last: as long as it is there, clients check for a subscription before they send.
         declared.sort(key=lambda entry: entry is token)
         for entry in declared:
             entry.close()
@@ -527,7 +534,7 @@ class ActionServerPort:
         if not self._publishers[self._keys.status, GoalStatusArray, RESULT].matching():
             return False
         unaware = set(self._clients)
-        if not unaware:  # a server that has just started may not have heard of them yet
+        if not unaware:  # a server that has just started may not have found them yet
             pattern = token_pattern(Kind.ACTION_CLIENT, self._name)
             unaware = set(self._node.transport.list_alive(pattern, FAREWELL_LIST_S))
         self._unaware = unaware
@@ -537,7 +544,7 @@ class ActionServerPort:
         return not self._unaware
 
     def send_farewell(self, taken: Iterable[StatusEntry]) -> None:
-        """Send a GoalStatusArray whose frame id is our token."""
+        """Send a GoalStatusArray with our token as its frame_id."""
         payload = pack_statuses(self._clock.time_ns(), taken, self._own_key)
         self._publishers[self._keys.status, GoalStatusArray, RESULT].put(payload)
 
@@ -554,7 +561,7 @@ class ActionServerPort:
         feedback = self._publishers[self._keys.feedback, self._types.action_feedback, FEEDBACK]
         feedback.put(pack_report(self._clock.time_ns(), entry, body))
 
-    # -- what arrives --------------------------------------------------------------------------
+    # -- messages ------------------------------------------------------------------------------
 
     def _on_goal(self, sample: Sample) -> None:
         if sample.encoding != self._goal_encoding and not self._readable.check(
@@ -573,7 +580,7 @@ class ActionServerPort:
         self._listener.on_goal(goal_id, stamp_ns, content, sample.source)
 
     def _is_of_another(self, frame: str) -> bool:
-        """Return whether a goal is a late copy of one for another server of this name."""
+        """Return whether a goal was sent to another server of this action."""
         server = parse_token(frame)
         return (
             server is not None and server.kind is Kind.ACTION_SERVER and server.name == self._name
@@ -599,7 +606,7 @@ class ActionServerPort:
         self._listener.on_acknowledged([entry.id for entry in entries])
 
     def _on_query(self, query: Query) -> None:
-        """Answer what became of a goal; without an id, the status list."""
+        """Reply with a goal's result or status; without an id, with the status list."""
         goal_id = self._read_question(query)
         if goal_id:
             entry, body = self._listener.find_end(goal_id)
@@ -614,13 +621,13 @@ class ActionServerPort:
         query.finish()
 
     def _on_goal_query(self, query: Query) -> None:
-        """Answer what a goal was."""
+        """Reply with the goal message of a goal id."""
         goal_id = self._read_question(query)
         if goal_id is not None:
             found = self._listener.find_goal(goal_id)
             if found is None:
                 query.reply_error(
-                    f"action '{self._name}': goal {goal_id!r} is not known, or no more"
+                    f"action '{self._name}': goal {goal_id!r} is unknown or was forgotten"
                 )
             else:
                 stamp_ns, content = found
@@ -637,11 +644,11 @@ class ActionServerPort:
             return None
 
     def _report_unreadable(self, what: str, sample: Sample, error: Exception) -> None:
-        """Report a message that is dropped; a sender that goes on like this is told of once."""
+        """Report a dropped message, once per sender and kind."""
         text = f"action '{self._name}': {what} of session {sample.source} cannot be read: {error}"
         self._readable.report(f"{sample.source} {what}", ActionlibError(text))
 
-    # -- who is there --------------------------------------------------------------------------
+    # -- other clients and servers -------------------------------------------------------------
 
     def _on_presence(self, presence: Presence) -> None:
         other = parse_token(presence.key)
@@ -668,9 +675,10 @@ class ActionServerPort:
             if error is not None:
                 self._readable.report(f"{client.session} {client.type} {client.md5}", error)
         elif self._clients.pop(presence.key, None) is not None:
-            if presence.key in self._unaware:
+            if presence.key in self._unaware:  # it is gone and will not answer the farewell
                 self._unaware.discard(presence.key)
                 self._listener.on_acknowledged([])
-            clients = list(self._clients.values())  # another thread may change it
+            # A goal knows its client's session only, which may have several clients of the action.
+            clients = list(self._clients.values())  # a copy, as other threads change it
             if not any(end.session == client.session for end in clients):
                 self._listener.on_client_lost(client.session)

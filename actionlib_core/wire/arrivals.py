@@ -1,4 +1,4 @@
-"""What arrives at either end of an action: which samples can be read, and what comes in bursts."""
+"""Incoming messages of actions: checks of their types, and bursts that are handed on together."""
 
 from __future__ import annotations
 
@@ -22,30 +22,30 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-RAPID_S = 0.5e-3  # messages closer than this follow each other rapidly
-RAPID = 8  # so many of them make a burst
-PAUSE_S = 1e-3  # in a burst they are gathered for so long
-TOLD = 1000  # what was reported is remembered so far back; senders can be made up
+RAPID_S = 0.5e-3  # messages with shorter intervals may belong to a burst
+RAPID = 8  # a burst begins after this number of them
+PAUSE_S = 1e-3  # the messages of a burst are gathered for this time
+REPORTED = 1000  # remembered reports; limited, since a sender can invent names without end
 
 
 class Readable:
-    """Checks the types of samples; reports what is dropped once of each kind, to `log`.
+    """Checks the types of samples; logs dropped ones, once per kind.
 
     Threads: any.
     """
 
     def __init__(self, log: logging.Logger) -> None:
         self._log = log
-        self._lock = threading.Lock()  # guards `_told`
-        self._told = Recent(TOLD)
+        self._lock = threading.Lock()  # guards `_reported`
+        self._reported = Recent(REPORTED)
         self._encodings: dict[type[Typed], str] = {}
 
     def check(self, sample: Sample, message_class: type[Typed]) -> bool:
-        """Tell whether `message_class` reads a sample; if not, report its sender and type."""
+        """Return whether `message_class` can read a sample; if not, report sender and type."""
         encoding = self._encodings.get(message_class)
         if encoding is None:
             encoding = self._encodings.setdefault(message_class, encoding_of(message_class))
-        if sample.encoding == encoding:  # the usual case; anything else is parsed
+        if sample.encoding == encoding:  # the usual case, without parsing
             return True
         try:
             check_encoding(
@@ -60,29 +60,29 @@ class Readable:
         return True
 
     def report(self, about: str, error: ActionlibError) -> None:
-        """Log an error, unless one about the same was: a sender may go on like this."""
+        """Log an error, unless one with the same `about` was logged before."""
         with self._lock:
-            known = about in self._told
-            self._told.add(about)
+            known = about in self._reported
+            self._reported.add(about)
         if not known:
             self._log.error("%s", error)
 
 
 class Bursts(Generic[T]):
-    """Hands items on, in order: at once, or in a burst a little later and together.
+    """Hands items on in order: single ones at once, those of a burst together, a little later.
 
-    A thread of the network that hands on each message of a burst changes places with the thread
-    that works on it thousands of times a second, which takes longer than the work.
+    Without this, the network's thread and the thread that handles the items would switch for each
+    message of a burst, thousands of times a second, which takes longer than the work itself.
 
     Args:
-        clock: Gives time.
-        spawn: Runs a function in another thread, which has a name.
-        handle: Takes an item; never by two threads at once.
+        clock: The clock.
+        spawn: Runs a function in another thread with the given name.
+        handle: Handles an item; never called by two threads at once.
 
     Attributes:
-        waiting: What was taken and not yet handed on.
-        lock: Held while an item is handed on. When nothing waits, and then nobody holds it,
-            everything was handed on.
+        waiting: Items that were taken and not yet handed on.
+        lock: Held while an item is handed on. If nothing waits and then the lock is free,
+            everything was handed on; the two are to be read in this order.
 
     Threads: `take` and `flush` are called by the network's threads.
     """
@@ -100,8 +100,8 @@ class Bursts(Generic[T]):
         self._handle = handle
         self.lock = threading.Lock()
         self.waiting: deque[T] = deque()
-        self._called = False  # the thread that gathers is under way
-        # Without a lock: threads that miscount only begin a burst sooner or later.
+        self._called = False  # the thread that gathers was started
+        # Without a lock: if threads miscount, a burst begins a few messages earlier or later.
         self._rapid = 0
         self._last = float("-inf")
 
@@ -120,7 +120,7 @@ class Bursts(Generic[T]):
             self._spawn(self._gather, "feedback")
 
     def flush(self) -> None:
-        """Hand everything on that was taken before."""
+        """Hand on everything that was taken before."""
         with self.lock:
             if self.waiting:
                 self._hand_on()
@@ -130,12 +130,13 @@ class Bursts(Generic[T]):
         with self.lock:
             self._hand_on()
             self._called = False
-            self._hand_on()  # what came in between, when nobody was called
+            # Once more: an item taken before the line above has started no other thread.
+            self._hand_on()
 
     def _hand_on(self) -> None:
         waiting = self.waiting
         while waiting:
             try:
                 self._handle(waiting.popleft())
-            except Exception:  # noqa: BLE001  a border: reported, the next item is handed on
+            except Exception:  # noqa: BLE001  reported here, so that the next item is handed on
                 report_thread_exception()

@@ -1,8 +1,8 @@
-"""Texts of message types that travel with their topics, for who has no definition of his own.
+"""Definitions of message types over the network, for subscribers that do not have them.
 
-A bridge passes on messages of types that it does not know. Whoever has the text of a type answers
-queries on `@smachpy_definition/<pkg>/<Type>/<md5>` with it: the `.msg` text, behind it that of each
-nested type after a line of `=` and one `MSG: pkg/Type`, as ROS 1 writes it.
+A bridge passes on messages of types that it does not know. It answers queries on
+`@smachpy_definition/<pkg>/<Type>/<md5>` with the text of the type: the `.msg` text, followed by
+that of each nested type after a line of `=` and a line `MSG: pkg/Type`, the format of ROS 1.
 """
 
 from __future__ import annotations
@@ -17,19 +17,22 @@ if TYPE_CHECKING:
     from actionlib_core.transport import Reply
 
 ROOT = "@smachpy_definition"
-LARGEST = 1 << 20
-ASK_S = 1.0
+LARGEST = 1 << 20  # larger replies are ignored [bytes]
+ASK_S = 1.0  # longest wait for a reply
 _LINE = "=" * 80
 _NAME = "MSG: "
 
 
 def definition_key(type_name: str, md5: str) -> str:
-    """Return the key on which the text of a type is asked for."""
+    """Return the key of queries for the text of a type."""
     return f"{ROOT}/{type_name}/{md5}"
 
 
 def split_definition(type_name: str, text: str) -> dict[str, str]:
-    """Return the texts of a type and of those nested in it, by name, the nested ones first."""
+    """Return the texts of the nested types and of the type itself, by name, in this order.
+
+    The nested types come last in the text, but must be defined first.
+    """
     first, *rest = text.split(f"{_LINE}\n")
     texts = {}
     for part in reversed(rest):
@@ -41,10 +44,10 @@ def split_definition(type_name: str, text: str) -> dict[str, str]:
 
 
 def define(type_name: str, md5: str, text: str) -> type[Message]:
-    """Make the class of a type from its text; types that are known already are used as they are.
+    """Make the class of a type from its text; types that are already known here are reused.
 
     Raises:
-        InterfaceError: the text is none, or one of the types is known here with another definition.
+        InterfaceError: the text is malformed, or a type has another definition here.
     """
     from actionlib_core.interfaces import define_message, get_message
 
@@ -63,7 +66,7 @@ def define(type_name: str, md5: str, text: str) -> type[Message]:
 
 
 def ask_definition(node: Node, type_name: str, md5: str) -> str | None:
-    """Return the text of a type, from whoever has it; None when nobody has.
+    """Query the network for the text of a type; None when there is no reply.
 
     Blocks: `ASK_S` at most.
     """

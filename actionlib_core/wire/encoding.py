@@ -1,7 +1,7 @@
-"""How a message says on the wire what it is: type and checksum in the encoding.
+"""The encoding of a message on the wire, which contains its type and checksum.
 
-`ros1/move_base_msgs/MoveBaseActionGoal;md5=660d6895a1b9a16dce51fbdd9a64a56b` reads: the payload is
-that type, serialised as ROS 1 does, from a definition with that checksum.
+`ros1/move_base_msgs/MoveBaseActionGoal;md5=660d6895a1b9a16dce51fbdd9a64a56b` means: the payload is
+of that type, serialised as in ROS 1, with a definition that has this checksum.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ ROS1 = "ros1"
 
 
 class Typed(Protocol):
-    """What a message, service or action class tells of itself."""
+    """A message, service or action class."""
 
     _type: ClassVar[str]
     _md5sum: ClassVar[str]
 
 
 class Encoding(NamedTuple):
-    """An encoding taken apart.
+    """A parsed encoding.
 
     Attributes:
-        format: How the payload is serialised, "ros1".
+        format: The serialisation, "ros1".
         type: "pkg/Type".
-        md5: Checksum of the definition; "" when the sender did not say.
+        md5: Checksum of the definition; "" when it is missing.
     """
 
     format: str
@@ -47,7 +47,7 @@ def encoding_of(message_class: type[Typed]) -> str:
 
 
 def parse_encoding(encoding: str) -> Encoding:
-    """Take an encoding apart; what is missing is ""."""
+    """Parse an encoding; missing parts are ""."""
     front, _, schema = encoding.partition(";")
     form, _, type_name = front.partition("/")
     return Encoding(form, type_name, schema.removeprefix("md5=") if schema else "")
@@ -56,16 +56,18 @@ def parse_encoding(encoding: str) -> Encoding:
 def check_encoding(
     encoding: str, message_class: type[Typed], *, name: str, sender: str = ""
 ) -> None:
-    """Check that a payload is what a class reads. An encoding of "" is taken on trust.
+    """Check that a class can read a payload.
+
+    An empty encoding is accepted unchecked.
 
     Args:
-        encoding: As it came with the payload.
-        message_class: Reads the payload.
+        encoding: The payload's encoding.
+        message_class: The class that is to read the payload.
         name: The topic, service or action, for the error text.
-        sender: Who sent it, for the error text.
+        sender: The sender, for the error text.
 
     Raises:
-        TypeMismatchError: it is something else; the error names both types and checksums.
+        TypeMismatchError: the types or checksums differ; the error names both.
     """
     if not encoding or encoding == encoding_of(message_class):
         return

@@ -1,7 +1,7 @@
-"""One end of a topic or service on the wire that its type, or the configuration of its name, says.
+"""One end of a topic or service, on the wire chosen by its type or the configuration of its name.
 
-Publishers, subscribers, services and proxies speak through an `EndPort` and know neither keys nor
-encodings nor tokens.
+Publishers, subscribers, services and proxies use the network through an `EndPort`. Only the ports
+know keys, encodings and tokens.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ class Sender(NamedTuple):
 
     Attributes:
         put: Sends a message; raises FieldError when a value does not fit its field, TransportError
-            when the transport is closed. Blocks while the network has no room.
-        close: Leaves the topic.
+            when the transport is closed. Blocks while a link is full.
+        close: Ends the publication.
     """
 
     put: Callable[[Any], None]
@@ -53,36 +53,36 @@ class EndPort(Protocol):
 
     Attributes:
         own: The end, as others see it.
-        ages: Whether its `age` tells which of two ends came first.
+        ages: Whether its `age` tells which of two ends started first.
     """
 
     own: Endpoint
     ages: bool
 
     def show(self) -> Closable:
-        """Show that the end is there."""
+        """Announce the end with a token."""
 
     def watch(self, kinds: Collection[Kind], callback: OnEnd) -> Closable:
-        """Hear of the ends of the name: of those that are there, then of every change.
+        """Call back for each end of the name that is there, then at every change.
 
-        The callback gets what tells an end from others, the end, and whether it is there.
+        The callback gets the end's unique key, the end, and whether it is there.
         """
 
     def list_services(self) -> list[Endpoint]:
         """Return the servers of the name. Blocks: until the network has answered, 1 s at most."""
 
     def send(self, *, latch: bool) -> Sender:
-        """Declare that messages are sent."""
+        """Declare a publication."""
 
     def receive(self, callback: Callable[[Sample], None]) -> Closable:
-        """Receive messages, with the last one of each publisher that latches."""
+        """Subscribe, also to the latched message of each publisher."""
 
     def read(self, sample: Sample) -> Any:
-        """Return a message.
+        """Decode a message.
 
         Raises:
             TypeMismatchError: it is of another type.
-            DeserializationError: it cannot be read.
+            DeserializationError: its bytes are malformed.
         """
 
     def sender_of(self, sample: Sample) -> Endpoint:
@@ -96,14 +96,14 @@ class EndPort(Protocol):
 
         Raises:
             TypeMismatchError: it is of another type.
-            ValueError: it is none.
+            ValueError: the query is not a request.
         """
 
     def read_request(self, query: Query) -> Any:
-        """Return a request; raises DeserializationError."""
+        """Decode a request; raises DeserializationError."""
 
     def reply(self, query: Query, response: Any) -> None:
-        """Send a response; the exchange goes on until the query's `finish`."""
+        """Send a response; `query.finish` must follow."""
 
     def ask(
         self,
@@ -115,27 +115,27 @@ class EndPort(Protocol):
         """Send a request; see `Transport.query`."""
 
     def read_response(self, reply: Reply) -> Any:
-        """Return a response; errors as `read`."""
+        """Decode a response; errors as `read`."""
 
 
 def make_end_port(
     node: Node, kind: Kind, name: str, interface: Any, *, calls: bool = False
 ) -> EndPort:
-    """Return a new end of the full name `name`, not yet shown to anybody.
+    """Return a new end of the full name `name`, which is not yet announced.
 
     Args:
-        node: Where it lives.
-        kind: What it does; a caller of services is of kind SERVICE, too.
+        node: Its node.
+        kind: Its role; SERVICE also for a caller of services.
         calls: It is such a caller.
         name: See above.
-        interface: Its message or service class; None for an end of no type, which only watches.
+        interface: Its message or service class; None for an end that only watches.
 
     Raises:
-        ConfigError: it is on ROS 2, and no network of ROS 2 has the name; or its type has no
-            counterpart on the network that has it.
+        ConfigError: the interface is a ROS 2 type and the name is on no configured ROS 2 network;
+            or the type has no counterpart on the network of the name.
         TransportError: that network cannot be joined.
 
-    Blocks: the first time on a network of ROS 2, until it is joined.
+    Blocks: the first time on a ROS 2 network, until it is joined.
     """
     wire = getattr(interface, "_wire", "ros1")
     if interface is not None and (wire == "ros2" or node.config.ros2):

@@ -1,4 +1,7 @@
-"""What this program looks for without showing a token that would tell others."""
+"""The services and actions that this program has looked for, which no token shows.
+
+The bridge to ROS 1 reads them from here.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +12,10 @@ if TYPE_CHECKING:
 
 
 class LookedFor:
-    """The full names that were looked for.
+    """A set of full names.
 
-    No lock, as operations on dicts and lists are atomic: forked processes look for servers too.
+    Without a lock, as operations on dicts and lists are atomic: a lock that another thread holds at
+    a fork would stay locked in the forked process.
 
     Threads: every method may be called from any thread.
     """
@@ -21,23 +25,23 @@ class LookedFor:
         self._listeners: list[Callable[[], object]] = []
 
     def add(self, name: str) -> None:
-        """Note a name; who listens is called in this thread if it is new, and must not block."""
+        """Add a name; if it is new, call the listeners in this thread. They must not block."""
         if name not in self._names:
             self._names[name] = None
             for listener in list(self._listeners):
                 listener()
 
     def names(self) -> list[str]:
-        """Return the names so far."""
+        """Return all names."""
         return list(self._names)
 
     def on_new(self, listener: Callable[[], object]) -> Callable[[], None]:
-        """Call `listener` at each new name; returns what ends that."""
+        """Call `listener` at each new name; return a function that ends this."""
         self._listeners.append(listener)
         return lambda: self._listeners.remove(listener)
 
 
 services = LookedFor()
-"""Services that were called or waited for, on whatever network."""
+"""Services that were called or waited for, on any network."""
 actions = LookedFor()
 """Actions whose servers were waited for before there was a client."""

@@ -1,4 +1,4 @@
-"""Which wire an action is on: its type says so, or the configuration of its name."""
+"""Choice of an action's wire: by its type, or by the configuration of its name."""
 
 from __future__ import annotations
 
@@ -23,24 +23,25 @@ def make_client_port(
     types: ActionTypes,
     spawn: Callable[[Callable[[], object], str], object],
 ) -> ClientPort:
-    """Return the client's end of the action with the full name `name`.
+    """Return a client's port of the action with the full name `name`.
 
     Args:
-        node: On whose network.
+        node: The client's node.
         name: See above.
         types: The action's message classes.
         spawn: Starts a named thread for a burst of feedback.
 
     Raises:
-        ConfigError: the action is one of ROS 2, and no network of ROS 2 has the name; or it has no
-            counterpart on the network that has it.
+        ConfigError: the action has a ROS 2 type and its name is on no configured ROS 2 network; or
+            its type has no counterpart on the network of its name.
         TransportError: that network cannot be joined.
 
-    Blocks: the first time on a network of ROS 2, until it is joined.
+    Blocks: the first time on a ROS 2 network, until it is joined.
 
-    Threads: any. The listener is called on the network's threads; feedback that comes in a burst is
-        handed on in a thread of its own.
+    Threads: any. The listener is called on the network's threads; for a burst of feedback, on a
+        thread of its own.
     """
+    # Imported here, and below: most programs need one of the two wires only.
     if _is_on_ros2(node, name, types):
         from actionlib_core.wire.ros2.client_port import RosClientPort
 
@@ -51,7 +52,7 @@ def make_client_port(
 
 
 def make_server_port(node: Node, name: str, types: ActionTypes) -> ServerPort:
-    """Return the server's end of the action with the full name `name`.
+    """Return a server's port of the action with the full name `name`.
 
     Raises and blocks: as `make_client_port`.
     """
@@ -67,17 +68,17 @@ def make_server_port(node: Node, name: str, types: ActionTypes) -> ServerPort:
 def watch_for_server(
     node: Node, name: str, type_name: str, on_there: Callable[[], object]
 ) -> Closable:
-    """Call `on_there` for each server of an action that is there or comes, on either wire.
+    """Call `on_there` for each present and future server of an action, on either wire.
 
     Args:
-        node: On whose networks.
+        node: The node whose networks are watched.
         name: The action's full name.
-        type_name: Its type, "pkg/NameAction", or of ROS 2 "pkg/action/Name".
-        on_there: Called on the network's threads; must not wait.
+        type_name: Its type, "pkg/NameAction", or in ROS 2 "pkg/action/Name".
+        on_there: Called on the network's threads; must not block.
 
     Raises:
         ConfigError: As `make_client_port`.
-        TransportError: a network of ROS 2 cannot be joined.
+        TransportError: a ROS 2 network cannot be joined.
 
     Blocks: as `make_client_port`.
     """
@@ -107,7 +108,7 @@ def watch_for_server(
 
 
 def _types_of(type_name: str) -> ActionTypes | None:
-    """Return the classes of an action; None when no definition of it is known."""
+    """Return the message classes of an action; None when its definition is unknown."""
     from actionlib_core.interfaces import get_action, ros2
 
     try:
@@ -118,9 +119,9 @@ def _types_of(type_name: str) -> ActionTypes | None:
 
 
 def _is_on_ros2(node: Node, name: str, types: ActionTypes) -> bool:
-    """Return whether an action is on a network of ROS 2."""
+    """Return whether an action is on a ROS 2 network."""
     wire = getattr(types.action, "_wire", "ros1")
-    if wire == "ros1" and not node.config.ros2:  # without loading what ROS 2 needs
+    if wire == "ros1" and not node.config.ros2:  # decided without importing the ROS 2 modules
         return False
     from actionlib_core.wire.ros2.mapping import find_network
 

@@ -1,13 +1,13 @@
-"""Who is there: the liveliness tokens of action servers, clients, services and topics.
+"""The liveliness tokens by which action servers, clients, services and topics announce themselves.
 
-Every end of a name shows one token while it lives. The token's key carries everything that tools
-and clients need to know, so nothing is asked and nothing polls:
+Every end of a name has one token while it lives. The token's key contains everything that tools and
+clients need, so that they need not query or poll:
 
     @smachpy/<kind>/<session>/<entity>/<node>/<type>/<md5>/<name ...>
 
-`session` is the network session's id, `entity` a number within it, `node` the node's full name;
-slashes in `node` and `type` are written `%`, an empty word is written `-`. The name comes last with
-its own slashes, so `@smachpy/*/*/*/*/*/*/robot_1/**` is everything of one robot.
+`session` is the id of the network session, `entity` a number within it, `node` the node's full
+name. Slashes in `node` and `type` are written `%`, an empty word is written `-`. The name comes
+last and keeps its slashes, so `@smachpy/*/*/*/*/*/*/robot_1/**` matches everything of one robot.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 
 ROOT = "@smachpy"
 WORDS_BEFORE_NAME = 7
-LIST_TIMEOUT_S = 1.0  # longest wait for the network to say who is there
-SETTLE_S = 0.4  # the network is known when nobody new has shown up for so long
-SETTLE_MOST_S = 3.0
+LIST_TIMEOUT_S = 1.0  # longest wait for the answers to a query for tokens
+SETTLE_S = 0.4  # discovery counts as finished after this time without a new token
+SETTLE_MOST_S = 3.0  # or after this time in all
 
 
 class Kind(StrEnum):
-    """What an end of a name does there."""
+    """The role of an end of a name."""
 
     ACTION_SERVER = "action_server"
     ACTION_CLIENT = "action_client"
@@ -42,10 +42,10 @@ class Kind(StrEnum):
 
 
 class Endpoint(NamedTuple):
-    """One end of a name, as its token says.
+    """One end of a name, with the contents of its token.
 
     Attributes:
-        kind: What it does.
+        kind: Its role.
         name: Full name of the action, service or topic, no slash in front.
         type: "pkg/Type".
         md5: Checksum of the type.
@@ -64,34 +64,34 @@ class Endpoint(NamedTuple):
 
     @property
     def age(self) -> tuple[int, str]:
-        """The greater, the later the end came; see `with_age`."""
+        """Sorts ends by their start: the later, the greater; see `with_age`."""
         return self.entity, self.session
 
 
 def with_age(endpoint: Endpoint, now_ns: int) -> Endpoint:
-    """Return `endpoint` with a number that tells its age: milliseconds, then its own number.
+    """Return `endpoint` with an entity number that contains the time: milliseconds, then its own.
 
-    For names that only one may have: of two, the older stays.
+    For names that only one end may have: of two, the older stays.
     """
     entity = now_ns // 1_000_000 * 1_000_000 + endpoint.entity % 1_000_000
     return endpoint._replace(entity=entity)
 
 
 def is_younger(endpoint: Endpoint, other: Endpoint) -> bool:
-    """Tell whether `endpoint` came after `other`; both sides say the same."""
+    """Return whether `endpoint` started after `other`; both sides come to the same answer."""
     return endpoint.age > other.age
 
 
-@lru_cache(maxsize=1024)  # every goal names its server
+@lru_cache(maxsize=1024)  # used for every goal, whose message names its server
 def token_key(endpoint: Endpoint) -> str:
-    """Return the key of the token that shows `endpoint`."""
+    """Return the key of the token of `endpoint`."""
     kind, name, type_name, md5, session, node, entity = endpoint
     words = (kind.value, session, str(entity), node, type_name, md5)
     return "/".join((ROOT, *(_pack(word) for word in words), name))
 
 
 def parse_token(key: str) -> Endpoint | None:
-    """Return what a token's key says, None when it is none of ours."""
+    """Return the end that a token's key describes; None if the key is not one of our tokens."""
     words = key.split("/", WORDS_BEFORE_NAME)
     if len(words) <= WORDS_BEFORE_NAME or words[0] != ROOT:
         return None
@@ -124,12 +124,12 @@ def token_pattern(kind: Kind | None = None, name: str = "**", *, session: str = 
 def in_conflict(
     own: Endpoint, other: Endpoint, *, stays: bool = False
 ) -> tuple[tuple[str, str], tuple[str, str]]:
-    """Return (node, session) of the one of two servers that gives way, and of the one that stays.
+    """Return (node, session) of the server that stops, then of the one that keeps the name.
 
-    `own` gives way; `stays`: the other one does.
+    `own` stops; with `stays`, the other one does.
     """
-    gives, keeps = (other, own) if stays else (own, other)
-    return (gives.node, gives.session), (keeps.node, keeps.session)
+    stops, keeps = (other, own) if stays else (own, other)
+    return (stops.node, stops.session), (keeps.node, keeps.session)
 
 
 def list_endpoints(
@@ -139,7 +139,7 @@ def list_endpoints(
     name: str = "**",
     timeout: float = LIST_TIMEOUT_S,
 ) -> list[Endpoint]:
-    """Return the ends that are there now, sorted.
+    """Return the ends that have a token now, sorted.
 
     Blocks: until the network has answered, `timeout` [s] at most.
     """
@@ -149,7 +149,7 @@ def list_endpoints(
 
 
 def settle_network(transport: Transport, clock: Clock, quiet: float = SETTLE_S) -> None:
-    """Wait until nobody new has been found for `quiet` [s], in a session that has just been opened.
+    """Wait in a new session until no new token has been found for `quiet` [s].
 
     Blocks: `SETTLE_MOST_S` at most.
     """
