@@ -1,4 +1,4 @@
-"""One end of a topic or service, and what it knows of the other ends of its name."""
+"""The base class of the ends of topics and services, and the watch on the other ends of a name."""
 
 from __future__ import annotations
 
@@ -27,9 +27,10 @@ logger = logging.getLogger("actionlib_core")
 
 
 class End:
-    """What publisher, subscriber, service and proxy share: a name, a type, an eye on the others.
+    """Base class of publisher, subscriber, service and proxy.
 
-    A subclass sets `_ends` and, in `_parts`, what it has declared.
+    A subclass sets `_ends` and `_forget`, and appends to `_parts` everything that is to be closed
+    with it.
     """
 
     _what: str
@@ -73,22 +74,22 @@ class End:
 
 
 def close_all(parts: list[Closable]) -> None:
-    """Close what was declared, the newest first."""
+    """Close the parts, the newest first."""
     for part in reversed(parts):
         part.close()
 
 
 class NameWatch:
-    """Knows the ends of a name that are there, from their tokens.
+    """Tracks the present ends of a name by their tokens.
 
     An end with another type than ours is logged as an error, once, and kept in `mismatches`.
 
     Args:
-        node: Where we are.
-        end: Our own end; it is not counted.
-        kinds: Which ends concern us.
-        any_type: Another type than our own is no error.
-        on_new: Gets each end that appears, on the network's thread.
+        node: Our node.
+        end: Our own end, which is not counted.
+        kinds: The kinds of ends to track.
+        any_type: Ends of other types are no error.
+        on_new: Called with each end that appears, on the network's thread.
 
     Threads: every method may be called from any thread; `wait` not from a transport callback.
     """
@@ -106,7 +107,7 @@ class NameWatch:
         self._end = end
         self._any_type = any_type
         self._on_new = on_new
-        self._lock = threading.Lock()  # guards the three below; never held while others are called
+        self._lock = threading.Lock()  # guards the next three; not held during callbacks
         self._ends: dict[str, Endpoint] = {}
         self._mismatches: dict[Endpoint, TypeMismatchError] = {}
         self._waiters: list[Event] = []
@@ -122,7 +123,7 @@ class NameWatch:
             raise
 
     def ends(self, kind: Kind | None = None, *, any_type: bool = False) -> list[Endpoint]:
-        """Return the ends there are now: of `kind` or all, of our type or any."""
+        """Return the present ends: of `kind` or of all kinds, of our type or of any type."""
         with self._lock:
             ends = list(self._ends.values())
         wanted = self._end.own.type, self._end.own.md5
@@ -134,12 +135,12 @@ class NameWatch:
 
     @property
     def mismatches(self) -> list[TypeMismatchError]:
-        """The errors of the ends of another type that are there now, or sent to us."""
+        """The errors of ends of another type that are present, or have sent to us."""
         with self._lock:
             return list(self._mismatches.values())
 
     def note(self, error: TypeMismatchError, end: Endpoint) -> None:
-        """Keep and log that `end` has another type, unless it is known already."""
+        """Store and log the mismatch of `end`, unless it is already known."""
         with self._lock:
             if end in self._mismatches:
                 return
@@ -150,18 +151,19 @@ class NameWatch:
     def wait(
         self, condition: Callable[[], bool], timeout: float | None, changed: Event | None = None
     ) -> bool:
-        """Wait until `condition` holds, looking again whenever an end appears or vanishes.
+        """Wait until `condition` holds; it is checked whenever an end appears or vanishes.
 
         Args:
-            condition: What is waited for.
+            condition: The condition.
             timeout: Longest wait [s]; None: no limit.
-            changed: Its owner sets it when the condition may hold, which wakes this wait alone.
+            changed: An event that the caller sets when the condition may have changed; it wakes
+                this wait only.
 
         Returns:
             Whether it holds.
 
-        Blocks: until then, `timeout` [s] at most, or until the node closes; without a time-out
-            until the program is to end, too.
+        Blocks: until then, `timeout` [s] at most, or until the node closes; without a timeout also
+            until shutdown is requested.
         """
         clock = self._node.clock
         deadline = None if timeout is None else clock.now() + timeout
@@ -176,7 +178,7 @@ class NameWatch:
                 if over or self._closed:
                     return False
                 changed.wait(left)
-                changed.clear()  # before the next look: what happens after it sets it again
+                changed.clear()  # before the condition is read: a later change sets it again
             return True
         finally:
             forget()
@@ -184,14 +186,14 @@ class NameWatch:
                 self._waiters.remove(changed)
 
     def wake(self) -> None:
-        """Let those who wait look at their condition again."""
+        """Let the waiting threads check their conditions again."""
         with self._lock:
             waiters = list(self._waiters)
         for waiter in waiters:
             waiter.set()
 
     def close(self) -> None:
-        """Stop following; those who wait are woken."""
+        """Stop tracking, and wake the waiting threads."""
         self._closed = True
         self._forget()
         if self._watch is not None:

@@ -1,7 +1,7 @@
-"""A node of a ROS 2 robot: its parameters, and the life cycle that some have.
+"""A node of a ROS 2 robot: its parameters and, for managed nodes, its life cycle.
 
-Every ROS 2 node offers services beside its topics: `<node>/get_parameters` and its like, and, if it
-is a managed one, `<node>/get_state` and `<node>/change_state`. Nav2 consists of managed nodes.
+Every ROS 2 node offers services for its parameters, such as `<node>/get_parameters`. A managed node
+also offers `<node>/get_state` and `<node>/change_state`. Nav2 consists of managed nodes.
 
 Source:
     rcl_interfaces and lifecycle_msgs; https://design.ros2.org/articles/node_lifecycle.html.
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
         bool | int | float | str | bytes | list[bool] | list[int] | list[float] | list[str]
     )
 
-TIMEOUT_S = 10.0
-MOST = 2**63  # integers of parameters have 64 bits
+TIMEOUT_S = 10.0  # default limit of a call
+MOST = 2**63  # integer parameters have 64 bits
 
 _FIELDS = {
     1: "bool_value",
@@ -43,27 +43,27 @@ _FIELDS = {
     8: "double_array_value",
     9: "string_array_value",
 }
-"""Where a ParameterValue has its value, by its type (rcl_interfaces/msg/ParameterType)."""
+"""The field of a ParameterValue that holds its value, by its `type` (ParameterType)."""
 _NUMBERS = {field: number for number, field in _FIELDS.items()}
 
 
 class RemoteNode:
-    """Asks a node of a ROS 2 robot.
+    """Calls the parameter and life-cycle services of a ROS 2 node.
 
     Args:
         name: The node's name, `controller_server` for example.
-        timeout: Longest time of a call [s], waiting for the node to appear included.
-        node: Where to ask from; the node in force when None.
+        timeout: Longest time of a call [s], including the wait for the node to appear.
+        node: Our node; None: the current node.
 
     Raises:
-        InvalidDurationError: `timeout` is no time, or negative.
+        InvalidDurationError: `timeout` is not a duration, or negative.
         InvalidNameError: the name breaks the ROS rules.
-        ConfigError: there are several networks of ROS 2, and none has the name.
+        ConfigError: several ROS 2 networks are configured, and the name is on none of them.
 
-    Every method raises what a `ServiceProxy` does when the node does not answer, and blocks until
-    it has, `timeout` at most.
+    Every method blocks until the node has answered, `timeout` at most, and raises the errors of
+    `ServiceProxy.call` when it does not answer.
 
-    Threads: any number of threads may ask at the same time.
+    Threads: any number of threads may call at the same time.
     """
 
     def __init__(
@@ -78,10 +78,11 @@ class RemoteNode:
         """Return the values of parameters by name.
 
         Raises:
-            RemoteNodeError: the node does not have some of them; it names all of those.
+            RemoteNodeError: the node does not have some of them; the error names all of those.
         """
         values = self._values(names)
-        if len(values) != len(names):  # one that is not there makes rclcpp answer nothing
+        # If one of them is undeclared, rclcpp answers with an empty list: ask one by one.
+        if len(values) != len(names):
             values = [(self._values((name,)) or [None])[0] for name in names]
         found = dict(zip(names, values, strict=True))
         missing = {
@@ -101,8 +102,8 @@ class RemoteNode:
         """Set parameters by name.
 
         Raises:
-            RemoteNodeError: some values are none that a parameter can have, and nothing was sent;
-                or the node refused some, and has set the others. It names all of those.
+            RemoteNodeError: some values are not possible for a parameter, and nothing was sent; or
+                the node refused some values and has set the others. The error names all of those.
         """
         make: Any = ros2.get_message("rcl_interfaces/ParameterValue", self._distro)
         make_parameter: Any = ros2.get_message("rcl_interfaces/Parameter", self._distro)
@@ -127,7 +128,7 @@ class RemoteNode:
             raise RemoteNodeError(self.name, refused)
 
     def list_parameters(self, *prefixes: str) -> list[str]:
-        """Return the names of its parameters, sorted; with prefixes, of those below them."""
+        """Return the names of its parameters, sorted; with prefixes, only those below them."""
         response = self._call(
             "list_parameters", "rcl_interfaces/ListParameters", prefixes=list(prefixes), depth=0
         )
@@ -139,7 +140,7 @@ class RemoteNode:
         return str(state.label)
 
     def change_state(self, transition: str) -> None:
-        """Move a managed node along a transition, and wait until it has ended.
+        """Request a transition of a managed node, and wait until it has ended.
 
         Args:
             transition: "configure", "activate", "deactivate", "cleanup" or "shutdown".
@@ -153,6 +154,7 @@ class RemoteNode:
         request.transition.id = getattr(
             type(request.transition), f"TRANSITION_{transition.upper()}", 0
         )
+        # An unknown label with id 0 is sent too: the node decides which transitions it has.
         if not self._call("change_state", "lifecycle_msgs/ChangeState", request).success:
             why = f"got a refusal in state '{self.state()}'; expected a transition from there"
             raise RemoteNodeError(self.name, {transition: why})
@@ -166,7 +168,7 @@ class RemoteNode:
 
 
 def value_of(message: Any) -> Any:
-    """Return what a ParameterValue holds; None when it is not set, or of a type not known here."""
+    """Return the value in a ParameterValue; None when it is not set, or of an unknown type."""
     field = _FIELDS.get(message.type)
     if field is None:
         return None
@@ -180,8 +182,9 @@ def parameter_value(value: Any, make: Callable[[], Any]) -> Any:
     """Return a ParameterValue.
 
     Args:
-        value: A bool, int, float, str, bytes, or a list of one of them; numbers may be mixed.
-        make: Makes an empty one.
+        value: A bool, int, float, str, bytes, or a list of one of them; ints and floats may be
+            mixed.
+        make: Makes an empty ParameterValue.
 
     Raises:
         ValueError: a parameter cannot have this value.
@@ -204,6 +207,7 @@ def _field_of(value: Any) -> str:
         if len(inner) == 1 and inner <= simple:
             return inner.pop().replace("_value", "_array_value")
     too_big = type(value) is int and not -MOST <= value < MOST
+    # bool before int, of which it is a subclass.
     kinds = ((bool, "bool"), (int, "integer"), (float, "double"), (str, "string"))
     for kind, word in (*kinds, (bytes, "byte_array"), (bytearray, "byte_array")):
         if isinstance(value, kind) and not too_big:

@@ -1,8 +1,8 @@
-"""Services: call a function in another program and get its answer, in rospy's shape.
+"""Services: functions that other programs can call, with rospy's interface.
 
-A handler's exception travels to the caller as a `ServiceException`; a server that dies, is absent
-or does not answer in time ends the call with an error of its own. No call waits for ever by
-default.
+A handler's exception is raised in the caller as a `ServiceException`. When the server is absent,
+dies or does not answer in time, the call raises an error of its own kind. By default no call waits
+for ever.
 
 Source:
     rospy.Service for names, arguments and meaning.
@@ -46,8 +46,8 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger("actionlib_core")
 
-CALLS_AT_ONCE = 500  # of one service; each has a thread
-BUSY_LOG_S = 10.0  # shortest time between two words in the log that calls are refused
+CALLS_AT_ONCE = 500  # limit for one service, as each call has a thread
+BUSY_LOG_S = 10.0  # shortest interval of log entries about refused calls
 
 
 class Service(ServiceEnd):
@@ -56,26 +56,26 @@ class Service(ServiceEnd):
     Args:
         name: Service name, relative, absolute or private.
         service_class: The service's class, `SetBool` for example.
-        handler: Gets the request; returns the response, or what makes one: a dict of its fields, a
-            tuple or list of all of them, or the value of its only field.
-        node: Where it lives; the node in force when None.
-        alone: False when others may have the name too: each of them runs its handler for every
-            call, and the caller takes the first answer.
+        handler: Called with the request. Returns the response, a dict of its fields, a tuple or
+            list of all fields, or the value of its only field.
+        node: Its node; None: the current node.
+        alone: False: other servers may have the same name. Then each of them runs its handler for
+            every call, and the caller takes the first answer.
 
     Attributes:
-        error: Why it stopped by itself: an older server has the name; None while all is well.
+        error: Set when it has stopped by itself because an older server has the name, else None.
 
     Raises:
         InvalidNameError: the name breaks the ROS rules.
         NodeError: the node is closed.
         ServiceConflictError: the name has a server already.
 
-    Blocks: until the network has said who has the name, 1 s at most.
+    Blocks: until the network has answered who has the name, 1 s at most.
 
     Threads: each call of the handler has a thread of the node's clock, so calls may overlap, block,
-        and call services themselves. An exception goes to the caller, and to the log. A caller that
-        finds `CALLS_AT_ONCE` under way, or no thread left, gets a `ServiceBusyError`, which the log
-        tells of every `BUSY_LOG_S` at most.
+        and call services themselves. An exception is sent to the caller and logged. When
+        `CALLS_AT_ONCE` calls are running, or no thread can be started, the caller gets a
+        `ServiceBusyError`, which is logged every `BUSY_LOG_S` at most.
     """
 
     def __init__(
@@ -96,8 +96,8 @@ class Service(ServiceEnd):
         self._alone = alone
         self._lock = threading.Lock()
         self._running = 0
-        self._busy_logged = -math.inf  # clock time [s]
-        self._shown = False
+        self._busy_logged = -math.inf  # when refused calls were last logged [s, clock]
+        self._shown = False  # the token was declared
         self._refuse_second()
         self._ends = self._watch()
         self._parts.append(self._ends)
@@ -125,7 +125,7 @@ class Service(ServiceEnd):
         self.close()
 
     def spin(self) -> None:
-        """Answer until the service is closed or the program is to end.
+        """Answer until the service is closed or shutdown is requested.
 
         Raises:
             ServiceConflictError: it stopped because an older server has the name.
@@ -149,7 +149,11 @@ class Service(ServiceEnd):
             raise self._conflict(there[0])
 
     def _meet_servers(self) -> None:
-        """Look at the servers that were found while this one was made, and from now on at all."""
+        """Check for conflicts: with the servers found so far, and from now on with each new one.
+
+        Not before our token is declared: until then, the others cannot see that we have the name,
+        and of two servers both might stop.
+        """
         self._shown = True
         for other in self._ends.ends(any_type=True):
             self._on_server(other)
@@ -157,7 +161,7 @@ class Service(ServiceEnd):
             raise self.error
 
     def _on_server(self, other: Endpoint) -> None:
-        """Stop when `other` is older: a session that has just been opened hears of it late."""
+        """Stop if `other` is older; a new session may discover it only after the constructor."""
         if not (self._alone and self._shown and self._end.ages) or self._closed:
             return
         if not is_younger(self._end.own, other):
@@ -186,14 +190,14 @@ class Service(ServiceEnd):
             query.finish()
             return
         if not self._begin_call():
-            # Without an end, handlers that call themselves would take all threads there are.
+            # Without a limit, a handler that calls its own service would use up all threads.
             self._refuse(query, _BUSY.format(CALLS_AT_ONCE))
             return
         try:
             self._calls.spawn(partial(self._answer, query), f"service /{self.resolved_name}")
         except BaseException as error:
             self._end_call()
-            if not isinstance(error, RuntimeError):
+            if not isinstance(error, RuntimeError):  # Python's "can't start new thread"
                 raise
             self._refuse(query, f"no thread is left: {error}.")
 
@@ -203,14 +207,17 @@ class Service(ServiceEnd):
         _fail(query, error)
 
     def _pass_on(self, query: Query, text: str) -> None:
-        """Answer with the very words of a busy service: handlers that call each other add none."""
+        """Answer with the unchanged text of a busy service.
+
+        Handlers that call each other would otherwise each put their own text in front of it.
+        """
         kind = ServiceBusyError.__name__
-        if not is_from(self.resolved_name, text):  # else it was logged when it came up
+        if not is_from(self.resolved_name, text):  # our own was logged when it was raised
             self._log_busy(handler_raised(self.resolved_name, kind, text))
         _send_error(query, kind, text)
 
     def _log_busy(self, error: ServiceException) -> None:
-        """Log that calls fail because a service is busy: once in a while, as there may be many."""
+        """Log that a service is busy, every `BUSY_LOG_S` at most, as this may happen often."""
         now = self.node.clock.now()
         with self._lock:
             if now < self._busy_logged + BUSY_LOG_S:
@@ -239,12 +246,12 @@ class Service(ServiceEnd):
         try:
             response = self._respond(self.handler(self._end.read_request(query)))
             self._end.reply(query, response)
-        except BaseException as error:  # sys.exit() too: the caller waits for an answer
+        except BaseException as error:  # also for sys.exit(), the caller waits for an answer
             busy = _find_busy(error)
             if busy:
                 self._pass_on(query, busy)
             else:
-                if isinstance(error, Exception | SystemExit):  # not the end of a test's clock
+                if isinstance(error, Exception | SystemExit):  # not when a virtual clock ends it
                     logger.exception("service /%s: the handler raised", self.resolved_name)
                 _fail(query, error)
             if not isinstance(error, Exception):
@@ -270,8 +277,8 @@ class Service(ServiceEnd):
 
 
 _BUSY = (
-    "{} calls are under way; expected fewer. Try looking whether the handler calls its own "
-    "service, directly or through another, or ending calls sooner."
+    "{} calls are running; expected fewer. Try checking whether the handler calls its own "
+    "service, directly or through another, or a handler that returns sooner."
 )
 
 
@@ -285,7 +292,10 @@ def _send_error(query: Query, kind: str, text: str) -> None:
 
 
 def _find_busy(error: BaseException) -> str:
-    """Return what a busy service has said, this one or one that the handler called, or ""."""
+    """Return the text of a `ServiceBusyError` of ours or of a service that the handler called.
+
+    "" for other errors.
+    """
     if isinstance(error, ServiceBusyError):
         return str(error)
     if isinstance(error, ServiceException) and error.remote_type == ServiceBusyError.__name__:
@@ -294,6 +304,6 @@ def _find_busy(error: BaseException) -> str:
 
 
 def _caller_of(query: Query) -> Endpoint:
-    """Return the end that a call of another type came from; callers have no token."""
+    """Return an end for a caller with another type; callers have no token."""
     encoding = parse_encoding(query.encoding)
     return Endpoint(Kind.SERVICE, query.key, encoding.type, encoding.md5, "", "", 0)

@@ -1,4 +1,4 @@
-"""The caller's end of a service, in rospy's shape.
+"""The caller's end of a service, with rospy's interface.
 
 Source:
     rospy.ServiceProxy and rospy.wait_for_service for names, arguments and meaning.
@@ -40,28 +40,28 @@ if TYPE_CHECKING:
     from actionlib_core.wire.end_port import EndPort
 
 CALL_TIMEOUT_S = 60.0  # default limit of a call
-APPEAR_S = 2.0  # how much of it a call gives a server to appear
-FOREVER_S = 1e8  # for the network, which wants a number: three years
+APPEAR_S = 2.0  # part of it in which the server must appear
+FOREVER_S = 1e8  # three years: the network needs a number for "no limit"
 LEAST_S = 3600.0  # see `patience_of`
-STALE_S = 0.2  # a server that vanishes so soon after a call may have been gone before it
-MARGIN_S = 1.0  # the network gives up after the call itself has
+STALE_S = 0.2  # a server that vanishes this soon after a call may already have died before it
+MARGIN_S = 1.0  # added for the network, so that it does not give up before the call itself
 
 
-_unlimited = itertools.count(1)  # calls without a limit; taking one is a single step
+_unlimited = itertools.count(1)  # numbers of calls without a limit; `next` is atomic
 
 
 def patience_of(calls: int) -> float:
-    """Return how long the network may wait for the answer to the `calls`-th call without a limit.
+    """Return the network's timeout for the `calls`-th call without a limit.
 
-    Zenoh keeps some 0.7 kB of each query until its time is over, answered or not. A program that
-    makes a few such calls may wait years; one that makes millions is held to some 20 MB, and what
-    its calls of the last hour take.
+    Zenoh keeps about 0.7 kB of each query until its timeout, even when it was answered. So a few
+    such calls may wait for years, and a program that makes millions of them needs about 20 MB, plus
+    the memory of the calls of the last hour.
     """
     return max(FOREVER_S / calls, LEAST_S)
 
 
 class ServiceEnd(End):
-    """What server and proxy share."""
+    """Base class of server and proxy."""
 
     _what = "service"
     _kind = Kind.SERVICE
@@ -79,7 +79,7 @@ class ServiceEnd(End):
 
 
 def is_from(name: str, text: str) -> bool:
-    """Tell whether `text` is that of an error of the service `name`."""
+    """Return whether `text` is the text of an error of the service `name`."""
     return text.startswith(f"service /{name}: ")
 
 
@@ -99,15 +99,15 @@ class ServiceProxy(ServiceEnd):
     Args:
         name: Service name, relative, absolute or private.
         service_class: The service's class, `SetBool` for example.
-        persistent: As rospy takes it; there is no connection to keep here.
-        headers: As rospy takes it; not sent.
-        timeout: Longest time of a call [s], waiting for the server to appear included; None waits
-            until the server has answered or died. After 27,777 calls without a limit in one
-            program each waits an hour at most; see `patience_of`.
-        node: Where it lives; the node in force when None.
+        persistent: As in rospy, but without effect: there is no connection to keep.
+        headers: As in rospy, but not sent.
+        timeout: Longest time of a call [s], including the wait for the server to appear. None:
+            until the server has answered or died; after 27,777 such calls in one program, an hour
+            at most (see `patience_of`).
+        node: Its node; None: the current node.
 
     Raises:
-        InvalidDurationError: `timeout` is no time, or negative.
+        InvalidDurationError: `timeout` is not a duration, or negative.
         InvalidNameError: the name breaks the ROS rules.
         NodeError: the node is closed.
 
@@ -135,14 +135,15 @@ class ServiceProxy(ServiceEnd):
         return self.node.shared(("caller", *self._shared_key()), partial(make, calls=True))
 
     def _shared_key(self) -> tuple[str, str, str]:
-        """Return what proxies share what lasts by: programs make many and never close them."""
+        """Return the key of what proxies share: programs make many of them and close none."""
         return self.resolved_name, self.type, self.md5sum
 
     def close(self) -> None:
-        """Make later calls fail, and those under way at once; a second call does nothing."""
+        """Make running and later calls fail; a second call does nothing."""
         self._leave()
 
     def _leave(self) -> None:
+        # The watch and the end stay, as other proxies of the node share them.
         self._closed = True
         self._ends.wake()
 
@@ -159,10 +160,10 @@ class ServiceProxy(ServiceEnd):
             ServiceUnavailableError: there is no server.
             ServiceTimeoutError: the server did not answer in time.
             ServiceLostError: the server died or left during the call.
-            ServiceBusyError: too many calls are under way there, its handler calls itself, or no
-                thread is left.
+            ServiceBusyError: too many calls are running there, for example because its handler
+                calls itself, or no thread could be started.
             TypeMismatchError: the server has another type.
-            NodeError: the node is closed, or the program is to end.
+            NodeError: the node is closed, or shutdown was requested.
 
         Blocks: until the answer, `timeout` at most.
         """
@@ -180,13 +181,13 @@ class ServiceProxy(ServiceEnd):
         """Wait until there is a server.
 
         Args:
-            timeout: Longest wait [s]; None waits until the node closes or the program is to end.
+            timeout: Longest wait [s]; None: until the node closes or shutdown is requested.
 
         Raises:
-            InvalidDurationError: `timeout` is no time.
-            WaitTimeoutError: there is none in time.
+            InvalidDurationError: `timeout` is not a duration.
+            WaitTimeoutError: there was no server in time.
             TypeMismatchError: there is one, but of another type.
-            NodeError: the node was closed, or the program is to end.
+            NodeError: the node was closed, or shutdown was requested.
 
         Blocks: see `timeout`.
         """
@@ -207,7 +208,7 @@ class ServiceProxy(ServiceEnd):
             raise self.mismatches[0]
         if self.node.closed or (timeout is None and requested()):
             raise NodeError(
-                f"/{self.resolved_name}: not called: the node was closed or the program is to end."
+                f"/{self.resolved_name}: not called: the node was closed or shutdown was requested."
             )
         return False
 
@@ -221,9 +222,9 @@ class ServiceProxy(ServiceEnd):
             )
 
     def _ask(self, request: Message, timeout: float | None) -> Reply:
-        """Return the first reply.
+        """Send a request and return the first reply.
 
-        Blocks: until the first, or until none can come any more.
+        Blocks: until the first reply, or until none can come any more.
         """
         replies: list[Reply] = []
         done: list[bool] = []
@@ -250,21 +251,22 @@ class ServiceProxy(ServiceEnd):
             query.close()
         if replies:
             return replies[0]
+        # Only a call without a limit gets here: `MARGIN_S` lets others time out before.
         if done and self.node.clock.now() >= start + longest:
             raise ServiceTimeoutError(
                 self.resolved_name,
-                f"no answer: got none in {longest:g} s; expected one sooner in a program that has "
-                "made so many calls without a limit. Try a timeout.",
+                f"no answer: got none in {longest:g} s; expected one sooner, as the program has "
+                "made many calls without a limit. Try a timeout.",
             )
         raise self._explain_silence(timeout, in_time=in_time)
 
     def _wait_for_answer(
         self, settled: Callable[[], bool], timeout: float | None, news: Event
     ) -> bool:
-        """Wait until a call is settled, or whoever may have got it is gone; return whether.
+        """Wait until a call is settled or its servers are gone; return False after `timeout`.
 
-        When the servers that were known at the call go right after it, a new one that has just
-        taken the name has got it: its token may be later here than the answer.
+        If the servers known at the call vanish right after it, they may have been dead before, and
+        a new server may have received the call: its token can arrive later than its answer.
         """
         now, servers = self.node.clock.now, self._ends
         start = now()
@@ -291,7 +293,7 @@ class ServiceProxy(ServiceEnd):
             )
         if self.node.closed or timeout is None:
             return NodeError(
-                f"/{self.resolved_name}: no answer: the node was closed or the program is to end."
+                f"/{self.resolved_name}: no answer: the node was closed or shutdown was requested."
             )
         return ServiceTimeoutError(
             self.resolved_name,
@@ -305,20 +307,21 @@ class ServiceProxy(ServiceEnd):
             return response
         text = reply.payload.decode(errors="replace")
         try:
-            told = json.loads(text)
-            remote_type, remote_text = str(told["type"]), str(told["text"])
-        except (ValueError, TypeError, KeyError):  # a server that is not ours says it its own way
+            error = json.loads(text)
+            remote_type, remote_text = str(error["type"]), str(error["text"])
+        except (ValueError, TypeError, KeyError):  # a server of another program: any text
             remote_type, remote_text = "", text
         if remote_type == TypeMismatchError.__name__:
             self._raise_mismatch(remote_text)
         busy = remote_type == ServiceBusyError.__name__
-        if busy and is_from(self.resolved_name, remote_text):  # else it is one that it called
+        # Otherwise a service is busy that the handler has called.
+        if busy and is_from(self.resolved_name, remote_text):
             _, _, reason = remote_text.partition(": ")
             raise ServiceBusyError(self.resolved_name, reason)
         raise handler_raised(self.resolved_name, remote_type, remote_text)
 
     def _raise_mismatch(self, remote_text: str) -> None:
-        """Raise the mismatch that the tokens show, rather than the server's words."""
+        """Raise the mismatch found by tokens, which says more than the server's text."""
         if self.mismatches:
             raise self.mismatches[0]
         raise ServiceException(
@@ -332,17 +335,17 @@ class ServiceProxy(ServiceEnd):
 def wait_for_service(
     service: str, timeout: float | Duration | None = None, *, node: Node | None = None
 ) -> None:
-    """Wait until a service of that name has a server, of whatever type.
+    """Wait until a service has a server, of any type.
 
     Args:
         service: Service name, relative, absolute or private.
-        timeout: Longest wait [s]; None waits until the node closes or the program is to end.
-        node: Where to look; the node in force when None.
+        timeout: Longest wait [s]; None: until the node closes or shutdown is requested.
+        node: Our node; None: the current node.
 
     Raises:
-        InvalidDurationError: `timeout` is no time.
-        WaitTimeoutError: there is none in time.
-        NodeError: the node was closed, or the program is to end.
+        InvalidDurationError: `timeout` is not a duration.
+        WaitTimeoutError: there was no server in time.
+        NodeError: the node was closed, or shutdown was requested.
 
     Blocks: see `timeout`.
     """
@@ -357,7 +360,7 @@ def wait_for_service(
     finally:
         watch.close()
     if seconds is None or node.closed:
-        raise NodeError(f"/{name}: not there: the node was closed or the program is to end.")
+        raise NodeError(f"/{name}: not there: the node was closed or shutdown was requested.")
     raise WaitTimeoutError(
         f"/{name}: no server: got none in {seconds:g} s; expected one. "
         "Try 'actionlib service list'."

@@ -1,8 +1,8 @@
-"""Topics: publish messages to whoever subscribes, in rospy's shape.
+"""Topics: publishers and subscribers with rospy's interface.
 
-Nothing is dropped on the way unless it is said here: a publisher waits when the network has no
-room, a subscriber keeps the newest `queue_size` messages (100,000 if nothing is said) until its
-callback has run, and counts what it dropped.
+Messages are dropped in one place only. A publisher blocks while a link is full; a subscriber keeps
+the newest `queue_size` messages (default: 100,000) until its callback has run, and counts those
+that it drops.
 
 Source:
     rospy.Publisher, rospy.Subscriber and rospy.wait_for_message for names, arguments and meaning.
@@ -39,7 +39,7 @@ logger = logging.getLogger("actionlib_core")
 
 
 class _TopicEnd(End):
-    """What publisher and subscriber share."""
+    """Base class of publisher and subscriber."""
 
     _what = "topic"
     _counterpart: Kind
@@ -53,7 +53,7 @@ class _TopicEnd(End):
         self._forget = self._leave_with_node()
 
     def _leave_with_node(self) -> Callable[[], None]:
-        """See to it that the end closes with its node; returns how to forget that."""
+        """Let the end close with its node; return a function that undoes this."""
         return self.node.on_close(self.unregister)
 
     @property
@@ -62,21 +62,21 @@ class _TopicEnd(End):
         return f"/{self.resolved_name}"
 
     def get_num_connections(self) -> int:
-        """Return how many ends of the other kind, of our type, there are."""
+        """Return the number of ends of the other kind and of our type."""
         return len(self._ends.ends(self._counterpart))
 
     def wait_for_connections(self, count: int = 1, timeout: float | Duration | None = None) -> bool:
         """Wait until at least `count` ends of the other kind are there.
 
         Args:
-            count: How many.
-            timeout: Longest wait [s]; None waits until the node closes or the program is to end.
+            count: Their number.
+            timeout: Longest wait [s]; None: until the node closes or shutdown is requested.
 
         Returns:
-            Whether they are.
+            Whether they are there.
 
         Raises:
-            InvalidDurationError: `timeout` is no time.
+            InvalidDurationError: `timeout` is not a duration.
 
         Blocks: see `timeout`.
         """
@@ -86,13 +86,13 @@ class _TopicEnd(End):
     def unregister(self) -> None:
         """Leave the topic; a second call does nothing.
 
-        What has not reached a callback yet never does. One that runs in another thread then, or is
-        just being entered there, is not waited for.
+        Messages that still wait are not delivered any more. A callback that is running, or just
+        starting, in another thread is not waited for.
         """
         self._leave()
 
     def _join(self, declare: Callable[[], Closable]) -> None:
-        """Declare our end and show it; all of it, or nothing and the error."""
+        """Declare our end and announce it; after an error, leave the topic."""
         try:
             self._parts.append(declare())
             self._parts.append(self._end.show())
@@ -104,15 +104,15 @@ class _TopicEnd(End):
 class Publisher(_TopicEnd):
     """Sends messages of one class to a topic.
 
-    One that the program drops leaves the topic, unless it latches.
+    A publisher that the program drops leaves the topic, unless it latches.
 
     Args:
         name: Topic name, relative, absolute or private.
         data_class: Class of the messages.
-        latch: Keep the last message and give it to every subscriber that comes later.
-        queue_size: As rospy takes it; nothing is queued here: `publish` hands the message to the
-            network and waits while that has no room.
-        node: Where it lives; the node in force when None.
+        latch: Keep the last message and send it to every later subscriber.
+        queue_size: As in rospy, but without effect: nothing is queued here, `publish` blocks while
+            a link is full.
+        node: Its node; None: the current node.
 
     Raises:
         InvalidNameError: the name breaks the ROS rules.
@@ -141,8 +141,9 @@ class Publisher(_TopicEnd):
         self._join(self._declare)
 
     def _leave_with_node(self) -> Callable[[], None]:
-        if self.latch:  # its last message is for those who come later
+        if self.latch:  # it must live on after the program has dropped it: for later subscribers
             return super()._leave_with_node()
+        # The node and the finalizer must not refer to `self`, which would then never be dropped.
         leave = partial(close_all, self._parts)
         forget = self.node.on_close(leave)
         let_go = weakref.finalize(self, self.node.let_go, lambda: (forget(), leave()))
@@ -166,7 +167,7 @@ class Publisher(_TopicEnd):
             TypeMismatchError: there are subscribers, but all of them have another type.
             TransportError: the publisher or its node is closed.
 
-        Blocks: while the network has no room.
+        Blocks: while a link is full.
         """
         if len(args) == 1 and not kwargs and isinstance(args[0], self.data_class):
             message = args[0]
@@ -185,24 +186,24 @@ class Publisher(_TopicEnd):
 class Subscriber(_TopicEnd, Generic[M]):
     """Calls back with every message of a topic, in order, one at a time.
 
-    It goes on when the program drops it, as in rospy, until `unregister` or the end of its node.
+    As in rospy it goes on when the program drops it, until `unregister` or the end of its node.
 
     Args:
         name: Topic name, relative, absolute or private.
         data_class: Class of the messages.
-        callback: Gets the message, and `callback_args` when these are given.
-        callback_args: Second argument of the callback; None is none.
-        queue_size: How many messages may wait for the callback: when there are more, the oldest is
-            dropped and counted in `dropped`. None is 100,000, of 32 MiB together, and a drop is
-            logged, once.
-        node: Where it lives; the node in force when None.
+        callback: Called with the message, and with `callback_args` unless that is None.
+        callback_args: Second argument of the callback.
+        queue_size: Number of messages that may wait for the callback: beyond it the oldest is
+            dropped and counted in `dropped`. None: 100,000 messages of together 32 MiB, and the
+            first drop is logged.
+        node: Its node; None: the current node.
 
     Raises:
         InvalidNameError: the name breaks the ROS rules.
         NodeError: the node is closed.
 
-    Threads: the callback runs in a thread of the node's clock and may block; an exception is given
-        to `threading.excepthook`, and the next message comes.
+    Threads: the callback runs in a thread of the node's clock and may block. An exception is passed
+        to `threading.excepthook`; the next message is delivered all the same.
     """
 
     _kind = Kind.SUBSCRIBER
@@ -225,7 +226,7 @@ class Subscriber(_TopicEnd, Generic[M]):
         self.callback = callback
         self.callback_args = callback_args
         self.queue_size = queue_size
-        self._lock = threading.Lock()  # guards the messages that wait
+        self._lock = threading.Lock()  # guards `_waiting`
         self._waiting: Backlog[Sample] = Backlog(queue_size or MESSAGES)
         self._call = self._caller()
         self._join(lambda: self._end.receive(self._on_sample))
@@ -235,19 +236,20 @@ class Subscriber(_TopicEnd, Generic[M]):
 
     @property
     def dropped(self) -> int:
-        """How many messages were dropped because too many waited."""
+        """Number of messages dropped because too many waited."""
         return self._waiting.dropped
 
     def _on_sample(self, sample: Sample) -> None:
         with self._lock:
             dropped_before = self._waiting.dropped
             fitted = self._waiting.add(sample, len(sample.payload))
-        if fitted:  # one call each; a message that pushed another out is delivered in its place
+        # One queued call per message. A message that has displaced another uses its call.
+        if fitted:
             self._call(self._deliver)
-        elif not dropped_before and not self.queue_size:  # else it was asked for
+        elif not dropped_before and not self.queue_size:  # with a queue_size, drops are intended
             logger.warning(
-                "topic %s: messages come faster than they are taken, and the oldest of %d is "
-                "dropped. Try a callback that takes no time, or a queue_size.",
+                "topic %s: messages arrive faster than they are processed: of %d waiting messages, "
+                "the oldest is dropped. Try a faster callback, or a queue_size.",
                 self.name,
                 len(self._waiting),
             )
@@ -255,7 +257,8 @@ class Subscriber(_TopicEnd, Generic[M]):
     def _deliver(self) -> None:
         with self._lock:
             sample = self._waiting.take()
-        if sample is None or self._closed or self.callback is None:  # None: a drop was its end
+        # None: one large message can displace several, and then there are more calls than messages.
+        if sample is None or self._closed or self.callback is None:
             return
         try:
             message = self._end.read(sample)
@@ -265,7 +268,7 @@ class Subscriber(_TopicEnd, Generic[M]):
         self._call_back(message)
 
     def _call_back(self, message: M) -> None:
-        if self._closed or self.callback is None:  # it may have left while the message was read
+        if self._closed or self.callback is None:  # unregistered while the message was decoded
             return
         if self.callback_args is None:
             self.callback(message)
@@ -274,10 +277,11 @@ class Subscriber(_TopicEnd, Generic[M]):
 
 
 class NotingSubscriber(Subscriber[M]):
-    """A subscriber whose callback only takes note of the message: no thread is needed for that.
+    """A subscriber whose callback returns at once and so needs no thread of its own.
 
-    Threads: the callback runs on the network's thread, which it must not hold up: it may keep the
-        message and set an event, and knows no clock and node of its own. The rest as above.
+    Threads: the callback runs on the network's thread, which it must not block: it may store the
+        message and set an event. The node and its clock are not the current ones there. Otherwise
+        as `Subscriber`.
     """
 
     def _caller(self) -> Callable[[Callable[[], None]], object]:
@@ -296,14 +300,14 @@ def wait_for_message(
     Args:
         topic: Topic name, relative, absolute or private.
         topic_type: Class of the message.
-        timeout: Longest wait [s]; None waits until the node closes or the program is to end.
-        node: Where to listen; the node in force when None.
+        timeout: Longest wait [s]; None: until the node closes or shutdown is requested.
+        node: The subscriber's node; None: the current node.
 
     Raises:
-        InvalidDurationError: `timeout` is no time.
+        InvalidDurationError: `timeout` is not a duration.
         WaitTimeoutError: no message came in time.
-        TypeMismatchError: somebody publishes another type there, and nobody ours.
-        NodeError: the node was closed, or the program is to end.
+        TypeMismatchError: all publishers of the topic have another type.
+        NodeError: the node was closed, or shutdown was requested.
 
     Blocks: see `timeout`.
     """
@@ -313,7 +317,7 @@ def wait_for_message(
 
 
 class _OneMessage(NotingSubscriber[M]):
-    """A subscriber that is waited for."""
+    """The subscriber of `wait_for_message`."""
 
     def __init__(self, topic: str, topic_type: type[M], node: Node | None) -> None:
         self._found: list[M] = []
@@ -333,7 +337,7 @@ class _OneMessage(NotingSubscriber[M]):
             raise mismatch
         if self._closed or self.node.closed or (timeout is None and requested()):
             raise NodeError(
-                f"{self.name}: no message: the node was closed or the program is to end."
+                f"{self.name}: no message: the node was closed or shutdown was requested."
             )
         raise WaitTimeoutError(
             f"{self.name}: no message: got none in {timeout:g} s, "

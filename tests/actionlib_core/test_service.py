@@ -320,11 +320,11 @@ def test_handlers_that_call_each_other_for_ever_end_in_an_error(nodes, caplog, m
     with pytest.raises(ServiceBusyError) as caught:
         ServiceProxy("a", Trigger, node=caller)()
     assert str(caught.value) == (
-        "service /a: 20 calls are under way; expected fewer. Try looking whether the handler calls "
-        "its own service, directly or through another, or ending calls sooner."
+        "service /a: 20 calls are running; expected fewer. Try checking whether the handler calls "
+        "its own service, directly or through another, or a handler that returns sooner."
     )
     assert len(runs) == 20 * len(names)
-    assert caplog.text.count("calls are under way") == len(names)
+    assert caplog.text.count("calls are running") == len(names)
     # The service has not suffered.
     with pytest.raises(ServiceBusyError):
         ServiceProxy("a", Trigger, node=caller)()
@@ -356,7 +356,7 @@ def test_the_caller_of_a_handler_that_calls_a_busy_service_is_told_which_one(nod
         error = caught.value
         assert not isinstance(error, ServiceBusyError)
         assert (error.name, error.remote_type) == (name, "ServiceBusyError")
-        assert error.remote_text.startswith("service /b: 1 calls are under way")
+        assert error.remote_text.startswith("service /b: 1 calls are running")
         assert f"service /{name}: the handler raised ServiceBusyError: service /b" in str(error)
         assert str(error) in caplog.messages
 
@@ -366,9 +366,9 @@ def test_refused_calls_are_logged_once_in_a_while(nodes, clock, busy, caplog):
     for logged in (1, 1, 2, 2):
         if len(caplog.messages) < logged:
             clock.sleep(10.0)
-        with pytest.raises(ServiceBusyError, match="service /b: 1 calls are under way"):
+        with pytest.raises(ServiceBusyError, match="service /b: 1 calls are running"):
             proxy()
-        assert caplog.text.count("calls are under way") == logged
+        assert caplog.text.count("calls are running") == logged
 
 
 def test_a_call_that_no_thread_is_left_for_is_answered(nodes, clock, caplog, monkeypatch):

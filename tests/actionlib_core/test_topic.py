@@ -254,7 +254,7 @@ def test_wait_for_message_raises_on_another_type(nodes, clock):
 def test_wait_for_message_ends_with_the_program(nodes, clock):
     with shutdown.use_shutdown(shutdown.Shutdown()) as end:
         clock.call_later(4.0, end.request)
-        with pytest.raises(NodeError, match="program is to end"):
+        with pytest.raises(NodeError, match="shutdown was requested"):
             wait_for_message("chatter", String, node=nodes[1])
 
 
