@@ -1,7 +1,7 @@
-"""The network as one object that can be replaced: zenoh for robots, memory for tests.
+"""The interface of the network: Zenoh for robots, a network in memory for tests.
 
-A transport moves bytes under keys. It knows nothing of actions or messages. Every implementation
-passes the suite in `tests/conformance`.
+A transport sends bytes under keys and knows nothing of actions or messages. Every implementation
+passes the tests in `tests/conformance`.
 """
 
 from __future__ import annotations
@@ -14,16 +14,17 @@ if TYPE_CHECKING:
 
 
 class Sample(NamedTuple):
-    """One message as it crossed the network.
+    """One received message.
 
     Attributes:
-        key: The key it was put on, slashes between words, none in front.
+        key: Its key: words with slashes between them, without a leading slash.
         payload: The bytes.
-        encoding: What the bytes are, in the sender's words; "" when it said nothing.
+        encoding: The sender's description of the bytes; "" without one.
         source: Session id of the sender; "" when unknown.
-        attachment: What the sender put beside the payload; None when nothing.
-        stamp_ns: When it was sent, by the clock of a session on its way (`Config.timestamping`), to
-            the microsecond [ns since the epoch]; 0 when nobody said. Only beside an attachment.
+        attachment: Further bytes beside the payload, or None.
+        stamp_ns: When it was sent, by the clock of a session on its way that stamps messages
+            (`Config.timestamping`), to the microsecond [ns since the epoch]; 0 without a stamp.
+            Only set for messages with an attachment.
     """
 
     key: str
@@ -45,11 +46,11 @@ class Reply(NamedTuple):
     """An answer to a query.
 
     Attributes:
-        key: The key that was asked; "" for an error.
+        key: The query's key; "" for an error.
         payload: The bytes; the text of an error.
-        encoding: What the bytes are.
-        error: It says why there is no answer.
-        attachment: What the sender put beside the payload; None when nothing.
+        encoding: The sender's description of the bytes.
+        error: Whether it is an error.
+        attachment: Further bytes beside the payload, or None.
         source: Session id of the sender; "" when unknown.
     """
 
@@ -63,14 +64,14 @@ class Reply(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """How a publisher's messages travel.
+    """The delivery options of a publisher.
 
     Attributes:
         express: Send at once, never batched (goals, cancels, results).
-        block: Wait for room rather than drop when the network is slower than the sender.
-        latch: Keep the last message and give it to every subscriber that comes later.
-        cache: Keep so many of the last messages, in the way of zenoh's advanced publishers, for
-            subscribers that ask for them (`cached`); ROS 2 latches in this way.
+        block: Block while a link is full rather than drop the message.
+        latch: Keep the last message and send it to every later subscriber.
+        cache: Number of last messages to keep, in the way of Zenoh's advanced publishers, for
+            subscribers that ask for them (`cached`). ROS 2 latches in this way.
     """
 
     express: bool = False
@@ -85,7 +86,7 @@ class Closable(Protocol):
     def close(self) -> None:
         """Undeclare it; a second call does nothing.
 
-        No callback starts after it returned; one that runs in another thread may still be ending.
+        No callback starts after this has returned; one in another thread may still be running.
         """
         ...
 
@@ -98,7 +99,7 @@ class PublisherPort(Closable, Protocol):
 
         Args:
             payload: The bytes.
-            attachment: More bytes, which arrive beside the payload; not for a key that latches.
+            attachment: Further bytes beside the payload; not for a publisher that latches.
 
         Raises:
             TransportError: the transport is closed.
@@ -106,16 +107,15 @@ class PublisherPort(Closable, Protocol):
         ...
 
     def matching(self) -> bool:
-        """Tell whether any subscriber listens now."""
+        """Return whether there is a subscriber now."""
         ...
 
 
 class Query(Protocol):
-    """A question that a queryable answers, now or later, from any thread.
+    """A query that a queryable answers, now or later, from any thread.
 
-    It is open until `finish`; what is called on it after that does nothing. A session that ends
-    finishes what it has not answered, and so does a queryable's callback that raises (its error is
-    the answer then).
+    It is open until `finish`; calls after that do nothing. A session that ends finishes its open
+    queries. So does a queryable's callback that raises; its error is then sent as the answer.
     """
 
     key: str
@@ -128,26 +128,27 @@ class Query(Protocol):
         ...
 
     def reply_error(self, text: str) -> None:
-        """Send an error; the asking side sees it as `Reply(error=True)`."""
+        """Send an error, which arrives as `Reply(error=True)`."""
         ...
 
     def finish(self) -> None:
-        """End the exchange; the asking side's `on_done` fires when all queryables have finished."""
+        """End the answer; `on_done` is called when all queryables have done so."""
         ...
 
 
 class Transport(Protocol):
     """One session on the network.
 
-    Keys are exact here, without wildcards; only tokens are asked for by pattern.
+    Keys are exact, without wildcards; only tokens are matched with patterns.
 
     Threads: callbacks run on the transport's own threads, never inside a call of yours, in order
-    per key and sender (those of different senders may overlap); they must be short and must not
-    wait. They may call every method here, also for their own key. An exception that one lets
-    through is given to `threading.excepthook`, and what it was about to get next still comes.
+    per key and sender (those of different senders may overlap). They must be short and must not
+    block, and may call every method here, also for their own key. An exception in a callback is
+    passed to `threading.excepthook`; the next items are delivered all the same.
 
     Raises:
-        TransportError: by every method but `close`: the session is closed, or a key is malformed.
+        TransportError: by every method except `close`: the session is closed, or a key is
+            malformed.
     """
 
     @property
@@ -157,11 +158,11 @@ class Transport(Protocol):
 
     @property
     def rediscovery(self) -> float:
-        """Longest time until a lost link that could be there again is there again [s]."""
+        """Longest time in which a lost link is restored once the network allows it [s]."""
         ...
 
     def publisher(self, key: str, encoding: str = "", quality: Quality = ...) -> PublisherPort:
-        """Declare that this session sends on `key`."""
+        """Declare a publisher of `key`."""
         ...
 
     def subscribe(
@@ -172,15 +173,15 @@ class Transport(Protocol):
         history: bool = True,
         cached: int = 0,
     ) -> Closable:
-        """Receive what is put on `key`, own puts included.
+        """Receive the messages on `key`, also this session's own.
 
         Args:
             key: An exact key.
-            callback: Gets each message.
-            history: Ask latched publishers for their last message: one that was put before now
-                comes first, once. False saves the asking where nobody latches.
-            cached: Ask publishers with a cache (`Quality.cache`) for so many of their last
-                messages, now and when one appears later; `history` counts as False then.
+            callback: Called with each message.
+            history: Query latched publishers for their last message: one that was sent earlier
+                comes first, and only once. False spares the queries where nothing is latched.
+            cached: Number of last messages to request from publishers with a cache
+                (`Quality.cache`), now and when one appears later; then `history` has no effect.
         """
         ...
 
@@ -191,9 +192,9 @@ class Transport(Protocol):
 
         Args:
             key: An exact key.
-            callback: Gets each query.
-            complete: It knows all there is to answer, so that a query for one (`best`) may come
-                here and to nobody else.
+            callback: Called with each query.
+            complete: It has the whole answer, so that a query for one answer (`best`) may be sent
+                to it alone.
         """
         ...
 
@@ -209,37 +210,36 @@ class Transport(Protocol):
         on_reply: Callable[[Reply], None],
         on_done: Callable[[], None],
     ) -> Closable:
-        """Ask every queryable on `key`; `on_done` is called exactly once, after the last reply.
+        """Query every queryable on `key`; `on_done` is called exactly once, after the last reply.
 
-        It is called at once when there is no queryable, when all have finished, and when those that
-        have not are known to be dead. Closing the query ends the interest: neither callback starts
-        after that.
+        It is called as soon as there is no queryable, all have finished, or those that have not are
+        known to be dead. After the query was closed, neither callback starts any more.
 
         Args:
             key: An exact key.
-            payload: The question.
-            encoding: What the payload is.
-            attachment: More bytes beside the payload.
-            best: Ask one complete queryable only, however many there are; all if none is complete.
-            timeout: After this [s] the query is done, whoever has not answered.
-            on_reply: Gets each answer.
-            on_done: Hears that no more answers come.
+            payload: The bytes of the query.
+            encoding: Description of the payload.
+            attachment: Further bytes beside the payload.
+            best: Query only one of the complete queryables; all queryables if none is complete.
+            timeout: After this time [s] the query is done, even if answers are missing.
+            on_reply: Called with each answer.
+            on_done: Called when no more answers come.
         """
         ...
 
     def declare_alive(self, key: str) -> Closable:
-        """Show a liveliness token on `key` until it is closed or this session dies."""
+        """Declare a liveliness token on `key`, until it is closed or this session dies."""
         ...
 
     def watch_alive(self, pattern: str, callback: Callable[[Presence], None]) -> Closable:
-        """Hear of tokens matching `pattern`: those that exist now first, then every change.
+        """Watch the tokens that match `pattern`: first the present ones, then every change.
 
-        A token that several declare appears with the first of them and vanishes with the last.
+        A token that several sessions declare appears with the first and vanishes with the last.
 
         Args:
-            pattern: A key in which `*` stands for one word and `**` for any number of words;
-                neither stands for a word that begins with `@`.
-            callback: Gets each token that appears or vanishes.
+            pattern: A key in which `*` matches one word and `**` any number of words; neither
+                matches a word that begins with `@`.
+            callback: Called with each token that appears or vanishes.
         """
         ...
 

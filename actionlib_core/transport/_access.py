@@ -1,8 +1,9 @@
-"""Access rules told to those they are for, so that a forbidden name is an error and no silence.
+"""Access rules sent to the programs they concern, so that a forbidden name raises an error.
 
-Zenoh drops what a rule forbids without a word. A session with rules therefore answers a question on
-`@smachpy_access` with the rules that concern the one who asks, who checks his own names before
-they go out. This is a courtesy: what enforces the rules is zenoh, on the side that has them.
+Zenoh silently drops messages that a rule forbids. A session with rules therefore answers queries on
+`@smachpy_access` with the rules for the program that asks, which checks its own names before it
+uses them. The rules are enforced by Zenoh in the session that has them; this check only adds errors
+that people can understand.
 """
 
 from __future__ import annotations
@@ -24,12 +25,12 @@ ACCESS_KEY = "@smachpy_access/rules"
 
 @dataclass(frozen=True, slots=True)
 class Permissions:
-    """What one program may use.
+    """The names that one program may use.
 
     Attributes:
-        who: Whom the other side takes it for: "user 'alice'".
-        allow: Names it may use.
-        deny: Names it may not, whatever `allow` says.
+        who: The program, as the other side identifies it: "user 'alice'".
+        allow: Patterns of the names it may use.
+        deny: Patterns of the names it may not use, even if `allow` has them.
     """
 
     who: str
@@ -37,31 +38,31 @@ class Permissions:
     deny: tuple[str, ...]
 
     def allows(self, key: str) -> bool:
-        """Tell whether a key, or what a token or latched message is about, may be used."""
+        """Return whether the program may use a key: by its name, or that in a token's key."""
         name = _name_of(key)
         if name is None or any(key_matches(pattern, name) for pattern in self.deny):
             return name is None
         return any(key_matches(pattern, name) for pattern in self.allow)
 
     def encode(self) -> bytes:
-        """Return it as it travels."""
+        """Return it as bytes."""
         fields = {"who": self.who, "allow": self.allow, "deny": self.deny}
         return json.dumps(fields).encode()
 
 
 def decode_permissions(payload: bytes) -> Permissions:
-    """Return what `Permissions.encode` wrote."""
+    """Return the `Permissions` that `Permissions.encode` has written."""
     fields = json.loads(payload)
     return Permissions(fields["who"], tuple(fields["allow"]), tuple(fields["deny"]))
 
 
 def find_permissions(rules: Iterable[AccessRule], user: str, certificate: str) -> Permissions:
-    """Return what a program may use that logged in as `user` or showed `certificate`.
+    """Return the permissions of the program that has logged in as `user` or with `certificate`.
 
     Args:
         rules: All rules.
-        user: Name it logged in with; "" is none.
-        certificate: Common name of the certificate it showed; "" is none.
+        user: Its user name, or "".
+        certificate: Common name of its certificate, or "".
     """
     mine = [rule for rule in rules if _concerns(rule, user, certificate)]
     who = f"certificate {certificate!r}" if certificate else f"user {user!r}" if user else "anybody"
@@ -79,7 +80,7 @@ def _concerns(rule: AccessRule, user: str, certificate: str) -> bool:
 
 
 def _name_of(key: str) -> str | None:
-    """Return the ROS name that a key is about; None for keys and patterns that are about none."""
+    """Return the ROS name in a key; None for keys without one, and for patterns."""
     if key.startswith(f"{ROOT}/"):
         words = key.split("/", WORDS_BEFORE_NAME)
         name = words[-1] if len(words) > WORDS_BEFORE_NAME else "*"

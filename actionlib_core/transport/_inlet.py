@@ -1,7 +1,8 @@
-"""How foreign threads deliver to callbacks: in order, never on a caller's own stack, stoppable.
+"""Delivery from the threads of a network library to callbacks.
 
-A network library may call back on its own threads and also inside a call of ours. `Inlet` evens
-that out; `Gate` lets a session end with no callback left running.
+A network library calls back on its own threads, and also inside a call of ours. `Inlet` delivers in
+order and never on the stack of a caller, who may hold locks. `Gate` lets a session end with no
+callback left running.
 """
 
 from __future__ import annotations
@@ -22,17 +23,19 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-POLL_S = 1e-3  # calls are many and their end is asked for once: looking is cheaper than telling
+# `Inside.wait_idle` polls: it runs once per process, while calls are frequent and would all have to
+# signal their end.
+POLL_S = 1e-3
 
 
 class Inside:
-    """Which threads are in calls into the library; a callback on one of them is inline.
+    """The threads that are in calls into the library; a callback on one of them is inline.
 
-    A dictionary by thread, not a `threading.local`: a foreign thread is a new one to Python each
-    time that it calls back, and would make its part of a local anew.
+    A dictionary by thread, not a `threading.local`: to Python a thread of the library is a new one
+    each time it calls back, and a `threading.local` would set up its values each time.
 
     Attributes:
-        depths: How deep each thread is; one that is not is not there.
+        depths: Thread id -> number of nested calls; other threads have no entry.
     """
 
     def __init__(self) -> None:
@@ -51,8 +54,9 @@ class Inside:
     def wait_idle(self, timeout: float) -> None:
         """Wait until no other thread is in a call.
 
-        Blocks: about `timeout` [s] at most after the last of them that came out of one; a time in
-        which the process was stopped does not count.
+        Blocks: until `timeout` [s] have passed in which none of them has returned from its call.
+        Time in which the process was suspended does not count, as the sleeps are counted and not
+        the clock.
         """
         left = timeout
         others = self.depths.keys() - {get_ident()}
@@ -68,15 +72,16 @@ inside = Inside()
 
 
 class Gate:
-    """Lets callbacks run until it is shut, and knows when the last one has returned.
+    """Lets callbacks run until it is shut, and waits until the last one has returned.
 
-    Who enters puts itself down before it looks whether the gate is shut, and who shuts it does so
-    before looking who is down; list operations are atomic, so no lock is needed.
+    It needs no lock: a callback registers in `running` before it reads `is_shut`, and `shut` sets
+    `is_shut` before `wait_idle` reads `running`. So one of the two sees the other. List operations
+    are atomic.
 
     Attributes:
-        running: The threads that are in a callback, or about to look whether they may.
+        running: The threads that are in a callback, or about to check whether they may start.
         is_shut: No callback may start.
-        left: Set by each that leaves a gate that is shut.
+        left: Set by each callback that returns after the gate was shut.
     """
 
     def __init__(self) -> None:
@@ -89,14 +94,14 @@ class Gate:
         self.is_shut = True
 
     def wait_idle(self, timeout: float) -> None:
-        """Wait until no callback runs, not counting one that this thread is in itself.
+        """Wait until no callback runs, except one in this thread.
 
         Blocks: `timeout` [s] at most.
         """
         deadline = RealClock.now() + timeout
         me = get_ident()
         while True:
-            self.left.clear()
+            self.left.clear()  # before reading `running`: a callback that returns then sets it
             left = deadline - RealClock.now()
             if left <= 0 or all(runner == me for runner in tuple(self.running)):
                 return
@@ -104,11 +109,11 @@ class Gate:
 
 
 class Inlet:
-    """Runs what the library delivers to one declaration: in order, never inside a call of ours.
+    """Delivers the items of one declaration: in order, and never inside a call of ours.
 
     Args:
-        gate: Decides whether a callback may still start.
-        executor: Runs what arrives inside a call of ours.
+        gate: Whether a callback may still start.
+        executor: Delivers the items that arrive inside a call of ours.
     """
 
     __slots__ = ("_gate", "_queued", "_submit", "closed")
@@ -116,7 +121,7 @@ class Inlet:
     def __init__(self, gate: Gate, executor: SerialExecutor) -> None:
         self._gate = gate
         self._submit = executor.submit
-        self._queued: list[None] = []  # one for each that waits; list operations are atomic
+        self._queued: list[None] = []  # a counter of queued items: list operations are atomic
         self.closed = False
 
     def take(
@@ -127,6 +132,7 @@ class Inlet:
     ) -> None:
         """Run `function(item)`, or `refuse(item)` when this is closed."""
         me = get_ident()
+        # While items are queued, the next ones must queue behind them to stay in order.
         if self._queued or me in inside.depths:
             self._queued.append(None)
             self._submit(partial(self._run_queued, function, item, refuse))
@@ -157,7 +163,7 @@ class Inlet:
                 function(item)
             elif refuse is not None:
                 refuse(item)
-        except Exception:  # noqa: BLE001  a border: reported, the next item is delivered
+        except Exception:  # noqa: BLE001  reported here, so that the next item is delivered
             report_thread_exception()
         finally:
             gate.running.remove(me)
@@ -165,23 +171,22 @@ class Inlet:
                 gate.left.set()
 
 
-# CPython makes a thread state for a foreign thread that calls back and destroys it as the callback
-# returns, with a mapping of memory each time: about 14 microseconds of a callback that otherwise
-# takes 2 (3.11). A thread that has entered once more than it has left keeps its state.
+# When a foreign thread calls back, CPython (3.11) makes a thread state for it and destroys that
+# when the callback returns, mapping memory each time: about 14 us of a callback that otherwise
+# takes 2. After one call of PyGILState_Ensure without its Release, the thread keeps its state.
 # https://docs.python.org/3/c-api/init.html#non-python-created-threads
-LONGEST = 64  # threads; a library that starts more of them than this has no pool worth keeping
+LONGEST = 64  # threads; a library that starts more than these does not reuse its threads
 
 _enter = ctypes.pythonapi.PyGILState_Ensure if sys.implementation.name == "cpython" else None
 
 pinned: set[int] = set()
-"""The threads that are kept, by their idents."""
+"""The ids of threads whose states are kept."""
 
 
 def pin(me: int) -> None:
-    """Keep the state of the calling thread, whose ident is `me`, until the interpreter ends.
+    """Keep the state of the calling thread, whose id is `me`, until the interpreter ends.
 
-    An ident that comes again for a new thread stays in `pinned`: that thread is not kept, which
-    costs it time and nothing else.
+    A new thread with the id of an earlier one is not pinned again. That only costs it time.
     """
     if _enter is not None and len(pinned) < LONGEST:
         _enter()

@@ -1,4 +1,4 @@
-"""Keys and patterns of keys, by zenoh's rules as far as they are used here.
+"""Keys and patterns of keys: the part of Zenoh's rules that is used here.
 
 Source:
     Zenoh's key expression specification: https://github.com/eclipse-zenoh/roadmap/blob/main/rfcs/ALL/Key%20Expressions.md
@@ -16,7 +16,7 @@ _KEY = re.compile(r"[^/*$?#]+(?:/[^/*$?#]+)*")
 
 
 def check_key(key: str) -> str:
-    """Return `key` unchanged if one can send on it.
+    """Return `key` unchanged if it is a valid key.
 
     Raises:
         TransportError: it is empty, has an empty word or a character with a meaning in patterns.
@@ -31,10 +31,9 @@ def check_key(key: str) -> str:
 
 @lru_cache(maxsize=1024)
 def compile_pattern(pattern: str) -> re.Pattern[str]:
-    """Return what matches the keys of a pattern in full.
+    """Return a regular expression for `fullmatch` with a key and one more slash.
 
-    `*` stands for one word, `**` for any number of words; neither stands for a word that begins
-    with `@`.
+    `*` matches one word, `**` any number of words; neither matches a word that begins with `@`.
 
     Raises:
         TransportError: the pattern has an empty word.
@@ -52,25 +51,25 @@ _WORDS = {"*": "[^/@][^/]*/", "**": "(?:[^/@][^/]*/)*"}
 
 
 def key_matches(pattern: str, key: str) -> bool:
-    """Tell whether a pattern stands for a key."""
+    """Return whether a pattern matches a key."""
     return compile_pattern(pattern).fullmatch(key + "/") is not None
 
 
-_MARK = 0xC000_0000
+_MARK = 0xC000_0000  # two bits that mark the number as ours; 30 bits of checksum follow
 
 
 def key_mark(key: str) -> int:
-    """Return the number that a message for `key` carries, so that its receiver can tell it is.
+    """Return a checksum of `key` for its messages, by which a receiver recognises other keys.
 
-    A network library that names keys by numbers may take one for another: zenoh does for moments,
-    when one side of a link has given it up and the other has not.
+    Zenoh sends short numbers instead of keys. For a moment, when one side of a link has given it up
+    and the other has not, a number may stand for another key.
     """
     return _MARK | zlib.crc32(key.encode()) >> 2
 
 
 def is_for_another_key(number: int, mark: int) -> bool:
-    """Tell whether a message that carries `number` came to a key whose mark is not its own.
+    """Return whether a message with `number` was sent on another key than the one with `mark`.
 
-    Foreign senders carry none, or count their messages: they are trusted.
+    Other programs send no number, or count their messages from 0: those are accepted.
     """
     return number >= _MARK and number != mark

@@ -1,7 +1,7 @@
-"""What a session in memory declares, and the inbox that its callbacks are run from.
+"""The declarations of a session in memory, and the inbox that delivers to their callbacks.
 
-An entry puts itself into the network's tables when it is made and leaves them when it is closed;
-both, and every method whose name ends in `_locked`, need the network's lock.
+An entry adds itself to the network's tables when it is made and removes itself when it is closed.
+Both need the network's lock, and so does every method whose name ends in `_locked`.
 """
 
 from __future__ import annotations
@@ -29,30 +29,30 @@ CLOSE_WAIT_S = 0.9  # how long `close` waits for a callback that is running in a
 
 
 class Inbox:
-    """What waits for one session, first in, first out: who gets it, and what."""
+    """The items that wait for one session, first in, first out, with their receivers."""
 
-    __slots__ = ("_clock", "_deaf", "_idle", "_items", "_running")
+    __slots__ = ("_clock", "_idle", "_items", "_running", "_shut")
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._items: deque[tuple[Receiver, Any]] = deque()
-        self._running: int | None = None
+        self._running: int | None = None  # id of the thread that delivers
         self._idle: Event | None = None
-        self._deaf = False
+        self._shut = False
 
     def post(self, receiver: Receiver, item: object) -> None:
         self._items.append((receiver, item))
         self._clock.call_later(0.0, self._deliver)
 
-    # No lock: who delivers says so before it looks whether it may, and who shuts says so before it
-    # looks whether somebody delivers.
+    # No lock is needed: `_deliver` sets `_running` before it reads `_shut`, and `shut` sets `_shut`
+    # before it reads `_running`. So one of the two sees the other.
     def _deliver(self) -> None:
         receiver, item = self._items.popleft()
         self._running = threading.get_ident()
         try:
-            if not self._deaf:
+            if not self._shut:
                 receiver.deliver(item)
-        except Exception:  # noqa: BLE001  a border: reported, the next item is delivered
+        except Exception:  # noqa: BLE001  reported here, so that the next item is delivered
             report_thread_exception()
         finally:
             self._running = None
@@ -67,20 +67,20 @@ class Inbox:
         """
         if wait:
             self._idle = self._clock.event()
-        self._deaf = True
+        self._shut = True
         if self._idle is not None and self._running not in {None, threading.get_ident()}:
             self._idle.wait(CLOSE_WAIT_S)
 
 
 class Receiver(Protocol):
-    """What an inbox delivers to."""
+    """Receives the items of an inbox."""
 
     def deliver(self, item: Any) -> None:
-        """Take what was posted, unless closed."""
+        """Handle an item, unless closed."""
 
 
 class Entry:
-    """Something declared by a session: it is in the tables of the network until closed."""
+    """A declaration of a session, which is in the network's tables until it is closed."""
 
     __slots__ = ("closed", "network", "session")
 
@@ -104,10 +104,10 @@ class Entry:
         raise NotImplementedError
 
     def link_dead_locked(self) -> None:
-        """The session's link has been cut for longer than its lease (`FaultyTransport`)."""
+        """React to a link that was cut for longer than its lease (`FaultyTransport`)."""
 
     def link_back_locked(self) -> None:
-        """The session's link is there again."""
+        """React to the return of the session's link."""
 
 
 class Listener(Entry, Generic[T]):
@@ -126,7 +126,7 @@ class Listener(Entry, Generic[T]):
 
 
 class Subscriber(Listener[Sample]):
-    """Gets the messages of a key."""
+    """Receives the messages of a key."""
 
     __slots__ = ("_cached", "_history", "_key")
 
@@ -162,7 +162,7 @@ class Subscriber(Listener[Sample]):
 
 
 class Queryable(Listener["MemoryQuery"]):
-    """Gets the queries on a key; one that it cannot answer any more is finished for it."""
+    """Receives the queries on a key; those that it can no longer answer are finished."""
 
     __slots__ = ("_key", "complete")
 
@@ -195,7 +195,10 @@ class Queryable(Listener["MemoryQuery"]):
 
 
 class Watcher(Listener[Presence | None]):
-    """Is told of tokens, through a faulty link of those that can be seen through it."""
+    """Watches tokens; behind a faulty link, those that are visible through it.
+
+    `_there` are the tokens of the network, `_shown` those that the callback knows of.
+    """
 
     __slots__ = ("_shown", "_there", "pattern")
 
@@ -217,10 +220,10 @@ class Watcher(Listener[Presence | None]):
             return
         if item is not None:
             (self._there.add if item.alive else self._there.discard)(item.key)
-        if link.is_cut and not link.is_dead:
+        if link.is_cut and not link.is_dead:  # within the lease, nothing changes for this session
             return
         with self.network.lock:
-            seen = set(self.session.own_tokens(self.pattern))  # no link is needed for these
+            seen = set(self.session.own_tokens(self.pattern))  # visible without a link
         seen |= set() if link.is_dead else self._there
         gone, new = sorted(self._shown - seen), sorted(seen - self._shown)
         self._shown = seen
@@ -240,7 +243,7 @@ class Watcher(Listener[Presence | None]):
 
 
 class Token(Entry):
-    """A liveliness token; the others lose sight of it when the link is dead."""
+    """A liveliness token, which vanishes for other sessions while the link is dead."""
 
     __slots__ = ("_shown", "key")
 
@@ -300,7 +303,7 @@ class Publisher(Entry):
         network = self.network
         with network.lock:
             if self.closed:
-                if self.session.killed:
+                if self.session.killed:  # see `MemoryTransport.kill`
                     return
                 raise TransportError(
                     f"{self._key}: the publisher is closed. Try sending before the node is closed."
@@ -325,7 +328,7 @@ class Publisher(Entry):
 
 
 class Exchange(Entry):
-    """One query on its way: who has still to answer, and whether the asker still listens."""
+    """One running query: it counts the queryables that have not finished their answers."""
 
     __slots__ = ("_on_done", "_on_reply", "_timer", "_waiting")
 
@@ -339,13 +342,13 @@ class Exchange(Entry):
         super().__init__(session)
         self._on_reply = on_reply
         self._on_done = on_done
-        self._waiting = 1  # for the question to be asked; then for each that was asked
+        self._waiting = 1  # 1 until the query is sent, plus 1 per queryable that has not finished
         self._timer = self.network.clock.call_later(timeout, self._time_out)
 
     def ask(
         self, key: str, payload: bytes, encoding: str, attachment: bytes | None, *, best: bool
     ) -> None:
-        """Put the question to all who are there or the best of them, unless time is up."""
+        """Send the query to all queryables or the best of them, unless it has timed out."""
         with self.network.lock:
             if not self._waiting:
                 return

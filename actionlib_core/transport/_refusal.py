@@ -1,4 +1,4 @@
-"""Why a network cannot be joined, in words: zenoh itself says little, or nothing."""
+"""Explanations why a network cannot be joined; Zenoh's own errors contain little or nothing."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ PROBE_S = 1.0  # longest wait for an answer of the other side
 
 
 def check_interface(config: Config) -> None:
-    """Check that the interface of `discovery` is there; zenoh would find nobody, in silence.
+    """Check that the interface in `discovery` exists; otherwise Zenoh silently finds no peers.
 
     Raises:
-        ConfigError: it is not.
+        ConfigError: it does not exist.
     """
     names = [name for _, name in socket.if_nameindex()]
     if config.discovery in {*names, "auto", "off"}:
@@ -35,9 +35,9 @@ def check_interface(config: Config) -> None:
 
 
 def explain_refusal(config: Config) -> str:
-    """Return what is known about each endpoint of `connect` that could not be joined.
+    """Return an explanation for each endpoint of `connect`, which could not be joined.
 
-    Blocks: about `PROBE_S` per endpoint; it is tried once more, without zenoh.
+    Blocks: about `PROBE_S` per endpoint, for a connection of its own, without Zenoh.
     """
     return "; ".join(f"{point}: {_explain(point, config)}" for point in config.connect)
 
@@ -64,21 +64,22 @@ def _explain(endpoint: str, config: Config) -> str:
 
 
 def _tls_context(tls: Tls) -> ssl.SSLContext | str:
-    """Return what encrypts as `tls` says, or what is wrong with its files."""
+    """Return a context with the settings of `tls`, or the error of its files."""
     try:
         context = ssl.create_default_context(cafile=tls.ca)
-    except OSError as error:  # ssl's own are of this kind too
+    except OSError as error:  # the base class of ssl's errors too
         return (
             f"tls.ca {tls.ca!r}: it cannot be used: {_reason(error)}; expected a file of "
             "certificates in PEM form."
         )
     context.check_hostname = tls.verify_name
-    # Python 3.13 refuses certificates that zenoh accepts: those are not the reason.
+    # Python 3.13 also refuses certificates that Zenoh accepts, which cannot be the reason here.
     context.verify_flags &= ~ssl.VERIFY_X509_STRICT
     if not tls.certificate:
         return context
     try:
-        # Zenoh takes no key with a password; without an empty one ssl would ask on the terminal.
+        # Zenoh supports no key with a password. Without this empty one, ssl would ask for the
+        # password on the terminal.
         context.load_cert_chain(tls.certificate, tls.key, password="")
     except OSError as error:
         return (
@@ -94,10 +95,11 @@ def _reason(error: OSError) -> str:
 
 
 def _explain_tls(plain: socket.socket, host: str, context: ssl.SSLContext, tls: Tls) -> str:
-    """Return what is wrong with the certificates, "" when nothing is."""
+    """Return the error of the certificates, "" without one."""
     try:
         with context.wrap_socket(plain, server_hostname=host) as secure:
-            # A refusal of our certificate comes after the handshake, with the first bytes.
+            # With TLS 1.3 our handshake succeeds before the other side has checked our certificate;
+            # its refusal arrives with the first bytes.
             secure.settimeout(PROBE_S / 2)
             secure.recv(1)
     except TimeoutError:

@@ -1,7 +1,7 @@
-"""Our configuration as zenoh's settings: path in zenoh's configuration -> plain JSON value.
+"""Our configuration as Zenoh's settings: path in Zenoh's configuration -> plain JSON value.
 
 Source:
-    https://github.com/eclipse-zenoh/zenoh/blob/main/DEFAULT_CONFIG.json5 names and explains them.
+    https://github.com/eclipse-zenoh/zenoh/blob/main/DEFAULT_CONFIG.json5 lists and explains them.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from actionlib_core.wire.presence import ROOT
 if TYPE_CHECKING:
     from actionlib_core.config import AccessRule, Config
 
-DISCOVERY_GROUP = "224.0.0.224"  # zenoh's own
-FIRST_PORT = 7446  # zenoh's own for discovery, domain 0
-SCOUT_S = 8.0  # zenoh's longest time between two looks for others
-RETRY_S = 1.0  # between two tries of an endpoint that does not answer
-LOOPBACK = "tcp/127.0.0.1:0"
+DISCOVERY_GROUP = "224.0.0.224"  # Zenoh's default
+FIRST_PORT = 7446  # of discovery in domain 0; Zenoh's default
+SCOUT_S = 8.0  # Zenoh's longest interval between two searches for peers
+RETRY_S = 1.0  # interval of attempts to connect to an endpoint
+LOOPBACK = "tcp/127.0.0.1:0"  # a free port, not reachable from other machines
 _MESSAGES = [
     "put",
     "delete",
@@ -32,20 +32,20 @@ _MESSAGES = [
     "liveliness_query",
     "declare_liveliness_subscriber",
 ]
-# Of two peers one dials the other, never both, as zenoh does unasked: with both, a link that only
-# one side has given up (a process was suspended, a cable cut, for about the lease) can be dialled
-# anew and be added to what is left of the old one, for ever. Each side then names keys by numbers
-# that the other does not know, or has given to other keys.
+# Only one of two peers opens the connection; by default both do. If then only one side has given up
+# a link (a process was suspended or a cable was cut, for about the lease), the new link is added to
+# the rest of the old one, for ever: each side then uses numbers for keys that the other does not
+# know, or uses for other keys.
 # https://github.com/eclipse-zenoh/zenoh/issues/2806
 _ONE_DIALS = {"peer": {"to_router": "always", "to_peer": "greater-zid"}}
 _LOOKING = ["liveliness_query", "declare_liveliness_subscriber"]
-QUEUED = 16  # the most that zenoh takes; room is made when it is needed
-DROP_S = 0.005
+QUEUED = 16  # Zenoh's maximum; memory is allocated only when it is needed
+DROP_S = 0.005  # how long a message that may be dropped waits for room
 _QUEUE = "transport/link/tx/queue"
 
 
 def zenoh_settings(config: Config) -> dict[str, object]:
-    """Return what has to be set in a zenoh configuration."""
+    """Return the settings for a Zenoh configuration."""
     settings: dict[str, object] = {
         "mode": config.mode,
         "connect/endpoints": list(config.connect),
@@ -65,11 +65,11 @@ def zenoh_settings(config: Config) -> dict[str, object]:
         "open/return_conditions/declares": config.settle > 0,
         "timestamping/enabled": _stamps(config),
         "transport/link/tx/lease": round(config.lease * 1e3),
-        # Messages that may be dropped rather than waited for (those to ROS 2) are dropped after a
-        # few of a burst otherwise: zenoh's own queue has room for two.
+        # Zenoh's default queue has room for two. Messages that may be dropped (those to ROS 2)
+        # would be dropped after the first few of a burst.
         f"{_QUEUE}/size/data": QUEUED,
         f"{_QUEUE}/congestion_control/drop/wait_before_drop": round(DROP_S * 1e6),
-        # Shared memory saves nothing at our sizes, and a killed process leaves its segments behind.
+        # Shared memory is not faster for our small messages, and killed processes leave segments.
         "transport/shared_memory/enabled": False,
     }
     if config.discovery != "off":
@@ -82,15 +82,15 @@ def zenoh_settings(config: Config) -> dict[str, object]:
 
 
 def new_session_id(now_ns: int) -> str:
-    """Return an id for a session that opens now: greater, as zenoh compares, than earlier ones.
+    """Return an id for a new session: greater, in Zenoh's order, than those of earlier sessions.
 
-    Of two peers the one with the greater id dials. The one that comes later looks around at once;
-    the others look every 8 s only, so it should be that one.
+    Of two peers, the one with the greater id opens the connection. That should be the newer one: it
+    searches for peers at once, while the others do so only every 8 s.
 
     Args:
         now_ns: The time [ns since the epoch].
     """
-    # Zenoh compares from the last byte of the number to the first.
+    # Zenoh compares ids from the last byte of the number to the first.
     raw = now_ns.to_bytes(8, "big") + secrets.token_bytes(8)
     return f"{int.from_bytes(raw, 'little'):x}"
 
@@ -138,11 +138,9 @@ def _login(config: Config) -> dict[str, object]:
 def _access(config: Config) -> dict[str, object]:
     if not config.access:
         return {}
-    # What everybody may: ask who is there (only what is allowed answers), and ask for the rules.
+    # Everybody may list tokens (each token is itself subject to the rules) and query the rules.
     rules: list[dict[str, object]] = [
-        _rule(
-            "look", "allow", [f"{ROOT}/**"], ["liveliness_query", "declare_liveliness_subscriber"]
-        ),
+        _rule("look", "allow", [f"{ROOT}/**"], _LOOKING),
         _rule("ask", "allow", [ACCESS_KEY], ["query", "reply", "declare_queryable"]),
     ]
     subjects: list[dict[str, object]] = [{"id": "everybody"}]
@@ -178,7 +176,7 @@ def _rule(name: str, permission: str, keys: list[str], messages: list[str]) -> d
 
 
 def _keys(rule: AccessRule) -> list[str]:
-    """Return a rule's names with the keys that belong to them: tokens and latched messages."""
+    """Return the keys of a rule's names: messages, latched messages and tokens."""
     keys = []
     for name in rule.names:
         keys += [name, f"{name}/@latch/**", f"{ROOT}/*/*/*/*/*/*/{name}"]

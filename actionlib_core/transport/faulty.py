@@ -1,7 +1,7 @@
-"""A bad network on purpose: drops, delays, repeats, reorders, and cuts of the link.
+"""A faulty network for tests: it drops, delays, repeats and reorders messages, and cuts the link.
 
-Wrap one end's session, or both, to see what a protocol makes of it. Everything is deterministic: a
-plan decides the fate of the n-th message of a key, the clock delivers what is late.
+Wrap the session of one side, or of both, to test a protocol. Everything is deterministic: a plan
+decides the fate of the n-th message of a key, and the clock delivers late messages.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ def deliver_all(key: str, number: int) -> Fate:  # noqa: ARG001  a plan's signat
 
 @dataclass(frozen=True)
 class RandomFaults:
-    """Chooses fates at random; the seed, the key and the number of the message decide.
+    """Chooses fates at random, but reproducibly: by the seed, the key and the message's number.
 
     Attributes:
-        seed: Another one, other faults.
-        pattern: Which keys are concerned.
+        seed: Selects the faults.
+        pattern: The keys with faults.
         drop: Share of the messages that are lost, 0 to 1.
-        repeat: Share of those that arrive twice.
-        delay: Share of those that come late, and so out of order.
+        repeat: Share of the others that arrive twice.
+        delay: Share of the others that come late, and so out of order.
         longest: Longest delay [s].
     """
 
@@ -68,11 +68,11 @@ class RandomFaults:
 
 @dataclass(frozen=True)
 class ScriptedFaults:
-    """Gives the messages of a key the fates of a list, in turn; those after it are delivered.
+    """Takes the fates of a key's messages from a list, in order; later messages are delivered.
 
     Attributes:
-        fates: Key pattern -> fates; the first pattern that matches counts. A fate is the delays [s]
-            of the copies: `()` loses the message, `(0.0,)` delivers it, `(0.0, 0.5)` repeats it.
+        fates: Key pattern -> fates; the first matching pattern counts. A fate has the delay [s] of
+            each copy: `()` loses the message, `(0.0,)` delivers it, `(0.0, 0.5)` repeats it.
     """
 
     fates: Mapping[str, Sequence[Fate]] = field(default_factory=dict)
@@ -86,12 +86,12 @@ class ScriptedFaults:
 
 
 class Sent(NamedTuple):
-    """What became of a message, for the report of a failed test.
+    """The fate of a message, for the report of a failed test.
 
     Attributes:
         t: When it was sent [s].
-        key: On which key.
-        number: Which of that key, from 0.
+        key: Its key.
+        number: Its number among the messages of the key, from 0.
         fate: The delays of its copies; empty when it was lost.
     """
 
@@ -102,18 +102,18 @@ class Sent(NamedTuple):
 
 
 class FaultyTransport:
-    """A session whose messages suffer the fates of a plan and whose link can be cut.
+    """A session whose messages have the fates of a plan and whose link can be cut.
 
-    While the link is cut nothing gets out or in, what is sent is lost, and queries stay unanswered.
-    When the cut lasts longer than the lease, the other sessions see the tokens of this one vanish,
-    and it sees theirs vanish; all that are there appear again when the link is back, and latched
-    messages come once more.
+    While the link is cut, messages in both directions are lost and queries stay unanswered. If that
+    lasts longer than the lease, the tokens of this session vanish for the others, and theirs for
+    this session. When the link is back, present tokens appear again and latched messages are sent
+    once more.
 
     Args:
         inner: The session that gets the faults; closing this closes it.
-        plan: Decides the fate of what this session sends: messages, and queries too, of which only
-            one copy is ever sent.
-        clock: Delivers what is late; the current clock when None.
+        plan: Decides the fates of this session's messages and queries; a query is sent once at
+            most.
+        clock: Delivers late messages; None: the current clock.
         lease: How long [s] a cut link counts as alive.
 
     Threads: as the protocol says; `cut` and `restore` from any thread.
@@ -137,7 +137,7 @@ class FaultyTransport:
         self._lock = threading.Lock()
         self._counts: Counter[str] = Counter()
         self._timers: list[Timer] = []
-        # What the session declares looks at its link by itself.
+        # The entries of the inner session check `link` themselves, so its methods are used as is.
         inner.link = self
         self.publisher = inner.publisher
         self.subscribe = inner.subscribe
@@ -173,7 +173,7 @@ class FaultyTransport:
                 self._timers.append(self.clock.call_later(seconds, self.restore))
 
     def restore(self) -> None:
-        """Mend the link; no effect when it is not cut."""
+        """Restore the link; no effect when it is not cut."""
         with self.inner.network.lock:
             if not self.is_cut:
                 return
@@ -196,7 +196,7 @@ class FaultyTransport:
             timer.cancel()
 
     def choose(self, key: str) -> Fate:
-        """Return the fate of the next message on `key`, and note it."""
+        """Return the fate of the next message on `key`, and record it in `sent`."""
         with self._lock:
             number = self._counts[key]
             self._counts[key] += 1
@@ -205,7 +205,7 @@ class FaultyTransport:
         return fate
 
     def later(self, delay: float, function: Callable[[], object]) -> None:
-        """Call `function` after `delay` [s], unless the link is cut then."""
+        """Call `function` after `delay` [s], unless the link is then cut."""
 
         def call() -> None:
             if not self.is_cut:

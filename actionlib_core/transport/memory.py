@@ -1,12 +1,11 @@
 # ruff: noqa: D102  the methods of a session are documented in the protocol
-"""The network inside one process: for tests and simulations, deterministic, no sockets.
+"""A network inside one process, for tests and simulations: deterministic, without sockets.
 
-A `MemoryNetwork` joins sessions. What a session sends lands in the inbox of each receiving
-session, and a callback of the clock takes one item out: under a `VirtualClock` that happens when
-the running participant waits, at a moment that the clock's seed chooses, without a thread; under a
-`RealClock` on the clock's timer thread.
+A `MemoryNetwork` connects sessions. A message is put into the inbox of each receiving session, and
+a timer of the clock delivers one item. With a `VirtualClock` this happens while the running thread
+waits, at a moment that depends on the clock's seed; with a `RealClock` on its timer thread.
 
-Threads: one lock per network guards all tables; no foreign code runs while it is held.
+Threads: one lock per network guards all tables; no callback runs while it is held.
 """
 
 from __future__ import annotations
@@ -46,10 +45,10 @@ DEFAULT_QUALITY = Quality()
 
 
 class MemoryNetwork:
-    """Joins the sessions of one process.
+    """Connects the sessions of one process.
 
     Args:
-        clock: Delivers the messages; the current clock when None.
+        clock: Delivers the messages; None: the current clock.
     """
 
     def __init__(self, clock: Clock | None = None) -> None:
@@ -67,7 +66,7 @@ class MemoryNetwork:
         return MemoryTransport(self, f"{next(self._ids):032x}")
 
     def count_token(self, key: str, step: int) -> None:
-        """Count a token up or down; watchers hear when it appears or vanishes. Needs the lock."""
+        """Count a token up or down; watchers are notified of its first and last. Needs the lock."""
         before = self._tokens.pop(key, 0)
         after = before + step
         if after:
@@ -78,7 +77,7 @@ class MemoryNetwork:
                     watcher.inbox.post(watcher, Presence(key, alive=bool(after)))
 
     def match_tokens(self, pattern: re.Pattern[str]) -> list[str]:
-        """Return the tokens that a compiled pattern stands for. Needs the lock."""
+        """Return the tokens that match a compiled pattern. Needs the lock."""
         return sorted(key for key in self._tokens if pattern.fullmatch(key + "/"))
 
 
@@ -101,12 +100,12 @@ class MemoryTransport:
 
     @property
     def is_cut(self) -> bool:
-        """Whether nothing gets out or in."""
+        """Whether the session's link is cut."""
         return self.link is not None and self.link.is_cut
 
     @property
     def rediscovery(self) -> float:
-        """None is ever lost."""
+        """0: no link is ever lost."""
         return 0.0
 
     def publisher(
@@ -171,7 +170,7 @@ class MemoryTransport:
             return self.network.match_tokens(compiled)
 
     def own_tokens(self, pattern: re.Pattern[str]) -> list[str]:
-        """Return this session's tokens that a compiled pattern stands for. Needs the lock."""
+        """Return this session's tokens that match a compiled pattern. Needs the lock."""
         own = {entry.key for entry in self.declared if isinstance(entry, Token)}
         return sorted(key for key in own if pattern.fullmatch(key + "/"))
 
@@ -179,9 +178,9 @@ class MemoryTransport:
         self._end(wait=True)
 
     def kill(self) -> None:
-        """Die as a process does that gets SIGKILL: its tokens vanish, none of its callbacks runs.
+        """End as a process does that gets SIGKILL: its tokens vanish, none of its callbacks runs.
 
-        Threads of the dead that go on talk to nobody, without an error.
+        Its threads, which a test cannot kill, go on in an empty network, without errors.
         """
         self.killed = True
         self._end(wait=False)

@@ -1,11 +1,11 @@
 # ruff: noqa: D102  the methods of a session are documented in the protocol
-"""Zenoh as transport: the only place that imports zenoh.
+"""Zenoh as transport: the only package that imports zenoh.
 
-Threads: zenoh calls back on its own threads, and for what a session sends to itself inside the
-sending call. `Inlet` evens that out: an item that arrives inside a call of ours is handed to a
-thread of the transport, so that no callback ever runs on the caller's stack, under its locks.
+Threads: Zenoh calls back on its own threads. What a session sends to itself, it delivers inside the
+sending call; `Inlet` hands such an item to a thread of the transport, so that no callback ever runs
+on the stack of a caller, who may hold locks.
 
-Locks: each guards a few fields for a moment; none is held while zenoh or foreign code is called.
+Locks: each guards a few fields for a short time; none is held while Zenoh or a callback is called.
 
 Nothing is left to finalizers: a session is kept alive here until it is closed, at the latest when
 the interpreter exits.
@@ -68,26 +68,26 @@ __all__ = ["ZenohTransport"]
 
 D = TypeVar("D", bound=Declared)
 
-CLOSE_S = 0.5  # zenoh may take so long to leave the network; it is left behind after that
-LET_GO_S = 2.0  # the interpreter waits so long for what had begun, on a busy computer
+CLOSE_S = 0.5  # longest wait for Zenoh to close a session; its thread is then left behind
+LET_GO_S = 2.0  # longest wait at exit for running callbacks and calls; long on a busy computer only
 LET_GO_PARTS = round(LET_GO_S / PART_S)
-IDLE_S = 0.3  # `close` waits so long for callbacks that are running
+IDLE_S = 0.3  # longest wait of `close` for running callbacks
 ACCESS_S = 1.0  # longest wait for the other side's access rules
 ASK_S = 5.0  # longest wait for a latched publisher's answer
 DEFAULT = Quality()
 
 
 class ZenohTransport:
-    """A session on a zenoh network.
+    """A session on a Zenoh network.
 
     Args:
-        config: How to join; None takes `SMACHPY_CONFIG`, else the machine's loopback only.
+        config: How to join; None: the file in `SMACHPY_CONFIG`, else only this machine's loopback.
 
     Raises:
         ConfigError: the configuration has errors.
         TransportError: the network cannot be joined.
 
-    Blocks: making one opens the session: `connect_timeout` plus `settle` of `config` at most.
+    Blocks: the constructor opens the session: `connect_timeout` plus `settle` of `config` at most.
     """
 
     def __init__(self, config: Config | None = None) -> None:
@@ -106,7 +106,7 @@ class ZenohTransport:
         _loopbacks.add(self.loopback)
         _open_transports[self] = None
         if self.config.access:
-            self.queryable(ACCESS_KEY, self._tell_permissions)
+            self.queryable(ACCESS_KEY, self._send_permissions)
         if self.config.connect:
             self._permissions = self._ask_permissions()
 
@@ -117,7 +117,7 @@ class ZenohTransport:
 
     @property
     def rediscovery(self) -> float:
-        """What zenoh takes: peers look around every 8 s, clients try their router each second."""
+        """Zenoh's intervals: peers search every 8 s, clients try their router every second."""
         looks = self.config.mode == "peer" and self.config.discovery != "off"
         return SCOUT_S if looks else 2 * RETRY_S
 
@@ -170,7 +170,7 @@ class ZenohTransport:
     def ask(
         self, key: str, on_reply: Callable[[zenoh.Reply], None], on_done: Callable[[], None]
     ) -> None:
-        """Ask without giving the question to anybody to hold; for the declarations here."""
+        """Send an empty query that cannot be closed; for the declarations of this session."""
         callback = direct(on_reply, on_done)
         try:
             self._get(key, callback, b"", "", ASK_S, None)
@@ -190,7 +190,7 @@ class ZenohTransport:
         *,
         best: bool = False,
     ) -> None:
-        # The mark is for programs of ours; see `Publisher`.
+        # The mark is for our own programs; see `Publisher`.
         mark = zenoh.SourceInfo(self.session.id, key_mark(key)) if attachment is None else None
         try:
             with inside:
@@ -222,7 +222,7 @@ class ZenohTransport:
         compile_pattern(pattern)
         self._check_open(pattern)
         found: set[str] = set()
-        done, told = self.clock.event(), self.clock.event()
+        done, freed = self.clock.event(), self.clock.event()
 
         def on_token(token: zenoh.Sample) -> None:
             there = token.kind == zenoh.SampleKind.PUT
@@ -232,21 +232,22 @@ class ZenohTransport:
             if reply.ok is not None:
                 found.add(str(reply.ok.key_expr))
 
-        # Zenoh (1.10) leaves out of an answer what this session was told meanwhile, for another
-        # subscriber of its own. A subscriber with history is told of that, at times after the
-        # answer's end: all has come when zenoh, after undeclaring it, has let go of its callback.
+        # Zenoh (1.10) omits from an answer the tokens that this session receives at the same time
+        # for another of its subscribers. A subscriber with history gets those too, sometimes after
+        # the end of the answer. It has got all when it was undeclared and Zenoh has freed its
+        # callback.
         deadline = self.clock.now() + timeout
         try:
             with inside:
                 liveliness = self.session.liveliness()
                 history = liveliness.declare_subscriber(
-                    pattern, direct(on_token, told.set), history=True
+                    pattern, direct(on_token, freed.set), history=True
                 )
                 liveliness.get(pattern, direct(on_reply, done.set), timeout=timeout)
             done.wait(timeout)
             with inside:
                 history.undeclare()  # type: ignore[no-untyped-call]  # zenoh's stub
-            told.wait(max(0.0, deadline - self.clock.now()))
+            freed.wait(max(0.0, deadline - self.clock.now()))
         except zenoh.ZError as error:
             raise TransportError(f"{pattern}: cannot ask: {error}") from error
         return sorted(found)
@@ -259,29 +260,29 @@ class ZenohTransport:
         self.gate.shut()
         _leave(self.clock, self.session)
         self.gate.wait_idle(IDLE_S)
-        # Not earlier: what zenoh's objects do when they are dropped is nothing after the session.
+        # Not earlier: once the session is closed, dropping Zenoh's objects has no side effects.
         if ending.begun:
             _kept.extend(self._declared)
         self._declared.clear()
         _open_transports.pop(self, None)
 
     def forget(self, entry: Declared) -> bool:
-        """Drop an entry that is being closed; False when it was gone already."""
+        """Remove an entry that is being closed; False when it was removed before."""
         if ending.begun:
             _kept.append(entry)
         with self._lock:
             return self._declared.pop(entry, False) is None
 
-    def _tell_permissions(self, query: Query) -> None:
+    def _send_permissions(self, query: Query) -> None:
         asked = json.loads(query.payload)
         links = {str(link.zid): link.auth_identifier for link in self.session.info.links()}
         certificate = links.get(asked["session"]) or ""
-        told = find_permissions(self.config.access, asked["user"], certificate)
-        query.reply(told.encode())
+        permissions = find_permissions(self.config.access, asked["user"], certificate)
+        query.reply(permissions.encode())
         query.finish()
 
     def _ask_permissions(self) -> Permissions | None:
-        """Return what the other side lets us do, None when it has no rules.
+        """Return our permissions on the other side, None when it has no rules.
 
         Blocks: for one exchange, `ACCESS_S` at most.
         """
@@ -297,8 +298,8 @@ class ZenohTransport:
         )
         done.wait(ACCESS_S)
         asking.close()
-        told = [decode_permissions(reply.payload) for reply in answers if not reply.error]
-        return told[0] if told else None
+        found = [decode_permissions(reply.payload) for reply in answers if not reply.error]
+        return found[0] if found else None
 
     def _check_access(self, key: str) -> None:
         permissions = self._permissions
@@ -309,11 +310,12 @@ class ZenohTransport:
         self._check_open(key)
         self._check_access(key)
         try:
-            with inside:  # whom the interpreter's end waits for: so look again
+            # `_close_all` waits for threads that are inside: from here on the check is final.
+            with inside:
                 self._check_open(key)
                 entry = make()
         except zenoh.ZError as error:
-            if ending.begun:  # its frames hold what was declared before it was raised
+            if ending.begun:  # its traceback refers to objects of Zenoh; see `_kept`
                 _kept.append(error)
             raise TransportError(f"{key}: cannot be declared: {error}") from error
         with self._lock:
@@ -348,18 +350,18 @@ def _open(config: Config, session_id: str) -> zenoh.Session:
 def _leave(clock: RealClock, session: zenoh.Session) -> None:
     """Close a session.
 
-    Blocks: `CLOSE_S` at most. Zenoh waits 10 s when another side has stopped reading; a thread is
-    left behind with it then, which does not keep the interpreter alive.
+    Blocks: `CLOSE_S` at most. Zenoh waits 10 s for another side that has stopped reading. Its
+    thread is then left behind, which does not keep the interpreter alive.
     """
 
     def close() -> None:
-        # A time-out says that the network could not be told; the session is unusable all the same.
+        # An error means that others could not be notified. The session is closed all the same.
         with inside, contextlib.suppress(zenoh.ZError):
             session.close()  # type: ignore[no-untyped-call]  # zenoh's stub
 
     try:
         clock.spawn(close, name="transport-close").join(CLOSE_S)
-    except RuntimeError:  # the interpreter exits and starts no more threads
+    except RuntimeError:  # the interpreter is exiting and starts no more threads
         close()
 
 
@@ -367,20 +369,22 @@ def _leave(clock: RealClock, session: zenoh.Session) -> None:
 _open_transports: dict[ZenohTransport, None] = {}
 _loopbacks: weakref.WeakSet[SerialExecutor] = weakref.WeakSet()
 
-# What is closed as the interpreter ends. A thread that drops the last reference to an object of
-# zenoh's leaves the interpreter for a moment, and must not come back after its end.
+# Objects closed while the interpreter exits, kept alive for good. A thread that drops the last
+# reference to an object of Zenoh releases the GIL for a moment, and must not ask for it again after
+# the interpreter's end (see `_close_all`).
 _kept: list[Declared | zenoh.ZError] = []
 
 
 def _close_all() -> None:
-    """Leave the network, and let zenoh's threads that are about to enter Python do so.
+    """Close all sessions, and wait for threads that are about to return to Python.
 
-    CPython ends a foreign thread that asks for the interpreter after its end, which aborts the
-    process ("exception not rethrown") when zenoh's Rust is on the thread's stack. A callback that
-    had begun before the session closed can be at that point; zenoh tells when it has let go of it.
-    A call of another thread that had begun comes back to Python likewise; a later one is refused.
+    CPython ends a foreign thread that asks for the GIL after the interpreter's end. If Zenoh's Rust
+    code is on the thread's stack, this aborts the process ("exception not rethrown"). Two kinds of
+    threads can be at that point: those in a callback that started before its session was closed
+    (`held` waits until Zenoh has freed the callbacks), and those in a call into Zenoh (`inside`
+    waits for them; later calls are refused).
     """
-    if process.forked:  # they are the other process's, and nothing here would answer
+    if process.forked:  # the sessions belong to the parent; their threads do not exist here
         return
     ending.begin()
     for transport in list(_open_transports):

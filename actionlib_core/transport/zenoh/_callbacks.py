@@ -1,4 +1,4 @@
-"""Callbacks on zenoh's own threads, and the proof that none of them will enter Python again."""
+"""Callbacks on Zenoh's own threads, and the way to know that none of them will run again."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ T = TypeVar("T")
 
 
 class Held:
-    """What zenoh may still call: for each callback a lock, released when zenoh has let go of it.
+    """The callbacks that Zenoh may still call: a lock for each, released when Zenoh has freed it.
 
-    Zenoh lets go of a callback when it was undeclared, or its session closed, and every call of it
-    has returned: it calls the callback's second function, and then drops both. The last thing that
-    its thread does in Python is to free that second function. A weak reference to it releases the
-    lock then, in C and not in Python code, so that the thread cannot lose the interpreter between
-    that and its way out, and never has to ask for it again.
+    Zenoh frees a callback when it was undeclared, or its session closed, and every call of it has
+    returned: it calls the callback's second function and then drops both. So the last thing that
+    its thread does in Python is to free that second function. A weak reference to the function then
+    releases the lock. This happens in C, without Python code, so the thread keeps the GIL until it
+    leaves Python, and never asks for it again.
     """
 
     def __init__(self) -> None:
@@ -36,18 +36,20 @@ class Held:
         """Hold a lock until `last` is freed."""
         held = threading.Lock()
         held.acquire()
-        release: Any = held.__exit__  # as `release`, but takes the argument that it gets here
+        # As `release`, but accepts an argument: weakref passes itself.
+        release: Any = held.__exit__
         entry = held, weakref.ref(last, release)
         with self._lock:
+            # Released entries are removed when the list is full; doubling keeps that cheap.
             if len(self._held) >= self._room:
                 self._held = [entry for entry in self._held if entry[0].locked()]
                 self._room = 2 * len(self._held) + 64
             self._held.append(entry)
 
     def wait(self, timeout: float) -> bool:
-        """Wait until zenoh has let go of everything there is now; return whether it has.
+        """Wait until Zenoh has freed all present callbacks; return whether it has.
 
-        Blocks: `timeout` [s] at most, not counting a time in which the process was stopped.
+        Blocks: `timeout` [s] at most, not counting time in which the process was suspended.
         """
         left = timeout
         with self._lock:
@@ -67,12 +69,12 @@ held = Held()
 def direct(
     callback: Callable[[T], None], ended: Callable[[], object] = bool
 ) -> handlers.Callback[T]:
-    """Run a callback on zenoh's thread; zenoh's default starts a Python thread for each.
+    """Run a callback on Zenoh's thread; by default Zenoh starts a Python thread for each callback.
 
     Args:
-        callback: Gets each item.
+        callback: Called with each item.
         ended: Called after the last call.
     """
-    last = partial(ended)
+    last = partial(ended)  # a new object, whose end `held` can watch
     held.add(last)
     return handlers.Callback(callback, last, indirect=False)

@@ -1,6 +1,6 @@
-"""What a zenoh session declares: publishers, subscribers, queryables, queries, tokens.
+"""The declarations of a Zenoh session: publishers, subscribers, queryables, queries, tokens.
 
-Each keeps its zenoh objects until it is closed, so that no finalizer undeclares anything.
+Each keeps its Zenoh objects until it is closed, so that no finalizer undeclares anything.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ T = TypeVar("T")
 
 log = logging.getLogger("actionlib_core")
 
-LATCH_RETRIES = 5  # how often a latched publisher that cannot be reached yet is asked
-LATCH_RETRY_S = 0.1
-HEARTBEAT_S = 0.5  # a publisher with a cache tells its last number so often, as those of ROS 2 do
+LATCH_RETRIES = 5  # queries to a latched publisher that cannot be reached yet
+LATCH_RETRY_S = 0.1  # between them
+HEARTBEAT_S = 0.5  # interval in which publishers with a cache send their last number, as in ROS 2
 _EPOCH = datetime.fromtimestamp(0, UTC)
 _MICROSECOND = timedelta(microseconds=1)
-_PLAIN = "zenoh/bytes"  # what zenoh says of a payload without encoding
-_ERROR = "smachpy/error"  # marks the error replies that a queryable sent on purpose
+_PLAIN = "zenoh/bytes"  # Zenoh's encoding of a payload without one
+_ERROR = "smachpy/error"  # distinguishes `reply_error` from the errors of Zenoh itself
 
 
 class _Undeclarable(Protocol):
@@ -49,7 +49,7 @@ class _Undeclarable(Protocol):
 
 
 class Declared:
-    """Something declared by a session, kept by it until closed."""
+    """A declaration of a session, which keeps it until it is closed."""
 
     def __init__(self, transport: ZenohTransport) -> None:
         self._transport = transport
@@ -63,7 +63,7 @@ class Declared:
         self._inlet.closed = True
         if self._transport.forget(self):
             for handle in reversed(self._handles):
-                # It fails only when the session was closed meanwhile, which undeclares all.
+                # It fails only if the session was closed in the meantime, which undeclares all.
                 with inside, contextlib.suppress(zenoh.ZError):
                     handle.undeclare()
 
@@ -89,7 +89,7 @@ class Publisher(Declared):
         self._keep(self._port)
 
     def close(self) -> None:
-        # Zenoh refuses to undeclare what another thread is using: the last user does it then.
+        # Zenoh refuses to undeclare what another thread is using: then its last user does it.
         self._inlet.closed = True
         if not self._users:
             super().close()
@@ -103,12 +103,13 @@ class Publisher(Declared):
             )
 
     def put(self, payload: bytes, attachment: bytes | None = None) -> None:
-        if self._inlet.closed:  # not inside, or threads that go on sending never leave
+        # Before counting as inside, or a thread that keeps sending would delay the exit for good.
+        if self._inlet.closed:
             self._check_open()
         self._users.append(None)
         depths, me = inside.depths, get_ident()
         depth = depths.get(me, 0)
-        depths[me] = depth + 1  # as `with inside`, in half the time
+        depths[me] = depth + 1  # `with inside`, written out: takes half the time
         try:
             if self._inlet.closed or process.forked:
                 self._check_open()
@@ -125,7 +126,8 @@ class Publisher(Declared):
                 self.close()
 
     def _send(self, payload: bytes, attachment: bytes | None) -> None:
-        # The mark is for programs of ours: those of ROS 2 count on their own numbers there.
+        # The mark is for our own programs. ROS 2 programs, whose messages have an attachment, use
+        # this number in their own way.
         source = self._source if attachment is None else None
         self._port.put(payload, source_info=source, attachment=attachment)
 
@@ -136,7 +138,7 @@ class Publisher(Declared):
             with inside:
                 if self._inlet.closed:
                     return False
-                # Asked anew, which costs 2 us: what a listener is told comes too late.
+                # Queried each time (2 us): a listener would be notified too late.
                 status: Any = self._port.matching_status  # zenoh's stub says bool
                 return bool(status.matching)
         except zenoh.ZError:  # the session is closed
@@ -147,41 +149,42 @@ class Publisher(Declared):
                 self.close()
 
 
-# A latched publisher's messages carry its number in its session and their own number, counted from
-# 1; 0 answers whoever asks before the first. A subscriber gets the last message live, by asking, or
-# both ways in either order. (zenoh.ext's advanced publisher keeps a last message too, but sends no
-# source information of ours, so its messages could not carry the mark of their key.)
+# A latched publisher's messages have two numbers: that of the publisher in its session and their
+# own, counted from 1 (0: the answer to a query before the first message). A subscriber gets the
+# last message live, by a query, or in both ways and any order. (The advanced publishers of
+# zenoh.ext keep a last message too, but without our source information, so without the key's mark.)
 _NUMBERS = struct.Struct("<IQ")
 
 
 def _pack_numbers(publisher: int, message: int) -> bytes:
-    """Return what a latched message carries beside its payload."""
+    """Return the attachment of a latched message."""
     return _NUMBERS.pack(publisher, message)
 
 
 class _LatchFilter:
-    """Remembers the newest message of every latched publisher of a key."""
+    """Drops the second copy of a message that came both live and by a query."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
+        # By publisher: the number of the newest message, and of the one delivered from a query.
         self._newest: dict[tuple[str, int], int] = {}
         self._asked: dict[tuple[str, int], int] = {}
 
     def take_live(self, session: str, numbers: bytes) -> bool:
-        """Tell whether a message that came by itself is to be delivered."""
+        """Return whether a live message is to be delivered."""
         who, message = _unpack(session, numbers)
         with self._lock:
             self._newest[who] = max(message, self._newest.get(who, 0))
             return message > self._asked.get(who, 0)
 
     def take_asked(self, session: str, numbers: bytes) -> bool:
-        """Tell whether the answer of a latched publisher is to be delivered."""
+        """Return whether the answer of a latched publisher is to be delivered."""
         if len(numbers) != _NUMBERS.size:
             return False
         who, message = _unpack(session, numbers)
         with self._lock:
             if message <= self._newest.get(who, 0):
-                return False  # it came by itself, or nothing was sent yet
+                return False  # it came live before, or nothing was published yet
             self._newest[who] = self._asked[who] = message
             return True
 
@@ -192,11 +195,11 @@ def _unpack(session: str, numbers: bytes) -> tuple[tuple[str, int], int]:
 
 
 class LatchedPublisher(Publisher):
-    """Keeps its last message and gives it to whoever asks on its own key.
+    """Keeps its last message and answers queries for it on a key of its own.
 
-    The key is `<key>/@latch/<session>/<n>`; a token on it tells subscribers that it can be asked.
-    Every message carries `n` and its own number as attachment, so that a subscriber that gets it
-    live and asks for it too can tell that it is the same.
+    The key is `<key>/@latch/<session>/<n>`; a token on it announces it to subscribers. Every
+    message has `n` and its own number as attachment, so that a subscriber that gets it both live
+    and by a query recognises the copy.
     """
 
     def __init__(
@@ -224,7 +227,7 @@ class LatchedPublisher(Publisher):
         self._port.put(payload, source_info=self._source, attachment=attachment)
 
     def _on_query(self, query: zenoh.Query) -> None:
-        # Inline is right here: it calls nothing foreign and takes no lock.
+        # Without the inlet: this calls no callback and takes no lock, so it may run inline.
         with query:
             payload, attachment = self._last
             query.reply(
@@ -233,9 +236,9 @@ class LatchedPublisher(Publisher):
 
 
 class CachingPublisher(Publisher):
-    """Keeps its last messages as zenoh's advanced publishers do, for advanced subscribers.
+    """Keeps its last messages in the way of Zenoh's advanced publishers.
 
-    The plain publisher beside it sends nothing: it is there to say whether anybody listens.
+    The plain publisher of the base class sends nothing here; it only serves `matching`.
     """
 
     def __init__(
@@ -305,13 +308,13 @@ class Subscriber(Declared):
 
     def _deliver(self, raw: zenoh.Sample) -> None:
         payload = raw.payload.to_bytes()
-        if not payload and raw.kind != zenoh.SampleKind.PUT:
+        if not payload and raw.kind != zenoh.SampleKind.PUT:  # a Zenoh delete, which we never send
             return
         info = raw.source_info
         if _is_astray(info, self._mark, self._key):
             return
         encoding = raw.encoding
-        if encoding != self._encoding:  # comparing is cheaper than converting
+        if encoding != self._encoding:  # comparing is cheaper than converting to text
             self._encoding_text = _convert_encoding(encoding)
             self._encoding = encoding
         source = "" if info is None else str(info.source_id.zid)
@@ -382,7 +385,7 @@ class ZenohQuery:
     def reply(self, payload: bytes, encoding: str = "", *, attachment: bytes | None = None) -> None:
         raw = self._raw
         if raw is not None:
-            with inside, contextlib.suppress(zenoh.ZError):  # finished, or nobody is there any more
+            with inside, contextlib.suppress(zenoh.ZError):  # finished, or the caller is gone
                 raw.reply(
                     self.key,
                     payload,
@@ -403,7 +406,7 @@ class ZenohQuery:
         if raw is not None:
             with inside:
                 raw.drop()  # type: ignore[no-untyped-call]  # zenoh's stub
-                del raw  # which leaves the interpreter once more
+                del raw  # within `inside`, as freeing it releases the GIL once more
 
 
 class Queryable(Declared):
@@ -446,7 +449,7 @@ class Queryable(Declared):
 
 
 class Asking(Declared):
-    """A query of ours on its way."""
+    """A running query of this session."""
 
     def __init__(
         self,
@@ -457,9 +460,9 @@ class Asking(Declared):
         super().__init__(transport)
         self._on_reply = on_reply
         self._on_done = on_done
-        self._replying: int | None = None  # thread that is in the callback
+        self._replying: int | None = None  # id of the thread that is in `on_reply`
         self._answered = False
-        # Dropped when it is over: the token knows the callbacks, which know this object.
+        # Dropped at the end: it refers to the callbacks, which refer to this object, a cycle.
         self.token: zenoh.CancellationToken | None = zenoh.CancellationToken()
 
     def take_reply(self, raw: zenoh.Reply) -> None:
@@ -468,7 +471,7 @@ class Asking(Declared):
     def take_done(self) -> None:
         if self._answered:
             self._inlet.take(self._finish, None)
-        else:  # as a link is lost, zenoh says so while it holds a lock that any call of ours needs
+        else:  # may come from a lost link: Zenoh then holds a lock that any call of ours needs
             self._transport.loopback.submit(partial(self._inlet.take, self._finish, None))
 
     def _deliver(self, raw: zenoh.Reply) -> None:
@@ -490,7 +493,8 @@ class Asking(Declared):
         self._inlet.closed = True
         token, self.token = self.token, None
         if self._transport.forget(self) and token is not None:
-            if self._replying == get_ident():  # zenoh waits for our callback, which is this one
+            # Cancelling waits for running callbacks, and so would wait for itself inside one.
+            if self._replying == get_ident():
                 self._transport.loopback.submit(partial(_cancel, token))
             else:
                 _cancel(token)
@@ -502,7 +506,7 @@ def _cancel(token: zenoh.CancellationToken) -> None:
 
 
 class Watcher(Declared):
-    """Hears of tokens."""
+    """Watches tokens."""
 
     def __init__(
         self, transport: ZenohTransport, pattern: str, callback: Callable[[Presence], None]
@@ -521,7 +525,7 @@ class Watcher(Declared):
     def _deliver(self, raw: zenoh.Sample) -> None:
         key = str(raw.key_expr)
         alive = raw.kind == zenoh.SampleKind.PUT
-        if alive != (key in self._alive):
+        if alive != (key in self._alive):  # Zenoh may report one state twice
             (self._alive.add if alive else self._alive.discard)(key)
             self._callback(Presence(key, alive))
 
@@ -544,16 +548,17 @@ def _convert_attachment(raw: zenoh.ZBytes | None) -> bytes | None:
 
 
 def _convert_time(raw: zenoh.Timestamp | None) -> int:
-    """Return a timestamp in ns since the epoch, 0 for None; zenoh shows it to the microsecond."""
+    """Return a timestamp in ns since the epoch, 0 for None; Zenoh gives it in microseconds."""
     return 0 if raw is None else (raw.get_time() - _EPOCH) // _MICROSECOND * 1000
 
 
 def _is_astray(info: zenoh.SourceInfo | None, mark: int, key: str) -> bool:
-    """Tell whether a message or question was for another key than `key`, whose mark is given."""
+    """Return whether a message or query was sent on another key than `key`; see `key_mark`."""
     if info is None or not is_for_another_key(info.source_sn, mark):
         return False
     log.warning(
-        "%s: dropped what session %s sent on another key: its link was just lost or found.",
+        "%s: dropped a message of session %s that was sent on another key: its link was just lost "
+        "or restored.",
         key,
         info.source_id.zid,
     )
@@ -561,7 +566,7 @@ def _is_astray(info: zenoh.SourceInfo | None, mark: int, key: str) -> bool:
 
 
 def _convert_reply(raw: zenoh.Reply) -> Reply | None:
-    """Return an answer; None for zenoh's own note that the time is over."""
+    """Return an answer; None for an error of Zenoh itself, such as a timeout."""
     good, replier = raw.ok, raw.replier_id
     source = "" if replier is None else str(replier.zid)
     if good is not None:

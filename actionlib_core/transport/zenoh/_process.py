@@ -1,4 +1,4 @@
-"""A session works in the process that opened it: a forked copy has none of zenoh's threads."""
+"""Refusal of sessions in forked processes, in which Zenoh's threads do not exist."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from actionlib_core.exceptions import TransportError
 
 
 class Process:
-    """What this process knows of itself.
+    """The state of this process.
 
     Attributes:
         opened: A session was opened, here or before a fork.
@@ -24,13 +24,13 @@ class Process:
         self.forked = self.opened
 
     def check(self, what: str) -> None:
-        """Refuse what would wait for threads that do not exist.
+        """Raise an error in a forked process, where a call would wait for missing threads.
 
         Args:
-            what: What is to be done, a key for example.
+            what: The beginning of the error text, a key for example.
 
         Raises:
-            TransportError: this process is a forked one.
+            TransportError: this process was forked from one that had opened a session.
         """
         if self.forked:
             raise TransportError(
