@@ -28,6 +28,8 @@ from actionlib_core.interfaces._ros2 import ActionParts, Ros2Action, Ros2Service
 if TYPE_CHECKING:
     import os
 
+    from actionlib_core.interfaces._sources import Kind
+
 __all__ = [
     "DeserializationError",
     "FieldError",
@@ -37,6 +39,7 @@ __all__ = [
     "Ros2Message",
     "Ros2Service",
     "ServiceType",
+    "add_definition",
     "add_path",
     "define_action",
     "define_message",
@@ -115,6 +118,23 @@ def define_action(name: str, text: str) -> type[Message]:
     `define_message`.
     """
     return cast("type[Message]", registry.define("action", name, text))
+
+
+def add_definition(kind: Kind, name: str, text: str, origin: str) -> None:
+    """Make a definition known, in any order with those that it uses.
+
+    It is read when it is asked for, and errors come then. A definition that is there stays.
+
+    Args:
+        kind: "msg", "srv" or "action".
+        name: "my_pkg/Name".
+        text: What a file of that kind would hold.
+        origin: Where it is from, for errors.
+
+    Raises:
+        InterfaceError: The name breaks the rules.
+    """
+    registry.add_definition(kind, name, text, origin)
 
 
 def add_path(folder: str | os.PathLike[str]) -> None:

@@ -140,6 +140,13 @@ class Registry:
                         self._messages.pop(full, None)
                 raise
 
+    def add_definition(self, kind: Kind, name: str, text: str, origin: str) -> None:
+        """Make a definition known, to be read when it is asked for; one that is there stays."""
+        package, _, short = parse_name(name)
+        with self._lock:
+            if self.sources.find(kind, package, short) is None:
+                self.sources.define(kind, package, short, text, origin)
+
     def add_path(self, folder: str | os.PathLike[str]) -> None:
         """Search a folder before those known so far; classes already made stay."""
         with self._lock:

@@ -137,8 +137,8 @@ class Sources:
         if path not in self._added:
             self._added = [path, *self._added]
 
-    def define(self, kind: Kind, package: str, name: str, text: str) -> None:
-        source = Source(text, f"{package}/{kind}/{name} (inline)")
+    def define(self, kind: Kind, package: str, name: str, text: str, origin: str = "") -> None:
+        source = Source(text, origin or f"{package}/{kind}/{name} (inline)")
         self._inline = {**self._inline, (kind, package, name): source}
 
     def forget(self, kind: Kind, package: str, name: str) -> None:

@@ -9,19 +9,13 @@ from __future__ import annotations
 import ast
 import contextlib
 import re
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
-from actionlib_core.interfaces import (
-    InterfaceError,
-    define_action,
-    define_message,
-    define_service,
-    get_message,
-)
+from actionlib_core.interfaces import add_definition
 from smachpy.ros1.python2 import to_code, to_tree
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Iterable
     from pathlib import Path
 
 _NEXT: Final = re.compile(r"^={80}\nMSG: (\w+/\w+)\n", re.MULTILINE)
@@ -29,7 +23,11 @@ _PARTS: Final = (
     "Action",
     *(f"{a}{b}" for a in ("", "Action") for b in ("Goal", "Result", "Feedback")),
 )
-_FIELD: Final = re.compile(r"^\s*([\w/]+)(?:\[\d*\])?[ \t]+\w", re.MULTILINE)
+_GROUPS: Final[tuple[tuple[Literal["srv", "action"], str, tuple[str, ...]], ...]] = (
+    ("action", "Action", ("Goal", "Result", "Feedback")),
+    ("srv", "Request", ("Request", "Response")),
+)
+"""Kind of interface, end of the name of its first message, and of those that its text is of."""
 _GENERATE: Final = re.compile(r"\.generate\([^)]*[\"'](\w+)[\"']\s*\)")
 
 
@@ -46,49 +44,18 @@ def define_generated(folder: Path, package: str, defined: Iterable[Path]) -> Non
         for place in (folder / "src" / package / section, folder / section):
             for file in sorted(place.glob("_[A-Za-z]*.py")):
                 texts |= _texts(file)
-    known = {f"{package}/{file.stem}" for file in defined if file.suffix != ".action"}
-    actions = [file.stem for file in defined if file.suffix == ".action"]
-    known |= {f"{package}/{action}{part}" for action in actions for part in _PARTS}
-    for name in sorted(texts):
-        _define(name, texts, known)
-
-
-def _define(name: str, texts: dict[str, str], known: set[str]) -> None:
-    """Define what a text says: a message, or the service or action of which it is the first part.
-
-    Args:
-        name: Its type.
-        texts: Type -> text.
-        known: Types that are defined; grows.
-    """
-    if name in known:
-        return
-    known.add(name)
-    parts: list[str] = [""]
-    define: Callable[[str, str], object] = define_message
-    for end, ends, make in (
-        ("Action", ["Goal", "Result", "Feedback"], define_action),
-        ("Request", ["Request", "Response"], define_service),
-    ):
-        base = name.removesuffix(end)
-        if base != name and all(f"{base}{part}" in texts for part in ends):
-            known |= {f"{base}{part}" for part in ("", *_PARTS, *ends)}
-            name, parts, define = base, ends, make
-    said = [texts[f"{name}{part}"] for part in parts]
-    for kind in _FIELD.findall("\n".join(said)):
-        used = kind if "/" in kind else f"{name.partition('/')[0]}/{kind}"
-        if used in texts:
-            _define(used, texts, known)
-    if define is not define_message or not _is_known(name):
-        define(name, "\n---\n".join(said))
-
-
-def _is_known(name: str) -> bool:
-    try:
-        get_message(name)
-    except InterfaceError:
-        return False
-    return True
+    actions = {file.stem for file in defined if file.suffix == ".action"}
+    known = {f"{package}/{action}{part}" for action in actions for part in _PARTS}
+    origin = str(folder / "src" / package)
+    for name in sorted(texts.keys() - known):
+        for kind, end, parts in _GROUPS:
+            base = name.removesuffix(end)
+            said = [texts.get(f"{base}{part}") for part in parts]
+            if base != name and None not in said:
+                add_definition(kind, base, "\n---\n".join(map(str, said)), origin)
+                known |= {f"{base}{part}" for part in (*_PARTS, *parts)}
+        if name not in known:
+            add_definition("msg", name, texts[name], origin)
 
 
 def _texts(file: Path) -> dict[str, str]:

@@ -18,17 +18,11 @@ from importlib.util import find_spec, spec_from_file_location
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from actionlib_core.interfaces import (
-    InterfaceError,
-    add_path,
-    define_action,
-    define_message,
-    define_service,
-)
+from actionlib_core.interfaces import add_definition, add_path
 from smachpy.compat import MODULES as SMACH_MODULES
 from smachpy.ros1 import python2
 from smachpy.ros1.generated import config_file, config_module, define_generated
-from smachpy.ros1.project import is_package
+from smachpy.ros1.project import KINDS, is_package
 from smachpy.ros1.session import session
 from smachpy.ros1.stubs import OldSection, StubModule, StubSection
 
@@ -274,12 +268,10 @@ class OldNames(MetaPathFinder):
         if found and folder.name == package:
             add_path(folder)
         else:
-            for kind, define in (
-                ("msg", define_message),
-                ("srv", define_service),
-                ("action", define_action),
-            ):
-                _define_all(package, found.get(kind, []), define)
+            for kind in KINDS:
+                for file in found.get(kind, []):
+                    text = file.read_text(encoding="utf-8-sig")
+                    add_definition(kind, f"{package}/{file.stem}", text, str(file))
         define_generated(folder, package, [file for files in found.values() for file in files])
 
     def _in_project(self, fullname: str, path: Sequence[str] | None) -> ModuleSpec | None:
@@ -351,15 +343,6 @@ class OldNames(MetaPathFinder):
 
 def _alias(fullname: str, home: str) -> ModuleSpec:
     return ModuleSpec(fullname, _Alias(home), is_package=True)
-
-
-def _define_all(package: str, files: list[Path], define: Any) -> None:
-    for file in files:
-        try:
-            define(f"{package}/{file.stem}", file.read_text(encoding="utf-8-sig"))
-        except InterfaceError as error:
-            text = str(error).replace(f"{package}/", f"{file.parent}/", 1)
-            raise InterfaceError(text) from error
 
 
 def _lies_in(folder: Path, name: str) -> bool:

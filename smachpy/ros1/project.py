@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal
 from xml.etree import ElementTree as ET
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 MOST_FOLDERS: Final = 5000
 """Folders that are looked at around a script; a larger tree is not searched further."""
 
-KINDS: Final = ("msg", "srv", "action")
+KINDS: Final[tuple[Literal["msg", "srv", "action"], ...]] = ("msg", "srv", "action")
 _MANIFESTS: Final = ("package.xml", "manifest.xml")
 _SKIPPED: Final = frozenset({"__pycache__", "node_modules", "build", "devel", "install", "logs"})
 _COMMENT: Final = re.compile(r"<!--.*?-->", re.DOTALL)
