@@ -14,6 +14,7 @@ from smachpy.checks.model import RULES, Facts, OutcomeRule, Place, Problem, Read
 from smachpy.machines.concurrence import Concurrence
 from smachpy.machines.container import Container, state_problems
 from smachpy.machines.iterator import Iterator as IteratorState
+from smachpy.machines.old_states import Delegate
 from smachpy.machines.state import CBState, State, get_options
 from smachpy.util import CBInterface
 
@@ -109,6 +110,11 @@ def _is_foreign(code: Any) -> bool:
     return bool(code.__module__.partition(".")[0] != "smachpy")
 
 
+def _may_write_anything(state: State) -> bool:
+    """Tell whether a state is an old one that names no keys, as a stand-in's."""
+    return isinstance(state, Delegate) and not state.get_registered_output_keys()
+
+
 def _of_container(container: Container) -> Facts:
     rules: tuple[OutcomeRule, ...] = ()
     if isinstance(container, Concurrence):
@@ -123,7 +129,8 @@ def _of_container(container: Container) -> Facts:
         outcome_rules=rules,
         any_outcome=getattr(data, "outcome_cb", None) is not None,
         cuts=getattr(data, "child_termination_cb", None) is not None,
-        watched=bool(data.start_cbs or data.transition_cbs or data.termination_cbs),
+        watched=bool(data.start_cbs or data.transition_cbs or data.termination_cbs)
+        or any(_may_write_anything(child) for child in container.get_children().values()),
         prepared=get_options(container).on_enter is not None,
         made=frozenset(get_options(container).made_outcomes()),
         empty=isinstance(items, (list, tuple, range, dict, set, str)) and not items,

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 __all__ = ["adopt_slips", "as_state"]
 
 
-class _Delegate(State):
+class Delegate(State):
     """Runs an object that has a state's methods but is no `State`.
 
     Args:
@@ -46,7 +46,7 @@ def as_state(state: Any, label: object) -> Any:
     problem = f"{label}: state: got {state!r}, which is no State but has its methods;"
     if not accepts(f"{problem} expected a subclass of State."):
         return state
-    return _Delegate(state)
+    return Delegate(state)
 
 
 def adopt_slips(

@@ -29,6 +29,16 @@ _CHANGES: tuple[tuple[Any, str], ...] = (
 )
 
 
+class _NoOutput(str):
+    """The output of a process that did not run, as text and, for `decode()`, as bytes."""
+
+    __slots__ = ()
+
+    def decode(self, *_how: str) -> str:
+        """Return itself."""
+        return self
+
+
 class _NoProcess:
     """A process that has ended before it began."""
 
@@ -38,13 +48,12 @@ class _NoProcess:
     def __init__(self, args: Any = (), *_rest: Any, **options: Any) -> None:
         self.args = args
         text = options.get("text") or options.get("universal_newlines") or options.get("encoding")
-        self._empty: Any = "" if text else b""
         make: Any = io.StringIO if text else io.BytesIO
         self.stdin = self.stdout = self.stderr = make()
 
     def communicate(self, *_args: Any, **_kwargs: Any) -> tuple[Any, Any]:
         """Return no output."""
-        return self._empty, self._empty
+        return _NoOutput(), _NoOutput()
 
     def wait(self, *_args: Any, **_kwargs: Any) -> int:
         """Return 0."""

@@ -63,6 +63,13 @@ def install(script: str | Path | None = None, *, stub_missing: bool = False) -> 
         _installed.append(made)
         sys.meta_path.insert(0, finder)
         slips.set_accepting(True)
+        util.set_shutdown_check(_is_shutdown)  # as `import smach_ros` did in ROS, which some lack
+
+
+def _is_shutdown() -> bool:
+    from smachpy.ros1.names.rospy.core import is_shutdown
+
+    return is_shutdown()
 
 
 def uninstall() -> None:

@@ -69,8 +69,34 @@ def to_code(source: bytes, filename: str) -> CodeType:
         SyntaxError: it is Python in neither version; of the version that it looks like.
         MissingExtraError: it is Python 2, and what converts it is not installed.
     """
-    code: CodeType = compile(to_tree(source, filename), filename, "exec", dont_inherit=True)
+    tree = to_tree(source, filename)
+    try:
+        code: CodeType = compile(tree, filename, "exec", dont_inherit=True)
+    except SyntaxError as error:
+        if "prior to global declaration" not in str(error):
+            raise
+        _GlobalsFirst().visit(tree)
+        code = compile(tree, filename, "exec", dont_inherit=True)
     return code
+
+
+class _GlobalsFirst(ast.NodeTransformer):
+    """Puts a function's `global` lines at its top: Python 2 took them behind the first use, too."""
+
+    def __init__(self) -> None:
+        self._names: list[str] = []
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
+        outer, self._names = self._names, []
+        self.generic_visit(node)
+        if self._names:
+            node.body.insert(0, ast.copy_location(ast.Global(self._names), node.body[0]))
+        self._names = outer
+        return node
+
+    def visit_Global(self, node: ast.Global) -> ast.AST:
+        self._names += node.names
+        return ast.copy_location(ast.Pass(), node)
 
 
 def to_tree(source: bytes, filename: str) -> ast.Module:
@@ -354,13 +380,22 @@ class _GoneNames(ast.NodeTransformer):
             return ast.fix_missing_locations(node)
         if not isinstance(function, ast.Attribute):
             return node
-        if word == "isAlive" and not node.args and "isAlive" not in self._own:
+        if isinstance(function.value, ast.Name) and function.value.id == "string" and node.args:
+            self._use_method(node, function)
+        else:
+            self._use_today(node, function, name)
+        return node
+
+    def _use_today(self, node: ast.Call, function: ast.Attribute, name: str) -> None:
+        """Give a method its name of today, or an argument the value that libraries want today."""
+        if function.attr == "isAlive" and not node.args and "isAlive" not in self._own:
             function.attr = "is_alive"
         elif name == "yaml.load" and len(node.args) == 1 and not node.keywords:
             function.attr = "safe_load"  # PyYAML wants a loader by now
-        elif isinstance(function.value, ast.Name) and function.value.id == "string" and node.args:
-            self._use_method(node, function)
-        return node
+        elif function.attr == "set_printoptions":
+            for keyword in node.keywords:
+                if ast.unparse(keyword.value) in {"np.nan", "numpy.nan"}:
+                    keyword.value = _at(keyword.value, "__import__('sys').maxsize")
 
     def _use_method(self, node: ast.Call, function: Any) -> None:
         """Make a call of `string.split(text)` and the like one of `text.split()`."""

@@ -221,7 +221,7 @@ class StubModule(types.ModuleType):
 
 
 class _AnyClass(type):
-    """A class that has every name: what looked like a class may be a module."""
+    """A class that has every name: of a message a constant, and it may be a module in truth."""
 
     def __getattr__(cls, name: str) -> Any:
         if name.startswith("_") or name in _MARKS:
@@ -337,7 +337,8 @@ class StubSection(OldSection):
         made: set[str] = set()
         while True:
             try:
-                return getattr(self._known, name)
+                found = getattr(self._known, name)
+                return _loose.get(found, found)  # it was a stand-in for a program before, too
             except InterfaceError as error:
                 unknown = set(re.findall(r"unknown type: got '(\w+/\w+)'", str(error))) - made
                 if not unknown:
@@ -399,7 +400,7 @@ def permissive(kind: type) -> Any:
     if issubclass(kind, _Loose):
         return kind
     if kind not in _loose:
-        made: Any = type(kind.__name__, (_Loose, kind), {})
+        made: Any = _AnyClass(kind.__name__, (_Loose, kind), {})
         made.__slots__ = _EveryName()
         _loose[kind] = made
     return _loose[kind]

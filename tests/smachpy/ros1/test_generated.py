@@ -6,6 +6,7 @@ import sys
 
 import pytest
 
+from actionlib_core.interfaces import InterfaceError
 from smachpy import ros1
 
 RULER = "=" * 80
@@ -127,6 +128,27 @@ def test_a_definition_counts_more_than_a_generated_module(package):
     (package / "msg/Place.msg").write_text("int32 number\n")
     assert importlib.import_module("gen_leg.msg").Place(3).number == 3
     assert importlib.import_module("gen_leg.srv").GripRequest().force == 0
+
+
+def test_a_folder_of_another_name_than_its_package(package):
+    for path, text in {
+        "package.xml": "<package><name>gen_named</name></package>",
+        "msg/Arm.msg": "Bolt[] bolts\n",
+        "msg/Bolt.msg": "int32 size\n",
+        "msg/Broken.msg": "nobody_msgs/Thing thing\n",
+        "srv/Fetch.srv": "Bolt bolt\n---\nArm arm\n",
+    }.items():
+        file = package.parent / "checkout" / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+    (package.parent / ".git").mkdir()
+    ros1.uninstall()
+    with ros1.installed(package.parent / "checkout/script.py"):
+        msg = importlib.import_module("gen_named.msg")
+        assert msg.Arm([msg.Bolt(3)]).bolts[0].size == 3
+        assert importlib.import_module("gen_named.srv").FetchRequest(msg.Bolt(4)).bolt.size == 4
+        with pytest.raises(InterfaceError, match=r"checkout/msg/Broken.msg:1: unknown type"):
+            _ = msg.Broken
 
 
 def test_a_configuration_is_made_of_its_cfg_file(package):

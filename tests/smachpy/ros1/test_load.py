@@ -6,6 +6,7 @@ import pytest
 
 import smachpy
 from smachpy import ros1
+from smachpy.checks import check
 from smachpy.testing import MissionKit
 
 HEAD = """
@@ -48,6 +49,8 @@ assert client.send_goal_and_wait(MoveBaseGoal()) == 3
 with open({str(target)!r}, 'w') as file:
     file.write('x')
 subprocess.Popen(['touch', {str(target)!r}]).wait()
+assert subprocess.check_output(['ls']).split('\\n') == ['']
+assert subprocess.check_output(['ls']).decode('utf-8') == ''
 os.system('touch {target}')
 time.sleep(1000)
 rospy.sleep(1000)
@@ -233,6 +236,35 @@ sm.execute()
 
 
 @pytest.mark.slow
+def test_what_nobody_has_gives_constants_folders_and_keys(robot):
+    robot.write_text("""
+import warnings; warnings.simplefilter('ignore')
+import rospkg, rospy, smach, nobody_lib
+from nobody_msgs.msg import LookGoal, Place
+from nobody_msgs.srv import Ask
+assert str(LookGoal.FAR) == 'FAR' and Place.HIGH and Ask.ANY
+assert rospkg.RosPack().get_path('nobody_models').endswith('/nobody_models')
+
+class Show(smach.State):
+    def __init__(self):
+        smach.State.__init__(self, outcomes=['done'], input_keys=['seen'])
+
+    def execute(self, userdata):
+        rospy.loginfo(userdata.seen)
+        return 'done'
+
+sm = smach.StateMachine(outcomes=['done'])
+with sm:
+    smach.StateMachine.add('LOOK', nobody_lib.look(), {'seen': 'SHOW'})
+    smach.StateMachine.add('SHOW', Show())
+sm.execute()
+""")
+    stubbed = []
+    machine = ros1.load(robot, stub_missing=True, stubbed=stubbed)
+    assert "package nobody_models" in stubbed
+    assert not [problem for problem in check(machine).problems if problem.severity == "error"]
+
+
 def test_an_action_with_a_type_of_nobody(robot):
     robot.write_text(ACTION)
     with pytest.raises(ros1.LoadError, match=r"(?s)nobody_msgs/Code.*--stub-missing"):
@@ -250,6 +282,29 @@ def test_modules_of_added_folders_may_be_python_2_and_errors_name_their_line(rob
     )
     with pytest.raises(ros1.LoadError, match=r"lib.told\.py:3: NameError: name 'gone'"):
         ros1.load(robot)
+
+
+def test_what_python_2_or_an_old_numpy_took(load):
+    machine = load("""
+import numpy as np
+np.set_printoptions(threshold=np.nan)
+COUNT = 0
+
+def count(ud):
+    if COUNT < 3:
+        global COUNT
+        COUNT += 1
+        return 'again'
+    def inner():
+        return COUNT
+    return 'done' if inner() == 3 else 'wrong'
+
+sm = smach.StateMachine(outcomes=['done'])
+with sm:
+    sm.add('COUNT', smach.CBState(count, outcomes=['again', 'done']), {'again': 'COUNT'})
+sm.execute()
+""")
+    assert machine.execute() == "done"
 
 
 def test_a_name_that_a_bundled_package_lacks(load):

@@ -61,6 +61,25 @@ def test_a_wait_that_the_end_interrupts_is_a_preempt(clock, name):
     assert clock.now() == ASKED_AT_S
 
 
+def test_a_machine_whose_states_never_say_so_ends_without_smach_ros_too(clock):
+    rounds = []
+
+    def hurries(_ud):
+        rounds.append(clock.now())
+        assert len(rounds) < 100
+        if clock.now() < ASKED_AT_S:
+            clock.sleep(1.0)
+        return "again"
+
+    import smach
+
+    sm = smach.StateMachine(outcomes=["done"])
+    with sm:
+        sm.add("HURRIES", smach.CBState(hurries, outcomes=["again"]), {"again": "HURRIES"})
+    assert sm.execute() == "preempted"
+    assert clock.now() == ASKED_AT_S
+
+
 @pytest.fixture
 def client(clock):
     """A client of a server whose goals end only when they are cancelled."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from smachpy.ros1.install import current_project
+from smachpy.ros1.session import session
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,6 +57,9 @@ class RosPack:
         Raises:
             ResourceNotFound: there is none of that name.
         """
+        if session().stub_missing and name not in current_project().packages():
+            session().stand_in(f"package {name}")
+            return str(current_project().root / name)
         return str(_folder_of(name))
 
     def list(self) -> list[str]:

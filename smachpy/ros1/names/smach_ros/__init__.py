@@ -41,7 +41,6 @@ def _send_log_to_rospy() -> None:
 
 
 _send_log_to_rospy()
-smachpy.set_shutdown_check(_core.is_shutdown)
 
 
 def __getattr__(name: str) -> Any:
