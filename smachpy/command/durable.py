@@ -204,23 +204,21 @@ def find_or_create(store: Store, machine: Container, options: DurableOptions) ->
 
     open_ones = [row for row in store.missions(open_only=True) if row.every is None]
     if options.mission is not None:
-        for row in open_ones:
-            if row.id == options.mission:
-                return row
+        alike = [row for row in open_ones if row.id == options.mission]
     else:
         alike = [
             row for row in open_ones if (row.target, row.robot) == (options.target, options.robot)
         ]
-        same = [row for row in alike if row.argv == options.argv]
-        if same:
-            return same[-1]
-        if alike:
-            row = alike[-1]
-            raise MissionError(
-                f"{options.target}: arguments: got {list(options.argv)}, but mission {row.id!r} "
-                f"has begun with {list(row.argv)}; expected the same. Try 'smachpy missions resume "
-                f"{row.id}', 'smachpy missions forget {row.id}', or --mission NAME for another one."
-            )
+    same = [row for row in alike if row.argv == options.argv]
+    if same:
+        return same[-1]
+    if alike:
+        row = alike[-1]
+        raise MissionError(
+            f"{options.target}: arguments: got {list(options.argv)}, but mission {row.id!r} "
+            f"has begun with {list(row.argv)}; expected the same. Try 'smachpy missions resume "
+            f"{row.id}', 'smachpy missions forget {row.id}', or --mission NAME for another one."
+        )
     row = new_mission(
         machine,
         mission=options.mission,

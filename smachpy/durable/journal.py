@@ -27,11 +27,12 @@ def read_position(store: Store, mission: str) -> Position:
         StoreError: the journal cannot be read, or its entries are of a newer smachpy.
         UnknownMissionError: the store has none of this id.
     """
+    version = store.mission(mission).version  # of entries that no snapshot has replaced
     snapshot, entries = store.read(mission)
     where = f"mission {mission!r}"
     try:
         position = Position(None if snapshot is None else json.loads(snapshot))
-        version = position.data["version"]
+        version = max(version, position.data["version"])
         if version > VERSION:
             problem = (
                 f"journal: got version {version}; expected {VERSION} at most. Try a newer smachpy."

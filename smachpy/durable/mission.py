@@ -176,15 +176,17 @@ def kept_mission(
         goes_on = bool(position.visits)
         shift_ns = gone_ns = 0
         if goes_on:
-            alive_ns = max(position.data["last_ns"], round(row.changed * 1e9))
-            gone_ns = max(0, current_clock().time_ns() - alive_ns)
+            now_ns, last_ns = current_clock().time_ns(), position.data["last_ns"]
+            gone_ns = max(0, now_ns - max(last_ns, round(row.changed * 1e9)))
             if max_outage is not None and gone_ns > max_outage * 1e9:
                 raise OutageError(mission, gone_ns / 1e9, max_outage)
             fitted = _fitted(machine, row, position, migrate)
             if fitted is not position:  # the entries so far have the old paths
                 store.append(lease, [], snapshot=fitted.to_bytes())
                 position = fitted
-            shift_ns = max(0, gone_ns) if outage == "pauses" else 0
+            shift_ns = gone_ns if outage == "pauses" else 0
+            if now_ns < last_ns:  # the clock was put back: deadlines move with it
+                shift_ns = now_ns - last_ns
         recorder = Recorder(
             machine,
             Journal(store, lease, position),

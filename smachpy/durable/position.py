@@ -285,7 +285,8 @@ class Position:
     def _on_recovered(self, entry: Mapping[str, Any]) -> None:
         stamp_ns = entry["stamp_ns"]
         gone_ns = entry.get("gone_ns", stamp_ns)  # older journals do not say
-        self.data["outages"].append([max(self.data["last_ns"], stamp_ns - gone_ns), stamp_ns])
+        last_ns = self.data["last_ns"] = min(self.data["last_ns"], stamp_ns)  # a clock put back
+        self.data["outages"].append([max(last_ns, stamp_ns - gone_ns), stamp_ns])
         for visit in self.visits.values():
             visit["begun_ns"] = visit.get("begun_ns", visit["since_ns"]) + entry["shift_ns"]
             visit["since_ns"] += entry["shift_ns"]

@@ -151,7 +151,7 @@ class SqlStore(ABC):
                     return
                 raise MissionError(
                     f"{self.where}: mission {row.id!r}: got an id that is taken; "
-                    "expected a new one."
+                    f"expected a new one. Try 'smachpy missions forget {row.id}', if it is over."
                 )
             self._insert(cursor, row)
 

@@ -142,6 +142,21 @@ def test_other_arguments_are_another_mission_only_if_it_is_named(
     assert run("--input", "speed=2.0") == 2
     assert run("--input", "speed=2.0", "--mission", "second") == 130
     assert {row["id"] for row in listed(capsys)} >= {"second"}
+    assert run("--input", "speed=3.0", "--mission", "second") == 2
+    said = capsys.readouterr().err
+    assert "speed=3.0" in said
+    assert "speed=2.0" in said
+
+
+def test_the_id_of_one_that_has_ended_can_be_used_again_when_that_is_forgotten(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    Path("go").touch()
+    assert run("--mission", "first") == 0
+    assert run("--mission", "first") == 2
+    assert "Try 'smachpy missions forget first'" in capsys.readouterr().err
+    assert missions("forget", "first") == 0
+    assert run("--mission", "first") == 0
 
 
 def test_a_changed_machine_needs_to_be_told(capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 import smachpy
-from actionlib_core.clock import VirtualClock, use_clock
+from actionlib_core.clock import VirtualClock, current_clock, use_clock
 from actionlib_core.node import use_node
 from smachpy import Concurrence, InvalidStateError, NotDurableError, State, StateMachine, events
 from smachpy.durable.journal import read_position
@@ -297,6 +298,51 @@ def test_a_pause_between_attempts_and_their_number_go_on(store: KillingStore) ->
     assert [at - tries[0] for at in tries] == pytest.approx([0.0, 8.0, 24.0])
 
 
+class SetBack(VirtualClock):
+    """Shows a time that is `seconds` too early."""
+
+    def __init__(self, seconds: float) -> None:
+        super().__init__()
+        self.back_ns = round(seconds * 1e9)
+
+    def time_ns(self) -> int:
+        return super().time_ns() - self.back_ns
+
+
+@pytest.mark.parametrize("outage", ["counts", "pauses"])
+def test_a_clock_that_was_put_back_holds_nothing_up(store: KillingStore, outage: Any) -> None:
+    """The clock of a robot without a battery for it begins in the past after a power loss."""
+    options: dict[str, Any] = {"timeout": 10.0, "timeout_outcome": "late"}
+
+    def wait(state: State, _: Any) -> str:
+        return "preempted" if state.sleep(100.0) else "ok"
+
+    def die_after(seconds: float) -> Callable[..., str]:
+        def do(state: State, _: Any) -> str:
+            state.sleep(seconds)
+            smachpy.once(f"{current_clock().time_ns()}", int)  # a sign of life in the journal
+            raise Kill
+
+        return do
+
+    with VirtualClock() as clock, use_clock(clock):
+        kill(store, machine_of(Doing(die_after(4.0), **options)))
+    for seconds in (86_400.0, 2 * 86_400.0):
+        with SetBack(seconds) as clock, use_clock(clock):
+            machine = machine_of(Doing(die_after(1.0), **options))
+            with pytest.raises(Kill):
+                go_on(store, machine, outage=outage)
+            assert clock.now() == pytest.approx(1.0)
+    seen: list[events.Event] = []
+    with SetBack(3 * 86_400.0) as clock, use_clock(clock):
+        machine = machine_of(Doing(wait, **options))
+        machine.subscribe(seen.append)
+        assert go_on(store, machine, outage=outage) == "late"
+        assert clock.now() == pytest.approx(10.0 - 4.0 - 1.0 - 1.0)
+    [recovered] = [event for event in seen if isinstance(event, events.Recovered)]
+    assert all(end >= begin for begin, end in recovered.outages)
+
+
 def test_a_journal_that_is_too_old_wants_a_person(store: KillingStore) -> None:
     with VirtualClock() as clock, use_clock(clock):
         kill(store, machine_of(Doing(killed)))
@@ -458,6 +504,16 @@ def test_an_entry_that_cannot_be_read_is_told(store: KillingStore, entry: bytes)
     with pytest.raises(StoreError) as caught:
         go_on(store, machine_of(Doing(fine)))
     assert caught.value.reason == "corrupt"
+
+
+def test_entries_of_a_newer_smachpy_are_not_read(store: KillingStore) -> None:
+    kill(store, machine_of(Doing(killed)))
+    store.rows["m"] = dataclasses.replace(store.rows["m"], version=2)
+    before = list(store.entries["m"])
+    with pytest.raises(StoreError, match="Try a newer smachpy") as caught:
+        go_on(store, machine_of(Doing(fine)))
+    assert caught.value.reason == "future"
+    assert store.entries["m"] == before
 
 
 def test_a_journal_that_cannot_be_written_preempts_the_machine(store: KillingStore) -> None:
