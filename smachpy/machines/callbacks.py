@@ -1,4 +1,4 @@
-"""Who hears of a run: SMACH's callbacks and the listeners of events."""
+"""SMACH's callbacks, and the subscribers of events."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Callbacks:
-    """The part of a container that calls back."""
+    """The callbacks and subscriptions of a container."""
 
     userdata: UserData
     _smachpy: Any
@@ -30,7 +30,7 @@ class Callbacks:
         raise NotImplementedError
 
     def get_active_states(self) -> list[str]:
-        """Return the labels of the children that run now."""
+        """Return the labels of the active children."""
         raise NotImplementedError
 
     def register_start_cb(
@@ -50,7 +50,7 @@ class Callbacks:
             _checked("transition_cb", transition_cb, call, 2, cb_args)
         )
         EPOCH.value += 1
-        SUBSCRIPTIONS.version = object()
+        SUBSCRIPTIONS.version = object()  # a running `_buffered` loop must notice it
 
     def register_termination_cb(
         self, termination_cb: Callable[..., object], cb_args: Iterable[Any] = ()
@@ -76,27 +76,27 @@ class Callbacks:
 
     def __call(self, callbacks: list[Callback], *arguments: object) -> None:
         frame = self._smachpy.frame
-        for callback, extra in tuple(callbacks):
+        for callback, extra in tuple(callbacks):  # a copy: a callback may register another one
             given = (self.userdata, *arguments, *extra)
             try:
-                if frame is None:  # called by hand
+                if frame is None:  # the program calls `call_..._cbs` itself, outside of a run
                     callback(*given)
                 else:
                     call_bounded(frame.container, frame, callback, given)
-            except Exception as error:  # noqa: BLE001  a border: reported, the machine goes on
+            except Exception as error:  # noqa: BLE001  reported; as in SMACH, the machine goes on
                 if frame is not None:
                     frame.callback_failed(callback, error)
                 else:
                     log.log_exception(f"callback {callback!r} raised {error!r}", error)
 
     def subscribe(self, listener: Callable[[Event], object]) -> Callable[[], None]:
-        """Give every event of this container and of all below it to `listener`.
+        """Call `listener` with every event of this container and of all below it.
 
         Returns:
-            A function that ends it.
+            A function that ends the subscription.
 
-        Threads: `listener` is called in the thread where the event happens and holds the machine
-            up while it runs. What it raises is logged and otherwise without effect.
+        Threads: `listener` is called in the thread in which the event happens, and blocks the
+            machine while it runs. An exception that it raises is logged and has no other effect.
         """
         problems = Problems("subscribe")
         problems.function("listener", listener, "listener(event)", 1, optional=False)
@@ -114,10 +114,10 @@ class Callbacks:
     def event_buffer(
         self, on_news: Callable[[], object] | None = None, *, limit: int = LONGEST, name: str = ""
     ) -> EventBuffer:
-        """Take every event of this container and of all below it down, to be read later.
+        """Return a buffer that keeps every event of this container and of all below it.
 
-        It costs the machine a fraction of what a listener does. Arguments as for
-        `smachpy.events.buffer.EventBuffer`: its `read` gives the records, its `close` ends it.
+        It costs the machine a fraction of a listener. The arguments are those of
+        `smachpy.events.buffer.EventBuffer`; its `read` returns the events, its `close` ends it.
 
         Threads: any.
         """
@@ -150,10 +150,10 @@ class Callbacks:
 
 
 def _checked(name: str, function: Any, call: str, ours: int, args: Iterable[Any]) -> Callback:
-    """Return a callback and its arguments, which `register_...` was given.
+    """Check the arguments of a `register_..._cb` method.
 
     Raises:
-        InvalidStateError: the callback cannot be called so.
+        InvalidStateError: the callback cannot be called as `call`.
     """
     problems = Problems(f"register_{name}")
     more = problems.values("cb_args", args)

@@ -1,4 +1,4 @@
-"""The concurrence: all children at once, their outcomes make its own."""
+"""The concurrence: runs all children at once; their outcomes decide its own."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class _Plan:
 
 
 class ConcurrenceData(ContainerData):
-    """What the library knows of one concurrence; see the arguments of `Concurrence`."""
+    """The library's data of one concurrence; see the arguments of `Concurrence`."""
 
     __slots__ = _kept = ("child_termination_cb", "default_outcome", "outcome_cb", "rules")
 
@@ -80,26 +80,28 @@ class Concurrence(Container):
 
     Args:
         outcomes: Outcomes.
-        default_outcome: Outcome when no rule of `outcome_map` holds.
+        default_outcome: Outcome if no rule of `outcome_map` holds.
         input_keys: Keys copied from the parent's userdata when it starts.
         output_keys: Keys copied to the parent's userdata when it ends.
         outcome_map: Outcome -> rule: `{label: outcome}` (all must hold; an outcome may be a
-            list of outcomes), or `all_of`, `any_of`, `n_of`. The rule that asks for most wins.
+            list of outcomes), or `all_of`, `any_of`, `n_of`. Of the rules that hold, the one with
+            most conditions wins.
         outcome_cb: Called with label -> outcome when all have ended; returns the outcome, or
-            None to leave it to the rules.
-        child_termination_cb: Called with label -> outcome (None: still runs) each time a child
+            None to let the rules decide.
+        child_termination_cb: Called with label -> outcome (None while it runs) each time a child
             has ended; returns True to preempt all others, a list of labels to preempt those,
-            False to let them run. Called in the container's thread, never two at once, and not
-            after a child or it itself has raised.
+            False to let them run. Called in the container's thread, one call at a time, and not
+            after a child or the callback itself has raised.
         name: Name of the machine when it is the root.
         userdata_type: A dataclass or TypedDict: the userdata has its fields, and their defaults.
         **options: See `StateOptions`.
 
     Raises:
-        InvalidStateError: there is no way to an outcome, or a callback cannot be called.
+        InvalidStateError: there is no outcome policy, or a callback cannot be called.
 
-    Threads: each child runs in a thread named after its path; all have ended when `execute`
-        returns, except those left behind after a preempt they ignored (docs/preemption.md).
+    Threads: children run in threads named after their paths; one that has ended may run the next
+        child. All have ended when `execute` returns, except those that ignored a preempt and were
+        left behind (docs/preemption.md).
     """
 
     _smachpy: DataOf[ConcurrenceData] = DataOf(ConcurrenceData)
@@ -168,11 +170,12 @@ class Concurrence(Container):
             The state.
 
         Raises:
-            InvalidStateError: the label is taken, or `state` is no state.
+            InvalidStateError: the label is taken, or `state` is not a state.
             InvalidConstructionError: called on the class while no concurrence is open.
         """
         if self._smachpy.frame is not None:
             raise InvalidConstructionError(f"{label}: add: got a new state while it runs.")
+        # One object in two threads would share its attributes and its preempt flag.
         for other, child in self._smachpy.children.items():
             if child is state:
                 problem = (
@@ -195,10 +198,10 @@ class Concurrence(Container):
     def set_initial_state(
         self, initial_states: SequenceOf[str], userdata: UserData | None = None
     ) -> None:
-        """Add to the userdata; the children always start all together.
+        """Update the userdata; all children always start together.
 
         Raises:
-            InvalidStateError: a label that is not there.
+            InvalidStateError: an unknown label.
         """
         known = self._smachpy.children
         unknown = sorted(set(initial_states) - set(known))
@@ -213,13 +216,13 @@ class Concurrence(Container):
             self.userdata.update(userdata)
 
     def get_active_states(self) -> list[str]:
-        """Return the labels of the children that run now."""
+        """Return the labels of the children that are running."""
         frame = self._smachpy.frame
         group = None if frame is None else frame.group
         return [] if group is None else [branch.step.label for branch in group.running()]
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Return what the outcome map names as (child outcome, child label, outcome)."""
+        """Return the conditions of the outcome map as (child outcome, child label, outcome)."""
         return [
             (child_outcome, label, outcome)
             for outcome, rule in self._smachpy.rules
@@ -228,7 +231,7 @@ class Concurrence(Container):
         ]
 
     def find_problems(self, where: str) -> tuple[str, ...]:
-        """Return what is wrong with this concurrence itself."""
+        """Return the problems of this concurrence itself."""
         children = tuple(
             ChildSpec(label, state._smachpy.outcomes)
             for label, state in self._smachpy.children.items()
@@ -244,7 +247,7 @@ class Concurrence(Container):
         return (*concurrence_problems(spec), *shared)
 
     def __shared_states(self, where: str) -> Iterator[str]:
-        """Yield the states that two branches would run at the same time."""
+        """Yield a problem for each state that two branches would run at the same time."""
         if len(self._smachpy.children) == 1:
             return
         branch_of: dict[int, str] = {}
@@ -288,6 +291,7 @@ class Concurrence(Container):
         return _Plan(self, [make_step(self, label) for label in self._smachpy.children])
 
     def _smachpy_run_children(self, frame: Frame, plan: _Plan) -> str:
+        # Without callbacks the container wakes up once, after the last child.
         each = bool(self._smachpy.child_termination_cb or self._smachpy.transition_cbs)
         group = frame.group = Group(frame, plan.steps, each=each)
         try:
@@ -301,43 +305,46 @@ class Concurrence(Container):
             self.__run_group(group)
             return self.__outcome(frame, group)
         finally:
-            frame.group = None  # else run and branches would wait for the garbage collector
+            # Break the reference cycle frame -> group -> branches -> frame: the run is freed now.
+            frame.group = None
             if not group.started:
                 group.release()
 
-    def _smachpy_terminal_labels(self, frame: Frame) -> list[str]:  # noqa: ARG002  that of any container
+    def _smachpy_terminal_labels(self, frame: Frame) -> list[str]:  # noqa: ARG002  overrides
         return list(self._smachpy.children)
 
     def __run_group(self, group: Group) -> None:
-        """Start the branches and see them end.
+        """Start the branches and handle their ends.
 
         Raises:
-            Interruption: a callback did not listen; the branches have ended all the same.
+            Interruption: a callback outlasted its grace; the branches have ended too.
         """
         try:
             group.start()
-            self.__see_them_end(group)
+            self.__handle_ends(group)
         except BaseException as error:
             with asking("concurrence", group.frame.path, f"raised {type(error).__name__}"):
                 group.ask(group.running())
             raise
 
-    def __see_them_end(self, group: Group) -> None:
+    def __handle_ends(self, group: Group) -> None:
         failure: InvalidUserCodeError | None = None
         running = True
+        # As in SMACH, a transition callback is called once for each child that has started.
         if self._smachpy.transition_cbs:
             try:
                 for _ in group.branches:
                     self.call_transition_cbs()
             except Interruption as error:
                 self.__stop_calling(group, error)
+        # Handle all reports, also those that arrive together with the last end.
         while running or group.reports:
             running = group.wait() if running else False
             while group.reports:
                 branch = group.reports.popleft()
                 try:
                     self.__branch_ended(group, branch)
-                except InvalidUserCodeError as error:
+                except InvalidUserCodeError as error:  # raised below, when all branches have ended
                     failure = error
                     group.failed = True
                     with asking("concurrence", group.frame.path, "child_termination_cb raised"):
@@ -350,7 +357,7 @@ class Concurrence(Container):
             raise group.interruption
 
     def __stop_calling(self, group: Group, interruption: Interruption) -> None:
-        """Call no callback more: one did not listen, so the others might not either."""
+        """Call no other callback after one was interrupted: it might ignore its preempt too."""
         if group.frame.dead:
             raise interruption
         group.failed = True
@@ -364,7 +371,9 @@ class Concurrence(Container):
         if self._smachpy.transition_cbs and group.interruption is None:
             self.call_transition_cbs()
         if self._smachpy.child_termination_cb is None or group.failed:
-            return  # an outcome that a child did not live to give would pass for one that runs
+            # In the callback's argument None means "still runs", which would be wrong for a child
+            # that has raised.
+            return
         try:
             answer = call_bounded(
                 self, group.frame, self._smachpy.child_termination_cb, (_outcomes(group),)
@@ -378,7 +387,7 @@ class Concurrence(Container):
             group.ask(self.__chosen(group, answer))
 
     def __chosen(self, group: Group, answer: Any) -> list[ChildBranch]:
-        """Return the branches that the answer of child_termination_cb names."""
+        """Return the branches to preempt after `child_termination_cb` returned `answer`."""
         if answer is True or answer is False or answer is None:
             return group.running() if answer else []
         labels = [answer] if isinstance(answer, str) else answer
@@ -395,10 +404,11 @@ class Concurrence(Container):
         return [branch for branch in group.running() if branch.step.label in labels]
 
     def __outcome(self, frame: Frame, group: Group) -> str:
-        """Return the outcome that the callback, the rules or the default give.
+        """Return the outcome given by the callback, the rules or the default.
 
-        It answers a preempt only if every child behind it answered: when one just finished its
-        work, the machine above must not take the outcome for the end of the preempt.
+        It counts as an answer to a preempt only if every child that contributed to it has serviced
+        the request. If one just finished its work, the machine above must not treat the outcome as
+        the end of the preempt.
         """
         outcomes = _outcomes(group)
         answered = [b.step.label for b in group.branches if b.answered]
@@ -408,6 +418,7 @@ class Concurrence(Container):
             if answer is not None:
                 frame.answered = asked and len(answered) == len(outcomes)
                 return answer
+        # Only the children that met the rule count; for the default outcome one is enough.
         ruled = decide(self._smachpy.rules, outcomes) if self._smachpy.rules else None
         if ruled is not None:
             outcome, rule = ruled
@@ -445,5 +456,5 @@ class Concurrence(Container):
 
 
 def _outcomes(group: Group) -> dict[str, str | None]:
-    """Return label -> outcome of the branches, None for those that run."""
+    """Return label -> outcome of the branches; None for those that are running."""
     return {branch.step.label: branch.outcome for branch in group.branches}

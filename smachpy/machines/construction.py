@@ -1,7 +1,7 @@
-"""Which containers are open: `with sm:` and the `add` functions that find them.
+"""The open containers: `with sm:`, and the `add` functions that work on the innermost one.
 
-The open containers are a context variable, so machines can be built in several threads and
-coroutines at once, and an exception inside a `with` leaves nothing behind.
+They are in a context variable (SMACH: a class attribute), so that machines can be built in several
+threads and coroutines at once, and an exception inside a `with` leaves no container open.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ OPEN: ContextVar[tuple[Openable, ...]] = ContextVar("smachpy_open_containers", d
 
 
 def innermost(kind: type) -> Any:
-    """Return the container of this kind that was opened last, else None."""
+    """Return the innermost open container of this kind, or None."""
     for container in reversed(OPEN.get()):
         if isinstance(container, kind):
             return container
@@ -34,7 +34,11 @@ def innermost(kind: type) -> Any:
 
 
 class _NoneOpen:
-    """Stands in for the container when none is open: any use of it says so."""
+    """Takes the place of the container when none is open: any use of it raises the error.
+
+    The error comes at the use, not at the look-up of the method, so that `StateMachine.add` itself
+    can still be read, by `help` for instance.
+    """
 
     def __init__(self, kind: type, name: str) -> None:
         object.__setattr__(self, "_what", (kind.__name__, name))
@@ -49,7 +53,7 @@ class _NoneOpen:
 
 
 class construction_method(Generic[P, R_co]):  # noqa: N801  a decorator
-    """A method that, called on the class, works on the innermost open container of that class."""
+    """A method that works on the innermost open container if it is called on the class."""
 
     def __init__(self, function: Callable[Concatenate[Any, P], R_co]) -> None:
         self._function = function
@@ -66,12 +70,12 @@ class construction_method(Generic[P, R_co]):  # noqa: N801  a decorator
 
 
 class Openable:
-    """The part of a container that `with` opens."""
+    """A container as a context manager."""
 
     _smachpy: Any
 
     def check_consistency(self) -> None:
-        """Check the container and all below it."""
+        """Check this container and all containers below it."""
         raise NotImplementedError
 
     def __enter__(self) -> Self:
@@ -85,8 +89,9 @@ class Openable:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """Close it; at the outermost container everything is checked."""
+        """Close it; the outermost container checks everything below it."""
         OPEN.reset(self._smachpy.open_tokens.pop())
+        # Not after an error, whose message would be hidden by those of a half-built machine.
         if error is None and not OPEN.get() and self._smachpy.context_kwargs.get("check", True):
             try:
                 self.check_consistency()
@@ -114,7 +119,7 @@ class Openable:
         self.__enter__()
 
     def close(self) -> None:
-        """Close what `open` opened.
+        """Close the container after `open`.
 
         Raises:
             InvalidConstructionError: it is not the container that was opened last.
@@ -127,15 +132,17 @@ class Openable:
         self.__exit__(None, None, None)
 
     def is_opened(self) -> bool:
-        """Tell whether `add` goes to this container."""
+        """Return whether `add` goes to this container."""
         return bool(OPEN.get()) and OPEN.get()[-1] is self
 
     def assert_opened(self, msg: str = "") -> None:
-        """Raise unless it is open."""
+        """Raise an error unless the container is open."""
         if not self.is_opened():
             raise InvalidConstructionError(
                 f"{type(self).__name__}: not open: expected `with sm:`. {msg}".rstrip()
             )
+
+    # SMACH's names, for containers that users have written themselves.
 
     @classmethod
     def _any_containers_opened(cls) -> bool:

@@ -30,12 +30,15 @@ class FunctionState(CBState):
         self.__wrapped__ = function
 
     def __call__(self, userdata: Any) -> Any:
-        """Call the function, for tests of it."""
+        """Call the function, as a test of it does."""
         return self._smachpy.code[0](userdata)
 
 
 class _StateDecorator:
-    """The decorator; it also carries the classes of the module `smachpy.state`."""
+    """The decorator. Its attributes are those of SMACH's module `smach.state`.
+
+    Programs write `smach.state.State`; here the name `state` is the decorator, so both must work.
+    """
 
     State: ClassVar[type[State]] = State
     CBState: ClassVar[type[CBState]] = CBState
@@ -50,7 +53,7 @@ class _StateDecorator:
         io_keys: Iterable[str] = (),
         **options: Unpack[_StateOptions],
     ) -> Callable[[Callable[..., Any]], FunctionState]:
-        """Make a state of a function `f(userdata) -> outcome`, plain or `async`.
+        """Turn a function `f(userdata) -> outcome`, plain or `async`, into a state.
 
             @smachpy.state(outcomes=["charged", "failed"], output_keys=["level"])
             def charge(userdata):
@@ -59,7 +62,8 @@ class _StateDecorator:
 
             StateMachine.add("CHARGE", charge, {"charged": "DRIVE"})
 
-        Inside it, `smachpy.current_state()` is the state, for `sleep` and `preempt_requested`.
+        In the function, `smachpy.current_state()` is the state, for `sleep` and
+        `preempt_requested`.
         """
 
         def make(function: Callable[..., Any]) -> FunctionState:

@@ -1,4 +1,4 @@
-"""The iterator: one child again and again, once for each item."""
+"""The iterator: runs its child once for each item."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _END = object()
 
 
 class _Plan:
-    """An iterator, compiled: its step leads to itself for the next item, or to an end."""
+    """A compiled iterator: its step leads to itself for the next item, or to an end."""
 
     __slots__ = ("epoch", "step", "userdata")
 
@@ -64,7 +64,7 @@ class _Plan:
 
 
 class IteratorData(ContainerData):
-    """What the library knows of one iterator; see the arguments of `Iterator`."""
+    """The library's data of one iterator; see the arguments of `Iterator`."""
 
     __slots__ = _kept = (
         "break_outcomes",
@@ -125,7 +125,7 @@ class Iterator(Container):
             )
         self.__set_items(it, it_label, problems)
         problems.raise_all()
-        data = self._smachpy  # a second call of __init__ begins anew
+        data = self._smachpy  # reset for a second call of __init__, as in Container
         data.exhausted_outcome = exhausted
         data.loop_outcomes = data.break_outcomes = ()
         data.final_outcome_map = {}
@@ -139,7 +139,7 @@ class Iterator(Container):
         """Set the items and the userdata key of the current one.
 
         Raises:
-            InvalidStateError: `it` cannot be iterated, or `it_label` is no name.
+            InvalidStateError: `it` is not iterable, or `it_label` is not a name.
         """
         problems = Problems(type(self).__name__)
         self.__set_items(it, it_label, problems)
@@ -161,9 +161,10 @@ class Iterator(Container):
         Args:
             label: Its name here.
             state: The child.
-            loop_outcomes: Outcomes after which the next item comes. With neither these nor
-                `break_outcomes`, all outcomes loop.
-            break_outcomes: Outcomes that end the iterator; they win over `loop_outcomes`.
+            loop_outcomes: Outcomes that continue with the next item. Without these and without
+                `break_outcomes`, all outcomes do.
+            break_outcomes: Outcomes that end the iterator; they take precedence over
+                `loop_outcomes`.
             final_outcome_map: Child outcome (or the exhausted outcome) -> outcome of the
                 iterator; others keep their name.
             remapping: Key of the child -> key of the iterator's userdata.
@@ -175,6 +176,7 @@ class Iterator(Container):
         loop = problems.names("loop_outcomes", loop_outcomes)
         breaks = problems.names("break_outcomes", break_outcomes)
         final = problems.names_of("final_outcome_map", final_outcome_map, "outcome -> outcome")
+        # A new child replaces the old one, which stays if the new one is refused.
         before = self._smachpy.children, self._smachpy.remappings
         self._smachpy.children, self._smachpy.remappings = {}, {}
         try:
@@ -216,7 +218,7 @@ class Iterator(Container):
     def set_initial_state(
         self, initial_states: SequenceOf[str], userdata: UserData | None = None
     ) -> None:
-        """Add to the userdata; there is only one state to begin with.
+        """Update the userdata; there is only one state to begin with.
 
         Raises:
             InvalidStateError: a label that is not the child's.
@@ -242,7 +244,7 @@ class Iterator(Container):
         ]
 
     def find_problems(self, where: str) -> tuple[str, ...]:
-        """Return what is wrong with this iterator itself."""
+        """Return the problems of this iterator itself."""
         label = self.__label
         child = None
         breaks: tuple[str, ...] = ()
@@ -305,16 +307,16 @@ class Iterator(Container):
         return outcome
 
     def _smachpy_terminal_labels(self, frame: Frame) -> list[str]:
-        """Return the child, as in SMACH; even when there was no item."""
+        """Return the child, even if there was no item, as in SMACH."""
         super()._smachpy_terminal_labels(frame)
         assert self.__label is not None
         return [self.__label]
 
     def __loop(self, frame: Frame, step: Step) -> str:
-        """Run the child for item after item; return its last outcome, or that of the end."""
+        """Run the child for item after item; return its last outcome, or the exhausted one."""
         run = frame.run
         for index in self.__numbers(frame):
-            frame.step = step  # first the mark, then the look: see `smachpy.run.grace.ask`
+            frame.step = step  # first write the step, then read the flag: see `grace.ask`
             if self._preempt_requested:
                 return self.__preempted(frame, step)
             if run.watched:
@@ -322,7 +324,8 @@ class Iterator(Container):
             again = True
             while again:
                 outcome, why = self.__visit(frame, step)
-                again = why is Why.JUMPED  # a pause has cancelled it: again with the same item
+                # An operator jumps to the child itself after a pause that cancelled it.
+                again = why is Why.JUMPED
             if why is Why.STOPPED:
                 return self.__preempted(frame, step)
             if why is Why.ANSWERED:
@@ -335,9 +338,9 @@ class Iterator(Container):
         return self._smachpy.exhausted_outcome
 
     def __numbers(self, frame: Frame) -> IteratorOf[int]:
-        """Put item after item into the userdata; yield the number of each.
+        """Write each item to the userdata and yield its number.
 
-        A run that goes on after the end of its process passes over those that were done.
+        A resumed durable run skips the items that were done.
         """
         journal, index = frame.run.journal, -1
         for index, item in enumerate(self.__iterate(frame)):
@@ -350,7 +353,7 @@ class Iterator(Container):
             journal.check_items(frame, index + 1)
 
     def __visit(self, frame: Frame, step: Step) -> tuple[str, Why]:
-        """Run the child once; return its outcome, or an operator's, and what comes of it."""
+        """Run the child once; return its outcome, or an operator's, and the reason."""
         try:
             outcome: Any = self.__run_child(frame, step)
         except SmachError:
@@ -375,7 +378,7 @@ class Iterator(Container):
         run = frame.run
         if run.control is not None:
             run.control.pass_gate(frame, step)
-            if self._preempt_requested or frame.visit is not None:  # called off while it was held
+            if self._preempt_requested or frame.visit is not None:  # called off during the pause
                 return "preempted"
         return run_watched(frame, step) if run.watched else step.execute(step.userdata)
 
@@ -385,8 +388,9 @@ class Iterator(Container):
         return "preempted"
 
     def __iterate(self, frame: Frame) -> IteratorOf[Any]:
-        """Return the items' iterator; what making or running it raises names the iterator."""
+        """Yield the items; an exception of the user's iterable names the iterator."""
 
+        # A generator of the user's may block like any callback, so the grace bounds each step.
         def call(function: Callable[..., Any], *arguments: Any) -> Any:
             return call_bounded(self, frame, function, arguments)
 

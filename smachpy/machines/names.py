@@ -1,4 +1,4 @@
-"""Lists of names (outcomes, keys) as users give them; names of their functions."""
+"""Lists of names (outcomes, keys) given by users, and the names of their functions."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 
 
 def name_of(function: object) -> str:
-    """Return what to call a function of the user's in texts: its name, without an address.
+    """Return the name of a user's function for texts, never with a memory address.
 
-    A method's has its class in front; a `functools.partial` has that of its function, another
-    object to call that of its class.
+    A method is named with its class, a `functools.partial` as its function, and any other callable
+    object as its class.
     """
     while isinstance(function, functools.partial):
         function = function.func
@@ -25,7 +25,8 @@ def name_of(function: object) -> str:
 
 
 def missing_init(state: object, error: BaseException) -> str:
-    """Return what to try when a state lacks an attribute as its own `__init__` called no other."""
+    """Return a hint if `error` comes from a base class whose `__init__` was not called."""
+    # Private attributes carry the name of the class whose `__init__` sets them: `_CBState__args`.
     lacks = getattr(error, "name", None) or ""
     for kind in type(state).__mro__:
         ours = kind.__module__.startswith("smachpy.")
@@ -42,8 +43,9 @@ def unique_names(names: Iterable[str], what: str = "names") -> tuple[str, ...]:
     """Return `names` without repeats, in their order.
 
     Raises:
-        InvalidStateError: `names` is one string or no list, or holds something that is no string.
+        InvalidStateError: `names` is a string or not iterable, or an item is not a string.
     """
+    # A plain string is iterable too, and would silently become names of one letter each.
     if isinstance(names, str):
         problem = f"{what}: got the string {names!r}; expected a list of strings. Try [{names!r}]."
         if not accepts(problem):

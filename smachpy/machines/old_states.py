@@ -1,4 +1,4 @@
-"""What programs for ROS 1 add as states that are none here; only asked while slips are accepted."""
+"""Objects that programs for ROS 1 add as states; used only while their mistakes are accepted."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["adopt_slips", "as_state"]
 
 
 class Delegate(State):
-    """Runs an object that has a state's methods but is no `State`.
+    """Runs an object that has a state's methods but is not a `State`.
 
     Args:
         thing: The object.
@@ -32,7 +32,7 @@ class Delegate(State):
         return self._thing.execute(ud)
 
     def request_preempt(self) -> None:
-        """Ask the object to stop, too."""
+        """Ask the object to stop as well."""
         super().request_preempt()
         ask = getattr(self._thing, "request_preempt", None)
         if ask is not None:
@@ -40,7 +40,7 @@ class Delegate(State):
 
 
 def as_state(state: Any, label: object) -> Any:
-    """Return `state`, or a state that runs it when it only has a state's methods."""
+    """Return `state`, or a state that runs it if it only has a state's methods."""
     if isinstance(state, State | type) or not callable(getattr(state, "execute", None)):
         return state
     problem = f"{label}: state: got {state!r}, which is no State but has its methods;"
@@ -52,7 +52,11 @@ def as_state(state: Any, label: object) -> Any:
 def adopt_slips(
     label: object, state: Any, transitions: Mapping[str, str | None]
 ) -> dict[str, str | None]:
-    """Return transitions as SMACH took them; a state that names no outcomes gets those of them."""
+    """Return transitions as SMACH understood them.
+
+    A state without outcomes gets those that have a transition.
+    """
+    # Some programs write the string 'None' for "no transition".
     given = {o: None if target == "None" else target for o, target in transitions.items()}
     if isinstance(state, State) and given and not state.get_registered_outcomes():
         name = type(state).__name__

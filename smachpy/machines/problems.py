@@ -1,4 +1,4 @@
-"""Arguments as users give them: checked one by one, and all their problems told at once."""
+"""Checks of users' arguments; all problems of a call are reported at once."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from smachpy.slips import accepts
 
 
 class Problems:
-    """Collects what is wrong with the arguments of one call.
+    """Collects the problems of the arguments of one call.
 
-    Every method checks one argument and returns it as it is to be used; when it is wrong, the
-    method notes that and returns something harmless, so that the next argument is checked too.
-    `with problems:` notes an `InvalidStateError` of the block instead of letting it through.
+    Each method checks one argument and returns it in the form to use. If it is wrong, the method
+    adds a problem and returns a harmless value, so that the other arguments are checked too.
+    `with problems:` adds an `InvalidStateError` raised in the block instead of letting it through.
 
     Args:
-        where: What the arguments belong to, for the error: a class, with a name if it has one, or
-            "" when the arguments themselves say enough.
+        where: The object to which the arguments belong, for the error: a class, with a name if it
+            has one, or "" if the arguments say enough.
     """
 
     def __init__(self, where: str) -> None:
@@ -31,7 +31,7 @@ class Problems:
         self._found: list[str] = []
 
     def add(self, *problems: str) -> None:
-        """Note problems, each as "argument: got ...; expected ..."."""
+        """Add problems, each as "argument: got ...; expected ..."."""
         self._found += problems
 
     def __enter__(self) -> None:
@@ -44,10 +44,10 @@ class Problems:
         return True
 
     def raise_all(self) -> None:
-        """Raise what was found.
+        """Raise an error if there are problems.
 
         Raises:
-            InvalidStateError: with all problems, if there are any.
+            InvalidStateError: with all problems.
         """
         if self._found:
             where = f"{self._where}: " if self._where else ""
@@ -63,7 +63,7 @@ class Problems:
     def seconds(self, argument: str, given: Any, *, optional: bool = True) -> float | None:
         """Check a duration: a number of seconds or a `Duration`, not negative.
 
-        None, and infinity, mean "no limit" where the argument is `optional`.
+        If the argument is `optional`, None and infinity mean "no limit".
         """
         if given is None and optional:
             return None
@@ -88,19 +88,19 @@ class Problems:
         return int(given)
 
     def word(self, argument: str, given: Any) -> str:
-        """Check a name: a string that is not empty."""
+        """Check a name: a non-empty string."""
         if isinstance(given, str) and given:
             return given
         self.add(f"{argument}: got {given!r}; expected a string, not empty.")
         return ""
 
     def kind_of(self, argument: str, given: Any, attribute: str, what: str) -> None:
-        """Check that `given` is a class with this attribute: of messages, say."""
+        """Check that `given` is a class with this attribute, such as a message class."""
         if not isinstance(given, type) or not hasattr(given, attribute):
             self.add(f"{argument}: got {given!r}; expected {what}.")
 
     def mapping(self, argument: str, given: Any, holds: str) -> dict[Any, Any]:
-        """Check a dict; None is an empty one. `holds` says what is expected in it."""
+        """Check a dict; None counts as empty. `holds` describes the expected content."""
         if given is None:
             return {}
         try:
@@ -147,16 +147,16 @@ class Problems:
         optional: bool = True,
         plain: bool = True,
     ) -> Any:
-        """Check a function that the machine calls.
+        """Check a function that the machine will call.
 
         Args:
             argument: Its name.
             given: The function.
-            call: How it is called, for the error: "on_enter(userdata)".
-            count: How many positional arguments it is called with; None: that is not checked.
-            kwargs: The keyword arguments that it is called with.
+            call: The call, for the error text: "on_enter(userdata)".
+            count: The number of positional arguments of the call; None to skip the check.
+            kwargs: The keyword arguments of the call.
             optional: It may be None.
-            plain: An `async` function is refused, because nobody would await it.
+            plain: Refuse an `async` function, because nobody would await it.
         """
         if given is None and optional:
             return None
@@ -174,7 +174,7 @@ class Problems:
 
 
 def unknown_arguments(given: Iterable[str], known: Iterable[str]) -> str:
-    """Return the text about keyword arguments that do not exist, or "" when there are none."""
+    """Return the error text for keyword arguments that do not exist, or "" if there are none."""
     known = sorted(known)
     unknown = sorted(set(given) - set(known))
     if not unknown:
@@ -183,8 +183,8 @@ def unknown_arguments(given: Iterable[str], known: Iterable[str]) -> str:
 
 
 def as_number(given: Any) -> float | None:
-    """Return a number or `Duration` as a float, None for anything else; a bool is no number."""
-    if isinstance(given, bool):
+    """Convert a number or `Duration` to a float; None for anything else, such as a bool."""
+    if isinstance(given, bool):  # an int for Python, but a mistake as a duration or a count
         return None
     if isinstance(given, numbers.Real):
         try:
@@ -198,14 +198,14 @@ def as_number(given: Any) -> float | None:
 
 
 def takes(function: Any, count: int, kwargs: Mapping[str, Any] | None = None) -> bool:
-    """Tell whether `function` can be called with `count` positional arguments, as far as is known.
+    """Return whether `function` can be called with `count` positional arguments; True if unknown.
 
-    A decorator's own signature counts, not that of the function that it wraps: it may add
-    arguments or take some away.
+    For a decorated function the signature of the wrapper counts, not that of the wrapped function:
+    the wrapper may add or remove arguments.
     """
     try:
         signature = inspect.signature(function, follow_wrapped=False)
-    except (TypeError, ValueError):  # made in C: it does not say
+    except (TypeError, ValueError):  # implemented in C, without a signature
         return True
     try:
         signature.bind(*[None] * count, **(kwargs or {}))

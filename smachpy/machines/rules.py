@@ -1,4 +1,4 @@
-"""How the outcomes of parallel children make the outcome of their concurrence."""
+"""The rules by which the outcomes of parallel children decide the outcome of a concurrence."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """So many of these conditions must hold.
+    """Holds if at least `need` of the conditions hold.
 
     Attributes:
         need: Number of conditions that must hold.
-        conditions: Pairs (child label, outcomes of which the child must have one).
+        conditions: Pairs (child label, outcomes); it holds if the child has one of these outcomes.
     """
 
     need: int
     conditions: tuple[tuple[str, tuple[str, ...]], ...]
 
     def holds(self, outcomes: Mapping[str, str | None]) -> bool:
-        """Tell whether the children's outcomes fulfil the rule."""
+        """Return whether the children's outcomes fulfil the rule."""
         return len(self.met_by(outcomes)) >= self.need
 
     def met_by(self, outcomes: Mapping[str, str | None]) -> tuple[str, ...]:
@@ -44,18 +44,18 @@ class Rule:
 
 
 def all_of(conditions: Mapping[str, str | Iterable[str]]) -> Rule:
-    """Every child named here must have (one of) its outcome(s)."""
+    """Return a rule: every child named here must have its outcome, or one of its outcomes."""
     made = _conditions(conditions)
     return Rule(len(made), made)
 
 
 def any_of(conditions: Mapping[str, str | Iterable[str]]) -> Rule:
-    """At least one child named here must have (one of) its outcome(s)."""
+    """Return a rule: at least one child named here must have its outcome, or one of them."""
     return Rule(1, _conditions(conditions))
 
 
 def n_of(n: int, conditions: Mapping[str, str | Iterable[str]]) -> Rule:
-    """At least `n` of the children named here must have (one of) their outcome(s)."""
+    """Return a rule: at least `n` of the children named here must have their outcome."""
     made = _conditions(conditions)
     if as_number(n) is None or not 1 <= n <= len(made) or int(n) != n:
         raise InvalidStateError(
@@ -65,7 +65,7 @@ def n_of(n: int, conditions: Mapping[str, str | Iterable[str]]) -> Rule:
 
 
 def as_rules(outcome_map: Mapping[str, Any]) -> tuple[tuple[str, Rule], ...]:
-    """Return an `outcome_map` as pairs (container outcome, rule)."""
+    """Convert an `outcome_map` to pairs (container outcome, rule)."""
     return tuple(
         (outcome, rule if isinstance(rule, Rule) else all_of(rule))
         for outcome, rule in outcome_map.items()
@@ -75,9 +75,9 @@ def as_rules(outcome_map: Mapping[str, Any]) -> tuple[tuple[str, Rule], ...]:
 def decide(
     rules: Iterable[tuple[str, Rule]], outcomes: Mapping[str, str | None]
 ) -> tuple[str, Rule] | None:
-    """Return the rule that holds and asks for most, with its outcome; None when none holds.
+    """Return the rule that holds and needs most conditions, with its outcome; None if none holds.
 
-    Among rules that ask for equally much the last one wins, as in SMACH.
+    Among rules that need equally many, the last one wins, as in SMACH.
     """
     best: tuple[str, Rule] | None = None
     for outcome, rule in rules:

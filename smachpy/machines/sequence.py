@@ -1,4 +1,4 @@
-"""A state machine whose states are connected in the order in which they are added."""
+"""A state machine whose states follow each other in the order in which they are added."""
 
 from __future__ import annotations
 
@@ -60,9 +60,9 @@ class Sequence(StateMachine):
         transitions: Mapping[str, str | None] | None = None,
         remapping: Mapping[str, str] | None = None,
     ) -> State:
-        """Add a state after the one added before; arguments as in `StateMachine.add`.
+        """Add a state after the previous one; the arguments are those of `StateMachine.add`.
 
-        A transition given for the connector outcome takes precedence over the connection.
+        An explicit transition for the connector outcome takes precedence over the connection.
         """
         return self._smachpy_add(label, state, transitions, remapping, None)
 

@@ -1,4 +1,4 @@
-"""States: what a machine is made of."""
+"""States and their options."""
 
 from __future__ import annotations
 
@@ -52,32 +52,34 @@ __all__ = ["CBState", "Options", "Retry", "State", "StateOptions", "get_options"
 Data_co = TypeVar("Data_co", bound=StateData, covariant=True)
 T_co = TypeVar("T_co", covariant=True)
 Grace: TypeAlias = float | Literal["inherit"] | None
-# With None in it: within another union mypy takes the items of `["aborted", OSError]` for objects.
+# Includes None: in `RetrySpec | None`, mypy would infer `object` for the items of
+# `["aborted", OSError]`.
 RetrySpec: TypeAlias = (
     "Retry | tuple[int, float, Result | Iterable[Result]] | tuple[int, float] | int | None"
 )
 
 
 class StateOptions(TypedDict, total=False):
-    """What any state can be told beyond SMACH; all are off by default.
+    """The options of any state that SMACH does not have; all are off by default.
 
     Keys:
-        timeout: Longest run [s]; then the state is preempted and ends with `timeout_outcome`,
-            unless it finished after all.
-        timeout_outcome: Outcome after a timeout; default "aborted". It is registered by itself.
-        preempt_timeout: Grace after a preempt [s] before the state is abandoned; None waits for
-            ever; "inherit", the default, takes the container's, in the end 10 s.
+        timeout: Longest run [s]. After that the state is preempted and ends with `timeout_outcome`,
+            unless it finishes its work first.
+        timeout_outcome: Outcome after a timeout; default "aborted". Registered automatically.
+        preempt_timeout: Grace after a preempt [s], before the state is interrupted; None waits for
+            ever; "inherit", the default, takes that of the container above, at the top 10 s.
         retry: `Retry(attempts, backoff, on)`, or that as a tuple, or the number of attempts.
-        on_exception: Exception type -> outcome; the outcomes are registered by themselves.
+        on_exception: Exception type -> outcome; the outcomes are registered automatically.
         on_enter: Called with the userdata before the state runs.
         on_exit: Called with the userdata and the outcome after it ran.
-        resume: In a durable run that goes on after the end of its process, what takes the place of
-            executing this state, if it was active, again: "skip:OUTCOME" ends it so, "ask" holds
-            the machine until an operator says what to do, `resume(userdata)` returns the outcome or
+        resume: What a resumed durable run does with this state if it was active when the process
+            ended, instead of executing it again: "skip:OUTCOME" ends it with that outcome, "ask"
+            pauses the machine until an operator decides, `resume(userdata)` returns the outcome or
             None to execute it. See docs/durable_missions.md, also for the next three.
-        on_resume: Called with the userdata before it goes on there; with its own if a container.
-        idempotent: Of an action state: its goal may be sent anew when the server does not know it.
-        transient: Of a container: keys of its userdata that are not kept.
+        on_resume: Called with the userdata before the state continues in a resumed run; for a
+            container with its own userdata.
+        idempotent: For an action state: its goal may be sent again if the server does not know it.
+        transient: For a container: keys of its userdata that the journal does not keep.
     """
 
     timeout: float | None
@@ -94,7 +96,7 @@ class StateOptions(TypedDict, total=False):
 
 
 class DataOf(Generic[Data_co]):
-    """Stands where a state's data is missing: says that `State.__init__` was not called."""
+    """Descriptor behind `_smachpy`, reached only if `State.__init__` was not called: raises so."""
 
     def __init__(self, kind: type[Data_co]) -> None:
         self.kind = kind
@@ -118,9 +120,9 @@ class DataOf(Generic[Data_co]):
 
 
 class Shown(Generic[T_co]):
-    """An attribute that programs read, unless the user has one of that name.
+    """A read-only attribute that yields to one of the same name set by the user.
 
-    Unlike a property it is no data descriptor: an attribute of the instance comes before it.
+    Unlike a property it is a non-data descriptor, so an attribute of the instance hides it.
     """
 
     def __init__(self, get: Callable[[Any], T_co]) -> None:
@@ -136,12 +138,12 @@ class Shown(Generic[T_co]):
 
 
 class State:
-    """One thing a robot does: reads userdata, does it, and ends with one of its outcomes.
+    """One thing a robot does: it reads userdata, runs, and ends with one of its outcomes.
 
     Subclass it and define `execute(self, userdata)`, plain or `async`; the rest is optional. The
-    options (see `StateOptions`) work for every state, containers too, when a container runs it.
-    The attributes of a state are yours, whatever their names; `get_options` and `set_options` read
-    and change the options.
+    options (see `StateOptions`) work for every state, including containers, when a container runs
+    it. You may use any attribute name in a state; `get_options` and `set_options` read and change
+    the options.
 
     Args:
         outcomes: Names of the ways it can end.
@@ -151,15 +153,15 @@ class State:
         **options: See `StateOptions`.
 
     Raises:
-        InvalidStateError: a list is a plain string or holds something that is no string, or an
-            option has no meaning; all problems at once.
+        InvalidStateError: a list is a plain string or has an item that is not a string, or an
+            option has an invalid value; all problems at once.
         TypeError: there is no such option.
 
-    Threads: `request_preempt` may be called from any thread, callback or signal handler; all
+    Threads: `request_preempt` may be called from any thread, callback or signal handler; everything
         else belongs to the thread that runs the state.
     """
 
-    # The instance's own data is in its __dict__, which comes before this.
+    # Used only until __init__ sets the attribute of the instance, which hides this one.
     _smachpy: DataOf[StateData] = DataOf(StateData)
     _smachpy_is_made = False
     _smachpy_kind: ClassVar[Kind] = "state"
@@ -180,12 +182,15 @@ class State:
     ) -> None:
         problems = Problems(type(self).__name__)
         both = problems.names("io_keys", io_keys)
-        # On the instance, where Python finds it much faster; for that no `vars(self)` here either.
+        # Set on the instance: the hot path reads it, and a class attribute is found much slower.
+        # For the same reason no `vars(self)` here: it would make CPython store the attributes in a
+        # dict instead of inline.
         self._preempt_requested = False
         if not self._smachpy_is_made:
             self._smachpy = type(self)._smachpy.kind()
             self._smachpy_is_made = True
-        data = self._smachpy  # a second call keeps it: machines and waiting threads know it
+        # A second call of __init__ keeps the object, because machines and waiting threads use it.
+        data = self._smachpy
         data.outcomes = problems.names("outcomes", outcomes)
         data.input_keys = tuple(dict.fromkeys((*problems.names("input_keys", input_keys), *both)))
         data.output_keys = tuple(
@@ -198,19 +203,19 @@ class State:
         data.changed()
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a copy of the state needs."""
+        """Return the attributes for a copy of the state, with a copy of its data."""
         return {**vars(self), "_smachpy": self._smachpy.copy()}
 
     # The argument has SMACH's name at run time; for type checkers a subclass may call it anything.
     if TYPE_CHECKING:
 
         def execute(self, ud: Any, /) -> str | Coroutine[Any, Any, str]:
-            """Do it and return the outcome; see below."""
+            """Run the state and return the outcome; see below."""
 
     else:
 
         def execute(self, ud: Any) -> str:
-            """Do it and return the outcome; `async def` in a subclass is cancelled on a preempt.
+            """Run the state and return the outcome; a preempt cancels an `async def execute`.
 
             Args:
                 ud: The declared userdata keys, as attributes or items.
@@ -228,34 +233,34 @@ class State:
         return self._smachpy.outcomes
 
     def register_io_keys(self, keys: Iterable[str]) -> None:
-        """Add keys that are read and written."""
+        """Add keys that the state reads and writes."""
         names = unique_names(keys, "io_keys")
         self.register_input_keys(names)
         self.register_output_keys(names)
 
     def register_input_keys(self, keys: Iterable[str]) -> None:
-        """Add keys that are read."""
+        """Add keys that the state reads."""
         self._smachpy.add("input_keys", keys)
 
     def get_registered_input_keys(self) -> tuple[str, ...]:
-        """Return the keys that are read."""
+        """Return the keys that the state reads."""
         return self._smachpy.input_keys
 
     def register_output_keys(self, keys: Iterable[str]) -> None:
-        """Add keys that are written."""
+        """Add keys that the state writes."""
         self._smachpy.add("output_keys", keys)
 
     def get_registered_output_keys(self) -> tuple[str, ...]:
-        """Return the keys that are written."""
+        """Return the keys that the state writes."""
         return self._smachpy.output_keys
 
     # -- preemption ----------------------------------------------------------------------------
 
     def request_preempt(self) -> None:
-        """Ask the state to stop; a request belongs to the run that is on, or else to the next.
+        """Ask the state to stop. A request belongs to the current run, or else to the next one.
 
-        A container tells its children without it, and then calls an override, once in a visit, in
-        a thread of its own: whatever that does, it holds up nobody.
+        A container asks its children without this method. It then calls an override once per visit,
+        in a thread of its own, where it cannot block anybody.
 
         Threads: any thread, callback or signal handler; never waits for the state.
         """
@@ -265,49 +270,50 @@ class State:
     _smachpy_request_preempt: ClassVar[object] = request_preempt
 
     def service_preempt(self) -> None:
-        """Say that the request was answered; the machine follows the outcome then."""
+        """Service the request: the machine then follows the outcome of this state."""
         if self._preempt_requested:
+            # The cleared flag is what counts; without a subscriber there is nothing to publish.
             self._preempt_requested = False
             first = THREAD.get()
             if first is not None and first.run.watched:
                 note_serviced(self)
 
     def recall_preempt(self) -> None:
-        """Take a request back."""
+        """Withdraw a request."""
         self._preempt_requested = False
 
     def preempt_requested(self) -> bool:
-        """Tell whether the state was asked to stop."""
+        """Return whether the state was asked to stop."""
         return self._preempt_requested
 
     def wait_preempt(self, timeout: float | None = None) -> bool:
         """Wait until the state is asked to stop.
 
         Returns:
-            Whether it was, within `timeout` [s].
+            Whether it was asked within `timeout` [s].
 
         Raises:
-            InvalidStateError: `timeout` is no duration.
+            InvalidStateError: `timeout` is not a duration.
 
         Blocks: until the request or the timeout; None waits for ever.
         """
         return _wait_preempt(self, "wait_preempt: timeout", timeout)
 
     def sleep(self, seconds: float) -> bool:
-        """Let time pass, less of it when the state is asked to stop.
+        """Sleep, but not longer than until the state is asked to stop.
 
         Returns:
             Whether the sleep ended early because of a preempt.
 
         Raises:
-            InvalidStateError: `seconds` is no duration.
+            InvalidStateError: `seconds` is not a duration.
 
         Blocks: for `seconds`, or until the preempt.
         """
         return _wait_preempt(self, "sleep: seconds", seconds)
 
     def on_preempt(self, callback: Callable[[], object]) -> Callable[[], None]:
-        """Call `callback` on each request to stop, at once if there is one already.
+        """Call `callback` on each request to stop, and at once if there is one already.
 
         Returns:
             A function that removes the callback.
@@ -315,9 +321,9 @@ class State:
         Raises:
             InvalidStateError: `callback` cannot be called without arguments.
 
-        Threads: the callback has a thread of its own, so it may block, and never runs twice at
-            once: requests that come before it is called count as one. What it raises is reported
-            (`smachpy.events.CallbackFailed`).
+        Threads: the callback runs in a thread of its own, so it may block; it never runs twice at
+            once, and several requests before its call count as one. An exception that it raises is
+            reported (`smachpy.events.CallbackFailed`).
         """
         problems = Problems(current_path() or type(self).__name__)
         problems.function("on_preempt: callback", callback, "callback()", 0, optional=False)
@@ -331,12 +337,13 @@ class State:
 
         return forget_both
 
-    # -- for those who write states ------------------------------------------------------------
+    # -- for authors of states -----------------------------------------------------------------
 
-    # The library itself calls the functions behind these three: a user's state may use the names.
+    # The library calls the functions behind these methods, never the methods: a user's state may
+    # use their names for something else.
 
     def clock(self) -> Clock:
-        """Return the clock of this run; outside of a run, that of the context.
+        """Return the clock of this run; outside of a run, the current clock.
 
         Its `now()` [s], `event()` and `spawn()` follow virtual time in tests.
         """
@@ -345,7 +352,7 @@ class State:
     def scope(self) -> Scope | None:
         """Return the scope of this run, which publishes events; call it in `execute`.
 
-        None when the state is executed by hand, outside any machine.
+        None if the state is executed outside of any machine.
         """
         return current_scope()
 
@@ -363,11 +370,11 @@ class State:
         return self._smachpy_kind, tuple(details)
 
     def describe_structure(self) -> Structure:
-        """Return what is inside; leaves have nothing."""
+        """Return the children and transitions; a leaf has none."""
         return Structure()
 
     def _smachpy_set_options(self, options: Mapping[str, Any], problems: Problems) -> None:
-        """Take options over; what is wrong with them goes to `problems`.
+        """Set options; invalid values are added to `problems`.
 
         Raises:
             TypeError: there is no such option.
@@ -381,7 +388,7 @@ class State:
 
 
 def set_options(state: State, **options: Unpack[StateOptions]) -> None:
-    """Change options of `state`; they hold from its next run on.
+    """Change options of `state`, from its next run on.
 
     Raises:
         InvalidStateError: a value is wrong; all problems at once.
@@ -400,11 +407,12 @@ def set_options(state: State, **options: Unpack[StateOptions]) -> None:
 
 
 def _wait_preempt(state: State, argument: str, seconds: float | None) -> bool:
-    """Wait for a preempt of `state`, at most `seconds`; tell whether there is one."""
+    """Wait for a preempt of `state`, at most `seconds`; return whether there is one."""
+    # The usual numbers are checked here, without the cost of `Problems`.
     if seconds is not None and not (type(seconds) in {float, int} and 0 <= seconds <= TIMEOUT_MAX):
         problems = Problems(current_path() or type(state).__name__)
         number = as_number(seconds)
-        past = number is not None and number < 0  # a deadline that is over
+        past = number is not None and number < 0  # `deadline - now` after the deadline: no error
         seconds = 0.0 if past else problems.seconds(argument, seconds)
         problems.raise_all()
     if state._preempt_requested:
@@ -421,10 +429,10 @@ class CBState(State):
         cb: Called as `cb(userdata, *cb_args, **cb_kwargs)`; returns the outcome. May be `async`.
         cb_args: Positional arguments.
         cb_kwargs: Keyword arguments.
-        outcomes: Outcomes; those of a `cb_interface` are added.
-        input_keys: Keys read; likewise.
-        output_keys: Keys written; likewise.
-        io_keys: Keys read and written.
+        outcomes: Outcomes; those of a `cb_interface` are added, here and for the keys.
+        input_keys: Keys that it reads.
+        output_keys: Keys that it writes.
+        io_keys: Keys that it reads and writes.
         **options: See `StateOptions`.
     """
 

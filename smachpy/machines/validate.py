@@ -1,4 +1,4 @@
-"""What a container is made of, as data that cannot change, and all that is wrong with it."""
+"""The structure of a container as immutable data, and the search for its problems."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class ChildSpec:
     Attributes:
         label: Its name in the container.
         outcomes: Its outcomes.
-        transitions: Pairs (outcome, target); a target None falls through to the container outcome
-            of the same name.
+        transitions: Pairs (outcome, target); with the target None the outcome leads to the
+            container's outcome of the same name.
     """
 
     label: str
