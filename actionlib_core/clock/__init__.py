@@ -1,8 +1,8 @@
 """One clock for everything that waits: real time, or virtual time for tests.
 
-Nothing in smachpy sleeps, starts a thread or waits for an event past the `Clock` protocol, so a
-mission with its action servers runs unchanged on `RealClock` (wall time) or `VirtualClock`
-(deterministic, as fast as the computer allows).
+Everything in smachpy that sleeps, starts a thread or waits for an event does so through the `Clock`
+protocol. So a mission with its action servers runs unchanged on `RealClock` (wall time) or
+`VirtualClock` (deterministic, as fast as the computer allows).
 """
 
 from typing import TYPE_CHECKING, Any
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from actionlib_core.clock._virtual_parts import Deadlock as Deadlock
     from actionlib_core.clock._virtual_parts import TimeLimit as TimeLimit
 
-# Only tests need virtual time; programs on robots start without it.
+# Imported on first use: only tests need virtual time, and programs on robots start faster.
 _VIRTUAL = {"VirtualClock": "_virtual", "Deadlock": "_virtual_parts", "TimeLimit": "_virtual_parts"}
 
 __all__ = [

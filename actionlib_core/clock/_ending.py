@@ -1,36 +1,36 @@
-"""The interpreter's end, while threads of the program go on working."""
+"""The exit of the interpreter while threads of the program are still running."""
 
 from __future__ import annotations
 
 import sys
 import time
 
-# A wait until a time of the clock ends at once for a process that was stopped for longer, before
-# the threads that it waits for could run: so parts of it are counted.
+# Long waits at the exit are counted in parts. After a suspension of the process, a wait until a
+# time of the clock would end at once, before the other threads could run.
 PART_S = 0.1
-SWITCH_S = 1e-4  # threads take turns so often then; Python's 5 ms each would add up
-REFUSAL_S = 0.01  # a call that is refused then takes so long
+SWITCH_S = 1e-4  # Python's switch interval during the exit; the default, 5 ms per thread, adds up
+REFUSAL_S = 0.01  # duration of a refused call during the exit
 
 
 class Ending:
-    """Gives way to the threads that must come out of their calls before the interpreter is gone.
+    """Gives time to the threads that must return from their calls before the interpreter's end.
 
     Attributes:
-        begun: The interpreter ends.
+        begun: The interpreter is exiting.
     """
 
     def __init__(self) -> None:
         self.begun = False
 
     def begin(self) -> None:
-        """Say that the interpreter ends."""
+        """Note that the interpreter is exiting."""
         self.begun = True
         sys.setswitchinterval(SWITCH_S)
 
     def slow_down(self) -> None:
-        """Have a thread wait whose call is refused: it may try again without an end.
+        """Delay a thread whose call is refused, as it may try again in an endless loop.
 
-        Blocks: for `REFUSAL_S` when the interpreter ends.
+        Blocks: for `REFUSAL_S` while the interpreter is exiting.
         """
         if self.begun:
             time.sleep(REFUSAL_S)

@@ -1,8 +1,9 @@
-"""How a thread gets its turn from another one: the quickest way that the system offers."""
+"""Handing the turn from one thread to another, in the fastest way that the system offers."""
 
 from __future__ import annotations
 
 import _thread
+import contextlib
 import os
 import select
 from functools import partial
@@ -11,25 +12,25 @@ from typing import TYPE_CHECKING, Protocol
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-ONE = (1).to_bytes(8, "little")  # one turn, as an eventfd counts it
-WORD = 8  # bytes of its counter
+ONE = (1).to_bytes(8, "little")  # adds 1 to the counter of an eventfd
+WORD = 8  # size of that counter [bytes]
 
 
 class Gate(Protocol):
-    """Where one thread waits for its turn; a turn that was given early is kept."""
+    """One thread waits here for its turn; a turn that is given before the wait is kept."""
 
     acquire: Callable[[], object]
-    """Wait for the turn. Runs no Python code, so a signal handler runs before or after it."""
+    """Wait for the turn. Runs no Python code, so signal handlers run only before or after it."""
     release: Callable[[], object]
-    """Give the turn; in this too."""
+    """Give the turn. Runs no Python code either."""
 
     def acquire_within(self, seconds: float) -> bool:
-        """Wait for the turn, `seconds` of real time at most; whether it came."""
+        """Wait for the turn, `seconds` of real time at most; return whether it came."""
         ...
 
 
 class LockGate:
-    """A gate for every system."""
+    """A gate for all systems."""
 
     __slots__ = ("_lock", "acquire", "release")
 
@@ -44,10 +45,10 @@ class LockGate:
 
 
 class EventGate:
-    """A gate for Linux, two to four times as quick.
+    """A gate for Linux, two to four times as fast.
 
-    Releasing a lock wakes the other thread while this one still holds Python's global lock, so that
-    the other sleeps again at once; writing to an eventfd gives the global lock up before.
+    Releasing a lock wakes the other thread while this one still holds the GIL, so the other one
+    sleeps again at once. Writing to an eventfd releases the GIL before.
 
     Raises:
         OSError: the process has too many files open.
@@ -61,7 +62,7 @@ class EventGate:
         self.release: Callable[[], object] = partial(os.write, self._fd, ONE)
 
     def acquire_within(self, seconds: float) -> bool:
-        poll = select.poll()
+        poll = select.poll()  # not `select.select`, which accepts file numbers below 1024 only
         poll.register(self._fd, select.POLLIN)
         if not poll.poll(seconds * 1000):
             return False
@@ -75,10 +76,8 @@ class EventGate:
 
 
 def make_gate() -> Gate:
-    """Make a gate that is shut."""
+    """Return a new gate, without a turn."""
     if hasattr(os, "eventfd"):
-        try:
+        with contextlib.suppress(OSError):  # the process has too many open files
             return EventGate()
-        except OSError:  # no file left: a lock needs none
-            return LockGate()
     return LockGate()

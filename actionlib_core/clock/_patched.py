@@ -1,8 +1,8 @@
-"""Python's own ways to wait, put on a virtual clock for the threads that take part in it.
+"""Replacements for Python's own ways to wait, for the participants of a virtual clock.
 
-The replacements look at the calling thread: a participant of a clock that is inside `patched()`
-gets virtual time, every other thread what Python always did. They are installed with the first
-clock and removed with the last one.
+The replacements check the calling thread: a participant of a clock inside `patched()` gets virtual
+time, every other thread gets Python's original behaviour. They are installed with the first clock
+and removed with the last one.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from actionlib_core.clock._virtual import VirtualClock
     from actionlib_core.clock._virtual_parts import VirtualEvent, VirtualTask
 
-YIELD_S = 1e-6  # `time.sleep(0)`: others get their turn, and a loop around it ends
+YIELD_S = 1e-6  # step of `time.sleep(0)`: others get their turn, and a loop around it ends
 # Modules that wait for something outside the process, or measure the test run itself.
 REAL_TIME = (
     "actionlib_core.clock",
@@ -45,10 +45,11 @@ REAL_TIME = (
     "xdist",
     "pytest_timeout",
 )
-# Packages whose locks guard a few lines that never wait.
+# Packages whose locks guard a few lines that never wait: real locks do, and are faster.
 SHORT_LOCKS = ("actionlib_core", "smachpy", "viz", "logging")
 
-_getframe = sys._getframe  # what is replaced depends on the caller
+# The originals, for use in this module. (`_getframe`: some callers keep real time.)
+_getframe = sys._getframe
 _sleep, _allocate = time.sleep, threading.Lock
 _localtime, _asctime = time.localtime, time.asctime
 _thread_start, _thread_join = threading.Thread.start, threading.Thread.join
@@ -56,11 +57,11 @@ _thread_is_alive = threading.Thread.is_alive
 
 _guard = _allocate()
 _clocks: list[VirtualClock] = []  # those inside `patched()`
-_bypass: set[int] = set()  # threads that are starting or joining a thread for real
+_bypass: set[int] = set()  # threads that use real time, while they start or join a thread
 _places: list[tuple[dict[str, Any], str, Any, Any]] = []  # module globals that were replaced
-_seen: dict[str, tuple[int, int]] = {}  # modules searched before: identity and size
-_found: dict[str, list[tuple[str, Any]]] = {}  # what the search gave
-_tasks: dict[threading.Thread, VirtualTask] = {}  # user threads that take part, while they run
+_seen: dict[str, tuple[int, int]] = {}  # modules searched before: identity and size of globals
+_found: dict[str, list[tuple[str, Any]]] = {}  # their names that are to be replaced
+_tasks: dict[threading.Thread, VirtualTask] = {}  # running user threads that are participants
 _SimpleQueue = queue.SimpleQueue
 _pool: list[Callable[..., Any]] = []  # submit and shutdown of pools, and their class
 _twins: weakref.WeakKeyDictionary[ThreadPoolExecutor, dict[VirtualClock, ThreadPoolExecutor]] = (
@@ -69,7 +70,7 @@ _twins: weakref.WeakKeyDictionary[ThreadPoolExecutor, dict[VirtualClock, ThreadP
 
 
 def install(clock: VirtualClock) -> None:
-    """Put the participants of `clock` on it."""
+    """Give the participants of `clock` virtual time."""
     with _guard:
         _clocks.append(clock)
         if len(_clocks) == 1:
@@ -77,7 +78,7 @@ def install(clock: VirtualClock) -> None:
 
 
 def remove(clock: VirtualClock) -> None:
-    """Undo `install`, also half of it; with the last clock Python is as it was."""
+    """Undo `install`, also an incomplete one; with the last clock, restore Python's originals."""
     with _guard:
         if clock in _clocks:
             _clocks.remove(clock)
@@ -87,7 +88,7 @@ def remove(clock: VirtualClock) -> None:
 
 
 def _here() -> VirtualClock | None:
-    """Return the clock that the calling thread takes part in, the innermost of several."""
+    """Return the clock of the calling thread, the innermost of several; None: real time."""
     ident = threading.get_ident()
     if ident not in _bypass:
         for clock in reversed(_clocks):
@@ -132,7 +133,7 @@ def _now_ns(clock: VirtualClock) -> int:
 
 
 def _of_now(real: Callable[..., Any], index: int) -> Callable[..., Any]:
-    """Return a function that takes the time as argument number `index`, and now without it."""
+    """Replace a function whose argument number `index` is a time, by default the present."""
 
     def convert(*args: Any) -> Any:
         clock = _here()
@@ -197,7 +198,7 @@ class PatchedLock:
 
 
 def _call_site() -> str:
-    """Name the line of the user's code that waits."""
+    """Return the line of the user's code that waits."""
     frame: FrameType | None = _getframe(1)
     while frame is not None and _belongs(frame, _WAITERS):
         frame = frame.f_back
@@ -214,7 +215,10 @@ def _lock() -> Any:
 
 
 def _is_short(caller: FrameType) -> bool:
-    """Tell whether a lock made there stays a real one: no participant's, ours, or a module's."""
+    """Return whether a lock made there is a real one.
+
+    That is one of a thread with real time, of our own packages, or made by a module's import.
+    """
     if _here() is None or caller.f_code.co_name == "<module>":
         return True
     return _belongs(caller, SHORT_LOCKS)
@@ -224,7 +228,7 @@ def _make_rlock(real: Callable[[], Any]) -> Callable[[], Any]:
     def make() -> Any:
         if _is_short(_getframe(1)):
             return real()
-        return threading._RLock()  # noqa: SLF001  on `_allocate_lock`
+        return threading._RLock()  # noqa: SLF001  Python's version, on the replaced lock
 
     return make
 
@@ -277,7 +281,7 @@ def _join(thread: threading.Thread, timeout: float | None = None) -> None:
     if task is None or _here() is None:
         _really(_thread_join, thread, timeout)
     elif task.join(timeout):
-        _really(_thread_join, thread)  # its last steps after its turn
+        _really(_thread_join, thread)  # its last steps come after its last turn
 
 
 def _is_alive(thread: threading.Thread) -> bool:
@@ -286,7 +290,7 @@ def _is_alive(thread: threading.Thread) -> bool:
 
 
 def _really(function: Callable[..., None], *arguments: object) -> None:
-    """Call what waits for a thread that is about to start or end, in real time."""
+    """Call `function`, which waits for a thread to start or end, in real time."""
     ident = threading.get_ident()
     _bypass.add(ident)
     try:
@@ -299,7 +303,7 @@ def _really(function: Callable[..., None], *arguments: object) -> None:
 
 
 def _submit(pool: ThreadPoolExecutor, function: Any, /, *args: Any, **kwargs: Any) -> Any:
-    """Let a participant's work run on threads that take part, also with a pool made before."""
+    """Run a participant's work on participants, even if the pool was made outside the block."""
     clock = _here()
     used = pool if clock is None or _takes_part(pool) else _twin(pool, clock)
     return _pool[0](used, function, *args, **kwargs)
@@ -312,16 +316,19 @@ def _shutdown(pool: ThreadPoolExecutor, *args: Any, **kwargs: Any) -> None:
 
 
 def _takes_part(pool: Any) -> bool:
-    """Tell whether its threads wait in virtual time; one that is shut down refuses by itself."""
+    """Return whether a pool can be used directly: made inside the block, or shut down.
+
+    A pool that is shut down refuses the work itself.
+    """
     return type(pool._work_queue) is not _SimpleQueue or pool._shutdown  # noqa: SLF001  no other way
 
 
-# A pool has no public way to tell what it was made with.
+# A pool has no public attributes for the arguments of its constructor.
 _POOL_ARGUMENTS = attrgetter("_max_workers", "_thread_name_prefix", "_initializer", "_initargs")
 
 
 def _twin(pool: Any, clock: VirtualClock) -> ThreadPoolExecutor:
-    """Return the pool that stands in for one whose threads wait in real time."""
+    """Return the pool of participants that replaces one whose threads use real time."""
     twins = _twins.setdefault(pool, {})
     if clock not in twins:
         twins[clock] = _pool[2](*_POOL_ARGUMENTS(pool))
@@ -329,8 +336,8 @@ def _twin(pool: Any, clock: VirtualClock) -> ThreadPoolExecutor:
 
 
 def _replace_pools() -> None:
-    module: Any = sys.modules.get("concurrent.futures.thread")  # else no pool was made before
-    if module is None:
+    module: Any = sys.modules.get("concurrent.futures.thread")
+    if module is None:  # then there is no pool that was made before
         return
     kind = module.ThreadPoolExecutor
     if not _pool:
@@ -367,7 +374,7 @@ def _make_loop(real: Callable[[], Any]) -> Callable[[], Any]:
 
 
 def _replacements() -> dict[int, Any]:
-    """Map the identity of what is replaced to its replacement."""
+    """Return the replacements by the ids of the originals."""
     pairs: list[tuple[Any, Any]] = [
         (time.sleep, _virtual_sleep),
         (time.time, _reader(time.time, lambda clock: clock.time_ns() / 1e9)),
@@ -409,7 +416,7 @@ def _replace() -> None:
 
 
 def _search(name: str, names: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Return what is to be replaced in a module; a second search of it costs nothing."""
+    """Return the names to replace in a module; the result is kept, as modules rarely change."""
     key = (id(names), len(names))
     if _seen.get(name) != key:
         _found[name] = [(n, value) for n, value in list(names.items()) if id(value) in _FAKES]

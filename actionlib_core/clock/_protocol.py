@@ -1,4 +1,4 @@
-"""What a clock offers: time, waiting, threads and timers."""
+"""The interface of clocks: time, waiting, threads and timers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Event(Protocol):
     """A flag that threads wait for."""
 
     def is_set(self) -> bool:
-        """Tell whether the flag is set."""
+        """Return whether the flag is set."""
         ...
 
     def set(self) -> None:
@@ -33,7 +33,7 @@ class Event(Protocol):
         """Wait until the flag is set.
 
         Args:
-            timeout: Longest wait [s]; None and infinity wait for ever, 0 or less does not wait.
+            timeout: Longest wait [s]; None and infinity: no limit; 0 or less: do not wait.
 
         Returns:
             Whether the flag was set.
@@ -56,7 +56,7 @@ class Task(Protocol):
 
     @property
     def error(self) -> BaseException | None:
-        """What the target raised, once the task has ended."""
+        """The exception of the target, once the task has ended with one."""
         ...
 
     @property
@@ -68,7 +68,7 @@ class Task(Protocol):
         ...
 
     def is_alive(self) -> bool:
-        """Tell whether the target is still running."""
+        """Return whether the target is still running."""
         ...
 
     def join(self, timeout: float | None = None) -> bool:
@@ -86,13 +86,13 @@ class Timer(Protocol):
     """A callback scheduled by `Clock.call_later`."""
 
     def cancel(self) -> None:
-        """Forget the callback; no effect once it runs."""
+        """Cancel the callback; no effect once it has started."""
         ...
 
 
 @runtime_checkable
 class Clock(Protocol):
-    """Time and threads, the first of the three seams to the outside world."""
+    """Time and threads."""
 
     def now(self) -> float:
         """Monotonic time [s]; only differences have a meaning."""
@@ -103,7 +103,7 @@ class Clock(Protocol):
         ...
 
     def sleep(self, seconds: float) -> None:
-        """Wait; a negative time is none.
+        """Wait; a negative time does not wait.
 
         Raises:
             ValueError: `seconds` is NaN.
@@ -113,14 +113,14 @@ class Clock(Protocol):
         ...
 
     def event(self, name: str = "an event") -> Event:
-        """Make an event, not set; `name` says in reports what a waiter waits for."""
+        """Return a new event, not set; its `name` appears in reports about waiting threads."""
         ...
 
     def spawn(self, target: Callable[[], object], *, name: str) -> Task:
         """Run `target` in a thread named `name`, in a copy of the caller's context variables.
 
-        Threads come from a cache and never keep the interpreter alive. An exception that `target`
-        lets through is kept in `Task.error` and given to `threading.excepthook`.
+        Threads come from a cache and never keep the interpreter alive. An exception of `target` is
+        stored in `Task.error` and passed to `threading.excepthook`.
         """
         ...
 
@@ -130,9 +130,9 @@ class Clock(Protocol):
         Raises:
             ValueError: `delay` is NaN.
 
-        Threads: the callback runs on the clock's own thread, one at a time with all other
-        callbacks; it must not wait. An exception is given to `threading.excepthook`,
-            `SystemExit` to the log; the other timers go on.
+        Threads: callbacks run on the clock's own thread, one at a time; they must not block. An
+            exception is passed to `threading.excepthook`, `SystemExit` is logged; the other timers
+            go on.
         """
         ...
 
@@ -145,10 +145,10 @@ class Clock(Protocol):
 
 
 def check_seconds(where: str, seconds: float) -> None:
-    """Check that `seconds` can be waited; infinity can, and means for ever.
+    """Check that `seconds` is a number; infinity is one.
 
     Raises:
-        ValueError: it is not a number (NaN).
+        ValueError: it is NaN.
     """
     if math.isnan(seconds):
         raise ValueError(f"{where}: got {seconds!r}; expected a number of seconds.")

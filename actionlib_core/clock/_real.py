@@ -1,6 +1,6 @@
 """Wall time: threads from a cache, one timer thread on demand, events safe in signal handlers.
 
-It is the current clock unless `use_clock` says otherwise.
+It is the current clock unless `use_clock` has set another one.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 IDLE_S = 5.0  # a cached thread without work ends after this
-IDLE_NAME = "idle"  # what a cached thread is called between two jobs
+IDLE_NAME = "idle"  # name of a cached thread between two jobs
 
 
 @dataclass(slots=True, eq=False, repr=False)
 class RealEvent:
     """An event whose `set` takes no lock, so that a signal handler may call it at any moment.
 
-    `threading.Event.set` takes a lock that the interrupted `wait` of the same thread may hold.
-    Here every waiter brings a lock of its own; list operations are atomic.
+    `threading.Event.set` takes a lock that the interrupted `wait` of the same thread may hold,
+    which would be a deadlock. Here every waiter has a lock of its own; list operations are atomic.
     """
 
     _flag: bool = field(default=False, init=False)
@@ -68,7 +68,7 @@ class RealEvent:
         waiter.acquire()
         try:
             self._waiters.append(waiter)
-            # Set between the first look and the append: nobody may wake us.
+            # Checked again: a `set` before the append could not wake this waiter.
             if self.is_set():
                 return True
             if threading.get_ident() == threading.main_thread().ident:
@@ -76,27 +76,27 @@ class RealEvent:
             longest = -1 if timeout is None else min(timeout, _LONGEST_S)
             return waiter.acquire(timeout=longest) or self._flag
         finally:
-            with contextlib.suppress(ValueError):  # `set` has already taken it
+            with contextlib.suppress(ValueError):  # `set` has already removed it
                 self._waiters.remove(waiter)
 
 
 _LONGEST_S = threading.TIMEOUT_MAX
-_UNHEARD_S = 0.5
+_SIGNAL_S = 0.5
 
 
 def _acquire_in_main(waiter: _thread.LockType, timeout: float | None) -> bool:
     """Wait in the main thread, where signals are handled.
 
-    A signal that comes between Python's last look and the system call does not end that call, so
-    that its handler would run when the wait is over, maybe never. Looking up now and then bounds
-    the delay to `_UNHEARD_S`; a signal that comes later ends the call at once.
+    A signal that arrives between Python's last check and the system call does not interrupt that
+    call. Its handler would run only after the wait, perhaps never. Waiting in parts limits the
+    delay to `_SIGNAL_S`; a signal that arrives during the call interrupts it at once.
     """
     deadline = None if timeout is None else time.monotonic() + timeout
     while True:
-        left = _UNHEARD_S if deadline is None else deadline - time.monotonic()
-        if waiter.acquire(timeout=max(0.0, min(left, _UNHEARD_S))):
+        left = _SIGNAL_S if deadline is None else deadline - time.monotonic()
+        if waiter.acquire(timeout=max(0.0, min(left, _SIGNAL_S))):
             return True
-        if deadline is not None and left <= _UNHEARD_S:
+        if deadline is not None and left <= _SIGNAL_S:
             return False
 
 
@@ -115,14 +115,14 @@ class RealTask:
         self.ident = threading.get_ident()
         try:
             self._context.run(self._target)
-        except BaseException as error:  # noqa: BLE001  the thread's border: kept and reported
+        except BaseException as error:  # noqa: BLE001  end of the thread's stack: reported
             self.error = error
-            if not isinstance(error, SystemExit):
+            if not isinstance(error, SystemExit):  # which ends a thread silently, as in threading
                 report_thread_exception()
         finally:
             self.ident = None
-            del self._target, self._context
-            threading.current_thread().name = IDLE_NAME  # before anybody hears that it has ended
+            del self._target, self._context  # what they refer to must not live as long as the task
+            threading.current_thread().name = IDLE_NAME  # before `join` returns in other threads
             self._done.set()
 
     def is_alive(self) -> bool:
@@ -133,11 +133,11 @@ class RealTask:
 
 
 class _Worker:
-    """One cached thread: runs tasks handed to it, ends after `IDLE_S` without any."""
+    """One cached thread: it runs the tasks that it is given, and ends when idle for `IDLE_S`."""
 
     def __init__(self, cache: _ThreadCache) -> None:
         self._cache = cache
-        self._wake = _thread.allocate_lock()  # released by who gives a task
+        self._wake = _thread.allocate_lock()  # `give` releases it
         self._wake.acquire()
         self._task: RealTask | None = None
         self._thread = threading.Thread(target=self._run, name=IDLE_NAME, daemon=True)
@@ -158,23 +158,25 @@ class _Worker:
             if task is not None:
                 self._thread.name = task.name
                 task.run()
-            del task
+            del task  # the next one may be long in coming
             self._cache.put_back(self)
             if not self._wake.acquire(timeout=IDLE_S):
                 if self._cache.retire(self):
                     return
-                self._wake.acquire()  # kept, or `give` chose this worker at the last moment
+                # It is one of those to keep, or `start` has just taken it from the cache.
+                self._wake.acquire()
 
 
 class _ThreadCache:
-    """Idle threads, newest first; starting one from here costs a lock hand-over.
+    """Idle threads, newest first: starting a task in one costs only the release of a lock.
 
-    No lock: list operations are atomic, and a signal handler may need a thread at any moment.
+    Without a lock: list operations are atomic, and a signal handler may need a thread while the
+    code that it has interrupted holds the lock.
     """
 
     def __init__(self) -> None:
         self._idle: list[_Worker] = []
-        self._late: list[RealTask] = []  # what waits for a thread, as no more can be started
+        self._late: list[RealTask] = []  # tasks that wait, as no more threads can be started
         self._kept = 0
 
     def start(self, task: RealTask) -> None:
@@ -185,15 +187,17 @@ class _ThreadCache:
         try:
             worker.give(task)
         except RuntimeError:
+            # The system has no more threads, or the interpreter is exiting. In the second case the
+            # task waits for one of the threads of `keep`.
             if threading.main_thread().is_alive() or not self._kept:
                 raise
             self._late.append(task)
             self._start_late()
 
     def keep(self, count: int) -> None:
-        """Have `count` threads for what runs while the program ends.
+        """Keep `count` threads for tasks that are started while the interpreter exits.
 
-        Python 3.12 starts no thread then: jobs wait until one of these is free.
+        Python 3.12 then starts no more threads: tasks wait until one of these is free.
         """
         self._kept = max(self._kept, count)
         for _ in range(count - len(self._idle)):
@@ -205,7 +209,7 @@ class _ThreadCache:
             self._start_late()
 
     def retire(self, worker: _Worker) -> bool:
-        # Whoever takes a worker out of the list owns it: `start`, for a task, or this, to end it.
+        # Removing a worker from the list decides who owns it: `start`, or its own thread to end it.
         if len(self._idle) <= self._kept:
             return False
         try:
@@ -218,7 +222,7 @@ class _ThreadCache:
         while self._late and self._idle:
             try:
                 worker = self._idle.pop()
-            except IndexError:  # another thread took it; it comes here when it is free again
+            except IndexError:  # another thread took it, and calls this again when it is free
                 return
             try:
                 task = self._late.pop(0)
@@ -241,8 +245,8 @@ class RealTimer:
 class RealClock:
     """Monotonic and wall time of the computer, real threads.
 
-    All timers are in one thread, which exists while there are any. A forked child begins without
-    threads and timers: those of its parent stay there.
+    All timers run in one thread, which exists only while there are timers. A forked child starts
+    without the threads and timers of its parent.
     """
 
     def __init__(self) -> None:
@@ -252,9 +256,11 @@ class RealClock:
     def begin(self) -> None:
         """Forget all threads and timers."""
         self._cache = _ThreadCache()
-        # Re-entrant: a signal handler that sets a timer may interrupt the code that holds it.
+        # Reentrant: a signal handler that sets a timer may interrupt the code that holds the lock.
         self._timer_lock = threading.RLock()
-        self._timers: list[tuple[float, int, RealTimer]] = []  # a heap: when, a number, which
+        # A heap. The number keeps the order of timers that are due at the same time, and keeps
+        # heapq from comparing the timers themselves.
+        self._timers: list[tuple[float, int, RealTimer]] = []
         self._timer_count = itertools.count()
         self._timers_run = False
         self._timers_changed = RealEvent()
@@ -277,9 +283,9 @@ class RealClock:
         return task
 
     def keep_threads(self, count: int) -> None:
-        """Have `count` threads ready for what is spawned while the program ends.
+        """Keep `count` threads for tasks that are spawned while the interpreter exits.
 
-        Python 3.12 starts no thread then; more tasks than that wait for one another.
+        Python 3.12 then starts no more threads; further tasks wait until one of these is free.
         """
         self._cache.keep(count)
 
@@ -295,36 +301,36 @@ class RealClock:
             heapq.heappush(self._timers, (due, next(self._timer_count), timer))
             if not self._timers_run:
                 self._start_timers()
-            elif self._timers[0][2] is timer:
+            elif self._timers[0][2] is timer:  # due before the one that the thread waits for
                 self._timers_changed.set()
         return timer
 
     def _start_timers(self) -> None:
-        """Start the timer thread; with the lock held."""
+        """Start the timer thread. Needs the lock."""
         self._timers_run = True
         try:
-            # An empty context: timers belong to the clock, not to who came first.
+            # An empty context, else all timers would run in the context of the first one.
             Context().run(self.spawn, self._run_timers, name="clock-timers")
-        except BaseException:  # the system gives no thread: the next timer tries again
+        except BaseException:  # no thread could be started: the next timer tries again
             self._timers_run = False
             raise
 
     def _run_timers(self) -> None:
         try:
             while (timer := self._next_timer()) is not None:
-                callback, timer.callback = timer.callback, None  # a `cancel` from now on is late
+                callback, timer.callback = timer.callback, None  # from now on `cancel` is too late
                 if callback is not None:
                     try:
                         callback()
-                    except BaseException:  # noqa: BLE001  a border: reported, other timers go on
+                    except BaseException:  # noqa: BLE001  reported here; the other timers go on
                         report_callback("clock-timers")
-        except BaseException:  # out of memory, for one: the timers that are left need a thread
+        except BaseException:  # out of memory, for example: the other timers need a new thread
             with self._timer_lock:
                 self._start_timers()
             raise
 
     def _next_timer(self) -> RealTimer | None:
-        """Wait for the next timer that is due, and take it; None when none is left."""
+        """Wait until a timer is due, remove and return it; None when there are no more timers."""
         heap = self._timers
         while True:
             with self._timer_lock:
@@ -340,7 +346,7 @@ class RealClock:
             self._timers_changed.wait(wait)
 
     def run_async(self, main: Coroutine[object, object, T]) -> T:
-        import asyncio  # 60 ms that most programs never need
+        import asyncio  # here: it takes 60 ms, and most programs never need it
 
         with asyncio.Runner() as runner:
             return runner.run(main)

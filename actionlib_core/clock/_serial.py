@@ -1,4 +1,4 @@
-"""Run callables one after another, off the calling thread, without a thread while idle."""
+"""A queue of callables that run one after another in another thread; no thread while idle."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ if TYPE_CHECKING:
 class SerialExecutor:
     """Runs submitted callables in order, one at a time, in a task that ends when idle.
 
-    User callbacks go through one of these, so that they may block without holding up the
-    transport, and callbacks of one owner never overlap. An exception is reported, and so is what
-    ends a thread (`sys.exit`, for one); what was submitted after it runs all the same.
+    User callbacks run in one of these, so that they may block without delaying the transport, and
+    callbacks of one owner never overlap. Exceptions are reported, also those that end a thread,
+    such as `sys.exit`; later callables run all the same.
 
     Args:
-        clock: Gives events, and the task.
-        name: The task's.
-        spawn: Starts the task in another way than `clock.spawn` does.
+        clock: Makes events and tasks.
+        name: The task's name.
+        spawn: Starts the task; None: `clock.spawn`.
 
-    Threads: `submit` may be called from any thread or signal handler and never waits.
+    Threads: `submit` may be called from any thread or signal handler and never blocks.
     """
 
     def __init__(self, clock: Clock, name: str, spawn: Callable[..., Task] | None = None) -> None:
@@ -33,7 +33,7 @@ class SerialExecutor:
         self._name = name
         self._spawn = spawn or clock.spawn
         self._queue: deque[Callable[[], object]] = deque()
-        # Held while a task runs what is queued. Nobody waits for it: a signal handler that submits
+        # Held while a task runs the queue. It is never waited for: a signal handler that submits
         # may have interrupted a `submit` of the same thread at any line.
         self._busy = _thread.allocate_lock()
 
@@ -50,7 +50,7 @@ class SerialExecutor:
 
         Blocks: until then or `timeout` [s] has passed. Not to be called from a submitted callable.
         """
-        # In this order: what is taken from the queue runs while `_busy` is held.
+        # In this order: a callable that has left the queue runs while `_busy` is held.
         if not self._queue and not self._busy.locked():
             return True
         reached = self._clock.event()
@@ -61,7 +61,7 @@ class SerialExecutor:
         if self._queue and self._busy.acquire(blocking=False):
             try:
                 self._spawn(self._drain, name=self._name)
-            except BaseException:  # the system gives no thread
+            except BaseException:  # no thread could be started
                 self._busy.release()
                 raise
 
@@ -70,26 +70,27 @@ class SerialExecutor:
             while self._queue:
                 try:
                     self._queue.popleft()()
-                except Exception:  # noqa: BLE001  a border: reported, the next callable still runs
+                except Exception:  # noqa: BLE001  reported here; the next callable still runs
                     report_thread_exception()
-        except SystemExit as error:  # the one that a thread ends with in silence
+        except SystemExit as error:  # threads end silently with this one
             report_exit(self._name, error)
             raise
         finally:
             self._busy.release()
-            self._start()  # what was submitted until here has found it busy
+            # A callable submitted since the last check of the queue has found `_busy` held.
+            self._start()
 
 
 def report_exit(name: str, error: SystemExit) -> None:
-    """Log that a callback has called `sys.exit`, of which `threading.excepthook` says nothing."""
-    import logging  # 4 ms that a state machine alone never needs
+    """Log that a callback has called `sys.exit`, which `threading.excepthook` ignores."""
+    import logging  # here: it takes 4 ms, and programs with state machines only never need it
 
     log = logging.getLogger(__name__)
     log.error("%s: a callback raised SystemExit: %s", name, error, exc_info=error)
 
 
 def report_thread_exception() -> None:
-    """Give the exception being handled to `threading.excepthook`, as an ending thread would."""
+    """Pass the current exception to `threading.excepthook`, as at the end of a thread."""
     import sys
 
     kind, value, traceback = sys.exc_info()
@@ -99,13 +100,13 @@ def report_thread_exception() -> None:
         threading.excepthook(
             threading.ExceptHookArgs((kind, value, traceback, threading.current_thread()))
         )
-    except BaseException as error:  # noqa: BLE001  the program's own hook: it must not end us
+    except BaseException as error:  # noqa: BLE001  of the program's own hook: report both
         sys.__excepthook__(kind, value, traceback)
         sys.__excepthook__(type(error), error, error.__traceback__)
 
 
 def report_callback(name: str) -> None:
-    """Report the exception being handled, which a callback has raised; lets nothing through."""
+    """Report the current exception, raised by a callback; never raises."""
     import sys
 
     error = sys.exc_info()[1]
@@ -114,5 +115,5 @@ def report_callback(name: str) -> None:
         return
     try:
         report_exit(name, error)
-    except BaseException:  # noqa: BLE001  a handler of the program's log
+    except BaseException:  # noqa: BLE001  of a log handler of the program
         report_thread_exception()

@@ -1,4 +1,4 @@
-"""Threads for the participants of virtual clocks: used again, and started by their first turn."""
+"""Cached threads for the participants of virtual clocks; a thread's first turn starts its job."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ if TYPE_CHECKING:
 
 
 class Turns(Protocol):
-    """What a thread runs from its first turn on."""
+    """The job of a thread: a `VirtualTask`, whose module imports this one."""
 
     name: str
 
     def run_turns(self, worker: Worker) -> None:
-        """Do the work; lets nothing through, and calls `worker.free` with the turn still had."""
+        """Do the job; raises nothing, and calls `worker.free` before it gives the turn away."""
         ...
 
 
 class Worker:
-    """One cached thread; it waits at its gate between two jobs too, and ends after `IDLE_S`.
+    """One cached thread. Between two jobs it waits at its gate, and ends after `IDLE_S`.
 
     Attributes:
-        gate: Gives it the turn, of which the first begins its job.
+        gate: Gives it its turns; the first one starts its job.
     """
 
     def __init__(self) -> None:
@@ -37,11 +37,11 @@ class Worker:
         self._thread.start()
 
     def give(self, job: Turns) -> None:
-        """Let its next turn begin `job`."""
+        """Let its next turn start `job`."""
         self._job = job
 
     def free(self) -> None:
-        """Take the next job, as soon as this one has come to its end."""
+        """Offer this thread for the next job, which starts when the present one has ended."""
         _idle.append(self)
 
     def _run(self) -> None:
@@ -49,7 +49,7 @@ class Worker:
             if not self.gate.acquire_within(IDLE_S):
                 try:
                     _idle.remove(self)
-                except ValueError:  # chosen at the last moment
+                except ValueError:  # `take_worker` was faster: the turn comes soon
                     self.gate.acquire()
                 else:
                     return
@@ -60,7 +60,7 @@ class Worker:
             del job
 
 
-# Newest first. No lock: list operations are atomic.
+# Newest last. No lock is needed, as list operations are atomic.
 _idle: list[Worker] = []
 
 
@@ -73,4 +73,4 @@ def take_worker() -> Worker:
 
 
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_idle.clear)  # the threads stay with the parent
+    os.register_at_fork(after_in_child=_idle.clear)  # the threads exist only in the parent

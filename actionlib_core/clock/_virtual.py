@@ -1,7 +1,11 @@
-"""Virtual time: real threads, one at a time, and time that jumps when all of them wait.
+"""Virtual time: real threads, of which one runs at a time, and time that jumps when all wait.
 
-The participants are threads of the operating system, so that thread identity, thread-local data and
-stacks are what user code expects. `benchmarks/virtual_time.py` measures what they cost.
+The participants are threads of the operating system, so that thread ids, thread-local data and
+stacks are as user code expects. `benchmarks/virtual_time.py` measures their cost.
+
+A thread runs from the moment it receives the turn at its gate until it waits and gives the turn to
+another. The lock guards the tables for `set_event` and `call_later` calls of other threads; it is
+not what keeps participants from running at the same time.
 """
 
 from __future__ import annotations
@@ -41,8 +45,8 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 START_TIME_NS = 1_000_000_000 * 1_000_000_000  # 2001-09-09T01:46:40Z: stamps of tests never change
-INTERRUPT_S = 1.0  # real seconds that an interrupted thread waits for its turn
-JOIN_S = 5.0  # real seconds that `close` gives a thread to unwind
+INTERRUPT_S = 1.0  # longest wait of an interrupted thread for its turn [real s]
+JOIN_S = 5.0  # longest wait of `close` for a thread to unwind [real s]
 
 _clocks: weakref.WeakSet[VirtualClock] = weakref.WeakSet()
 
@@ -50,25 +54,25 @@ _clocks: weakref.WeakSet[VirtualClock] = weakref.WeakSet()
 class VirtualClock:
     """Deterministic time for tests.
 
-    One participant runs at a time: the thread that made the clock, and every `spawn`. Another one
-    gets its turn when the running one waits; when all wait, time jumps to the next deadline. The
-    seed chooses who is next among those that can go on: the same seed gives the same run, another
+    Participants are the thread that made the clock and every `spawn`; one of them runs at a time.
+    When it waits, another one gets the turn; when all wait, time jumps to the next deadline. The
+    seed chooses the next one among those that can go on: the same seed gives the same run, another
     seed another interleaving, None takes turns in order. A wait that can never end raises
     `Deadlock` in the thread that made the clock.
 
-    Use it as a context manager, or `close` it: participants that still wait are ended.
+    Use it as a context manager, or `close` it: this ends participants that still wait.
 
     Args:
-        seed: Picks the interleaving.
-        rate: Virtual seconds per real second, for watching a run; None jumps at once.
+        seed: Selects the interleaving.
+        rate: Virtual seconds per real second, for watching a run; None: time jumps at once.
         choose: Called with the names of the participants and callbacks that can go on, at least
-            two, gives the index of the next one; to go through interleavings one by one.
+            two; returns the index of the next one. For going through interleavings one by one.
 
     Attributes:
         limit: When time would pass this [s], the wait of the thread that made the clock raises
-            `TimeLimit` instead; None, the default: never.
-        most_turns: When so many turns were taken and no time passed, it does, too; None: never.
-        numbers: Counts for ids that are to be the same in every run.
+            `TimeLimit`; None, the default: no limit.
+        most_turns: After more turns than this at one time, that wait raises it too; None: no limit.
+        numbers: A counter for ids that are to be the same in every run.
 
     Threads: only participants may wait; `Event.set` and `call_later` may come from any thread.
 
@@ -90,17 +94,20 @@ class VirtualClock:
         self._pick = _picker(seed, choose)
         self.limit: float | None = None
         self.most_turns: int | None = None
-        self._turns = 0  # since this moment:
+        self._turns = 0  # turns since time was last advanced, to `_moment`
         self._moment = 0.0
         self.numbers = itertools.count(1)
         self._now = 0.0
-        self._stepped = time.monotonic()
-        self._poke = RealEvent()
+        self._stepped = time.monotonic()  # with a `rate`: when `_now` was last advanced [real s]
+        self._poke = RealEvent()  # with a `rate`: a call from outside ends the pause
+        # Reentrant: a signal handler may set an event while its thread holds the lock.
         self._lock = threading.RLock()
+        # Every other participant and timer is in exactly one place: ready to go on, or waiting.
         self._ready: list[Participant | VirtualTimer] = []
+        # A heap: when, a number, which. Entries of waits that have ended stay until they are next.
         self._deadlines: list[tuple[float, int, Participant | VirtualTimer]] = []
         self._count = itertools.count()
-        self._waits: dict[Participant, int] = {}
+        self._waits: dict[Participant, int] = {}  # with the numbers of their waits
         self._owner = Participant(threading.current_thread().name)
         self._owner.gate = make_gate()
         self._participants: dict[int, Participant] = {threading.get_ident(): self._owner}
@@ -145,7 +152,7 @@ class VirtualClock:
         return timer
 
     def run_async(self, main: Coroutine[object, object, T]) -> T:
-        import asyncio  # 60 ms that most programs never need
+        import asyncio  # here: it takes 60 ms, and most programs never need it
 
         from actionlib_core.clock._virtual_loop import VirtualLoop
 
@@ -165,17 +172,17 @@ class VirtualClock:
         modules imported before (`from time import sleep`) are covered too, and so are events,
         conditions, semaphores, queues and pools that were made before.
 
-        Not covered, because Python offers no place to do it: `datetime.now()`, `utcnow()` and
-        `date.today()` show real time (`datetime.fromtimestamp(time.time())` does not); a `Lock`,
+        Not covered, because Python offers no way to do so: `datetime.now()`, `utcnow()` and
+        `date.today()` return real time (`datetime.fromtimestamp(time.time())` does not); a `Lock`,
         `RLock` or `SimpleQueue` made before the block really blocks, for ever if another
-        participant is to release or fill it. Sockets, processes and code in C take real time, and
-        the mission stands still meanwhile. References kept elsewhere than in a module's globals
-        (a default argument, a class attribute) stay real. `time.sleep(0)` lets a microsecond pass,
-        so that a loop around it ends.
+        participant is to release or fill it. Sockets, processes and code in C take real time, in
+        which the mission stands still. References other than a module's globals (a default
+        argument, a class attribute) stay real. `time.sleep(0)` lets a microsecond pass, so that a
+        loop around it ends.
         """
         from actionlib_core.clock._patched import install, remove
 
-        try:  # around `install` too: a Ctrl-C in the midst of it leaves nothing replaced
+        try:  # around `install` too, so that a Ctrl-C during it leaves nothing replaced
             install(self)
             yield self
         finally:
@@ -184,13 +191,13 @@ class VirtualClock:
     # -- life ----------------------------------------------------------------------------------
 
     def close(self) -> None:
-        """End every participant that still waits; later waits raise.
+        """End every participant that still waits; later waits raise `Stopped`.
 
         Blocks: until their threads have unwound, `JOIN_S` real seconds at most each.
         """
         with self._lock:
             self._closed = True
-        while True:
+        while True:  # again, as threads that unwind may have started others
             with self._lock:
                 others = [p for p in (*self._waits, *self._ready) if isinstance(p, Participant)]
                 others = [p for p in others if p is not self._owner]
@@ -204,15 +211,15 @@ class VirtualClock:
                 participant.gate.release()
             for participant in others:
                 participant.ended.wait(JOIN_S)
-        # Programs keep clocks (in frames, contexts, tracebacks) longer than they use them: the file
-        # of the owner's gate goes now. Only the owner itself is sure not to wait at it.
+        # Clocks live on in frames, contexts and tracebacks, and the owner's gate is an open file:
+        # replace it now. Only the owner itself certainly does not wait at it.
         if self._participants.get(threading.get_ident()) is self._owner:
             self._owner.gate = LockGate()
 
     def stop(self, tasks: Iterable[VirtualTask]) -> None:
-        """End participants, as the end of their process would: their waits raise from now on.
+        """End participants as if their process had ended: from now on their waits raise `Stopped`.
 
-        Blocks: not; each unwinds when it has its next turn, and no time passes for that.
+        Does not block: each unwinds at its next turn, without a step of time.
         """
         with self._lock:
             for task in tasks:
@@ -228,11 +235,11 @@ class VirtualClock:
     # -- for `patched()` ------------------------------------------------------------------------
 
     def is_participant(self, ident: int) -> bool:
-        """Tell whether the thread `ident` takes part in this clock."""
+        """Return whether the thread `ident` is a participant of this clock."""
         return ident in self._participants
 
     def adopt(self, target: Callable[[], object], *, name: str) -> VirtualTask:
-        """Make a participant whose thread is the caller's business: it calls `VirtualTask.run`."""
+        """Make a participant for a thread of the caller, which calls `VirtualTask.run`."""
         task = VirtualTask(self, target, contextvars.copy_context(), name)
         task.participant.gate = make_gate()
         with self._lock:
@@ -245,10 +252,10 @@ class VirtualClock:
             self._ready.remove(task.participant)
 
     def interrupt(self, ident: int, error: BaseException) -> bool:
-        """Raise `error` in the participant in thread `ident` when it has its next turn.
+        """Raise `error` in the participant in thread `ident` at its next turn.
 
         Returns:
-            Whether it is waiting on this clock, for an event, for time or for its turn.
+            Whether it waits on this clock: for an event, for time or for its turn.
         """
         with self._lock:
             participant = self._participants.get(ident)
@@ -261,20 +268,20 @@ class VirtualClock:
     # -- for participants and their events -----------------------------------------------------
 
     def wait_for(self, event: VirtualEvent | None, timeout: float | None) -> bool:
-        """Let others run until `event` is set or `timeout` has passed; whether it was set."""
+        """Let others run until `event` is set or `timeout` has passed; return whether it is set."""
         me = self._participants.get(threading.get_ident())
         if me is None or self._in_callback:
             raise _refusal(in_callback=me is not None)
         with self._lock:
             if self._closed or me.stopped:
                 raise Stopped
-            if event is not None and event.flag:  # set since the caller looked
+            if event is not None and event.flag:  # set since the caller has checked it
                 return True
             deadline = None if timeout is None or timeout == math.inf else self._now + timeout
             if deadline is not None and self._is_alone(deadline):
                 self._now = deadline
                 return False
-            # Noted in the heap only when another participant gets the turn: most never need it.
+            # Added to the heap only when another participant gets the turn: most never need it.
             me.turn = self._waits[me] = next(self._count)
             me.event, me.deadline, me.woken = event, deadline, False
             me.noted = deadline is None
@@ -288,7 +295,7 @@ class VirtualClock:
         return me.woken
 
     def _is_alone(self, deadline: float) -> bool:
-        """Tell whether nobody can go on before `deadline`: the wait is a step of time, no more."""
+        """Return whether nothing else can run before `deadline`: then the wait only steps time."""
         if self._ready or self.rate is not None or self._is_past(deadline):
             return False
         due = self._next_due()
@@ -299,14 +306,18 @@ class VirtualClock:
             raise Stopped
 
     def enter(self, me: Participant) -> bool:
-        """Begin the first turn in a new thread; False when the clock was closed before it came."""
+        """Start the first turn in a new thread; False when the clock was closed before."""
         with self._lock:
             self._participants[threading.get_ident()] = me
         return not (self._closed or me.stopped)
 
     def _hand_over(self, me: Participant) -> None:
-        """Let the next one run and wait for my turn; so does, a moment, what a signal raised."""
-        steps: list[object] = []  # what was done when a signal handler raises: nothing, given, had
+        """Give the turn to the next participant, and wait for it to come back.
+
+        A signal handler may raise here (a Ctrl-C, for example). `steps` tells how far the exchange
+        has come: 0: the turn is still mine; 1: given away; 2: given away and received.
+        """
+        steps: list[object] = []
         chosen: Participant | None = None
         try:
             chosen = self._next_turn(me)
@@ -316,7 +327,8 @@ class VirtualClock:
             if chosen is not None:
                 chosen.begin()
                 gates = (chosen.gate.release, me.gate.acquire)
-            steps.extend(map(operator.call, gates))  # no signal handler gets in between the two
+            # In C, so that no signal handler runs between the end of a call and its entry here.
+            steps.extend(map(operator.call, gates))
         except BaseException as error:
             with self._lock:
                 self._wake(me)
@@ -326,12 +338,12 @@ class VirtualClock:
                     raise
             self._poke.set()
             if len(steps) == 1 and not me.gate.acquire_within(INTERRUPT_S):
-                self._closed = True  # another participant never waits: this clock is broken
+                self._closed = True  # another participant does not wait: the clock is unusable
                 raise
             me.error = error
 
     def leave(self, me: Participant) -> None:
-        """Hand the turn on for good: the participant's thread ends."""
+        """Give the turn away for good, at the end of the participant's thread."""
         with self._lock:
             self._participants.pop(threading.get_ident(), None)
             closed = self._closed
@@ -342,7 +354,7 @@ class VirtualClock:
         me.ended.set()
 
     def _next_turn(self, me: Participant | None = None) -> Participant | None:
-        """Run callbacks and choose who goes on, `me` who waits or another; None when nobody can."""
+        """Run callbacks and choose who goes on: the waiting `me` or another; None: nobody can."""
         while True:
             if self.rate is not None and (pause := self._pause(me)):
                 self._pace(pause)
@@ -374,7 +386,7 @@ class VirtualClock:
             return max(0.0, (due - self._now) / self.rate - (time.monotonic() - self._stepped))
 
     def _pace(self, pause: float) -> None:
-        """Let real time pass; a call from outside ends it early, with the time it took."""
+        """Let real time pass; a call from outside ends it early, and virtual time advances less."""
         if self._poke.wait(pause) and self.rate is not None:
             with self._lock:
                 real = time.monotonic()
@@ -406,14 +418,14 @@ class VirtualClock:
         return None
 
     def _is_stuck(self) -> bool:
-        """Count a turn; whether there were too many since time passed."""
+        """Count a turn; return whether there were too many since time was last advanced."""
         if self._now != self._moment:
             self._moment, self._turns = self._now, 0
         self._turns += 1
         return self.most_turns is not None and self._turns > self.most_turns
 
     def _stop_owner(self) -> bool:
-        """End a wait of the owner: turns are taken again and again, and no time passes."""
+        """End a wait of the owner with `TimeLimit`, as turns are taken without time passing."""
         owner = self._owner
         if owner not in self._waits and owner not in self._ready:
             return False
@@ -428,7 +440,7 @@ class VirtualClock:
         return self.limit is not None and due > self.limit
 
     def _next_due(self) -> float | None:
-        """Return the next deadline that still matters."""
+        """Return the next deadline; entries of waits that have ended are removed on the way."""
         deadlines = self._deadlines
         while deadlines:
             due, turn, what = deadlines[0]
@@ -442,7 +454,7 @@ class VirtualClock:
         return None
 
     def _jump(self) -> None:
-        """Advance to the next deadline; all that are due become ready."""
+        """Advance to the next deadline; everything that is due then becomes ready."""
         due = self._next_due()
         if due is None or self._is_past(due):
             return
@@ -460,17 +472,17 @@ class VirtualClock:
         try:
             contextvars.Context().run(callback)
         except Stopped:
-            pass  # it was for participants that were stopped
-        except BaseException as error:  # a border: reported, the run goes on
+            pass  # a callback of participants that were stopped
+        except BaseException as error:  # reported here, and the run goes on
             main = threading.current_thread() is threading.main_thread()
-            if main and isinstance(error, KeyboardInterrupt):  # Ctrl-C came, whoever was running
+            if main and isinstance(error, KeyboardInterrupt):  # Ctrl-C, not the callback's error
                 raise
             report_callback("clock-timers")
         finally:
             self._in_callback = False
 
     def set_event(self, event: VirtualEvent) -> None:
-        """Set `event`; those who wait for it can go on."""
+        """Set `event`; the participants that wait for it can go on."""
         with self._lock:
             event.flag = True
             for participant in tuple(event.waiters):
@@ -507,7 +519,7 @@ def _refusal(*, in_callback: bool) -> RuntimeError:
 def _picker(
     seed: int | None, choose: Callable[[list[str]], int] | None
 ) -> Callable[[list[Participant | VirtualTimer]], int] | None:
-    """Return what gives the index of the next one; None takes the first."""
+    """Return a function that chooses the index of the next one; None: always the first."""
     if choose is not None:
         return lambda ready: choose([each.name for each in ready])
     if seed is None:
@@ -517,7 +529,7 @@ def _picker(
 
 
 def _forget_all() -> None:
-    """Take a forked child out of every clock: its parent's participants are not in it."""
+    """Remove all participants in a forked child: their threads exist only in the parent."""
     for clock in _clocks:
         clock._participants.clear()  # noqa: SLF001  one module
 

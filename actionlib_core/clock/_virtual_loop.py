@@ -1,4 +1,4 @@
-"""An asyncio event loop whose time and waiting are a virtual clock's; it has no sockets."""
+"""An asyncio event loop on a virtual clock; it has no sockets."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class _VirtualSelector(selectors.BaseSelector):
-    """What asyncio waits on: no sockets, only the clock."""
+    """A selector without sockets, which waits for the clock only."""
 
     def __init__(self, clock: VirtualClock) -> None:
         self.wakeup = clock.event("a coroutine")
@@ -42,7 +42,7 @@ class _VirtualSelector(selectors.BaseSelector):
 
 
 class VirtualLoop(asyncio.SelectorEventLoop):
-    """An event loop whose time and waiting are the clock's."""
+    """An event loop with the time of a virtual clock."""
 
     def __init__(self, clock: VirtualClock) -> None:
         self._virtual_clock = clock
@@ -52,12 +52,13 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def time(self) -> float:
         return self._virtual_clock.now()
 
-    # asyncio's own way to be woken is a pair of sockets; here it is the clock's event.
+    # Other threads wake asyncio's own loop through a pair of sockets, this one through an event of
+    # the clock.
     def _make_self_pipe(self) -> None:
-        """Open nothing."""
+        """Open no sockets."""
 
     def _close_self_pipe(self) -> None:
-        """Close nothing."""
+        """Close no sockets."""
 
     def _write_to_self(self) -> None:
         self._virtual_selector.wakeup.set()

@@ -1,4 +1,4 @@
-"""What takes part in virtual time: participants, their events, tasks and timers."""
+"""The parts of virtual time: participants, their events, tasks and timers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Deadlock(Exception):  # noqa: N818  the field's word
-    """Every participant waits and nothing can ever wake one of them.
+    """All participants wait, and nothing can ever wake one of them.
 
     Attributes:
         waits: Participant name -> what it waits for.
@@ -38,11 +38,11 @@ class Deadlock(Exception):  # noqa: N818  the field's word
 
 
 class TimeLimit(Exception):  # noqa: N818  as Deadlock
-    """Time would have passed `VirtualClock.limit`, or stands still (`VirtualClock.most_turns`).
+    """Time would pass `VirtualClock.limit`, or stands still (`VirtualClock.most_turns`).
 
     Attributes:
         waits: Participant name -> what it waits for.
-        turns: So many turns were taken at one moment; 0 when time is up.
+        turns: Number of turns while time stood still; 0 when the limit was reached.
     """
 
     def __init__(self, now: float, waits: Mapping[str, str], turns: int = 0) -> None:
@@ -58,23 +58,26 @@ class TimeLimit(Exception):  # noqa: N818  as Deadlock
 
 
 class Stopped(BaseException):
-    """The clock was closed, or this participant stopped, while it waited."""
+    """The clock was closed, or this participant was stopped, while it waited.
+
+    A `BaseException`, so that user code with `except Exception` cannot stop it.
+    """
 
 
 class Participant:
-    """One thread under the clock; it runs while it has taken its turn from `gate`.
+    """One thread under the clock; it runs after it has received its turn at `gate`.
 
     Attributes:
-        name: Says who it is.
-        gate: Gives it the turn; that of its thread, from `begin` on.
-        job: What its thread is to run; None when that runs, or is not ours.
-        ended: It has given its last turn away.
-        event: What it waits for.
-        deadline: When its wait ends [s]; None: when its event is set.
+        name: Its name in reports.
+        gate: Gives it the turn; from `begin` on, that of its thread.
+        job: The job for its thread; None once that has it, or if the thread is not from our cache.
+        ended: Set when it has given its last turn away.
+        event: The event that it waits for.
+        deadline: When its wait ends [s]; None: only when its event is set.
         noted: Whether the clock's heap has that deadline, or need not have it.
-        turn: Number of its wait.
+        turn: Number of its wait; a heap entry with another number is out of date.
         woken: Whether the event ended its wait.
-        error: What its wait is to raise.
+        error: The exception that its wait is to raise.
         stopped: Whether its waits raise `Stopped`.
     """
 
@@ -106,7 +109,7 @@ class Participant:
         self.stopped = False
 
     def begin(self) -> None:
-        """See that it has a thread, which waits for the turn."""
+        """Give it a thread that waits for the turn, if it has none."""
         if self.job is not None:
             worker = take_worker()
             worker.give(self.job)
@@ -143,7 +146,7 @@ class VirtualEvent:
 
 
 class VirtualTask:
-    """A participant as its starter sees it; `run` or `run_turns` is its thread's side."""
+    """The task of a participant; its thread calls `run` or `run_turns`, others the rest."""
 
     __slots__ = ("_clock", "_context", "_done", "_target", "error", "ident", "name", "participant")
 
@@ -170,19 +173,19 @@ class VirtualTask:
         return self._done.wait(timeout)
 
     def run(self) -> None:
-        """Run in a thread that somebody else made and ends."""
+        """Run in the calling thread, which is not from our cache."""
         self.participant.gate.acquire()
         self.run_turns()
 
     def run_turns(self, worker: Worker | None = None) -> None:
-        """Run in a thread that has its first turn."""
+        """Run in the calling thread, which has received its first turn."""
         try:
             if self._clock.enter(self.participant):
                 self.ident = threading.get_ident()
                 self._context.run(self._target)
         except Stopped:
             pass
-        except BaseException as error:  # noqa: BLE001  the thread's border: kept and reported
+        except BaseException as error:  # noqa: BLE001  end of the thread's stack: reported
             self.error = error
             if not isinstance(error, SystemExit):
                 report_thread_exception()
@@ -191,6 +194,7 @@ class VirtualTask:
             del self._target, self._context
             threading.current_thread().name = IDLE_NAME
             self._done.set()
+            # Before the turn is given away, so that the next participant can reuse this thread.
             if worker is not None:
                 worker.free()
             self._clock.leave(self.participant)
@@ -207,7 +211,7 @@ class VirtualTimer:
     @property
     def name(self) -> str:
         callback: Any = self.callback
-        callback = getattr(callback, "func", callback)  # of a partial
+        callback = getattr(callback, "func", callback)  # the function in a partial
         return str(getattr(callback, "__qualname__", "a callback"))
 
     def cancel(self) -> None:
@@ -217,7 +221,10 @@ class VirtualTimer:
 def name_waits(
     waits: Mapping[Participant, int], idents: Mapping[int, Participant]
 ) -> dict[str, str]:
-    """Say who waits for what, and where if that has no name; names that come twice get numbers."""
+    """Return what each participant waits for, with the line of code if the event has no name.
+
+    Participants with the same name are numbered.
+    """
     threads = {participant: ident for ident, participant in idents.items()}
     frames = sys._current_frames()
     named: dict[str, str] = {}
@@ -239,7 +246,7 @@ def _describe(participant: Participant) -> str:
 
 
 def _where(frame: FrameType | None) -> str:
-    """Return the line that waits, and the line outside of the packages that led there."""
+    """Return the line that waits, and the line of the user's code that led there."""
     lines: list[str] = []
     while frame is not None and len(lines) < 2:  # noqa: PLR2004  the two lines
         module = str(frame.f_globals.get("__name__", ""))
