@@ -4,14 +4,16 @@
     from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
     from actionlib_core.interfaces.std_srvs.srv import Trigger, TriggerResponse
 
-Classes of ROS 2 have CDR for bytes and a type hash for a checksum; `ros2` tells more of them:
+Classes of ROS 2 are serialised as CDR and have a type hash as checksum; see the subpackage `ros2`:
 
     from actionlib_core.interfaces.nav2_msgs.action import NavigateToPose
     from actionlib_core.interfaces.ros2.geometry_msgs.msg import PoseStamped
 
-Your own definitions lie in folders in ROS layout (`my_pkg/action/Turn.action`), named in the
-environment variable `SMACHPY_INTERFACE_PATH` or given to `add_path`; `define_action` and its like
-take text. Bytes and checksums of the others are those of ROS 1.
+All other classes have the bytes and checksums of ROS 1.
+
+Your own definitions are files in ROS layout (`my_pkg/action/Turn.action`) in the folders that the
+environment variable `SMACHPY_INTERFACE_PATH` lists or `add_path` was called with; `define_action`
+and the like take their text directly.
 """
 
 from __future__ import annotations
@@ -94,11 +96,11 @@ def get_action(name: str) -> type[Message]:
 
 
 def define_message(name: str, text: str) -> type[Message]:
-    """Define a message by its `.msg` text; `get_message` and imports find it from then on.
+    """Define a message by its `.msg` text; from then on `get_message` and imports find it.
 
     Args:
         name: "my_pkg/Name".
-        text: What a `.msg` file would hold.
+        text: The contents of a `.msg` file.
 
     Raises:
         InterfaceError: Malformed text, or the name has another definition already.
@@ -141,10 +143,10 @@ def add_path(folder: str | os.PathLike[str]) -> None:
     """Search a folder in ROS layout before those known so far.
 
     Args:
-        folder: Holds `my_pkg/{msg,srv,action}/Name.*`; it may also be the folder `my_pkg` itself.
+        folder: Contains `my_pkg/{msg,srv,action}/Name.*`; it may also be the folder `my_pkg`.
 
     Raises:
-        InterfaceError: No such folder, or nothing of that kind in it.
+        InterfaceError: No such folder, or no interfaces in it.
     """
     registry.add_path(folder)
 
@@ -154,7 +156,7 @@ def ros2_action(action: type[Ros2Action], distro: str | None = None) -> ActionPa
 
     Args:
         action: Its class, `nav2_msgs.action.NavigateToPose` for example.
-        distro: Whose definitions to take instead of the class's own.
+        distro: The distribution whose definitions are used; None: that of the class.
 
     Raises:
         InterfaceError: The distribution does not define it.
@@ -164,7 +166,7 @@ def ros2_action(action: type[Ros2Action], distro: str | None = None) -> ActionPa
 
 
 def rihs01(message: type[Message] | str) -> str:
-    """Return the ROS 2 type hash ("RIHS01_...") of a message class or of the ROS name of one.
+    """Return the ROS 2 type hash ("RIHS01_...") of a message class or of its ROS name.
 
     Raises:
         InterfaceError: Unknown, or ROS 2 cannot have such a type.
@@ -190,7 +192,7 @@ def from_cdr(cls: type[AnyMessage], data: bytes) -> AnyMessage:
     """Make a message from its little-endian CDR serialisation; a `Header` gets `seq` 0.
 
     Raises:
-        DeserializationError: The bytes are no message of this type.
+        DeserializationError: The bytes are not a message of this type.
         InterfaceError: As `to_cdr`.
     """
     from actionlib_core.interfaces import _typesys

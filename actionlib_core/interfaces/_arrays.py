@@ -1,4 +1,4 @@
-"""Array fields to bytes: what the generated serialisers call for each array."""
+"""Conversion of array fields to bytes, called by the generated serialisers."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ STRUCT_CODES = {
 """The `struct` code of each numeric type."""
 
 BOOLS = {False: 0, True: 1}
-"""A bool's byte; anything that is neither (in the sense of ==) raises KeyError."""
+"""A bool's byte; a value that equals neither raises KeyError."""
 
 _NATIVE = {"l": "q", "L": "Q"} if struct.calcsize("l") == 8 else {"l": "i", "L": "I"}  # noqa: PLR2004 # 64-bit
 
 
 class MismatchError(Exception):
-    """A value that the fast path does not take; the slow path converts it or says what is wrong."""
+    """A value that the fast path does not handle, but perhaps the slow one (`coerced`)."""
 
 
 def numbers(code: str, values: Any) -> bytes:
@@ -78,21 +78,21 @@ def bools(values: Any) -> bytes:
 
 
 def fixed(values: Any, length: int) -> Any:
-    """Return `values` if there are `length` of them."""
+    """Return `values` if it has `length` elements."""
     if len(values) != length:
         raise MismatchError
     return values
 
 
 def objects(values: Any) -> Any:
-    """Return `values` if it is a list or a tuple, so that no string is taken for one."""
+    """Return `values` if it is a list or a tuple; a string, for example, is not accepted."""
     if values.__class__ is not list and values.__class__ is not tuple:
         raise MismatchError
     return values
 
 
 def same(left: Any, right: Any) -> bool:
-    """Compare two array fields whatever they are held in: list, tuple, bytes or numpy array."""
+    """Compare two array fields, each a list, tuple, bytes or numpy array."""
     if left.__class__ is right.__class__ and left.__class__ in {list, tuple, bytes}:
         return bool(left == right)
     try:

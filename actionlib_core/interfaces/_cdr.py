@@ -1,11 +1,12 @@
-"""Source text of the CDR serialiser and deserialisers of a class: ROS 2's bytes.
+"""Generator of a class's CDR serialiser and deserialisers: ROS 2's bytes.
 
 Source: OMG CDR version 1 as ROS 2's middlewares write it: 4 bytes of encapsulation, then the
-fields, each aligned to its size from the first byte after those 4; strings behind a uint32 length
-that counts their final NUL; an empty array is not aligned; a message without fields has one byte.
+fields, each aligned to its size, counted from the first byte after those 4; a string after its
+length as uint32, which includes the final NUL; an empty array is not aligned; a message without
+fields has one byte.
 
-Bytes are read as ROS 2's nodes read them: either byte order, anything in the padding, behind the
-end and in the last two bytes of the encapsulation, strings without NUL.
+Bytes are read as ROS 2's nodes read them: both byte orders are accepted, and so are strings without
+NUL and any values in the padding, after the end, and in the last two bytes of the encapsulation.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ if TYPE_CHECKING:
     from actionlib_core.interfaces._definition import Definition, Field, FieldType
     from actionlib_core.interfaces._message import Message
 
-_HEADER = b"\x00\x01\x00\x00"
+_HEADER = b"\x00\x01\x00\x00"  # encapsulation of little-endian CDR
 _ORDERS = {b"\x00\x00": ">", b"\x00\x01": "<"}
-_WIDEST = 8
+_WIDEST = 8  # largest alignment [bytes]
 
 
 def make_cdr_codecs(
@@ -60,15 +61,15 @@ def make_cdr_codecs(
 
 
 def _execute(text: str, definition: Definition, scope: dict[str, Any]) -> None:
-    # The text holds only names checked by the parser and numbers made here.
+    # Safe, as the text contains only names that the parser has checked and our own numbers.
     exec(compile(text, f"<CDR of {definition.name}>", "exec"), scope)  # noqa: S102
 
 
 class _Output:
-    """Emits writes to the bytearray `b`; runs of scalars become one `pack`, padding included.
+    """Emits writes to the bytearray `b`; consecutive scalars become one `pack` with padding.
 
-    The length of `b` is known to be `_at` modulo `_modulus`; what needs a wider alignment than that
-    is padded at run time.
+    The length of `b` is known to be `_at` modulo `_modulus`. Where an alignment is wider than
+    `_modulus`, the padding is computed at run time.
     """
 
     def __init__(self, source: Source, modulus: int = 1) -> None:
@@ -99,13 +100,13 @@ class _Output:
         self._codes, self._values = "", []
 
     def ready(self, expression: str, element_size: int = 1) -> None:
-        """Write bytes, any number of elements of a size."""
+        """Write the bytes of any number of elements of a size."""
         self.flush()
         self.source.add(f"b += {expression}")
         self._at, self._modulus = 0, min(element_size, self._modulus)
 
     def moved(self) -> None:
-        """Go on where nothing is known of the length."""
+        """Continue without any knowledge of the length."""
         self._at, self._modulus = 0, 1
 
 
@@ -190,7 +191,7 @@ def _write_loop(output: _Output, kind: FieldType, values: str, resolve: Resolve)
 
 
 class _Cursor(Cursor):
-    """Reads aligned values; the next byte is known to be `_at` modulo `_modulus`."""
+    """Reads aligned values; the position is known to be `_at` modulo `_modulus`."""
 
     def __init__(self, source: Source, offset: str) -> None:
         super().__init__(source, offset)

@@ -1,4 +1,4 @@
-"""What `actionlib interface show|list|stubs` prints and writes."""
+"""The output of `actionlib interface show|list|stubs`."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ _PARTS: dict[Kind, tuple[str, ...]] = {"msg": (), "srv": SERVICE_PARTS, "action"
 
 
 def show(name: str, *, all_comments: bool = False) -> str:
-    """Return a definition with its nested types written out below their fields, tab by tab.
+    """Return a definition with its nested types below their fields, indented by tabs.
 
     Args:
-        name: "pkg/Name" or "pkg/kind/Name"; the short form shows every kind that has the name.
+        name: "pkg/Name" or "pkg/kind/Name"; the short form shows every kind with that name.
         all_comments: Show the comments of nested types too.
 
     Raises:
@@ -87,11 +87,11 @@ def write_stubs(folder: str | os.PathLike[str], packages: Sequence[str] = ()) ->
     """Write typed `.pyi` files, `<folder>/<package>/msg.pyi` and `srv.pyi`, and return their paths.
 
     Args:
-        folder: Made if need be; put it on mypy's `mypy_path`.
-        packages: Which ones; none means all that are not bundled (those have their stubs).
+        folder: Created if necessary; add it to mypy's `mypy_path`.
+        packages: The packages; empty: all except the bundled ones, which have stubs.
 
     Raises:
-        InterfaceError: Unknown packages, none at all, or malformed definitions.
+        InterfaceError: Unknown packages, no packages, or malformed definitions.
     """
     known = registry.sources.packages()
     wanted = list(packages) or [p for p in known if not (BUNDLED / p).is_dir()]
@@ -111,7 +111,7 @@ def write_stubs(folder: str | os.PathLike[str], packages: Sequence[str] = ()) ->
 
 
 def _kinds_of(name: str) -> tuple[Registry, list[Kind]]:
-    """Return where a name is defined, of ROS 1 or else of ROS 2, and the kinds that define it.
+    """Return the registry of a name, ROS 1's or else ROS 2's, and the kinds that define it.
 
     Parts of services and actions count as messages of ROS 1.
     """
@@ -124,7 +124,7 @@ def _kinds_of(name: str) -> tuple[Registry, list[Kind]]:
         found = [kind for kind in kinds if source.sources.find(kind, package, short) is not None]
         if found:
             return source, found
-    registry.message(name)  # raises where it is unknown
+    registry.message(name)  # raises if it is unknown
     return registry, ["msg"]
 
 
@@ -157,5 +157,5 @@ def _lines(
 
 def _without_comment(line: str) -> str:
     if line.lstrip().startswith("string ") and "=" in line.partition("#")[0]:
-        return line.rstrip()  # the value of a string constant may hold the comment sign
+        return line.rstrip()  # the value of a string constant may contain the comment sign
     return line.partition("#")[0].rstrip()

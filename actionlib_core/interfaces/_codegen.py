@@ -1,11 +1,11 @@
-"""Source text of a class's serialiser and deserialiser, one flat function each.
+"""Generator of a class's serialiser and deserialiser, one flat function each.
 
-The whole tree of nested messages is unrolled: runs of fixed-size fields become one `struct` call,
-nested objects are made without their `__init__`. That makes them faster than a call per field or
-per nested message by a factor of three to ten; the codecs are the hot path of every goal.
+All nested messages are unrolled: consecutive fields of fixed size become one `struct` call, and
+nested objects are made without their `__init__`. This is three to ten times as fast as a call per
+field or nested message, which matters because every goal and message passes through this code.
 
-Source: the ROS 1 wire format, http://wiki.ros.org/ROS/Technical%20Overview: little-endian,
-unpadded, strings and dynamic arrays behind a uint32 length.
+Source: the ROS 1 wire format, http://wiki.ros.org/ROS/Technical%20Overview: little-endian, without
+padding, strings and dynamic arrays after their length as uint32.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ _TIMES: Final[dict[str, tuple[type[Time | Duration], str]]] = {
     "time": (Time, "II"),
     "duration": (Duration, "ii"),
 }
-TEXT = "'utf-8', 'surrogateescape'"  # so that bytes which are not UTF-8 pass through unchanged
-_ZERO_SIZE_LIMIT = 1_000_000  # elements without content, whose number no payload size bounds
+TEXT = "'utf-8', 'surrogateescape'"  # bytes that are not UTF-8 are then preserved
+_ZERO_SIZE_LIMIT = 1_000_000  # elements without content: the payload's size does not limit them
 
 WRITE_ERRORS = (
     _arrays.MismatchError,
@@ -42,14 +42,14 @@ WRITE_ERRORS = (
     OverflowError,
     KeyError,
 )
-"""What the fast path raises on a value it does not take."""
+"""Exceptions of the fast path for values that it does not handle."""
 
 
 class Source:
-    """Lines of a function and the names they use; `scope` becomes the function's globals.
+    """Source lines of a function; `scope` becomes the function's globals.
 
     Attributes:
-        order: Byte order of numbers, as `struct` spells it.
+        order: Byte order of numbers, as in `struct`.
     """
 
     def __init__(self, scope: dict[str, Any], order: str = "<") -> None:
@@ -86,9 +86,10 @@ class Source:
         return "\n".join([f"def {signature}:", *self.lines, ""])
 
     def writer(self) -> str:
-        """Return the function `write`, whose lines are the fast path.
+        """Return the function `write` with the lines as its fast path.
 
-        Values of other types than the fields' own are converted, or refused with what is wrong.
+        If a value does not have exactly the field's type, `coerced` makes a copy with converted
+        values, or raises an error that lists all wrong ones; then the fast path runs once more.
         """
         body = ["    " + line for line in self.lines]
         return "\n".join(
@@ -113,7 +114,7 @@ def make_codecs(
     """
     scope = new_scope()
     text = _write_source(definition, resolve, scope) + _read_source(cls, definition, resolve, scope)
-    # The text holds only names checked by the parser and numbers made here.
+    # Safe, as the text contains only names that the parser has checked and our own numbers.
     exec(compile(text, f"<codecs of {definition.name}>", "exec"), scope)  # noqa: S102
     return scope["write"], scope["read"]
 
@@ -140,7 +141,7 @@ def new_scope() -> dict[str, Any]:
 
 
 class _Items:
-    """The parts of the payload in order: runs of packed scalars, and ready bytes."""
+    """The parts of the payload in order: packed scalars, and expressions of bytes."""
 
     def __init__(self, source: Source) -> None:
         self._source = source
@@ -213,7 +214,7 @@ def _write_one(
 
 
 def checked(source: Source, value: str, cls: type) -> str:
-    """Put `value` into a local, checked to be exactly of a class."""
+    """Assign `value` to a local, after a check that it is exactly of a class."""
     name = source.local()
     source.add(f"{name} = {value}")
     source.add(f"if {name}.__class__ is not {source.bind('C', cls)}: raise Mismatch")
@@ -268,10 +269,10 @@ def _write_loop(source: Source, kind: FieldType, values: str, resolve: Resolve) 
 
 
 class Cursor:
-    """Emits reads in wire order and gathers runs of scalars into one `unpack_from`.
+    """Emits reads in wire order; consecutive scalars become one `unpack_from`.
 
-    A subclass for another format says how strings end, what an empty message holds, and where
-    values are aligned.
+    A subclass for another format defines the end of strings, the bytes of an empty message, and the
+    alignment of values.
     """
 
     def __init__(self, source: Source, offset: str) -> None:
@@ -300,28 +301,28 @@ class Cursor:
         self._codes, self._names = "", []
 
     def skip(self, size: int) -> None:
-        """Go on `size` bytes further."""
+        """Advance by `size` bytes."""
         self._skip += size
 
     def position(self) -> str:
-        """The expression of the next byte to read; call only when flushed."""
+        """Return the expression of the next byte's position; call `flush` before."""
         if self._offset == "0":
             return str(self._skip)
         return f"{self._offset} + {self._skip}" if self._skip else self._offset
 
     def settle(self) -> None:
-        """Bring the variable `p` to the next byte to read."""
+        """Set the variable `p` to the position of the next byte."""
         self.flush()
         if self._offset != "p" or self._skip:
             self.source.add(f"p = {self.position()}")
         self.moved()
 
     def moved(self) -> None:
-        """Go on from the variable `p`."""
+        """Continue at the variable `p`."""
         self._offset, self._skip = "p", 0
 
     def take(self, length: str) -> str:
-        """Move past `length` bytes; return the slice of them."""
+        """Advance by `length` bytes; return the expression of their slice."""
         self.flush()
         start = self.position()
         name = start
@@ -336,18 +337,18 @@ class Cursor:
         return f"d[{name}:p]"
 
     def text(self, length: str) -> str:
-        """Move past a string of `length` bytes; return its expression."""
+        """Advance by a string of `length` bytes; return its expression."""
         return f"str({self.take(length)}, {TEXT})"
 
     def empty(self) -> None:
-        """Move past a message without fields."""
+        """Advance by the bytes of a message without fields."""
 
     def align(self, size: int, *, unless_empty: str = "") -> None:
-        """Move to where a value of `size` bytes may stand.
+        """Advance to the next aligned position of a value of `size` bytes.
 
         Args:
             size: A power of two.
-            unless_empty: The count of an array that, when empty, needs no alignment.
+            unless_empty: The count of an array, which is not aligned when it is empty.
         """
 
 
@@ -375,7 +376,7 @@ def _read_source(
 def read_message(
     cursor: Cursor, cls: type[Message], fields: tuple[Field, ...], resolve: Resolve
 ) -> str:
-    """Read the fields; the object is put together in `cursor.builds`, when all is read."""
+    """Read the fields. The lines in `cursor.builds` make the object, after everything is read."""
     name = cursor.source.local("o")
     cursor.builds.append(f"{name} = new({cursor.source.bind('C', cls)})")
     if not fields:
@@ -402,7 +403,7 @@ def _read_one(cursor: Cursor, kind: FieldType, resolve: Resolve) -> str:
         secs, nsecs = cursor.scalar(codes[0]), cursor.scalar(codes[1])
         name = cursor.source.local("t")
         bound = cursor.source.bind("C", time_class)
-        # A sender may leave more than a second in nsecs; `set` carries it over.
+        # The nsecs of a sender may be a second or more; `set` normalises them.
         cursor.builds += [
             f"{name} = new({bound}); {name}.secs = {secs}; {name}.nsecs = {nsecs}",
             f"if not 0 <= {nsecs} < 1000000000: {name}.set({secs}, {nsecs})",
@@ -455,7 +456,7 @@ def _read_loop(cursor: Cursor, kind: FieldType, name: str, count: str, resolve: 
         source.add(line)
     source.add(f"{name}.append({element})")
     source.indent -= 1
-    # A wrong count must not keep us busy, or fill the memory, before the bytes run out.
+    # A wrong count would otherwise fill the memory, or take long, before the bytes run out.
     bound = f"(len(d) - p) // {inner.minimum}" if inner.minimum else str(_ZERO_SIZE_LIMIT)
     text = f"if {count} > {bound}: raise Mismatch(f'an array says it has {{{count}}} elements')"
     source.lines.insert(guard, "    " * source.indent + text)

@@ -1,8 +1,8 @@
-"""Which field of one message is which of another: ROS 1 and ROS 2, or two distributions of ROS 2.
+"""Correspondence of the fields of two messages: of ROS 1 and ROS 2, or of two distributions.
 
-Fields correspond by name (capital letters do not count), else by being the only ones of their type
-on either side. The message of the user's side has to be covered: each of its fields needs a
-counterpart. What the other side has more keeps its default value, or is left out on the way back.
+Fields correspond by name (ignoring case), otherwise by being the only fields of their type on both
+sides. Each field of the user's message needs a counterpart. Further fields of the other message
+keep their default values, or are left out on the way back.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _TIMES = {
     "duration": (Duration, "builtin_interfaces/msg/Duration"),
 }
 _ONLY_ROS1 = {"std_msgs/Header": {"seq"}}
-"""Fields that ROS 2 does without: they are 0 on the way back."""
+"""Fields that ROS 2 does not have: they are 0 on the way back."""
 
 
 def converter(
@@ -37,19 +37,19 @@ def converter(
     *,
     whole: Literal["source", "target"] = "source",
 ) -> Convert:
-    """Return a function that makes a `target` of a `source`; the same one when they are one class.
+    """Return a function that converts a `source` to a `target`; for one class, the identity.
 
     It raises FieldError, ValueError or TypeError for values that the target cannot hold.
 
     Args:
-        source: Class of what it takes.
-        target: Class of what it returns.
-        fields: Counterparts that names and types do not tell: fields of the side that `whole`
-            names, to those of the other; "" for one that is to be without.
+        source: Class of its argument.
+        target: Class of its result.
+        fields: Counterparts that do not follow from names and types: field of the side `whole` ->
+            field of the other side; "" for a field without counterpart.
         whole: The side of which every field needs a counterpart.
 
     Raises:
-        CorrespondenceError: Fields have none; all of them.
+        CorrespondenceError: Fields have no counterpart; the error lists all of them.
     """
     if source is target:
         return lambda message: message
@@ -61,7 +61,7 @@ def converter(
 
 
 class _Pairs:
-    """Pairs the fields of two classes, all the way down, and collects what has no counterpart."""
+    """Pairs the fields of two classes, also nested ones; collects those without counterpart."""
 
     def __init__(self, whole: Literal["source", "target"]) -> None:
         self.problems: list[str] = []
@@ -132,7 +132,7 @@ class _Pairs:
     def _field(
         self, source: type[Message], mine: Field, target: type[Message], theirs: Field, path: str
     ) -> Convert | None:
-        """Return what converts a value of a field, None when it is taken as it is."""
+        """Return the conversion of a field's value; None: the value is used unchanged."""
         here = f"{path}{mine.name}"
         if mine.type.is_array != theirs.type.is_array or (
             {mine.type.length, theirs.type.length} - {None} != set()
@@ -184,14 +184,14 @@ def _family(kind: FieldType) -> str:
 
 
 def _alike(one: Field, other: Field) -> bool:
-    """Tell whether two fields hold the same kind of value, so that one may be the other."""
+    """Return whether two fields have the same kind of value, so that they may correspond."""
     if one.type.is_array != other.type.is_array:
         return False
     return _plain_type(one.type) == _plain_type(other.type)
 
 
 def _plain_type(kind: FieldType) -> str:
-    """Return the type as both worlds would call it."""
+    """Return a name of the type that is the same for ROS 1 and ROS 2."""
     if kind.base in _TIMES:
         return _TIMES[kind.base][1]
     return (

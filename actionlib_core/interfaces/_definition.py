@@ -1,8 +1,8 @@
-"""Reading `.msg` text: fields, constants and comments, or an error with file, line and caret.
+"""The parser of `.msg` text: fields, constants and comments, or errors with file, line and caret.
 
-Source: the ROS 1 message description format, http://wiki.ros.org/msg. The text is read here and
-not by `rosbags`, because a user needs positions, comments and the spelling of constants (which
-the ROS 1 checksum covers); the tests hold the result against `rosbags`.
+Source: the ROS 1 message description format, http://wiki.ros.org/msg. `rosbags` is not used here,
+because it drops positions, comments and the spelling of constants (which the ROS 1 checksum
+covers); the tests compare the results with those of `rosbags`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ INTEGERS = {
     "uint32": (0, 2**32 - 1),
     "int64": (-(2**63), 2**63 - 1),
     "uint64": (0, 2**64 - 1),
-    # Old names: in ROS 1 a byte is signed and a char is not.
+    # Old names. In ROS 1 a byte is signed and a char is unsigned.
     "byte": (-(2**7), 2**7 - 1),
     "char": (0, 2**8 - 1),
     # ROS 2's `byte`, which has a type hash of its own.
@@ -48,7 +48,7 @@ _ROS2_SPELT = {"char": "uint8", "byte": "octet"}
 """ROS 2's names of one byte: `char` is another name of `uint8`, `byte` is unsigned."""
 _ROS2_BUILTINS = (*(name for name in BUILTINS if name not in {*TIMES, "char"}), "octet")
 
-# Names a message class has for itself; a field of that name gets a trailing underscore.
+# Names of a message class's own; the attribute of such a field gets a trailing underscore.
 RESERVED = frozenset(
     {
         *("serialize", "deserialize", "to_bytes", "from_bytes"),
@@ -56,7 +56,7 @@ RESERVED = frozenset(
     }
 )
 
-_LENGTH_DIGITS = 18  # of an array; more are too many whatever its elements are
+_LENGTH_DIGITS = 18  # of an array's length; with more, any array is too large
 _LONGEST_SHOWN = 40
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
@@ -66,7 +66,7 @@ _TYPE_PATH = re.compile(r"([a-zA-Z][A-Za-z0-9_]*/)?[A-Za-z][A-Za-z0-9_]*\Z")
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """Where in a definition something stands, for error messages."""
+    """A position in a definition, for error messages."""
 
     source: str
     line: int
@@ -87,8 +87,8 @@ class FieldType:
         base: A built-in such as "float64", or a message type "pkg/Name".
         is_array: Whether it is an array.
         length: The length of a fixed array, None for a dynamic one.
-        most: The most elements a dynamic array may have (ROS 2's `type[<=N]`), None for any.
-        most_text: The most bytes a string may have (ROS 2's `string<=N`), None for any.
+        most: Most elements of a dynamic array (ROS 2's `type[<=N]`); None: no limit.
+        most_text: Most bytes of a string (ROS 2's `string<=N`); None: no limit.
     """
 
     base: str
@@ -104,7 +104,7 @@ class FieldType:
 
     @property
     def is_builtin(self) -> bool:
-        """Whether the base is no message type."""
+        """Whether the base is a built-in type, not a message."""
         return self.base in BUILTINS or self.base == "octet"
 
     @property
@@ -124,10 +124,11 @@ class FieldType:
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One field: its ROS name, the Python attribute (they differ for keywords), its type.
+    """One field of a message.
 
     Attributes:
-        default: ROS 2's default value, None for that of the type; a tuple, or bytes, of an array.
+        name: Its ROS name, from which `attribute` differs for Python's keywords.
+        default: Its default value in ROS 2, a tuple or bytes for an array; None: that of the type.
     """
 
     name: str
@@ -144,7 +145,7 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """One constant: `text` is the value as spelt, which the checksum covers."""
+    """One constant; `text` is its value as it is spelt, which the checksum covers."""
 
     name: str
     type: str
@@ -160,9 +161,9 @@ class Constant:
 
 @dataclass(frozen=True, slots=True)
 class Definition:
-    """A message type: name, fields, constants and the text they were read from.
+    """A message type: name, fields, constants and their text.
 
-    The name is "pkg/Name", for ROS 2's types "pkg/msg/Name" (or srv, action).
+    The name is "pkg/Name", for ROS 2 types "pkg/msg/Name" (or srv, action).
     """
 
     name: str
@@ -179,7 +180,7 @@ class Definition:
 
     @property
     def has_header(self) -> bool:
-        """Whether it begins with `Header header`, so that a publisher may number the messages."""
+        """Whether it begins with `Header header`; ROS 1's publishers number such messages."""
         first = self.fields[0] if self.fields else None
         return first is not None and (first.name, str(first.type)) == ("header", "std_msgs/Header")
 
@@ -190,7 +191,7 @@ class Definition:
 
 
 def attribute_of(name: str) -> str:
-    """Return the Python attribute for a field name: with "_" behind keywords and own methods."""
+    """Return the Python attribute of a field: keywords and `RESERVED` names get a "_"."""
     return f"{name}_" if keyword.iskeyword(name) or name in RESERVED else name
 
 
@@ -205,7 +206,7 @@ def parse(name: str, text: str, *, source: str = "", first_line: int = 1) -> Def
         first_line: Number of the text's first line in that file.
 
     Raises:
-        InterfaceError: Lines that cannot be read; all of them at once.
+        InterfaceError: Malformed lines; the error lists all of them.
     """
     reader = _Ros2Reader if name.count("/") > 1 else _Reader
     return reader(name, source or name, first_line).read(text)
@@ -233,7 +234,7 @@ class _Reader:
                 if "#" in line:
                     block.append(comment.strip())
                     continue
-                # A block of comments with a blank line behind it tells of the message itself.
+                # A block of comments before a blank line and any field describes the message.
                 head = head or ([] if self.seen else block)
                 block = []
                 continue
@@ -352,7 +353,7 @@ _ROS2_TYPE = re.compile(
 
 
 class _Ros2Reader(_Reader):
-    """Reads ROS 2's dialect.
+    """The parser of ROS 2's dialect.
 
     Source: https://docs.ros.org/en/jazzy/Concepts/Basic/About-Interfaces.html
     """
@@ -443,11 +444,11 @@ class _Ros2Reader(_Reader):
 
 
 def _ros2_value(kind: FieldType, text: str) -> Any:
-    """Convert a default value or a constant; ValueError says what is wrong with it."""
+    """Convert the text of a default value or constant; raises ValueError for a wrong one."""
     if kind.is_array:
         if not (kind.is_builtin and text.startswith("[") and text.endswith("]")):
             raise ValueError(f"got {text!r}; expected `[value, ...]` for an array of built-in type")
-        # Commas within quotes do not separate.
+        # Commas within quotes are not separators.
         parts = re.findall(r"\"(?:\\.|[^\"\\])*\"|'(?:\\.|[^'\\])*'|[^,]+", text[1:-1])
         values = [_ros2_value(kind.element, part.strip()) for part in parts if part.strip()]
         if kind.length not in {None, len(values)} or len(values) > (kind.most or len(values)):
@@ -461,7 +462,7 @@ def _ros2_value(kind: FieldType, text: str) -> Any:
 
 
 def _constant_value(kind: str, text: str) -> bool | int | float | str:
-    """Convert the text of a constant; ValueError says what is wrong with it."""
+    """Convert the text of a constant; raises ValueError for a wrong one."""
     if kind == "string":
         return text
     if kind == "bool":
@@ -476,6 +477,7 @@ def _constant_value(kind: str, text: str) -> bool | int | float | str:
             raise ValueError(f"got {text!r}; expected a number") from None
     lowest, highest = INTEGERS[kind]
     try:
+        # Base 0 reads 0x10 but refuses 010, which ROS reads as ten.
         number = int(text, 10 if text.lstrip("+-").isdigit() else 0)
     except ValueError:
         raise ValueError(f"got {text!r}; expected a whole number") from None
@@ -484,13 +486,13 @@ def _constant_value(kind: str, text: str) -> bool | int | float | str:
     return number
 
 
-# --- size and depth: what no computer could make is refused at its definition --------------------
+# --- size and depth: types that no computer could handle are refused at their definition --------
 
-LARGEST = 100_000_000  # bytes of a message with its default values
-MOST_FIELDS = 50_000  # the code that writes and reads has a line for each
-DEEPEST = 50  # types in types: a value is walked down by calls in calls
+LARGEST = 100_000_000  # size of a message with its default values [bytes]
+MOST_FIELDS = 50_000  # the generated code has a line for each field
+DEEPEST = 50  # nested types: checking and printing values is recursive
 NESTED = "types in one another"
-MOST_LOOPS = 19  # arrays in arrays: Python has no more loops in a loop
+MOST_LOOPS = 19  # nested arrays: CPython allows 20 nested blocks, and the code's `try` is one
 
 _SIZES = {base: struct.calcsize(f"<{code}") for base, code in STRUCT_CODES.items()}
 _SIZES |= {"string": 4, "time": 8, "duration": 8}
@@ -498,13 +500,13 @@ _LENGTH_SIZE = 4  # of a dynamic array
 
 
 class Extent(NamedTuple):
-    """What a type, or a field, asks for.
+    """The size of a type or field.
 
     Attributes:
-        size: Bytes of the default value.
-        fields: Fields, those of nested types counted again at each place.
-        depth: Types in types; 0 for a built-in one.
-        loops: Arrays in arrays.
+        size: Size of the default value [bytes].
+        fields: Number of fields; those of nested types count wherever the type is used.
+        depth: Depth of nested types; 0 for a built-in one.
+        loops: Depth of nested arrays.
     """
 
     size: int
@@ -535,7 +537,7 @@ def message_extent(fields: Iterable[Extent]) -> Extent:
 
 
 def find_excess(extent: Extent) -> tuple[str, str] | None:
-    """Return which attribute of a message's extent is too much, and the problem; None when none."""
+    """Return the attribute of a message's extent that is too large, and the problem, or None."""
     problems = {
         "fields": (MOST_FIELDS, "fields, nested ones counted"),
         "depth": (DEEPEST, NESTED),

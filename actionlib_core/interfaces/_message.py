@@ -1,4 +1,4 @@
-"""The base class of all messages, and the making of a message class from its definition."""
+"""The base class of all messages, and the function that makes a message class."""
 
 from __future__ import annotations
 
@@ -32,31 +32,31 @@ if TYPE_CHECKING:
 
 
 class Buffer(Protocol):
-    """Where `Message.serialize` writes, for example an `io.BytesIO`."""
+    """The target of `Message.serialize`, for example an `io.BytesIO`."""
 
     def write(self, data: bytes, /) -> object:
-        """Take the bytes."""
+        """Write the bytes."""
         ...
 
 
 class Message:
-    """Base of all message classes; it has what ROS 1's generated classes have, and more.
+    """Base of all message classes, with the interface of ROS 1's generated classes, and more.
 
-    A message takes its fields by position or keyword; fields not given have ROS's default values
-    (0, False, "", empty arrays, default messages). Fields may be set to anything: types are checked
-    when the message is written (`to_bytes`, `serialize`, `to_yaml`), where every bad field is named
-    with its path. `time` and `duration` fields take float seconds: the constructor converts them at
-    once, a later assignment is converted in the bytes only.
+    The constructor accepts fields by position or keyword; the others have ROS's default values (0,
+    False, "", empty arrays, default messages). A field can be set to any value: types are checked
+    when the message is written (`to_bytes`, `serialize`, `to_yaml`), and the error lists every bad
+    field with its path. `time` and `duration` fields accept float seconds: the constructor converts
+    them at once; a value that is assigned later is converted only in the bytes.
 
     `uint8[]` and `char[]` are `bytes`; other arrays are lists. Lists, tuples, bytearrays and 1-D
-    numpy arrays are taken wherever an array is written.
+    numpy arrays are accepted for every array.
     """
 
     __slots__: ClassVar[Any] = ()
     __hash__ = None  # type: ignore[assignment] # mutable
 
     _wire: ClassVar[str] = "ros1"
-    """Whose bytes they are: "ros1", which smachpy's own wire speaks too, or "ros2"."""
+    """The serialisation: "ros1", also used by smachpy's own wire, or "ros2"."""
     _type: ClassVar[str]
     """ROS name, "pkg/Name"; of ROS 2's classes "pkg/msg/Name" (or srv, action)."""
     _md5sum: ClassVar[str]
@@ -77,7 +77,7 @@ class Message:
         """Return the ROS 1 serialisation.
 
         Raises:
-            FieldError: Values do not fit their fields; all of them are named.
+            FieldError: Values do not fit their fields; the error lists all of them.
         """
         data: bytes = self._write(self)
         return data
@@ -87,7 +87,7 @@ class Message:
         """Make a message from its ROS 1 serialisation.
 
         Raises:
-            DeserializationError: The bytes are no message of this type.
+            DeserializationError: The bytes are not a message of this type.
         """
         return cls._read(data)  # type: ignore[no-any-return] # generated code
 
@@ -118,7 +118,7 @@ class Message:
         (stamped now).
 
         Raises:
-            FieldError: Unknown fields or values that do not fit; all of them are named.
+            FieldError: Unknown fields or values that do not fit; the error lists all of them.
         """
         return filled(cls, values)
 
@@ -135,7 +135,7 @@ class Message:
         """Make a message from YAML text, block or flow style; values as in `from_dict`.
 
         Raises:
-            FieldError: The text is no YAML mapping, or as `from_dict`.
+            FieldError: The text is not a YAML mapping, or as `from_dict`.
         """
         return filled(cls, load(text, cls._type))
 
@@ -166,17 +166,17 @@ class Message:
 
 
 class Ros2Message(Message):
-    """Base of the message classes of ROS 2: their bytes are CDR, their checksum is the type hash.
+    """Base of the message classes of ROS 2, with CDR as bytes and the type hash as checksum.
 
-    They differ from ROS 1's (`Message`) in this: a stamp is a `builtin_interfaces` message with
-    `sec` and `nanosec`, in whose place float seconds, `Time` and `Duration` may be given; fields
-    have the default values of their definition; arrays and strings may have bounds.
+    The other differences from ROS 1's (`Message`): a stamp is a `builtin_interfaces` message with
+    `sec` and `nanosec`, for which float seconds, `Time` and `Duration` are accepted too; fields may
+    have default values in their definition; arrays and strings may have limits.
     """
 
     __slots__: ClassVar[Any] = ()
     _wire: ClassVar[str] = "ros2"
     _rihs01: ClassVar[str]
-    """Type hash, "RIHS01_" and 64 hexadecimal digits; computed when first asked for.
+    """Type hash, "RIHS01_" and 64 hexadecimal digits; computed on first use.
 
     Source: ROS 2 REP 2016."""
     _distro: ClassVar[str]
@@ -188,7 +188,7 @@ class Ros2Message(Message):
         Padding is zero.
 
         Raises:
-            FieldError: Values do not fit their fields; all of them are named.
+            FieldError: Values do not fit their fields; the error lists all of them.
         """
         return Message.to_bytes(self)
 
@@ -196,10 +196,10 @@ class Ros2Message(Message):
     def from_cdr(cls, data: bytes) -> Self:
         """Make a message from its CDR serialisation, of either byte order.
 
-        Bytes behind the end are ignored, as ROS 2's nodes do.
+        Extra bytes at the end are ignored, as by ROS 2's nodes.
 
         Raises:
-            DeserializationError: The bytes are no message of this type. It is a ValueError.
+            DeserializationError: The bytes are not a message of this type. It is a ValueError.
         """
         return cls._read(data)  # type: ignore[no-any-return] # generated code
 
@@ -216,10 +216,10 @@ def make_class(
     """Make the class of a message.
 
     Args:
-        definition: What to make it of.
+        definition: Its definition.
         resolve: Returns the class of a nested type.
-        module: Value of `__module__`, under which the class can be imported (pickle needs it).
-        base: What it derives from.
+        module: Value of `__module__`, from which the class can be imported (pickle needs it).
+        base: Its base class.
         make: Makes its serialiser and deserialiser, with the arguments of `make_codecs`.
         attributes: Further attributes of the class, such as its checksum.
     """
@@ -246,8 +246,8 @@ def make_class(
 
     @cache
     def codecs() -> Codecs:
-        # On first use: most classes are only ever parts of others, which have them unrolled. Two
-        # threads here at once do the same work twice, nothing worse.
+        # On first use: most classes are only parts of others, whose code contains their fields.
+        # If two threads come here at once, the work is done twice, without other consequences.
         write, read = make(cls, definition, resolve)
         cls._write = staticmethod(write)
         cls._read = staticmethod(read)
@@ -264,13 +264,13 @@ def make_class(
     cls._read = staticmethod(first_read)
     for field in definition.fields:
         if field.name != field.attribute and not hasattr(base, field.name):
-            # `getattr(message, "in")` works too, under the field's own name.
+            # Also under the ROS name: `getattr(message, "in")`.
             setattr(cls, field.name, cls.__dict__[field.attribute])
     return cast("type[Message]", cls)
 
 
 def codecs_of(cls: type[Message]) -> Codecs:
-    """Return the compiled `to_bytes` and `from_bytes` of a class, for those who call them often."""
+    """Return the compiled `to_bytes` and `from_bytes` of a class, for frequent use."""
     return cls._codecs()
 
 
@@ -281,8 +281,8 @@ def _documentation(definition: Definition) -> str:
 
 
 def _make_init(definition: Definition, resolve: Callable[[str], type[Message]]) -> Any:
-    """Make `__init__`: one argument per field, None (or nothing) for the default."""
-    # Names with an underscore in front, which no field has.
+    """Make `__init__` with one argument per field; None or no argument: the default value."""
+    # These names begin with an underscore, which no field name does.
     scope: dict[str, Any] = {
         "_new": object.__new__,
         "_Time": Time,
@@ -305,7 +305,7 @@ def _make_init(definition: Definition, resolve: Callable[[str], type[Message]]) 
             cls = "_M_" + field.type.base.replace("/", "_")
             given = f"({name} if {name}.__class__ is {cls} else _to_ros2_time({cls}, {name}))"
         if default in {"_Time()", "_Duration()"}:
-            # Most messages have a header: its stamp is made without a call, as codecs do.
+            # Written out for speed, as most messages have a header with a stamp.
             lines += [
                 f"    if {name} is None:",
                 f"        self.{name} = _t = _new({default[:-2]})",
@@ -315,13 +315,13 @@ def _make_init(definition: Definition, resolve: Callable[[str], type[Message]]) 
         else:
             lines.append(f"    self.{name} = {default} if {name} is None else {given}")
     lines.append("    if _extra: _take_extra(self, _extra)")
-    # The text holds only names checked by the parser.
+    # Safe, as the text contains only names that the parser has checked.
     exec(compile("\n".join(lines), f"<__init__ of {definition.name}>", "exec"), scope)  # noqa: S102
     return scope["__init__"]
 
 
 def _take_extra(message: Message, extra: dict[str, Any]) -> None:
-    """Take fields by their ROS names where Python's differ (`in`), and refuse unknown ones."""
+    """Set fields given by ROS names that differ from Python's (`in`); refuse unknown ones."""
     known = list(message.__slots__)
     ours = {field.name: field.attribute for field in message._definition.fields}
     problems = [

@@ -1,4 +1,4 @@
-"""`from actionlib_core.interfaces.geometry_msgs.msg import PoseStamped`: modules made on demand."""
+"""Import of interface classes (`actionlib_core.interfaces.geometry_msgs.msg`), made on demand."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _SECTIONS: dict[str, Kind] = {"msg": "msg", "srv": "srv", "action": "action"}
 
 
 class _Section(types.ModuleType):
-    """The module `pkg.msg`, `pkg.srv` or `pkg.action`; its classes are made when first named."""
+    """The module `pkg.msg`, `pkg.srv` or `pkg.action`; its classes are made on first use."""
 
     def __init__(self, name: str, package: str, kind: Kind, source: Registry) -> None:
         super().__init__(name, f"The {kind} classes of the ROS package {package}.")
@@ -74,8 +74,8 @@ class _Finder(MetaPathFinder, Loader):
 
     Args:
         prefix: "actionlib_core.interfaces." or "" for plain ROS names.
-        choose: Returns where the classes of a package and section ("" for the package itself) come
-            from, None when there are none.
+        choose: Returns the registry of a package and section ("" for the package itself), None
+            when there is none.
     """
 
     def __init__(self, prefix: str, choose: Choose) -> None:
@@ -98,7 +98,7 @@ class _Finder(MetaPathFinder, Loader):
         return ModuleSpec(fullname, self, is_package=not section)
 
     def _is_found_elsewhere(self, fullname: str, path: Sequence[str] | None) -> bool:
-        """Tell whether a plain name has a module of another origin; a mere folder is none."""
+        """Return whether a plain name has another module; a folder without code is not one."""
         if self.prefix:
             return False
         others = [finder for finder in sys.meta_path if not isinstance(finder, _Finder)]
@@ -114,7 +114,7 @@ class _Finder(MetaPathFinder, Loader):
         return _Section(spec.name, package, _SECTIONS[section], source)
 
     def exec_module(self, module: types.ModuleType) -> None:
-        """Nothing to run: the module looks its classes up."""
+        """Do nothing: there is no code to run, the module looks its classes up."""
 
 
 def install() -> None:
@@ -126,11 +126,11 @@ def install() -> None:
 def install_ros_names() -> None:
     """Make the plain ROS names importable: `from geometry_msgs.msg import PoseStamped`.
 
-    Old programs then run unchanged. The classes are those of `actionlib_core.interfaces`. Modules
-    that exist otherwise (a ROS installation) win. Calling it again has no effect.
+    Old programs then run unchanged. The classes are those of `actionlib_core.interfaces`. Other
+    modules of these names (of a ROS installation) take precedence. A second call has no effect.
 
     Raises:
-        InterfaceError: Called after a module of another origin took a package's name.
+        InterfaceError: A ROS installation's `geometry_msgs` was imported before.
     """
     taken = sys.modules.get("geometry_msgs")
     if taken is not None and not isinstance(taken, _Package):
@@ -153,15 +153,15 @@ def _ros2(package: str, section: str) -> Registry | None:
 
 
 def _either(package: str, section: str) -> Registry | None:
-    """Choose ROS 1 for what it has; only ROS 2 has `pkg.action`, and some packages of ours.
+    """Prefer ROS 1; only ROS 2 has `pkg.action`, and some of the bundled packages.
 
-    A folder of yours with another version of such a package makes it no package of ROS 1.
+    A folder of yours with a version of such a package does not make it a package of ROS 1.
     """
     first, second = (_ros2, _ros1) if is_only_ros2(package) else (_ros1, _ros2)
     return first(package, section) or second(package, section)
 
 
 def _install(prefix: str, choose: Choose) -> None:
-    # First, so that no folder (of stubs, of definitions) is taken for a namespace package.
+    # In front, so that folders of stubs or definitions do not become namespace packages.
     if not any(isinstance(f, _Finder) and f.prefix == prefix for f in sys.meta_path):
         sys.meta_path.insert(0, _Finder(prefix, choose))

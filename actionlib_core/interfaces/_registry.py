@@ -1,4 +1,4 @@
-"""The message, service and action classes of this process, made when first asked for."""
+"""The message, service and action classes of this process, made on first use."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class ServiceType:
 
 
 class UnknownTypeError(InterfaceError):
-    """No place defines the type `name`."""
+    """There is no definition of the type `name`."""
 
     def __init__(self, text: str, name: str) -> None:
         self.name = name
@@ -66,7 +66,7 @@ class Registry:
         self._messages: dict[str, type[Message]] = {}
         self._services: dict[str, type[ServiceType]] = {}
         self._extents: dict[str, Extent] = {}
-        self._building: list[str] = []
+        self._building: list[str] = []  # types whose classes are being made, outermost first
 
     def message(self, name: str) -> type[Message]:
         """Return a message class by ROS name; parts of services and actions included.
@@ -135,7 +135,7 @@ class Registry:
             except InterfaceError:
                 if before is None:
                     self.sources.forget(kind, package, short)
-                    # Parts that were fine must not meet the next definition of this name.
+                    # Those parts that were valid must not be used for the next definition.
                     for full in made:
                         self._messages.pop(full, None)
                 raise
@@ -163,11 +163,11 @@ class Registry:
                 for name in self.sources.names("action", package)
                 for end in _ACTION_ENDS
             ]
-            # A build folder of ROS holds the parts of actions as files too.
+            # A build folder of ROS has the parts of actions as files too.
             return list(dict.fromkeys([*self.sources.names("msg", package), *actions]))
 
     def attribute(self, package: str, kind: Kind, name: str) -> type:
-        """Return what `pkg.msg.name` or `pkg.srv.name` is; raises as `message`."""
+        """Return the class `pkg.msg.name` or `pkg.srv.name`; raises as `message`."""
         if kind == "srv" and self.sources.find("srv", package, name) is not None:
             return self.service(f"{package}/{name}")
         return self.message(f"{package}/{name}")
@@ -323,7 +323,7 @@ _ENDS: dict[Kind, tuple[str, ...]] = {
     "srv": ("Request", "Response"),
     "action": _ACTION_ENDS,
 }
-"""What follows the name in the messages that a definition makes."""
+"""The suffixes of the messages that a definition makes."""
 
 
 def parse_name(name: str) -> tuple[str, str | None, str]:

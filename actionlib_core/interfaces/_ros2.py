@@ -1,8 +1,7 @@
 """ROS 2's message, service and action classes, one registry per distribution.
 
-The definitions that come with this package lie in one file per ROS package in `ros2/definitions`;
-an entry names the distributions it is for. Your own files are those of `Sources`, read in ROS 2's
-dialect.
+The bundled definitions are in one file per ROS package in `ros2/definitions`; each entry lists its
+distributions. Your own files are found by `Sources` and parsed in ROS 2's dialect.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ DISTROS = ("humble", "jazzy", "kilted", "lyrical", "rolling")
 DISTRO_VARIABLE = "SMACHPY_ROS2_DISTRO"
 DEFAULT_DISTRO = "jazzy"
 NO_HASH = "TypeHashNotSupported"
-"""What stands in place of the type hash with Humble."""
+"""Used instead of a type hash by Humble, which has none."""
 
 _DEFINITIONS = Path(__file__).parent / "ros2" / "definitions"
 _ENTRY = re.compile(r"=== (msg|srv|action)/(\w+)(?:: ([a-z ]+))?\Z")
@@ -53,7 +52,7 @@ _DERIVED = {
 
 
 class _Hash:
-    """The attribute `_rihs01` of a class, computed when read: most are only parts of others."""
+    """The attribute `_rihs01` of a class, computed on first use: few classes need their own."""
 
     def __get__(self, instance: object, owner: Any) -> str:
         value: str = owner._registry.hash(owner._type)
@@ -77,17 +76,17 @@ class Ros2Service:
 
 
 class Ros2Action:
-    """Base of ROS 2's action classes, which clients and servers take as they take an `XAction`.
+    """Base of ROS 2's action classes, which clients and servers accept like ROS 1's `XAction`.
 
-    An object has `action_goal`, `action_result` and `action_feedback` as one of ROS 1 has: a goal
-    id or status (of actionlib) beside the goal, result or feedback. They never travel.
+    As in ROS 1, an object has `action_goal`, `action_result` and `action_feedback`, with
+    actionlib's goal id or status. These three are never sent.
     """
 
     _wire: ClassVar[str] = "ros2"
     _type: ClassVar[str]
     """ROS name, "pkg/action/Name"."""
     _rihs01: ClassVar[str]
-    """Type hash of the action as a whole, which is no part of any key."""
+    """Type hash of the action as a whole, which no key contains."""
     _distro: ClassVar[str]
     Goal: ClassVar[type[Ros2Message]]
     Result: ClassVar[type[Ros2Message]]
@@ -105,7 +104,7 @@ class Ros2Action:
 
 
 class ServiceParts(NamedTuple):
-    """What one service of an action is on the wire.
+    """One service of an action.
 
     Attributes:
         type: "pkg/action/X_SendGoal" or "action_msgs/srv/CancelGoal".
@@ -121,7 +120,7 @@ class ServiceParts(NamedTuple):
 
 
 class TopicParts(NamedTuple):
-    """What one topic of an action is on the wire.
+    """One topic of an action.
 
     Attributes:
         type: "pkg/action/X_FeedbackMessage" or "action_msgs/msg/GoalStatusArray".
@@ -153,7 +152,7 @@ class _Entry(NamedTuple):
 
 @functools.cache
 def _entries(package: str) -> dict[tuple[str, str], list[_Entry]]:
-    """Read the definitions of one of our packages, by kind and name."""
+    """Read the bundled definitions of a package, by kind and name."""
     path = _DEFINITIONS / f"{package}.txt"
     found: dict[tuple[str, str], list[_Entry]] = {}
     if not package.isidentifier() or not path.is_file():
@@ -171,11 +170,11 @@ def _entries(package: str) -> dict[tuple[str, str], list[_Entry]]:
 
 
 class Ros2Sources(Sources):
-    """Finds ROS 2 definitions: yours as `Sources` finds them, then ours of one distribution.
+    """Finds ROS 2 definitions: yours as `Sources` finds them, then the bundled ones.
 
     Args:
-        distro: One of `DISTROS`.
-        ours: Search nothing but the definitions that come with this package.
+        distro: The distribution of the bundled ones, one of `DISTROS`.
+        ours: Search only the bundled ones.
     """
 
     def __init__(self, distro: str, *, ours: bool = False) -> None:
@@ -194,7 +193,7 @@ class Ros2Sources(Sources):
         )
 
     def first_line(self, source: Source, kind: Kind, package: str, name: str) -> int:
-        """Return the line of its file that a definition begins at."""
+        """Return the number of a definition's first line in its file."""
         entries = self._bundled(package).get((kind, name), [])
         return next((entry.first_line for entry in entries if entry.source is source), 1)
 
@@ -220,7 +219,7 @@ class Ros2Sources(Sources):
 class Ros2Registry(Registry):
     """Makes ROS 2's classes of one distribution.
 
-    Names are "pkg/kind/Name"; where the kind is left out, that of the definition found is taken.
+    Names are "pkg/kind/Name"; without a kind, the first kind that has the name is used.
 
     Args:
         distro: One of `DISTROS`.
@@ -306,9 +305,10 @@ class Ros2Registry(Registry):
         return self._hashes[full]
 
     def fields(self, full: str) -> list[tuple[str, str]]:
-        """Return (type, name) of each field of a type as its hash sees it, types written in full.
+        """Return (type, full name) of each field of a type, for its hash.
 
-        A service is a message of request, response and event; an action one of its parts.
+        For its hash, a service is a message with request, response and event, and an action is a
+        message with its parts (REP 2016).
 
         Raises:
             InterfaceError: No such type.
@@ -349,7 +349,7 @@ class Ros2Registry(Registry):
         return self.attribute(package, kind, short)
 
     def _full(self, what: str, name: str, kinds: tuple[Kind, ...]) -> tuple[str, Kind, str]:
-        """Complete a name by the kind of what is found; raises where nothing is."""
+        """Complete a name with the kind of its definition; raises when there is none."""
         package, given, short = parse_ros2_name(name)
         for kind in [k for k in kinds if given in {None, k}]:
             if what != "message" or kind == "msg":
@@ -360,7 +360,7 @@ class Ros2Registry(Registry):
         raise UnknownTypeError(self._unknown(what, name), name)
 
     def _part(self, package: str, kind: Kind, short: str) -> tuple[Source, int] | None:
-        """Return the text of a part of a service or action, and its first line."""
+        """Return the text and first line of a part of a service or action."""
         ends = _SERVICE_ENDS if kind == "srv" else _ACTION_ENDS
         for end in ends:
             base = short.removesuffix(end)
@@ -429,7 +429,7 @@ class Ros2Registry(Registry):
     def _action_parts(
         self, package: str, short: str, classes: list[type[Ros2Message]]
     ) -> tuple[type[Message], ...]:
-        """Make what stands around goal, result and feedback in the API of actionlib."""
+        """Make the classes of `action_goal`, `action_result` and `action_feedback`."""
         inner = {
             f"{package}/{short}{part.title()}": cls
             for part, cls in zip(ACTION_PARTS, classes, strict=True)
@@ -481,7 +481,7 @@ def _defines(distro: str, full: str) -> bool:
 
 
 def is_only_ros2(package: str) -> bool:
-    """Tell whether of the definitions that come with us only ROS 2's have a package."""
+    """Return whether the bundled definitions have a package for ROS 2 only."""
     return bool(_entries(package)) and not (BUNDLED / package).is_dir()
 
 
@@ -508,7 +508,7 @@ _default = ""
 
 
 def ros2_registry(distro: str | None = None) -> Ros2Registry:
-    """Return the classes of a distribution, the default one when None.
+    """Return the classes of a distribution; None: the default one.
 
     Raises:
         InterfaceError: Not one of `DISTROS`.
@@ -526,12 +526,12 @@ def ros2_registry(distro: str | None = None) -> Ros2Registry:
 
 
 def default_distro() -> str:
-    """Return the distribution of classes that name none: what was set, or the environment's."""
+    """Return the default distribution: the one that was set, or that of the environment."""
     return _default or os.environ.get(DISTRO_VARIABLE, "").strip().lower() or DEFAULT_DISTRO
 
 
 def set_default_distro(distro: str) -> None:
-    """Make a distribution the default of classes that are asked for from now on.
+    """Set the default distribution of classes that are looked up from now on.
 
     Raises:
         InterfaceError: Not one of `DISTROS`.

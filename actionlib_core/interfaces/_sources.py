@@ -1,6 +1,6 @@
-"""Where definitions come from: inline text, user folders in ROS layout, the bundled folder.
+"""The sources of definitions: inline text, user folders in ROS layout, the bundled folder.
 
-`.srv` and `.action` text has parts between `---` lines, of which messages are made.
+`.srv` and `.action` text has parts separated by `---` lines; each part becomes a message.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ BUNDLED = Path(__file__).parent / "share"
 """The folder of the definitions that come with this package."""
 
 _SEPARATOR = "---"
-# Printed course notes turn three hyphens into an en or em dash.
+# Text copied from printed course notes may have an en or em dash for the three hyphens.
 _LOOKS_LIKE_SEPARATOR = re.compile(r"\s*(-{2,}|[\u2012-\u2015]+|-[\u2012-\u2015]+)\s*(#.*)?\Z")
 
 SERVICE_PARTS = ("request", "response")
 ACTION_PARTS = ("goal", "result", "feedback")
-_warned: dict[str | tuple[str, type[Warning], int], int] = {}  # so that each is shown once
+_warned: dict[str | tuple[str, type[Warning], int], int] = {}  # each warning is shown once
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """The text of a definition and the file (or other origin) it was read from."""
+    """The text of a definition, and the file or other origin that it comes from."""
 
     text: str
     origin: str
@@ -41,7 +41,7 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """One part of a definition and the line it starts at."""
+    """One part of a definition, and the number of its first line."""
 
     text: str
     first_line: int
@@ -52,7 +52,7 @@ def split(text: str, parts: tuple[str, ...], source: str) -> tuple[Section, ...]
 
     Args:
         text: The whole `.srv` or `.action` text.
-        parts: Names of the parts expected, for the error message.
+        parts: Names of the expected parts, for the error message.
         source: File name for messages.
 
     Raises:
@@ -109,15 +109,16 @@ def action_messages(name: str) -> dict[str, str]:
 
 
 class Sources:
-    """Finds definitions by kind, package and name; the first place that has one wins.
+    """Finds definitions by kind, package and name; the first one found is used.
 
     The order: inline definitions, `add_path` folders (newest first), the folders in
     `SMACHPY_INTERFACE_PATH`, the bundled ones.
 
-    Threads: reads may happen while another thread defines or adds; those two need a lock around.
+    Threads: reading needs no lock; `define`, `forget` and `add_path` do. They replace the tables
+        instead of changing them, so that a thread that reads sees the old or the new one.
 
     Args:
-        folders: Search these and nothing else, neither the environment's nor the bundled ones.
+        folders: Search only these, and neither the environment's folders nor the bundled ones.
     """
 
     def __init__(self, folders: list[Path] | None = None) -> None:
@@ -146,7 +147,7 @@ class Sources:
         self._inline = {key: source for key, source in self._inline.items() if key != gone}
 
     def search_path(self) -> list[Path]:
-        """Return the folders searched, in order, missing ones included."""
+        """Return the folders that are searched, in order, including missing ones."""
         if self._only is not None:
             return [*self._added, *self._only]
         listed = os.environ.get(PATH_VARIABLE, "").split(os.pathsep)
@@ -165,7 +166,7 @@ class Sources:
         return None
 
     def sections(self, kind: Kind, package: str, name: str) -> dict[str, Section]:
-        """Return the sections of a service or action by part name; empty when there is none."""
+        """Return the sections of a service or action by part name; {} when it is unknown."""
         source = self.find(kind, package, name)
         if source is None:
             return {}
@@ -173,7 +174,7 @@ class Sources:
         return dict(zip(parts, split(source.text, parts, source.origin), strict=True))
 
     def message_source(self, package: str, name: str) -> tuple[Source, int] | None:
-        """Return the text of a message and its first line: a file's, or a part of an action's."""
+        """Return a message's text and first line: of its file, or of a part of an action."""
         source = self.find("msg", package, name)
         if source is not None:
             return source, 1
@@ -189,7 +190,7 @@ class Sources:
         return None
 
     def service_part(self, package: str, name: str) -> tuple[Source, int] | None:
-        """Return the text of a service's request or response and its first line."""
+        """Return the text and first line of a service's request or response."""
         for suffix in ("Request", "Response"):
             part = self._part("srv", package, name, suffix)
             if part is not None:
@@ -212,7 +213,7 @@ class Sources:
         return sorted(found)
 
     def has_package(self, package: str) -> bool:
-        """Tell whether a package defines something."""
+        """Return whether a package defines something."""
         return any(key[1] == package for key in self._inline) or any(
             _folders_of(root, package) for root in self.search_path()
         )

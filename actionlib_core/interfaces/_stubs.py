@@ -1,4 +1,4 @@
-"""Typed `.pyi` files, so that editors and mypy know the fields of every message."""
+"""Generator of typed `.pyi` files, from which editors and mypy know the fields of messages."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ _BASES: Final = {
     "_ServiceType": "ServiceType",
 }
 _PARTS: Final = {"Goal": "_HasGoal", "Result": "_HasResult", "Feedback": "_HasFeedback"}
-"""The parts of a ROS 2 action, and the protocols of what stands around them."""
+"""The parts of a ROS 2 action, and the protocols of `action_goal` and the other two."""
 _BUILTIN_NAMES: Final = frozenset({"int", "float", "bool", "str", "bytes", "list", "type"})
 
 
 def bundled_stubs() -> dict[str, str]:
-    """Return the text of each stub of the bundled packages by its path below this package."""
-    # Only what is bundled: the result must not depend on the environment.
+    """Return the stubs of the bundled packages by their paths below this package."""
+    # Only the bundled folder, so that the result does not depend on the environment.
     registry = Registry(Sources(folders=[BUNDLED]))
     files: dict[str, str] = {}
     for package in registry.sources.packages():
@@ -53,9 +53,9 @@ def bundled_stubs() -> dict[str, str]:
 
 
 def _ros2_stubs(ros1: dict[str, str]) -> dict[str, str]:
-    """Return the stubs of ROS 2's packages, below `ros2` and where else they are imported from.
+    """Return the stubs of ROS 2's packages, below `ros2` and at the other import paths.
 
-    Those of `DEFAULT_DISTRO`: which distribution it will be is known only as the program runs.
+    They describe `DEFAULT_DISTRO`, as the distribution is known only at run time.
 
     Args:
         ros1: The stubs of ROS 1's packages, by path.
@@ -92,7 +92,7 @@ def package_stubs(registry: Registry, package: str) -> dict[str, str]:
 
 
 def write(files: dict[str, str], folder: Path) -> list[Path]:
-    """Write files below a folder, which is made if need be; return their paths."""
+    """Write files below a folder, which is created if necessary; return their paths."""
     written = []
     for relative, text in files.items():
         path = folder / relative
@@ -113,7 +113,7 @@ def _module(registry: Registry, package: str, kind: Kind, make: type[_Stub] | No
 
 
 class _Stub:
-    """The text of one stub module, and the imports that its classes turned out to need."""
+    """One stub module; it collects the imports that its classes need."""
 
     _base = "_Message"
 
@@ -190,7 +190,7 @@ class _Stub:
         return f"    {constant.attribute}: _Final = {value}{comment}"
 
     def _types(self, kind: FieldType, shadowed: set[str]) -> tuple[str, str]:
-        """Return the type a field holds and the type the constructor takes."""
+        """Return the type of a field and the type of its constructor argument."""
         element = self._element(kind.base, shadowed)
         if not kind.is_array:
             return element, f"{element}{self._also_taken(kind.base)}"
@@ -201,7 +201,7 @@ class _Stub:
         return f"{self._builtin('list', shadowed)}[{element}]", taken
 
     def _also_taken(self, base: str) -> str:
-        """What the constructor takes besides the type itself."""
+        """Return further types that the constructor accepts."""
         return " | float" if base in {"time", "duration"} else ""
 
     def _element(self, base: str, shadowed: set[str]) -> str:
@@ -225,12 +225,12 @@ class _Stub:
 
     @staticmethod
     def _path(package: str) -> str:
-        """The module of a package: below this one if bundled, else its plain ROS name."""
+        """Return the module of a package: below ours if bundled, else its plain ROS name."""
         return f"{ROOT}.{package}" if (BUNDLED / package).is_dir() else package
 
 
 class _Ros2Stub(_Stub):
-    """As `_Stub`, of a module of ROS 2's classes."""
+    """As `_Stub`, for a module of ROS 2's classes."""
 
     _base = "_Ros2Message"
 
@@ -291,5 +291,5 @@ def _escaped(text: str) -> str:
 
 
 if __name__ == "__main__":
-    # For us, after a change to the bundled definitions.
+    # For developers of this package, after a change of the bundled definitions.
     write(bundled_stubs(), BUNDLED.parent)

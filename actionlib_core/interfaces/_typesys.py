@@ -1,8 +1,8 @@
-"""ROS 2's view of a message, through `rosbags`: type hashes and CDR. Nothing else imports rosbags.
+"""Type hashes and CDR of messages, through `rosbags`, which no other module imports.
 
-Types that ROS 2 has itself (std_msgs, geometry_msgs, ...) are taken as ROS 2 defines them, your own
-ones as their text here says. The only difference between the two worlds that CDR can bridge is the
-`seq` of a `std_msgs/Header`, which ROS 2 does not have: it is left out, and 0 on the way back.
+Types that ROS 2 has itself (std_msgs, geometry_msgs, ...) are used as ROS 2 defines them, your own
+types as they are defined here. One difference is bridged: the `seq` of a `std_msgs/Header`, which
+ROS 2 does not have, is left out, and is 0 on the way back.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def ros2_hash(name: str, fields_of: Callable[[str], list[tuple[str, str]]]) -> s
     """
     from rosbags.typesys.store import Typestore
 
-    # Nothing but the fields is asked of it, so that no classes need to be made.
+    # The hash needs only the fields, so no classes are made.
     store = Typestore()
     waiting = [name]
     while waiting:
@@ -65,7 +65,7 @@ _SPELT = re.compile(r"([\w/]+)(?:<=(\d+))?(?:\[(<=)?(\d*)\])?")
 
 
 def _described(kind: str) -> tuple[Any, str]:
-    """Return a field's type in the terms of rosbags, and the message type it uses ("" for none)."""
+    """Return a field's type as in rosbags, and the message type that it uses, or ""."""
     from rosbags.interfaces import Nodetype
 
     match = _SPELT.fullmatch(kind)
@@ -95,7 +95,7 @@ def from_cdr(cls: type[Message], data: bytes) -> Message:
     """Make a message from its little-endian CDR serialisation.
 
     Raises:
-        DeserializationError: The bytes are no message of this type.
+        DeserializationError: The bytes are not a message of this type.
         InterfaceError: As `to_cdr`.
     """
     from rosbags.serde import SerdeError
@@ -112,7 +112,7 @@ def from_cdr(cls: type[Message], data: bytes) -> Message:
 
 @functools.cache
 def _store() -> Typestore:
-    """Return the types of the newest ROS 2 with long-term support, to which ours are added."""
+    """Return the types of ROS 2 Jazzy, to which ours are added."""
     from rosbags.typesys import Stores, get_typestore
 
     return get_typestore(Stores.ROS2_JAZZY)
@@ -124,7 +124,7 @@ def _ros2_name(name: str) -> str:
 
 
 def _added(store: Typestore, cls: type[Message]) -> str:
-    """Make sure the store has a class's type and those it uses; return the ROS 2 name."""
+    """Add a class's type and the types that it uses to the store; return the ROS 2 name."""
     from rosbags.typesys import TypesysError, get_types_from_msg
 
     name = _ros2_name(cls._type)
@@ -141,10 +141,10 @@ def _added(store: Typestore, cls: type[Message]) -> str:
 
 
 def _comparable(store: Typestore, cls: type[Message]) -> str:
-    """Return the ROS 2 name of a class whose fields ROS 2 agrees on, all the way down.
+    """Return the ROS 2 name of a class after comparing all its fields, also nested ones.
 
     Raises:
-        InterfaceError: It does not.
+        InterfaceError: ROS 2 defines the type, or one that it uses, with other fields.
     """
     name = _added(store, cls)
     ours = [(field.name, _description(field)) for field in _wire_fields(cls._definition)]
@@ -195,4 +195,4 @@ def _plain(description: Any) -> Any:
 
 
 _SAME = {"byte": "uint8", "char": "uint8", "int8": "uint8", "octet": "uint8"}
-"""One byte is one byte; the two worlds disagree about which of these names are signed."""
+"""One-byte types have the same bytes; ROS 1 and ROS 2 disagree about which ones are signed."""

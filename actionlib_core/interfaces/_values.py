@@ -1,4 +1,4 @@
-"""Values of fields: defaults, deep checks and conversions with the path of each bad field."""
+"""Values of fields: defaults, and recursive checks and conversions that name every bad field."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     AnyMessage = TypeVar("AnyMessage", bound=Message)
     AnyTime = TypeVar("AnyTime", bound=TimeValue)
 
-TEXT_CODEC = ("utf-8", "surrogateescape")
+TEXT_CODEC = ("utf-8", "surrogateescape")  # as in `_codegen.TEXT`
 ROS2_TIMES: dict[str, type[Time | Duration]] = {
     "builtin_interfaces/msg/Time": Time,
     "builtin_interfaces/msg/Duration": Duration,
 }
-"""ROS 2's messages that take what our `Time` and `Duration` fields take."""
+"""ROS 2's messages that accept the same values as our `Time` and `Duration` fields."""
 HEADERS = ("std_msgs/Header", "std_msgs/msg/Header")
 _LONGEST_SHOWN = 8  # array elements in a repr
 _LARGEST_FLOAT32 = 3.4028235677973366e38  # rounds to infinity from here on
@@ -46,7 +46,7 @@ _DEFAULTS = {
 def default_source(
     field: Field, resolve: Callable[[str], type[Message]], scope: dict[str, Any]
 ) -> str:
-    """Return the Python expression of a field's default value, its names put into `scope`."""
+    """Return a Python expression of a field's default value; add its names to `scope`."""
     if isinstance(field.default, tuple):
         return f"[{', '.join(map(_literal, field.default))}]"
     if field.default is not None:
@@ -79,7 +79,7 @@ def _type_default(
 
 
 def to_time(cls: type[AnyTime], value: Any) -> AnyTime:
-    """Convert what a time field takes: seconds, or an object with `secs` and `nsecs`.
+    """Convert a value of a time field: seconds, or an object with `secs` and `nsecs`.
 
     Raises:
         TypeError: Another type, or out of range.
@@ -94,7 +94,7 @@ def to_time(cls: type[AnyTime], value: Any) -> AnyTime:
 
 
 def to_ros2_time(cls: type[AnyMessage], value: Any) -> AnyMessage:
-    """Convert what a `builtin_interfaces` Time or Duration takes besides itself; as `to_time`."""
+    """Convert a value to a `builtin_interfaces` Time or Duration; as `to_time`."""
     plain_class = ROS2_TIMES[cls._type]
     taken = to_time(plain_class, value)
     return cls(sec=taken.secs, nanosec=taken.nsecs)  # type: ignore[call-arg] # its two fields
@@ -104,10 +104,10 @@ def to_ros2_time(cls: type[AnyMessage], value: Any) -> AnyMessage:
 
 
 def coerced(message: AnyMessage) -> AnyMessage:
-    """Return a copy whose values are exactly of their fields' types; `message` stays as it is.
+    """Return a copy whose values have exactly their fields' types; `message` is unchanged.
 
     Raises:
-        FieldError: Values that no conversion makes fit; all of them, each with its path.
+        FieldError: Values that cannot be converted; the error lists all of them with their paths.
     """
     check = _Check(message._type, from_plain=False)
     result = check.message(type(message), message, "$")
@@ -116,10 +116,10 @@ def coerced(message: AnyMessage) -> AnyMessage:
 
 
 def filled(cls: type[AnyMessage], values: Mapping[str, Any]) -> AnyMessage:
-    """Make a message from plain values, defaults for the rest.
+    """Make a message from plain values, with defaults for missing fields.
 
     Raises:
-        FieldError: Unknown fields, values that do not fit; all of them, each with its path.
+        FieldError: Unknown fields or values that do not fit; the error lists all with their paths.
     """
     check = _Check(cls._type, from_plain=True)
     result = check.message(cls, values, "$")
@@ -232,13 +232,13 @@ class _Check:
 
 
 def _kind(value: object) -> str:
-    """Name the type of a wrong value, as ROS calls it where it is a message."""
+    """Return the name of a value's type; for a message, its ROS name."""
     name = getattr(value, "_type", None)
     return name if isinstance(name, str) else type(value).__name__
 
 
 def _plain_time(value: Any) -> Any:
-    """Turn the plain forms of a time, a dict or "now", into what `to_time` takes."""
+    """Convert the plain forms of a time, a dict or "now", for `to_time`."""
     if value == "now":
         return Time.now()
     if hasattr(value, "keys"):

@@ -19,7 +19,7 @@ _LARGEST_BMP = 0xFFFF
 
 
 def dump(message: Message) -> str:
-    """Return block-style YAML, two blanks per level, arrays of scalars on one line."""
+    """Return block-style YAML: two spaces per level, arrays of scalars on one line."""
     return "\n".join(_fields(message, "")) or "{}"
 
 
@@ -71,7 +71,7 @@ def quote(text: str) -> str:
 
 
 def _character(character: str) -> str:
-    """Return a character of a double-quoted YAML string, escaped where it has to be."""
+    """Return a character of a double-quoted YAML string, escaped if necessary."""
     if character in _ESCAPES:
         return _ESCAPES[character]
     if character.isprintable():
@@ -81,10 +81,10 @@ def _character(character: str) -> str:
 
 
 def load(text: str, where: str) -> Mapping[str, Any]:
-    """Read a YAML mapping, safely: plain data only. Empty text is an empty mapping.
+    """Read a YAML mapping of plain data, without constructing objects. Empty text is {}.
 
     Raises:
-        FieldError: No YAML, or no mapping.
+        FieldError: The text is not YAML, or not a mapping.
     """
     try:
         values = load_yaml(text)

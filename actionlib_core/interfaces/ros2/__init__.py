@@ -1,4 +1,4 @@
-"""ROS 2's message, service and action classes, by the definitions of a distribution.
+"""ROS 2's message, service and action classes, with the definitions of a distribution.
 
     from actionlib_core.interfaces.ros2.geometry_msgs.msg import PoseStamped
     from actionlib_core.interfaces.ros2.std_srvs.srv import SetBool
@@ -6,9 +6,9 @@
 
     goal = NavigateToPose.Goal(pose=PoseStamped(header={"frame_id": "map"}))
 
-Packages that only ROS 2 has, and the module `action` of every package, need no `ros2` in between.
-Distributions define some types differently. The default is `SMACHPY_ROS2_DISTRO`, or "jazzy";
-`set_distro` changes it for classes that are asked for later.
+Packages that only ROS 2 has, and the module `action` of every package, can also be imported without
+`ros2`. Distributions define some types differently. The default is `SMACHPY_ROS2_DISTRO`, or
+"jazzy"; `set_default_distro` changes it for classes that are looked up later.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def get_message(name: str, distro: str | None = None) -> type[Ros2Message]:
     Args:
         name: Parts of services and actions have names too: "nav2_msgs/action/Spin_Goal",
             "nav2_msgs/action/Spin_SendGoal_Request", "std_srvs/srv/SetBool_Request".
-        distro: Whose definition, None for the default.
+        distro: The distribution; None: the default.
 
     Raises:
         InterfaceError: Unknown there, or malformed.
@@ -76,7 +76,7 @@ def get_action(name: str, distro: str | None = None) -> type[Ros2Action]:
 
 
 def hash_of(name: str, distro: str | None = None) -> str:
-    """Return the type hash of a type as keys and tokens name it; see `distros_of`.
+    """Return the hash of a type, by its name in keys and tokens; see `distros_of`.
 
     Raises:
         InterfaceError: The distribution does not define it.
@@ -85,10 +85,10 @@ def hash_of(name: str, distro: str | None = None) -> str:
 
 
 def distros_of(name: str, type_hash: str) -> list[str]:
-    """Return the distributions whose definition of a type has a hash.
+    """Return the distributions in which a type has the given hash.
 
     Args:
-        name: As keys and tokens have it: "nav2_msgs/action/NavigateToPose_SendGoal",
+        name: As in keys and tokens: "nav2_msgs/action/NavigateToPose_SendGoal",
             "std_srvs/srv/SetBool", "nav_msgs/msg/Odometry".
         type_hash: "RIHS01_...".
     """
